@@ -1,0 +1,47 @@
+"""What can go wrong on the PC side, as one tree.
+
+ClientError
+├── MovementError      a movement file or its parameters make no sense
+├── PlanningError      a path leaves reach or limits; nothing has moved
+├── DriverError        the robot cannot be reached, or the stream broke
+│   └── RobotStoppedError  the robot stopped itself (protective stop, program error)
+└── RecordingError     a recording cannot be written or read
+
+Every message is one line: what was given, what is allowed, what to do.
+"""
+
+from __future__ import annotations
+
+
+class ClientError(Exception):
+    """Root of all errors that a user of the PC client may meet."""
+
+
+class MovementError(ClientError):
+    """A movement file, or the parameters of a movement, make no sense."""
+
+
+class PlanningError(ClientError):
+    """A path leaves the reach or the limits of the arm; nothing has moved.
+
+    Attributes:
+        sample: index of the offending sample of the path, or None.
+        joint: index 0..5 of the offending joint, or None.
+    """
+
+    def __init__(self, message: str, *, sample: int | None = None, joint: int | None = None) -> None:
+        super().__init__(message)
+        self.sample = sample
+        self.joint = joint
+
+
+class DriverError(ClientError):
+    """The robot cannot be reached, or the stream to it broke."""
+
+
+class RobotStoppedError(DriverError):
+    """The robot stopped by itself: protective stop, emergency stop or a program error."""
+
+
+class RecordingError(ClientError):
+    """A recording cannot be written or read."""
