@@ -1,0 +1,183 @@
+"""All errors of the language, one tree.
+
+    ScriptError                      anything wrong with a program, with its place in the text
+    ├── ScriptCompileError           found before the program runs
+    │   ├── ScriptSyntaxError        the text does not follow the grammar
+    │   │   └── ScriptLexerError     a character or number that no token starts with
+    │   ├── ScriptNameError          a name that is neither defined nor built in
+    │   ├── ScriptTypeError          wrong number or names of arguments
+    │   └── ScriptContextError       a statement where it makes no sense (`break` outside a loop)
+    └── ScriptRuntimeError           raised by an operation or a builtin while the program runs
+        └── ScriptBudgetError        a thread computed too long without giving the cycle away
+
+Who raises `ScriptRuntimeError` gives the message only: the interpreter adds the place of the call.
+`wire_text` is what a controller puts into a runtime-exception message, `log_text` what its log shows,
+`render()` what a person at a terminal wants. This module must not import the rest of the language.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+
+if TYPE_CHECKING:
+    from urscript.source import Source
+
+
+class StackEntry(NamedTuple):
+    """One call on the way to a run-time error: the function and where in it the program was."""
+
+    function: str
+    line: int
+    column: int
+
+
+class ScriptError(Exception):
+    """Something wrong with a program.
+
+    Attributes:
+        message: One line: what was given, what is allowed, what to do.
+        line: From 1; 0 while the place is not known.
+        column: From 1; 0 while the place is not known.
+        width: Number of characters the caret line underlines.
+        source: The text the place refers to.
+        hint: A suggestion such as a name that looks alike.
+    """
+
+    kind: ClassVar[str] = "Error"
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        line: int = 0,
+        column: int = 0,
+        width: int = 1,
+        source: Source | None = None,
+        hint: str | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.line = line
+        self.column = column
+        self.width = width
+        self.source = source
+        self.hint = hint
+
+    def locate(self, source: Source | None, line: int, column: int, width: int = 1) -> Self:
+        """Add the place, unless one is known already; returns itself."""
+        if not self.line:
+            self.source, self.line, self.column, self.width = source, line, column, width
+        return self
+
+    @property
+    def wire_text(self) -> str:
+        """The text of the runtime-exception message on the primary interface."""
+        return self.log_text
+
+    @property
+    def log_text(self) -> str:
+        """The line in the controller's log and popup."""
+        return f"{self.kind}: {self.message}"
+
+    def headline(self) -> str:
+        """One line for people: file, line, column, kind, message, suggestion."""
+        where = self.source.name if self.source else "<program>"
+        place = f"{where}:{self.line}:{self.column}: " if self.line else ""
+        hint = f" ({self.hint})" if self.hint else ""
+        return f"{place}{self.kind}: {self.message}{hint}"
+
+    def render(self) -> str:
+        """The headline, the source line and a caret below the place."""
+        if self.source is None or not self.line:
+            return self.headline()
+        return f"{self.headline()}\n{self.source.caret(self.line, self.column, self.width)}"
+
+    def __str__(self) -> str:
+        return self.headline()
+
+
+class ScriptCompileError(ScriptError):
+    """Found before the program runs."""
+
+    kind = "Compile error"
+
+
+class ScriptSyntaxError(ScriptCompileError):
+    """The text does not follow the grammar; the place is where the parser noticed."""
+
+    kind = "Syntax error"
+
+    @property
+    def wire_text(self) -> str:
+        """`syntax_error_on_line:<n>:<that line>:`. Source: capture of a missing bracket."""
+        text = self.source.line(self.line).strip() if self.source else ""
+        return f"syntax_error_on_line:{self.line}:{text}:"
+
+
+class ScriptLexerError(ScriptSyntaxError):
+    """A character, number or string that no token of the language starts with."""
+
+    kind = "Lexer exception"
+
+
+class ScriptNameError(ScriptCompileError):
+    """A name that is neither defined in the program nor built in.
+
+    Attributes:
+        name: The unknown name.
+    """
+
+    def __init__(self, name: str, *, line: int = 0, column: int = 0, hint: str | None = None) -> None:
+        super().__init__(
+            f"name '{name}' is not defined", line=line, column=column, width=len(name), hint=hint
+        )
+        self.name = name
+
+    @property
+    def wire_text(self) -> str:
+        """`compile_error_name_not_found:<name>:`. Source: primary interface captures."""
+        return f"compile_error_name_not_found:{self.name}:"
+
+
+class ScriptTypeError(ScriptCompileError):
+    """Arguments that do not fit the signature, seen before the program runs."""
+
+    kind = "Type error"
+
+
+class ScriptContextError(ScriptCompileError):
+    """A statement or name where it makes no sense."""
+
+    kind = "Contextual error"
+
+
+class ScriptRuntimeError(ScriptError):
+    """Raised by an operation or a builtin while the program runs.
+
+    Attributes:
+        stack: The calls on the way, outermost first; the last entry is the place of the error.
+    """
+
+    kind = "Runtime error"
+    stack: tuple[StackEntry, ...] = ()
+
+    @property
+    def log_text(self) -> str:
+        """`Runtime error (<line>:<column>): <text>`. Source: controller log, 5.12."""
+        place = f" ({self.line}:{self.column})" if self.line else ""
+        return f"{self.kind}{place}: {self.message}"
+
+    @property
+    def wire_text(self) -> str:
+        """The bare text: the message carries line and column in fields of its own."""
+        return self.message
+
+
+class ScriptBudgetError(ScriptRuntimeError):
+    """A thread computed too long without giving the cycle away. Source: CB3 3.4 log text."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "The program used too much time without instructing the robot what to do. "
+            "Consider using a Wait or sync() to split long program sequences that do not move the robot."
+        )

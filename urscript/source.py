@@ -1,0 +1,55 @@
+"""Program text with positions: `Source` (the text, its name, its lines) and `Span` (a stretch of it).
+
+Lines and columns count from 1, as a controller reports them; line 1 is the first line of the text that
+was handed in, on the wire the `def` line. Source: primary interface captures of runtime exceptions.
+This module renders carets; it must not know what is wrong or why.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+
+class Span(NamedTuple):
+    """A stretch of program text; `end_column` is the column just after the last character."""
+
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+
+    def to(self, other: Span) -> Span:
+        """The stretch from the start of this one to the end of `other`."""
+        return Span(self.line, self.column, other.end_line, other.end_column)
+
+
+NOWHERE = Span(1, 1, 1, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One program text and the name that people know it by (a file name, or `<program>`)."""
+
+    text: str
+    name: str = "<program>"
+    _lines: list[str] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    def line(self, number: int) -> str:
+        """Line `number` (from 1) without its line end; empty past either end of the text."""
+        if not self._lines:
+            self._lines.extend(self.text.split("\n"))
+        if not 1 <= number <= len(self._lines):
+            return ""
+        return self._lines[number - 1].rstrip("\r")
+
+    def caret(self, line: int, column: int, width: int = 1) -> str:
+        """The source line and, below it, carets under `width` characters from `column` on.
+
+        Tabs before the caret are kept, so that it stands below the same character in any terminal.
+        """
+        shown = self.line(line)
+        lead = "".join("\t" if char == "\t" else " " for char in shown[: column - 1])
+        lead += " " * (column - 1 - len(lead))
+        width = max(1, min(width, len(shown) - column + 1))
+        return f"    {shown}\n    {lead}{'^' * width}"

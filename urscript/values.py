@@ -1,0 +1,171 @@
+"""The values of URScript as Python values: which type is what, equality of types, text forms.
+
+| URScript | Python | | URScript | Python |
+|---|---|---|---|---|
+| none | `None` | | string | `str`, one character a byte (latin-1) |
+| bool | `bool` | | list | `list`, homogeneous |
+| int | `int`, 32 bit | | matrix | `Matrix` |
+| float | `float` | | pose | `Pose` |
+
+URScript passes everything by value. Here that is done by never changing a list, pose or matrix once it
+exists: assigning to an element makes a new one (`ops.store_item`). So nobody has to copy, as long as
+nobody, host functions included, changes a list in place after it was handed over.
+This module must not compute (see `ops`) and must not know the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Final
+
+from urscript.errors import ScriptRuntimeError
+
+INT_MIN: Final = -(2**31)
+INT_MAX: Final = 2**31 - 1
+
+TEXT_LIMIT: Final = 1023
+"""Longest result of to_str and str_cat in characters. Source: script manual 3.15.4, str_cat."""
+
+
+class Pose(tuple[float, float, float, float, float, float]):
+    """A pose: position x, y, z (m) and rotation vector rx, ry, rz (rad). Six floats, never changed."""
+
+    __slots__ = ()
+
+    def __new__(cls, x: float, y: float, z: float, rx: float, ry: float, rz: float) -> Pose:
+        """Convert all six to float."""
+        return tuple.__new__(cls, (float(x), float(y), float(z), float(rx), float(ry), float(rz)))
+
+    @classmethod
+    def of(cls, numbers: Iterable[float]) -> Pose:
+        """A pose from six numbers; raises ScriptRuntimeError for another count."""
+        six = tuple(map(float, numbers))
+        if len(six) != 6:
+            raise ScriptRuntimeError(f"a pose has 6 elements, not {len(six)}")
+        return tuple.__new__(cls, six)
+
+    def with_item(self, index: int, value: float) -> Pose:
+        """The same pose with element `index` (0..5) set to `value`."""
+        six = list(self)
+        six[index] = float(value)
+        return tuple.__new__(Pose, six)
+
+    def __repr__(self) -> str:
+        return f"Pose{tuple(self)}"
+
+
+class Matrix:
+    """A rectangular matrix of numbers, row by row; never changed once made."""
+
+    __slots__ = ("rows",)
+
+    rows: tuple[tuple[Any, ...], ...]
+
+    def __init__(self, rows: Iterable[Sequence[Any]]) -> None:
+        self.rows = tuple(tuple(row) for row in rows)
+        width = len(self.rows[0]) if self.rows else 0
+        for row in self.rows:
+            if len(row) != width:
+                raise ScriptRuntimeError(f"a matrix needs rows of equal length, got {width} and {len(row)}")
+            for item in row:
+                if not is_number(item):
+                    raise ScriptRuntimeError(f"a matrix holds numbers only, got a {type_name(item)}")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        return len(self.rows), len(self.rows[0]) if self.rows else 0
+
+    def __getitem__(self, index: tuple[int, int]) -> Any:
+        row, column = index
+        return self.rows[row][column]
+
+    def with_item(self, row: int, column: int, value: float) -> Matrix:
+        """The same matrix with one element set to `value`."""
+        rows = [list(cells) for cells in self.rows]
+        rows[row][column] = value
+        return Matrix(rows)
+
+    def __iter__(self) -> Iterator[list[Any]]:
+        return iter([list(row) for row in self.rows])
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Matrix) and self.rows == other.rows
+
+    def __hash__(self) -> int:
+        return hash(self.rows)
+
+    def __repr__(self) -> str:
+        return f"Matrix({[list(row) for row in self.rows]})"
+
+
+TYPE_NAMES: Final[dict[type, str]] = {
+    type(None): "none",
+    bool: "bool",
+    int: "int",
+    float: "float",
+    str: "string",
+    list: "list",
+    Matrix: "matrix",
+    Pose: "pose",
+}
+"""Python type -> URScript's word for it; other value classes carry theirs as `script_type`."""
+
+
+def type_name(value: Any) -> str:
+    """URScript's word for the type of `value`, for messages."""
+    return TYPE_NAMES.get(type(value)) or str(getattr(value, "script_type", type(value).__name__))
+
+
+def is_number(value: Any) -> bool:
+    """Whether `value` is an int or a float; a bool is not."""
+    kind = type(value)
+    return kind is float or kind is int or (isinstance(value, (int, float)) and not isinstance(value, bool))
+
+
+def wrap_int(value: int) -> int:
+    """`value` folded into 32 bits, two's complement (see dialect: INT_OVERFLOW)."""
+    return (value - INT_MIN) % 2**32 + INT_MIN
+
+
+def _decimals(value: float) -> str:
+    text = f"{value:.6f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def str_form(value: Any) -> str:
+    """The text that `to_str` and `str_cat` make, without their length limit.
+
+    Floats have up to six decimals without trailing zeros, elements stand apart by comma and blank.
+    Source: script manual 3.15.4, to_str.
+    """
+    if isinstance(value, str):
+        return value
+    return _nested_form(value, _decimals, ", ")
+
+
+def log_form(value: Any) -> str:
+    """The text that `textmsg` shows: floats with six significant digits, elements without blanks.
+
+    Source: primary interface captures of text messages.
+    """
+    if isinstance(value, str):
+        return value
+    return _nested_form(value, "{:.6g}".format, ",")
+
+
+def _nested_form(value: Any, float_form: Any, comma: str) -> str:
+    if isinstance(value, (bool, type(None))):
+        return str(value)
+    if isinstance(value, float):
+        return str(float_form(value))
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, (list, Matrix)):
+        return f"[{comma.join(_nested_form(item, float_form, comma) for item in value)}]"
+    if isinstance(value, Pose):
+        return f"p[{comma.join(_nested_form(item, float_form, comma) for item in value)}]"
+    return str(value)
