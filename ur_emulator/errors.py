@@ -1,0 +1,36 @@
+"""What can go wrong inside the control box, as one tree.
+
+EmulatorError
+├── ModelError        an unknown robot or fidelity name, or numbers that make no arm
+├── KinematicsError   arguments of the controller's own kinematics make no sense
+└── PlantError        the physics cannot go on: a target that is no number, or a diverged simulation
+
+Every message is one line: what was given, what is allowed, what to do. Errors of URScript programs are
+not here: they belong to the program (`urscript.errors`), not to the box.
+"""
+
+from __future__ import annotations
+
+
+class EmulatorError(Exception):
+    """Root of all errors that a user of the emulator may meet."""
+
+
+class ModelError(EmulatorError):
+    """A robot or fidelity name is unknown, or a table of numbers makes no arm."""
+
+
+class KinematicsError(EmulatorError):
+    """An argument of the controller's kinematics makes no sense (shape, not a number)."""
+
+
+class PlantError(EmulatorError):
+    """The physics cannot go on.
+
+    Attributes:
+        cycle: number of the control cycle, counted from the last reset, that failed; None before the first.
+    """
+
+    def __init__(self, message: str, *, cycle: int | None = None) -> None:
+        super().__init__(message)
+        self.cycle = cycle

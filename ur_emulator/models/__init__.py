@@ -1,0 +1,1 @@
+"""What is known about each arm: numbers with their sources, no behaviour."""

@@ -1,0 +1,161 @@
+"""Fidelity: how far the emulated arm is from a perfect one, as one frozen set of numbers.
+
+Three sets have names. `ideal` is for debugging clients: hardly a delay, hardly any noise. `typical` is what
+logs and reports of real arms show, and the default. `poor` is an arm and a network at the bad end of what
+users report. Every number that spoils the arm is here; every number of the arm itself is in `RobotModel`.
+
+Sources, cited by letter below:
+ A  Logs of a real UR3e at rest and moving, 500 Hz (kevinhpham/DalESelfEBot): encoder noise, steps, the filter
+    of the reported speed, speed ripple at 101 and 202 cycles a joint turn, current noise.
+ B  Delays reported for streamed motion: Universal_Robots_ROS_Driver pull 1 (aim of two cycles for speedj),
+    Universal_Robots_ROS2_Driver issue 1311 (UR5 CB3 about 35 ms), ur_modern_driver (a gain of 50 1/s is stable
+    on a UR3, so the whole loop stays below 31 ms there).
+ C  Factory calibrations of three real arms, see `calibration.py`.
+ D  UR3/CB3 manual (force precision ±10 N, ±5 Nm) and forum.universal-robots.com threads 229 and 4481.
+ E  assumed: no published figure; to be checked on a real arm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ur_emulator.errors import ModelError
+from ur_emulator.models.robot_model import Vector6
+
+
+@dataclass(frozen=True, slots=True)
+class Fidelity:
+    """One set of imperfections.
+
+    The loop delay that a streaming client sees is dead time + drive lag + feedback age + half a cycle of hold.
+
+    Attributes:
+        name: as on the command line.
+        dead_time: from the start of a cycle until the drives act on its target [s].
+        dead_time_spread: a part uniform in [0, spread) is added, drawn once a box [s].
+        drive_lag: time constant of the drive's set-point filter [s].
+        feedback_age: age of the measurements when they are reported [s]; 2 ms at least.
+        sample_jitter: sd of the moment at which all joints are sampled [s].
+        encoder_sigma: sd of the white noise of each reported angle [rad].
+        encoder_step: quantisation of the reported angle [rad].
+        speed_filter_hz: pole of the one-pole filter of each reported speed [Hz].
+        speed_dead_band: below this joint speed the filter's input is gated to zero [rad/s].
+        speed_sigma: sd of the white noise of the reported speed while moving [rad/s].
+        current_sigma: sd of the reported current [A].
+        ripple_first: rms speed ripple of the gear at one cycle per motor turn, as a share of joint speed [1].
+        ripple_second: the same at two cycles per motor turn.
+        friction_error: sd of the relative error of the controller's friction model, per joint [1].
+        mass_error: sd of the relative error of each link's mass in the controller's model [1].
+        calibration_length: sd of each length of the factory calibration [m].
+        calibration_angle: sd of each angle of the factory calibration [rad].
+        force_bias: bound of the slow drift of the force estimate [N]; moments drift by a tenth of it [Nm].
+        force_sigma: sd of the force estimate [N]; moments by a tenth of it [Nm].
+        force_friction: offset of the force estimate against the direction of motion [N].
+        accelerometer_sigma: sd of each axis of the tool accelerometer [m/s²].
+        voltage_sigma: sd of each joint voltage [V].
+    """
+
+    name: str
+    dead_time: float
+    dead_time_spread: float
+    drive_lag: float
+    feedback_age: float
+    sample_jitter: float
+    encoder_sigma: Vector6
+    encoder_step: float
+    speed_filter_hz: Vector6
+    speed_dead_band: float
+    speed_sigma: float
+    current_sigma: Vector6
+    ripple_first: float
+    ripple_second: float
+    friction_error: float
+    mass_error: float
+    calibration_length: float
+    calibration_angle: float
+    force_bias: float
+    force_sigma: float
+    force_friction: float
+    accelerometer_sigma: float
+    voltage_sigma: float
+
+
+TYPICAL = Fidelity(
+    name="typical",
+    dead_time=0.008,  # B
+    dead_time_spread=0.008,  # B
+    drive_lag=0.010,  # B: drives follow within 5-15 ms
+    feedback_age=0.008,  # B: the packet carries the state of one cycle before
+    sample_jitter=1e-5,  # A: more would show in the differences of reported angles
+    encoder_sigma=(1.1e-5, 1.1e-5, 1.45e-5, 1.45e-5, 1.75e-5, 1.75e-5),  # A
+    encoder_step=3.6e-6,  # A: 3.3-3.9e-6
+    speed_filter_hz=(368.0, 368.0, 217.0, 138.0, 138.0, 138.0),  # A: by joint size 2, 1, 0
+    speed_dead_band=1e-3,  # E
+    speed_sigma=1e-3,  # A: what is left of 2-6 mrad/s after the ripple
+    current_sigma=(0.015, 0.015, 0.012, 0.010, 0.010, 0.010),  # A: 7-20 mA
+    ripple_first=0.008,  # A: .5-1.5 % rms, both harmonics together
+    ripple_second=0.006,  # A
+    friction_error=0.15,  # E: friction changes with temperature by more than that
+    mass_error=0.02,  # E
+    calibration_length=0.0002,  # C
+    calibration_angle=0.001,  # C
+    force_bias=5.0,  # D
+    force_sigma=3.0,  # D
+    force_friction=2.0,  # D
+    accelerometer_sigma=0.05,  # E
+    voltage_sigma=0.05,  # E
+)
+
+IDEAL = replace(
+    TYPICAL,
+    name="ideal",
+    dead_time=0.002,
+    dead_time_spread=0.0,
+    drive_lag=0.004,
+    feedback_age=0.002,
+    sample_jitter=0.0,
+    encoder_sigma=(1e-6,) * 6,
+    encoder_step=1e-7,
+    speed_sigma=1e-5,
+    current_sigma=(0.001,) * 6,
+    ripple_first=0.0002,
+    ripple_second=0.0002,
+    friction_error=0.0,
+    mass_error=0.0,
+    force_bias=0.0,
+    force_sigma=0.05,
+    force_friction=0.0,
+    accelerometer_sigma=0.001,
+    voltage_sigma=0.001,
+)
+
+POOR = replace(
+    TYPICAL,
+    name="poor",
+    dead_time=0.012,
+    dead_time_spread=0.010,
+    drive_lag=0.014,
+    feedback_age=0.010,
+    sample_jitter=5e-5,
+    ripple_first=0.016,
+    ripple_second=0.012,
+    friction_error=0.30,
+    mass_error=0.04,
+    force_bias=10.0,
+    force_sigma=4.0,
+    force_friction=4.0,
+)
+
+FIDELITIES: dict[str, Fidelity] = {fidelity.name: fidelity for fidelity in (IDEAL, TYPICAL, POOR)}
+
+
+def fidelity_by_name(name: str) -> Fidelity:
+    """Look a fidelity up by its name, in any letter case.
+
+    Raises:
+        ModelError: when no set has that name.
+    """
+    fidelity = FIDELITIES.get(name.lower())
+    if fidelity is None:
+        raise ModelError(f"unknown fidelity {name!r}: choose one of {', '.join(FIDELITIES)}")
+    return fidelity

@@ -1,0 +1,120 @@
+"""RobotModel: everything that tells one arm from another, as frozen numbers.
+
+The physics, the kinematics and the wire read their robot from here and from nowhere else; a new arm is a
+new file of numbers beside `ur3.py` and a row in `robots.py`. This module holds no numbers of any robot
+and no behaviour.
+
+Lengths are metres, angles radians, masses kilograms. Sequences of six follow the joints from the base to
+wrist 3. Link frames are the standard (distal) Denavit-Hartenberg frames: link i moves with joint i.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class DhRow:
+    """One row of a standard Denavit-Hartenberg table: Rz(q + theta) Tz(d) Tx(a) Rx(alpha).
+
+    Attributes:
+        a: length along the new x axis [m] (the vendor writes "a"; some texts "r").
+        d: offset along the joint axis [m].
+        alpha: twist about the new x axis [rad].
+        theta: constant added to the joint angle [rad]; 0 in a nominal table.
+    """
+
+    a: float
+    d: float
+    alpha: float
+    theta: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Capsule:
+    """A piece of a link's hull, for collisions: a line segment with a radius, in the link's DH frame [m]."""
+
+    start: Vector3
+    end: Vector3
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """One moving link.
+
+    Attributes:
+        mass: [kg].
+        com: centre of mass in the link's DH frame [m].
+        inertia: principal moments about the centre of mass, along the axes of the DH frame [kg m²].
+        hull: capsules that stand for its shape in collisions.
+    """
+
+    mass: float
+    com: Vector3
+    inertia: Vector3
+    hull: tuple[Capsule, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotModel:
+    """One type of arm.
+
+    Attributes:
+        name: as on the command line, e.g. "ur3".
+        title: as people write it, e.g. "UR3".
+        dh: six nominal rows.
+        links: six moving links.
+        base_hull: capsules of the fixed base in the base frame.
+        tau_max: largest joint torque [Nm].
+        qd_max: largest joint speed [rad/s].
+        q_min: lower end of the joint range [rad].
+        q_max: upper end of the joint range [rad].
+        armature: rotor and gear inertia as felt at the joint [kg m²].
+        viscous: viscous friction [Nm s/rad].
+        coulomb: Coulomb friction at speed [Nm].
+        coulomb_standstill: share of the Coulomb friction that is left at standstill [1].
+        coulomb_speed: speed over which friction rises from that share to the full value [rad/s].
+        torque_constant: joint torque per motor current, gear included [Nm/A].
+        gear_ratio: motor turns per joint turn.
+        stop_deceleration: mean deceleration of a category 0 stop [rad/s²].
+        servo_frequency: natural frequency of the joint position loop [Hz].
+        servo_damping: damping ratio of that loop.
+        servo_inertia: inertia at the joint that the loop gains are laid out for [kg m²].
+        payload_max: rated payload [kg].
+        reach: rated reach [m].
+        robot_type: code in the primary interface's configuration data.
+        robot_subtype: code in the primary interface's configuration data.
+        box_type: code of the control box, as above.
+        home_q: a pose clear of the table, away from singularities [rad].
+    """
+
+    name: str
+    title: str
+    dh: tuple[DhRow, DhRow, DhRow, DhRow, DhRow, DhRow]
+    links: tuple[Link, Link, Link, Link, Link, Link]
+    base_hull: tuple[Capsule, ...]
+    tau_max: Vector6
+    qd_max: Vector6
+    q_min: Vector6
+    q_max: Vector6
+    armature: Vector6
+    viscous: Vector6
+    coulomb: Vector6
+    coulomb_standstill: float
+    coulomb_speed: float
+    torque_constant: Vector6
+    gear_ratio: float
+    stop_deceleration: Vector6
+    servo_frequency: float
+    servo_damping: float
+    servo_inertia: Vector6
+    payload_max: float
+    reach: float
+    robot_type: int
+    robot_subtype: int
+    box_type: int
+    home_q: Vector6
