@@ -1,0 +1,130 @@
+"""How far the arm stays from itself and from the surface it stands on.
+
+Convex hulls of the published collision meshes, moved by the nominal kinematics; distances by Pinocchio's
+collision library (coal). Tools and the surroundings are not known here: the bare arm on a plane z = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from pc_client.kinematics.robot_data import find_robot_file, find_share_folder
+from pc_client.kinematics.robot_model import RobotModel, load_pinocchio_model
+
+Array = NDArray[np.float64]
+
+# The base stands on the plane and the shoulder cannot come near it; from the upper arm on, links can.
+_FIRST_LINK_ABOVE_FLOOR = 2
+
+
+class Clearance(NamedTuple):
+    """Distances along a joint path; negative when bodies overlap.
+
+    Attributes:
+        floor: (n,) lowest point of upper arm, forearm and wrists above the base plane [m].
+        floor_link: (n,) names of the links that come lowest.
+        own: (n,) smallest distance between links that are not neighbours [m].
+        own_links: (n,) names of those two links, `a and b`.
+    """
+
+    floor: Array
+    floor_link: tuple[str, ...]
+    own: Array
+    own_links: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ClearanceModel:
+    """The hulls of one arm, ready for distance queries. Like RobotModel: one per thread."""
+
+    robot: RobotModel
+    _own_pairs: Any = field(repr=False)
+    _own_data: Any = field(repr=False)
+    _floor_pairs: Any = field(repr=False)
+    _floor_data: Any = field(repr=False)
+    _own_names: tuple[str, ...] = field(repr=False)
+    _floor_names: tuple[str, ...] = field(repr=False)
+
+    def along(self, q: ArrayLike) -> Clearance:
+        """Measure the clearance at each posture of a joint path.
+
+        Args:
+            q: (n, 6) joint angles [rad].
+
+        Returns:
+            The distances, one per posture.
+        """
+        path = np.atleast_2d(np.asarray(q, dtype=np.float64))
+        own, floor = np.empty(len(path)), np.empty(len(path))
+        own_links, floor_links = [], []
+        model, data = self.robot.pin_model, self.robot.pin_data
+        for k, q_k in enumerate(path):
+            nearest = pin.computeDistances(model, data, self._own_pairs, self._own_data, q_k)
+            own[k] = self._own_data.distanceResults[nearest].min_distance
+            own_links.append(self._own_names[nearest])
+            lowest = pin.computeDistances(model, data, self._floor_pairs, self._floor_data, q_k)
+            floor[k] = self._floor_data.distanceResults[lowest].min_distance
+            floor_links.append(self._floor_names[lowest])
+        return Clearance(floor, tuple(floor_links), own, tuple(own_links))
+
+
+def clearance_model(robot: RobotModel) -> ClearanceModel:
+    """Return the hulls of `robot`.
+
+    Raises:
+        PlanningError: example-robot-data is not installed.
+    """
+    own_pairs, floor_pairs = _load_hulls(robot.description.urdf)
+    return ClearanceModel(
+        robot,
+        own_pairs,
+        own_pairs.createData(),
+        floor_pairs,
+        floor_pairs.createData(),
+        tuple(f"{_link(own_pairs, p.first)} and {_link(own_pairs, p.second)}" for p in own_pairs.collisionPairs),
+        tuple(_link(floor_pairs, p.second) for p in floor_pairs.collisionPairs),
+    )
+
+
+@lru_cache(maxsize=4)
+def _load_hulls(urdf: str) -> tuple[Any, Any]:
+    """Read the meshes of a URDF: link-against-link pairs, and floor-against-link pairs (shared, unchanged)."""
+    model, T_base_root = load_pinocchio_model(urdf)
+    meshes = pin.buildGeomFromUrdf(
+        model, str(find_robot_file(urdf)), pin.GeometryType.COLLISION, package_dirs=[str(find_share_folder())]
+    )
+    own_pairs, floor_pairs = pin.GeometryModel(), pin.GeometryModel()
+    floor_pairs.addGeometryObject(
+        pin.GeometryObject("floor", 0, 0, pin.SE3.Identity(), coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0))
+    )
+    for mesh in meshes.geometryObjects:
+        if not isinstance(mesh.geometry, coal.BVHModelBase):
+            continue  # ee_link carries a token box, not a part of the arm
+        mesh.geometry.buildConvexRepresentation(False)
+        if mesh.parentJoint == 0:
+            mesh.placement = T_base_root * mesh.placement
+        hull = pin.GeometryObject(mesh.name, mesh.parentJoint, mesh.parentFrame, mesh.placement, mesh.geometry.convex)
+        own_pairs.addGeometryObject(hull)
+        if mesh.parentJoint >= _FIRST_LINK_ABOVE_FLOOR:
+            index = floor_pairs.addGeometryObject(hull)
+            floor_pairs.addCollisionPair(pin.CollisionPair(0, index))
+    joints = [hull.parentJoint for hull in own_pairs.geometryObjects]
+    for i, joint_i in enumerate(joints):
+        for j, joint_j in enumerate(joints):
+            # Neighbours touch at their common joint by construction.
+            if joint_j > joint_i + 1:
+                own_pairs.addCollisionPair(pin.CollisionPair(i, j))
+    return own_pairs, floor_pairs
+
+
+def _link(geometry: Any, index: int) -> str:
+    """Return a link's name for people: `wrist_1_link_0` becomes `wrist 1`."""
+    name: str = geometry.geometryObjects[index].name
+    return name.split("_link")[0].replace("_", " ")

@@ -1,0 +1,167 @@
+"""The client's nominal arm: published geometry through Pinocchio, and limits of its own.
+
+The geometry is read from example-robot-data, whose UR files equal UR's published DH table; its *limits* are
+wrong (the UR3 file carries UR10 torques and 124-183 deg/s) and its masses are guesses, so neither is used.
+Nothing here may be fed with the kinematics of an emulated box: a client of a real arm does not know them.
+
+Frames: everything is expressed in UR's `base` frame, the frame of the DH table and of the TCP poses that a
+control box reports. (The URDF's own root, `base_link`, is turned by pi about z against it.) TCP = flange = `tool0`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import pi, radians
+from types import MappingProxyType
+from typing import Any
+
+import pinocchio as pin
+
+from pc_client.errors import PlanningError
+from pc_client.kinematics.robot_data import find_robot_file
+
+Six = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """What the joints of one arm may do, base to wrist 3.
+
+    Attributes:
+        q_min: lowest joint angles [rad].
+        q_max: highest joint angles [rad].
+        qd_max: joint speed limits [rad/s].
+    """
+
+    q_min: Six
+    q_max: Six
+    qd_max: Six
+
+
+@dataclass(frozen=True, slots=True)
+class RobotDescription:
+    """What tells one arm of the family from another.
+
+    Attributes:
+        name: short name, e.g. `ur3`.
+        urdf: file below `example-robot-data/robots/`.
+        limits: joint limits.
+        q_branch: a posture on the IK branch that is preferred for drawing in front of the arm [rad].
+    """
+
+    name: str
+    urdf: str
+    limits: JointLimits
+    q_branch: Six
+
+
+@dataclass(frozen=True, slots=True)
+class RobotModel:
+    """One arm as Pinocchio computes it.
+
+    `pin_data` is scratch memory that every computation overwrites: give each thread a model of its own.
+
+    Attributes:
+        description: names, limits, preferred branch.
+        pin_model: Pinocchio model whose world frame is UR's `base`.
+        pin_data: its scratch memory.
+        tcp_frame: index of the frame `tool0`.
+    """
+
+    description: RobotDescription
+    pin_model: Any = field(repr=False)
+    pin_data: Any = field(repr=False)
+    tcp_frame: int
+
+    @property
+    def name(self) -> str:
+        """Short name, e.g. `ur3`."""
+        return self.description.name
+
+    @property
+    def limits(self) -> JointLimits:
+        """Joint limits of the client's own table."""
+        return self.description.limits
+
+
+def _six_degrees(*angles: float) -> Six:
+    """Turn six angles [deg] into [rad]."""
+    a, b, c, d, e, f = (radians(angle) for angle in angles)
+    return (a, b, c, d, e, f)
+
+
+# Source: UR user manuals CB3 3.13, section "Joint limits" / technical specifications: working range +-360 deg of
+# all joints (wrist 3 of the UR3 turns without end, but streaming needs no more than this).
+_ANY_TURN_MIN: Six = (-2 * pi,) * 6
+_ANY_TURN_MAX: Six = (2 * pi,) * 6
+
+# Elbow up, tool 45 deg down and forward: for the UR3 the branch whose whole box [.275, .425] x [-.2, .2] x
+# [.15, .35] m is reachable at >= .35 m/s in every direction. Source: own closed-form sweep of all branches.
+# The larger arms have the same shape, so the same posture names the same branch.
+_ELBOW_UP = _six_degrees(22.6, -101.1, -120.3, -5.9, 74.2, 106.4)
+
+ROBOTS = MappingProxyType(
+    {
+        # Speeds: UR3 manual CB3 3.13: base, shoulder, elbow 180 deg/s, wrists 360 deg/s
+        # (= ur_description config/ur3/joint_limits.yaml).
+        "ur3": RobotDescription(
+            name="ur3",
+            urdf="ur_description/urdf/ur3_robot.urdf",
+            limits=JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _six_degrees(180, 180, 180, 360, 360, 360)),
+            q_branch=_ELBOW_UP,
+        ),
+        # UR5 manual CB3: all joints 180 deg/s.
+        "ur5": RobotDescription(
+            name="ur5",
+            urdf="ur_description/urdf/ur5_robot.urdf",
+            limits=JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _six_degrees(180, 180, 180, 180, 180, 180)),
+            q_branch=_ELBOW_UP,
+        ),
+        # UR10 manual CB3: base and shoulder 120 deg/s, the others 180 deg/s.
+        "ur10": RobotDescription(
+            name="ur10",
+            urdf="ur_description/urdf/ur10_robot.urdf",
+            limits=JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _six_degrees(120, 120, 180, 180, 180, 180)),
+            q_branch=_ELBOW_UP,
+        ),
+    }
+)
+
+
+def robot_model(name: str = "ur3") -> RobotModel:
+    """Return a fresh nominal model of the arm called `name`.
+
+    Args:
+        name: one of `ur3`, `ur5`, `ur10`.
+
+    Raises:
+        PlanningError: unknown name, or example-robot-data is not installed.
+    """
+    description = ROBOTS.get(name)
+    if description is None:
+        raise PlanningError(f"no nominal model is called {name!r}; choose one of {', '.join(sorted(ROBOTS))}")
+    model, _ = load_pinocchio_model(description.urdf)
+    return RobotModel(description, model, model.createData(), int(model.getFrameId("tool0")))
+
+
+@lru_cache(maxsize=len(ROBOTS))
+def load_pinocchio_model(urdf: str) -> tuple[Any, Any]:
+    """Read a URDF of example-robot-data and move its world into UR's `base` frame.
+
+    The result is shared between all callers and must not be changed.
+
+    Args:
+        urdf: file below `example-robot-data/robots/`.
+
+    Returns:
+        The Pinocchio model, and T_base_root: the URDF's own root frame seen from `base` (pin.SE3).
+    """
+    model = pin.buildModelFromUrdf(str(find_robot_file(urdf)))
+    T_base_root = model.frames[model.getFrameId("base")].placement.inverse()
+    # Everything that hangs directly on the root moves with it; the rest of the chain follows by itself.
+    model.jointPlacements[1] = T_base_root * model.jointPlacements[1]
+    for frame in model.frames:
+        if frame.parentJoint == 0:
+            frame.placement = T_base_root * frame.placement
+    return model, T_base_root

@@ -1,0 +1,171 @@
+"""Inverse kinematics along a whole path, on one continuous branch.
+
+Each sample is solved from a linear prediction of the samples before it, so the solution stays on the branch
+that the first sample was put on; leaving it, coming near a singularity or out of reach is refused, never repaired.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from pc_client.errors import PlanningError
+from pc_client.kinematics.forward import tcp_jacobian, tcp_pose
+from pc_client.kinematics.inverse import IkSolution, solve_ik_se3
+from pc_client.kinematics.robot_model import RobotModel
+from pc_client.kinematics.singularity import SingularityMeasure, measure_singularity
+from pc_client.planning.limits import DEFAULT_LIMITS, PlanLimits
+from pc_client.planning.refusal import PathNames
+from protocol.ur_types import JOINT_NAMES
+
+Array = NDArray[np.float64]
+
+_LEAD_IN_STEP = 0.01  # m between the solutions that carry the branch from its own posture to the first sample
+
+
+@dataclass(frozen=True, slots=True)
+class JointPath:
+    """Joint angles along a path, with what they were checked for.
+
+    Attributes:
+        q: (n, 6) joint angles [rad].
+        position_error: (n,) distance between reached and wanted TCP [m].
+        rotation_error: (n,) angle between reached and wanted orientation [rad].
+        singularity: measures per sample.
+        iterations: total steps of the inverse kinematics.
+    """
+
+    q: Array
+    position_error: Array
+    rotation_error: Array
+    singularity: SingularityMeasure
+    iterations: int
+
+
+def follow_path(
+    model: RobotModel,
+    names: PathNames,
+    R_base_tcp: Array,
+    *,
+    q_branch: ArrayLike | None = None,
+    limits: PlanLimits = DEFAULT_LIMITS,
+) -> JointPath:
+    """Solve the inverse kinematics of a path with fixed orientation.
+
+    Args:
+        model: nominal arm.
+        names: time and TCP positions of the samples.
+        R_base_tcp: (3, 3) orientation of the TCP.
+        q_branch: (6,) posture whose branch is followed [rad]; the arm's preferred one by default.
+        limits: which steps and singularity distance are allowed.
+
+    Raises:
+        PlanningError: a sample is not finite, out of reach, too near a singularity, or on another branch; the
+            first such sample is named.
+    """
+    _refuse_not_finite(names)
+    branch = np.array(model.description.q_branch if q_branch is None else q_branch, dtype=np.float64)
+    q_before = _lead_in(model, names, R_base_tcp, branch, limits)
+
+    n = len(names.p)
+    q = np.empty((n, 6))
+    errors = np.empty((n, 2))
+    jacobians = np.empty((n, 6, 6))
+    iterations = 0
+    goal = pin.SE3(R_base_tcp, names.p[0])
+    seed, refusal = q_before, None
+    for k in range(n):
+        goal.translation = names.p[k]
+        solution = solve_ik_se3(model, goal, seed)
+        iterations += solution.iterations
+        refusal = _refuse_step(model, names, k, solution, q_before, limits)
+        if refusal is not None:
+            q, jacobians = q[:k], jacobians[:k]
+            break
+        q[k] = solution.q
+        errors[k] = solution.position_error, solution.rotation_error
+        jacobians[k] = tcp_jacobian(model, solution.q)
+        seed = 2.0 * solution.q - q_before if k else solution.q
+        q_before = solution.q
+
+    # A singularity usually shows first as a small measure, then as failing steps: name the first sample of the two.
+    singularity = measure_singularity(jacobians)
+    _refuse_singular(names, singularity, limits)
+    if refusal is not None:
+        raise refusal
+    return JointPath(q, errors[:, 0].copy(), errors[:, 1].copy(), singularity, iterations)
+
+
+def _lead_in(model: RobotModel, names: PathNames, R_base_tcp: Array, q_branch: Array, limits: PlanLimits) -> Array:
+    """Carry the branch of `q_branch` along a straight line to the first sample; return the posture there."""
+    p_branch = tcp_pose(model, q_branch)[:3, 3]
+    steps = max(1, int(np.ceil(np.linalg.norm(names.p[0] - p_branch) / _LEAD_IN_STEP)))
+    goal = pin.SE3(R_base_tcp, p_branch)
+    q = q_branch
+    for k in range(steps + 1):
+        goal.translation = p_branch + (names.p[0] - p_branch) * (k / steps)
+        solution = solve_ik_se3(model, goal, q)
+        measure = measure_singularity(tcp_jacobian(model, solution.q)[None])
+        if not solution.converged or measure.sigma_min[0] < limits.sigma_min:
+            raise names.refuse(
+                0,
+                "the start cannot be reached from the preferred posture without passing a singularity or leaving the"
+                " reach; move the movement into the arm's working box or give another q_branch",
+                joint=int(measure.racing_joint[0]),
+            )
+        q = solution.q
+    return q
+
+
+def _refuse_not_finite(names: PathNames) -> None:
+    """Raise for the first sample that has no finite position."""
+    bad = np.flatnonzero(~np.isfinite(names.p).all(axis=1))
+    if bad.size:
+        raise names.refuse(int(bad[0]), "the position is not finite; correct the movement")
+
+
+def _refuse_step(
+    model: RobotModel, names: PathNames, k: int, solution: IkSolution, q_before: Array, limits: PlanLimits
+) -> PlanningError | None:
+    """Return the error of a sample that is out of reach or too far from the one before; None if it is good."""
+    if not (
+        solution.converged
+        or (
+            solution.position_error <= limits.position_error_max
+            and solution.rotation_error <= limits.rotation_error_max
+        )
+    ):
+        joint = int(measure_singularity(tcp_jacobian(model, solution.q)[None]).racing_joint[0])
+        return names.refuse(
+            k,
+            f"out of reach: the nearest posture misses by {solution.position_error * 1e3:.2f} mm and"
+            f" {np.degrees(solution.rotation_error):.2f} deg; move or scale the movement into the arm's working box",
+            joint=joint,
+        )
+    step = np.abs(solution.q - q_before)
+    joint = int(step.argmax())
+    if step[joint] > limits.joint_step_max:
+        return names.refuse(
+            k,
+            f"the joint path jumps by {step[joint]:.3f} rad to another branch (at most {limits.joint_step_max:g} rad a"
+            " sample); keep the path continuous and away from singularities",
+            joint=joint,
+        )
+    return None
+
+
+def _refuse_singular(names: PathNames, singularity: SingularityMeasure, limits: PlanLimits) -> None:
+    """Raise for the first sample that comes too near a singularity."""
+    near = np.flatnonzero(singularity.sigma_min < limits.sigma_min)
+    if near.size:
+        k = int(near[0])
+        joint = int(singularity.racing_joint[k])
+        raise names.refuse(
+            k,
+            f"too near a singularity, where {JOINT_NAMES[joint]} would race: smallest singular value"
+            f" {singularity.sigma_min[k]:.4f}, at least {limits.sigma_min:g}; move the movement away from it",
+            joint=joint,
+        )
