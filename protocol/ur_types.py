@@ -1,0 +1,276 @@
+"""The controller's own numbers and names: modes, software versions, ports, serial numbers.
+
+Only values that both ends must agree on stand here; nothing in this module knows a robot's state.
+The numbers are those of the vendor's client interface documents; they go out unchanged on every port.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+
+__all__ = [
+    "JOINT_NAMES",
+    "SIMULATED_SERIAL_PREFIX",
+    "ControlMode",
+    "JointMode",
+    "LegacyRobotMode",
+    "Ports",
+    "ProgramState",
+    "RobotMode",
+    "RobotType",
+    "SafetyMode",
+    "SafetyStatus",
+    "SerialNumber",
+    "SoftwareVersion",
+    "parse_serial",
+    "simulated_serial",
+]
+
+JOINT_NAMES = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
+"""Joints in the order of every six-vector on the wire."""
+
+
+class RobotMode(IntEnum):
+    """Robot mode, software 3.0 and later.
+
+    Source: UR primary/secondary client interface, robot mode data.
+    """
+
+    NO_CONTROLLER = -1
+    DISCONNECTED = 0
+    CONFIRM_SAFETY = 1
+    BOOTING = 2
+    POWER_OFF = 3
+    POWER_ON = 4
+    IDLE = 5
+    BACKDRIVE = 6
+    RUNNING = 7
+    UPDATING_FIRMWARE = 8
+
+
+class LegacyRobotMode(IntEnum):
+    """Robot mode before software 3.0: the same column, other numbers.
+
+    Source: UR "Client_Interface" workbook, software 1.6 to 1.8.
+    """
+
+    RUNNING = 0
+    FREEDRIVE = 1
+    READY = 2
+    INITIALIZING = 3
+    SECURITY_STOPPED = 4
+    EMERGENCY_STOPPED = 5
+    FAULT = 6
+    NO_POWER = 7
+    NOT_CONNECTED = 8
+    SHUTDOWN = 9
+
+
+class JointMode(IntEnum):
+    """Mode of one joint; a subset also serves as tool mode.
+
+    Source: UR primary/secondary client interface, joint data; rarer ones from the older workbook.
+    """
+
+    RESET = 235
+    SHUTTING_DOWN = 236
+    PART_D_CALIBRATION = 237
+    BACKDRIVE = 238
+    POWER_OFF = 239
+    READY_FOR_POWER_OFF = 240
+    CALVAL_INITIALIZATION = 241
+    ERROR = 242
+    FREEDRIVE = 243
+    SIMULATED = 244
+    NOT_RESPONDING = 245
+    MOTOR_INITIALISATION = 246
+    BOOTING = 247
+    PART_D_CALIBRATION_ERROR = 248
+    BOOTLOADER = 249
+    CALIBRATION = 250
+    VIOLATION = 251
+    FAULT = 252
+    RUNNING = 253
+    INITIALISATION = 254
+    IDLE = 255
+
+
+class ControlMode(IntEnum):
+    """How the arm is controlled. Source: UR primary/secondary client interface, robot mode data."""
+
+    POSITION = 0
+    TEACH = 1
+    FORCE = 2
+    TORQUE = 3
+
+
+class SafetyMode(IntEnum):
+    """State of the safety system as CB3 software 3.15 numbers it.
+
+    Source: UR primary/secondary client interface, masterboard data. Newer software adds 12 to 22.
+    """
+
+    NORMAL = 1
+    REDUCED = 2
+    PROTECTIVE_STOP = 3
+    RECOVERY = 4
+    SAFEGUARD_STOP = 5
+    SYSTEM_EMERGENCY_STOP = 6
+    ROBOT_EMERGENCY_STOP = 7
+    VIOLATION = 8
+    FAULT = 9
+    VALIDATE_JOINT_ID = 10
+    UNDEFINED_SAFETY_MODE = 11
+
+
+class SafetyStatus(IntEnum):
+    """Safety mode with two more reasons, since software 3.10 / 5.4. Source: UR RTDE guide."""
+
+    NORMAL = 1
+    REDUCED = 2
+    PROTECTIVE_STOP = 3
+    RECOVERY = 4
+    SAFEGUARD_STOP = 5
+    SYSTEM_EMERGENCY_STOP = 6
+    ROBOT_EMERGENCY_STOP = 7
+    VIOLATION = 8
+    FAULT = 9
+    VALIDATE_JOINT_ID = 10
+    UNDEFINED_SAFETY_MODE = 11
+    AUTOMATIC_MODE_SAFEGUARD_STOP = 12
+    SYSTEM_THREE_POSITION_ENABLING_STOP = 13
+
+
+class ProgramState(IntEnum):
+    """Program state of the realtime interface, RTDE's `runtime_state`. Source: UR RTDE guide."""
+
+    STOPPING = 0
+    STOPPED = 1
+    PLAYING = 2
+    PAUSING = 3
+    PAUSED = 4
+    RESUMING = 5
+
+
+class RobotType(IntEnum):
+    """Robot type code of the configuration data. Source: UR client library, `datatypes.h`."""
+
+    UR5 = 1
+    UR10 = 2
+    UR3 = 3
+    UR16 = 4
+    UR18 = 5
+    UR8LONG = 6
+    UR20 = 7
+    UR30 = 8
+    UR15 = 9
+
+
+class SoftwareVersion(NamedTuple):
+    """Version of the controller software; compares as a tuple. CB3 is major 3, e-Series major 5."""
+
+    major: int
+    minor: int
+    bugfix: int = 0
+    build: int = 0
+
+    @classmethod
+    def parse(cls, text: str) -> SoftwareVersion:
+        """Read `3.15`, `3.15.8` or `3.15.8.106339`.
+
+        Raises:
+            LocalProtocolError: the text is not two to four whole numbers with points between.
+        """
+        parts = text.strip().split(".")
+        if not 2 <= len(parts) <= 4 or not all(part.isascii() and part.isdigit() for part in parts):
+            raise LocalProtocolError(
+                f"{text!r} is not a software version: give major.minor.bugfix, such as 3.15.8"
+            )
+        return cls(*map(int, parts))
+
+    def __str__(self) -> str:
+        text = f"{self.major}.{self.minor}.{self.bugfix}"
+        return f"{text}.{self.build}" if self.build else text
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """TCP ports of one control box. Source: UR remote control overview; clients hard-code these numbers."""
+
+    dashboard: int = 29999
+    primary: int = 30001
+    secondary: int = 30002
+    realtime: int = 30003
+    rtde: int = 30004
+    primary_ro: int = 30011
+    secondary_ro: int = 30012
+    realtime_ro: int = 30013
+
+    @classmethod
+    def standard(cls, offset: int = 0) -> Ports:
+        """The vendor's ports, all moved by `offset` for machines where they are taken.
+
+        Raises:
+            LocalProtocolError: a moved port would leave 1..65535.
+        """
+        low, high = 1 - cls().dashboard, 65535 - cls().realtime_ro
+        if not low <= offset <= high:
+            raise LocalProtocolError(f"port offset {offset} leaves the TCP ports: use {low} to {high}")
+        return cls(
+            dashboard=29999 + offset,
+            primary=30001 + offset,
+            secondary=30002 + offset,
+            realtime=30003 + offset,
+            rtde=30004 + offset,
+            primary_ro=30011 + offset,
+            secondary_ro=30012 + offset,
+            realtime_ro=30013 + offset,
+        )
+
+
+SIMULATED_SERIAL_PREFIX = "2099"
+"""Serial numbers start with the year of make (seen: 2017...); no arm was made in 2099."""
+
+_SIMULATED_SERIAL = re.compile(SIMULATED_SERIAL_PREFIX + r"([1-9])(\d{6})")
+_SEED_MODULUS = 10**6
+
+
+class SerialNumber(NamedTuple):
+    """A serial number and what it says: `seed` is None for a real arm."""
+
+    text: str
+    simulated: bool
+    seed: int | None
+
+
+def simulated_serial(robot_type: int, seed: int) -> str:
+    """Serial number of a simulated box: prefix, robot type digit, six digits of the seed.
+
+    Args:
+        robot_type: code of `RobotType`, one digit (3 = UR3).
+        seed: any whole number; only its value modulo 10**6 is kept.
+
+    Raises:
+        LocalProtocolError: the robot type is not one of 1..9.
+    """
+    if not 1 <= robot_type <= 9:
+        raise LocalProtocolError(f"robot type {robot_type} has no digit in a serial number: use 1 to 9")
+    return f"{SIMULATED_SERIAL_PREFIX}{robot_type:d}{seed % _SEED_MODULUS:06d}"
+
+
+def parse_serial(text: str) -> SerialNumber:
+    """Read a serial number as `get serial number` answers it.
+
+    Raises:
+        RemoteProtocolError: the text is not digits only.
+    """
+    text = text.strip()
+    if not (text.isascii() and text.isdigit()):
+        raise RemoteProtocolError(f"serial number {text!r} is not digits only")
+    match = _SIMULATED_SERIAL.fullmatch(text)
+    return SerialNumber(text, match is not None, int(match[2]) if match else None)
