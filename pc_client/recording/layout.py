@@ -1,0 +1,191 @@
+"""Which signals one row of a recording holds, and how the row lies in the file.
+
+A row is three ROS 2 messages (`/robot_state`, `/reference`, `/command`) that share one time stamp. Their
+fields are flat float64 numbers and arrays, so in CDR every message is a constant head followed by packed
+little-endian doubles, and a whole row is one element of a numpy record type: no per-message encoding.
+
+This module must not open files.
+
+ROS 2 allows only lower-case field names, and Foxglove and the `mcap-ros2-support` decoder refuse a whole
+topic with any other name. The schemas therefore say `actual_tcp_pose`, with the RTDE spelling beside it as a
+comment; `Signal.name`, the loader and the exports keep RTDE's `actual_TCP_pose`.
+Source: ROS 2 interface definition, "field names"; https://mcap.dev/spec; OMG CDR (XCDR1) alignment rules.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.errors import RecordingError
+
+
+class Phase(IntEnum):
+    """What the client was doing when a row was recorded."""
+
+    SETTLE_BEFORE = 0
+    MOVEMENT = 1
+    SETTLE_AFTER = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One column of a recording.
+
+    Attributes:
+        name: RTDE spelling where RTDE has the signal, e.g. `actual_TCP_pose`.
+        count: how many numbers it has.
+        unit: unit for people, e.g. "rad/s"; may be empty.
+        type: ROS 2 primitive type of one number.
+    """
+
+    name: str
+    count: int
+    unit: str = ""
+    type: str = "float64"
+
+    @property
+    def field(self) -> str:
+        """The name that ROS 2 allows: lower case."""
+        return self.name.lower()
+
+
+# What callers may hand in for a signal: itself, (name, count) or (name, count, unit).
+SignalLike = Signal | tuple[str, int] | tuple[str, int, str]
+
+REFERENCE_SIGNALS = (
+    Signal("ref_t", 1, "s, since the movement began"),
+    Signal("ref_q", 6, "rad"),
+    Signal("ref_qd", 6, "rad/s"),
+    Signal("ref_tcp_position", 3, "m, base frame"),
+    Signal("ref_tcp_velocity", 3, "m/s, base frame"),
+)
+# `phase` is the one byte of a row; it stands last so that the doubles before it need no padding.
+COMMAND_SIGNALS = (
+    Signal("cmd_qd", 6, "rad/s"),
+    Signal("phase", 1, "0 settle before, 1 movement, 2 settle after", "uint8"),
+)
+
+STATE_TOPIC, REFERENCE_TOPIC, COMMAND_TOPIC = "/robot_state", "/reference", "/command"
+
+CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+MESSAGE_OPCODE = 0x05
+# What a Message record carries before its data: channel id u16, sequence u32, log and publish time u64.
+MESSAGE_HEAD_BYTES = 22
+
+_NUMPY_TYPES = {"float64": "<f8", "uint8": "u1"}
+_FIELD_NAME = re.compile(r"[a-z](?:_?[a-z0-9]+)*")  # as strict as Foxglove's ROS 2 parser
+_SCHEMA_LINE = re.compile(
+    r"(?P<type>\w+)(?:\[(?P<count>\d+)\])? (?P<field>\w+)  # (?P<name>\w+)(?: \[(?P<unit>.*)\])?"
+)
+
+
+class Topic(NamedTuple):
+    """One ROS 2 topic of a recording; its index + 1 is channel and schema id."""
+
+    name: str
+    schema_name: str
+    signals: tuple[Signal, ...]
+
+    @property
+    def body_dtype(self) -> np.dtype[np.void]:
+        """Numpy record of the CDR body: packed, as no field needs padding."""
+        return np.dtype([(s.name, _NUMPY_TYPES[s.type], (s.count,)) for s in self.signals])
+
+
+@dataclass(frozen=True, slots=True)
+class RowLayout:
+    """How one row lies in a chunk.
+
+    Attributes:
+        topics: the topics in the order of their messages.
+        dtype: numpy record of the row: one `MESSAGE`-record a topic, named by the topic.
+    """
+
+    topics: tuple[Topic, ...]
+    dtype: np.dtype[np.void]
+
+    def blank_rows(self, n: int) -> NDArray[np.void]:
+        """Return n rows with every constant byte (opcode, length, channel, CDR head) filled in."""
+        rows = np.zeros(n, self.dtype)
+        for channel, topic in enumerate(self.topics, start=1):
+            message = rows[topic.name]
+            message["opcode"] = MESSAGE_OPCODE
+            message["length"] = self.dtype[topic.name].itemsize - 9
+            message["channel"] = channel
+            message["cdr"] = np.frombuffer(CDR_LITTLE_ENDIAN, np.uint8)
+        return rows
+
+
+def row_layout(state_signals: Iterable[SignalLike]) -> RowLayout:
+    """Build the layout of a recording whose robot state has these signals.
+
+    Args:
+        state_signals: every column of the realtime frame, in frame order; `timestamp`, the controller's
+            time in seconds, must be among them.
+
+    Raises:
+        RecordingError: a name is not allowed in ROS 2, appears twice, or `timestamp` is missing.
+    """
+    state = tuple(s if isinstance(s, Signal) else Signal(*s) for s in state_signals)
+    topics = (
+        Topic(STATE_TOPIC, "ur_hil/msg/RobotState", state),
+        Topic(REFERENCE_TOPIC, "ur_hil/msg/Reference", REFERENCE_SIGNALS),
+        Topic(COMMAND_TOPIC, "ur_hil/msg/Command", COMMAND_SIGNALS),
+    )
+    fields = [s.field for topic in topics for s in topic.signals]
+    for field in fields:
+        if not _FIELD_NAME.fullmatch(field):
+            raise RecordingError(
+                f"signal name {field!r} cannot be recorded; use letters, digits and single underscores"
+            )
+        if fields.count(field) > 1:
+            raise RecordingError(f"signal name {field!r} appears twice; every signal needs its own name")
+    if "timestamp" not in [s.name for s in state if s.count == 1]:
+        raise RecordingError(
+            "the robot state has no scalar 'timestamp'; a recording needs the controller's time"
+        )
+    head = [
+        ("opcode", "u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log_time", "<u8"),
+        ("publish_time", "<u8"),
+        ("cdr", "u1", (4,)),
+    ]
+    dtype = np.dtype([(t.name, np.dtype([*head, ("body", t.body_dtype)])) for t in topics])
+    return RowLayout(topics, dtype)
+
+
+def schema_text(signals: Iterable[Signal]) -> str:
+    """Return the ROS 2 message definition of these signals."""
+    lines = []
+    for s in signals:
+        array = f"[{s.count}]" if s.count > 1 else ""
+        unit = f" [{s.unit}]" if s.unit else ""
+        lines.append(f"{s.type}{array} {s.field}  # {s.name}{unit}")
+    return "\n".join(lines) + "\n"
+
+
+def parse_schema_text(text: str) -> tuple[Signal, ...]:
+    """Read back what `schema_text` wrote.
+
+    Raises:
+        RecordingError: a line is not of that form, so the file was not written by this package.
+    """
+    signals = []
+    for line in text.splitlines():
+        match = _SCHEMA_LINE.fullmatch(line)
+        if match is None or match["type"] not in _NUMPY_TYPES:
+            raise RecordingError(
+                f"cannot read the message definition {line!r}; only what this package writes is known"
+            )
+        signals.append(Signal(match["name"], int(match["count"] or 1), match["unit"] or "", match["type"]))
+    return tuple(signals)

@@ -1,0 +1,206 @@
+"""Reads a recording back, also one whose end is missing.
+
+The reader goes through the file from its beginning and never needs the index at its end, so that a run that
+was killed loads up to its last whole row. What it must not do: guess. Damage inside the file ends the reading
+there, and `Recording.complete` and `Recording.damage` say so.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Metadata, Schema
+from mcap.records import Chunk as ChunkRecord
+from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
+from numpy.typing import NDArray
+
+from pc_client.errors import RecordingError
+from pc_client.recording.layout import (
+    MESSAGE_HEAD_BYTES,
+    Phase,
+    Signal,
+    Topic,
+    parse_schema_text,
+)
+from pc_client.recording.mcap_file import CHUNK_HEAD_BYTES, MAGIC, PROVENANCE_RECORD, SUMMARY_RECORD
+from pc_client.recording.provenance import Provenance
+
+_RECORD_HEAD = struct.Struct("<BQ")
+_CHANNEL_ID = struct.Struct("<H")
+_CDR_HEAD_BYTES = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A recording in memory; all rows, one array a signal.
+
+    Attributes:
+        path: the file it came from.
+        provenance: where the data come from.
+        signals: every column, in file order.
+        summary: results that the recorder's `close` was given; empty when the file is cut off.
+        complete: True when the file was closed properly and all of it could be read.
+        damage: one line about what is missing when not complete, else "".
+    """
+
+    path: Path
+    provenance: Provenance
+    signals: tuple[Signal, ...]
+    summary: Mapping[str, Any]
+    complete: bool
+    damage: str
+    _columns: Mapping[str, NDArray[np.float64]] = field(repr=False)
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """Return one signal: (n,) for a scalar, (n, count) otherwise; SI units.
+
+        Args:
+            name: RTDE spelling, e.g. "actual_TCP_pose", or one of the client's, e.g. "ref_q".
+
+        Raises:
+            RecordingError: no such signal in this file.
+        """
+        try:
+            return self._columns[name]
+        except KeyError:
+            raise RecordingError(
+                f"{self.path} has no signal {name!r}; it has {', '.join(self._columns)}"
+            ) from None
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows, one a control cycle."""
+        return len(self.t)
+
+    @property
+    def t(self) -> NDArray[np.float64]:
+        """Controller time of each row in s, (n,)."""
+        return self._columns["timestamp"]
+
+    def rows_of(self, phase: Phase) -> NDArray[np.bool_]:
+        """Return a mask (n,) of the rows of one phase."""
+        return np.equal(self._columns["phase"], float(phase))
+
+
+def load_recording(path: Path | str) -> Recording:
+    """Load a recording, up to its last whole row when its end is missing.
+
+    Raises:
+        RecordingError: the file cannot be read, is no recording, or was cut before its first row's layout.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RecordingError(f"cannot read the recording {path}: {error.strerror or error}") from error
+    if not data.startswith(MAGIC):
+        raise RecordingError(f"{path} is not a recording: an MCAP file begins with {MAGIC!r}")
+    scan = _Scan()
+    damage = scan.read(data)
+    if PROVENANCE_RECORD not in scan.metadata or not scan.topics:
+        raise RecordingError(f"{path} holds no recording of this package{': ' + damage if damage else ''}")
+    summary = {key: json.loads(text) for key, text in scan.metadata.get(SUMMARY_RECORD, {}).items()}
+    return Recording(
+        path=path,
+        provenance=Provenance.from_metadata(scan.metadata[PROVENANCE_RECORD]),
+        signals=tuple(s for topic in scan.topics.values() for s in topic.signals),
+        summary=summary,
+        complete=not damage,
+        damage=damage,
+        _columns=scan.columns(),
+    )
+
+
+class _Scan:
+    """One pass over the records of a file, collecting what a recording consists of."""
+
+    def __init__(self) -> None:
+        self.schemas: dict[int, Schema] = {}
+        self.topics: dict[int, Topic] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.bodies: dict[int, list[bytes]] = {}
+
+    def read(self, data: bytes) -> str:
+        """Take in all whole records; return what is missing or damaged, "" when nothing is."""
+        position = len(MAGIC)
+        while position + _RECORD_HEAD.size <= len(data):
+            opcode, length = _RECORD_HEAD.unpack_from(data, position)
+            start = position + _RECORD_HEAD.size
+            end = start + length
+            if end > len(data):
+                if opcode == Opcode.CHUNK:
+                    # Only the rows stand behind a chunk's head, and they are not compressed.
+                    self._take_messages(data[position + CHUNK_HEAD_BYTES :])
+                return f"cut off inside a record at byte {position} of {len(data)}"
+            try:
+                self._take(opcode, data[start:end])
+            except CRCValidationError:
+                return f"damaged: checksum of the chunk at byte {position} is wrong"
+            except (McapError, ValueError, struct.error) as error:
+                return f"damaged: record at byte {position} cannot be read ({error})"
+            position = end
+            if opcode == Opcode.FOOTER:
+                return (
+                    "" if data[position : position + len(MAGIC)] == MAGIC else "cut off inside the end mark"
+                )
+        return f"cut off at byte {len(data)}: the end mark is missing"
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Return one array a signal; a row counts when all its messages are there."""
+        n_rows = min(len(bodies) for bodies in self.bodies.values())
+        columns: dict[str, NDArray[np.float64]] = {}
+        for channel, topic in self.topics.items():
+            rows = np.frombuffer(b"".join(self.bodies[channel][:n_rows]), topic.body_dtype)
+            for signal in topic.signals:
+                values = rows[signal.name].astype(np.float64)
+                columns[signal.name] = values[:, 0] if signal.count == 1 else values
+        return columns
+
+    def _take(self, opcode: int, body: bytes) -> None:
+        stream = ReadDataStream(BytesIO(body))
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            self.schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(stream)
+            schema = self.schemas[channel.schema_id]
+            self.topics[channel.id] = Topic(
+                channel.topic, schema.name, parse_schema_text(schema.data.decode())
+            )
+            self.bodies.setdefault(channel.id, [])
+        elif opcode == Opcode.METADATA:
+            metadata = Metadata.read(stream)
+            self.metadata[metadata.name] = metadata.metadata
+        elif opcode == Opcode.CHUNK:
+            chunk = ChunkRecord.read(stream)
+            rows, size = get_chunk_data_stream(chunk, validate_crc=True)
+            self._take_messages(rows.read(size))
+        elif opcode == Opcode.MESSAGE:
+            self._take_message(body)
+
+    def _take_messages(self, rows: bytes) -> None:
+        """Take the whole messages at the beginning of these bytes."""
+        position = 0
+        while position + _RECORD_HEAD.size <= len(rows):
+            opcode, length = _RECORD_HEAD.unpack_from(rows, position)
+            start, position = position + _RECORD_HEAD.size, position + _RECORD_HEAD.size + length
+            if position > len(rows):
+                return
+            if opcode == Opcode.MESSAGE:
+                self._take_message(rows[start:position])
+
+    def _take_message(self, body: bytes) -> None:
+        (channel,) = _CHANNEL_ID.unpack_from(body)
+        if channel not in self.bodies:
+            raise ValueError(f"a message names the unknown channel {channel}")
+        self.bodies[channel].append(body[MESSAGE_HEAD_BYTES + _CDR_HEAD_BYTES :])

@@ -1,0 +1,96 @@
+"""What a reader must know to trust a recording and to repeat the run.
+
+Only facts of the experiment belong here. Host names, ports, dates and paths do not: two runs of the same
+experiment must give the same bytes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from pc_client.errors import RecordingError
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where a recording comes from.
+
+    Attributes:
+        movement: name of the movement, e.g. "lognorm_4_1".
+        kind: "lognormal" or "uniform".
+        repetition: 1, 2, 3 ...
+        controller: name of the controller configuration, "preview" or "paper".
+        controller_config: its numbers (gains, limits), by name.
+        robot_model: e.g. "UR3".
+        firmware: controller software as it reports itself, e.g. "3.15.8".
+        serial: serial number of the arm.
+        simulated: True when the arm is an emulated one.
+        seed: seed of the emulated arm; None for a real arm.
+        pace: "realtime" or "lockstep".
+        cycle_time_s: control cycle of the robot in s.
+        identified_delay_s: loop delay that the client measured, in s; None when it did not.
+        client_version: version of this package.
+        movement_text: the movement file, as it was read.
+        target_points: the movement's target points in the base frame, (x, y, z) in m.
+    """
+
+    movement: str
+    kind: str
+    repetition: int
+    controller: str
+    robot_model: str
+    firmware: str
+    serial: str
+    simulated: bool
+    seed: int | None
+    pace: str
+    client_version: str
+    cycle_time_s: float = 0.008
+    identified_delay_s: float | None = None
+    controller_config: Mapping[str, float | int | bool | str | None] = field(default_factory=dict)
+    movement_text: str = ""
+    target_points: tuple[tuple[float, float, float], ...] = ()
+
+    @property
+    def robot(self) -> str:
+        """Model and firmware in one phrase, e.g. "UR3 3.15.8"."""
+        return f"{self.robot_model} {self.firmware}"
+
+    def to_metadata(self) -> dict[str, str]:
+        """Return the flat string map that goes into the file: texts as they are, all else as JSON."""
+        metadata = {}
+        for item in dataclasses.fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, Mapping):
+                value = dict(value)
+            metadata[item.name] = value if isinstance(value, str) else json.dumps(value)
+        return metadata
+
+    @classmethod
+    def from_metadata(cls, metadata: Mapping[str, str]) -> Provenance:
+        """Read back what `to_metadata` wrote; unknown keys of later versions are passed over.
+
+        Raises:
+            RecordingError: a key without default is missing, or a value cannot be read.
+        """
+        values: dict[str, object] = {}
+        for item in dataclasses.fields(cls):
+            text = metadata.get(item.name)
+            if text is None:
+                continue
+            try:
+                values[item.name] = text if item.type == "str" else json.loads(text)
+            except ValueError as error:
+                raise RecordingError(
+                    f"provenance {item.name!r} cannot be read: {text[:60]!r} is not JSON"
+                ) from error
+        if "target_points" in values:
+            points: list[list[float]] = values["target_points"]  # type: ignore[assignment]
+            values["target_points"] = tuple((p[0], p[1], p[2]) for p in points)
+        try:
+            return cls(**values)  # type: ignore[arg-type]
+        except TypeError as error:
+            raise RecordingError(f"the recording's provenance is incomplete: {error}") from error

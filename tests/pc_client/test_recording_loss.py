@@ -1,0 +1,223 @@
+"""What remains when a run is killed, the disk fills up, or a file is damaged."""
+
+from __future__ import annotations
+
+import errno
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recording_samples import SIGNALS, append_rows, provenance
+
+from pc_client.errors import RecordingError
+from pc_client.recording import recorder as recorder_module
+from pc_client.recording.layout import row_layout
+from pc_client.recording.loader import Recording, load_recording
+from pc_client.recording.mcap_file import encode_head
+from pc_client.recording.recorder import ROWS_PER_CHUNK, Recorder
+
+N_ROWS = 3 * ROWS_PER_CHUNK + 10
+HEAD_BYTES = len(encode_head(row_layout(SIGNALS), provenance().to_metadata())[0])
+
+
+class FullDisk:
+    """A raw file on a disk with this much room; writes short before it fails, as the kernel does."""
+
+    def __init__(self, path: Path, room: int) -> None:
+        self.file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
+        self.room = room
+
+    def write(self, data: memoryview) -> int:
+        free = self.room - self.file.tell()
+        if free <= 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return self.file.write(data[:free])
+
+    def seek(self, offset: int) -> int:
+        return self.file.seek(offset)
+
+    def truncate(self, size: int) -> int:
+        return self.file.truncate(size)
+
+    def close(self) -> None:
+        self.file.close()
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> bytes:
+    with Recorder(tmp_path / "whole.mcap", provenance(), SIGNALS) as recorder:
+        append_rows(recorder, N_ROWS)
+    return (tmp_path / "whole.mcap").read_bytes()
+
+
+def load_bytes(tmp_path: Path, data: bytes) -> Recording:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(data)
+    return load_recording(path)
+
+
+def is_prefix(recording: Recording) -> bool:
+    i = np.arange(recording.n_rows)
+    return bool(
+        np.array_equal(recording.t, 50.0 + 0.008 * i)
+        and np.array_equal(recording.column("cmd_qd"), np.arange(6) * 0.5 + i[:, None])
+    )
+
+
+def test_cut_at_every_chunk_boundary(tmp_path: Path) -> None:
+    ends = []
+    recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS)
+    for _ in range(4):
+        ends.append((tmp_path / "a.mcap").stat().st_size)  # what a killed process leaves
+        append_rows(recorder, ROWS_PER_CHUNK)
+    recorder.close()
+    data = (tmp_path / "a.mcap").read_bytes()
+    for n_chunks, end in enumerate(ends):
+        recording = load_bytes(tmp_path, data[:end])
+        assert recording.n_rows == n_chunks * ROWS_PER_CHUNK
+        assert not recording.complete
+        assert "end mark is missing" in recording.damage
+        assert recording.summary == {}
+        assert recording.provenance == provenance()
+
+
+def test_cut_at_random_bytes_keeps_every_whole_row(tmp_path: Path, whole: bytes) -> None:
+    row = row_layout(SIGNALS).dtype.itemsize
+    cuts = random.Random(3).sample(range(HEAD_BYTES, len(whole)), 150)
+    previous = 0
+    for cut in sorted(cuts):
+        recording = load_bytes(tmp_path, whole[:cut])
+        assert not recording.complete
+        assert is_prefix(recording)
+        assert recording.n_rows >= previous
+        # Chunk heads and indexes take less than two rows' bytes a chunk more than this.
+        share = (cut - HEAD_BYTES) / row * ROWS_PER_CHUNK / (ROWS_PER_CHUNK + 12)
+        assert recording.n_rows >= min(N_ROWS, int(share) - 4)
+        previous = recording.n_rows
+    assert load_bytes(tmp_path, whole).complete
+
+
+def test_cut_inside_the_head_is_refused_in_one_line(tmp_path: Path, whole: bytes) -> None:
+    for cut in range(0, HEAD_BYTES, 7):
+        with pytest.raises(RecordingError) as caught:
+            load_bytes(tmp_path, whole[:cut])
+        assert "\n" not in str(caught.value)
+
+
+def test_a_flipped_bit_ends_the_reading_there(tmp_path: Path, whole: bytes) -> None:
+    middle = bytearray(whole)
+    middle[HEAD_BYTES + int(1.5 * (len(whole) - HEAD_BYTES) / (N_ROWS / ROWS_PER_CHUNK))] ^= 0x10
+    recording = load_bytes(tmp_path, bytes(middle))
+    assert not recording.complete
+    assert recording.n_rows == ROWS_PER_CHUNK
+    assert "checksum" in recording.damage
+    assert is_prefix(recording)
+
+
+@pytest.mark.parametrize("data", [b"", b"hello", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" + bytes(100)])
+def test_files_that_are_no_recordings(tmp_path: Path, data: bytes) -> None:
+    with pytest.raises(RecordingError, match=r"cut\.mcap"):
+        load_bytes(tmp_path, data)
+
+
+def test_missing_file_and_missing_folder(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="cannot read the recording"):
+        load_recording(tmp_path / "none.mcap")
+    with pytest.raises(RecordingError, match=r"cannot create the recording .*No such file"):
+        Recorder(tmp_path / "none" / "a.mcap", provenance(), SIGNALS)
+
+
+def test_a_full_disk_never_raises_inside_the_loop_and_loses_nothing_written(tmp_path: Path) -> None:
+    chunk_bytes = ROWS_PER_CHUNK * row_layout(SIGNALS).dtype.itemsize
+    room = HEAD_BYTES + int(2.4 * chunk_bytes)
+    path = tmp_path / "a.mcap"
+    recorder = Recorder(path, provenance(), SIGNALS, opener=lambda p: FullDisk(p, room))
+    append_rows(recorder, N_ROWS)
+    assert recorder.error is not None
+    assert "No space left on device" in str(recorder.error)
+    assert recorder.n_rows == N_ROWS
+    with pytest.raises(RecordingError) as caught:
+        recorder.close()
+    recording = load_recording(path)
+    assert is_prefix(recording)
+    assert 2 * ROWS_PER_CHUNK < recording.n_rows < N_ROWS
+    assert f"{recording.n_rows} of {N_ROWS} rows are saved" in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    recorder.close()  # idempotent: reported once
+
+
+def test_every_size_of_disk(tmp_path: Path, whole: bytes) -> None:
+    for room in range(HEAD_BYTES, len(whole) + 5000, 4999):
+        path = tmp_path / "a.mcap"
+        recorder = Recorder(path, provenance(), SIGNALS, opener=lambda p, room=room: FullDisk(p, room))
+        append_rows(recorder, N_ROWS)
+        if room >= len(whole):
+            recorder.close()
+            assert path.read_bytes() == whole
+            continue
+        with pytest.raises(RecordingError):
+            recorder.close()
+        recording = load_recording(path)
+        assert is_prefix(recording)
+        assert whole.startswith(path.read_bytes())
+
+
+def test_rows_held_in_memory_are_written_when_there_is_room_again(tmp_path: Path, whole: bytes) -> None:
+    disk = FullDisk(tmp_path / "a.mcap", HEAD_BYTES + 20_000)
+    recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk)
+    append_rows(recorder, N_ROWS)
+    assert recorder.error is not None
+    disk.room = 10**9
+    with pytest.raises(RecordingError, match=f"all {N_ROWS} rows are saved"):
+        recorder.close()
+    assert (tmp_path / "a.mcap").read_bytes() == whole
+
+
+def test_memory_for_held_rows_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recorder_module, "MAX_HELD_CHUNKS", 2)
+    disk = FullDisk(tmp_path / "a.mcap", HEAD_BYTES)
+    recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk)
+    append_rows(recorder, 5 * ROWS_PER_CHUNK)
+    disk.room = 10**9
+    with pytest.raises(RecordingError, match=f"{2 * ROWS_PER_CHUNK} of {5 * ROWS_PER_CHUNK} rows are saved"):
+        recorder.close()
+    assert load_recording(tmp_path / "a.mcap").n_rows == 2 * ROWS_PER_CHUNK
+
+
+def test_disk_full_from_the_first_byte(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="No space left"):
+        Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda p: FullDisk(p, 0))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_dev_full() -> None:
+    with pytest.raises(RecordingError, match="/dev/full: No space left"):
+        Recorder("/dev/full", provenance(), SIGNALS)
+
+
+def test_the_error_that_ended_a_run_is_not_hidden_by_the_disk(tmp_path: Path) -> None:
+    def run() -> None:
+        disk = FullDisk(tmp_path / "a.mcap", HEAD_BYTES)
+        with Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk) as recorder:
+            append_rows(recorder, 1)
+            raise KeyError("the robot stopped")
+
+    with pytest.raises(KeyError) as caught:
+        run()
+    assert any("No space left" in note for note in caught.value.__notes__)
+
+
+def test_a_run_that_ends_in_an_error_leaves_a_complete_file_that_says_so(tmp_path: Path) -> None:
+    def run() -> None:
+        with Recorder(tmp_path / "a.mcap", provenance(), SIGNALS) as recorder:
+            append_rows(recorder, 5)
+            raise KeyError("the robot stopped")
+
+    with pytest.raises(KeyError):
+        run()
+    recording = load_recording(tmp_path / "a.mcap")
+    assert recording.complete
+    assert recording.n_rows == 5
+    assert recording.summary == {"aborted": "KeyError"}
