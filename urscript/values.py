@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final
 
+from urscript import dialect
 from urscript.errors import ScriptRuntimeError
 
 INT_MIN: Final = -(2**31)
@@ -127,7 +128,9 @@ def is_number(value: Any) -> bool:
 
 
 def wrap_int(value: int) -> int:
-    """`value` folded into 32 bits, two's complement (see dialect: INT_OVERFLOW)."""
+    """`value` folded into 32 bits, two's complement (see `dialect.INT_OVERFLOW`)."""
+    if dialect.INT_OVERFLOW == "error" and not INT_MIN <= value <= INT_MAX:
+        raise ScriptRuntimeError(f"{value} does not fit into an integer of 32 bits")
     return (value - INT_MIN) % 2**32 + INT_MIN
 
 

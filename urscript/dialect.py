@@ -1,0 +1,77 @@
+"""Every choice about the language that no document settles, in one place, with what is known.
+
+Two kinds: what differs between software generations or deserves a switch is a field of `Dialect`; what is
+merely unknown is a constant. Letters: D documented, O observed, I inferred, U unknown. `docs/fidelity.md`
+lists the U rows for users.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+STATEMENT_BUDGET: Final = 100_000
+"""Statements a thread may run in one cycle (U). Exported programs run thousands of assignments at their
+start without a sync, so real budgets are at least 10^4 to 10^5 (O)."""
+
+RECURSION_LIMIT: Final = 200
+"""Depth at which a recursive function is stopped with a run-time error (U; no field script recurses)."""
+
+INT_OVERFLOW: Literal["wrap", "error"] = "wrap"
+"""Results outside 32 bits fold around as in the controller's C (I)."""
+
+EXACT_DIVISION_GIVES_INT: Final = False
+"""6 / 3 is a float as 7 / 3 is (U). Both print the same; the driver script relies on real division."""
+
+MODULO_SIGN: Literal["dividend", "divisor"] = "dividend"
+"""-7 % 3 is -1, the rule of C (U)."""
+
+INDEX_TAKES_WHOLE_FLOATS: Final = True
+"""x[4/2] is x[2] (U; follows from EXACT_DIVISION_GIVES_INT, or indexes could not be computed)."""
+
+MIXED_TYPES_COMPARE: Final = True
+"""`==` between a string and a number, or a pose and a list, is False, not an error (U)."""
+
+INT_AS_CONDITION: Final = False
+"""`if 1:` is a run-time error (U, never seen in a script). Strings are allowed: empty is false (D)."""
+
+NONE_FITS_EVERY_VARIABLE: Final = True
+"""A variable may go from None to any type and back (U; a variable's type is otherwise fixed, D)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """The switches one program is compiled with.
+
+    Attributes:
+        short_circuit: `and` / `or` leave out the right side when the left decides (U; recommended reading).
+        list_resize: What storing a list of another length into a list variable does. "error" since 3.14 /
+            5.9.4 (O for 5.9.4-5.14.6, I for 3.14-3.15), "free" before (O).
+        has_pause: `pause` is a statement (e-Series 5.x, D); elsewhere it is an ordinary name.
+        has_methods: Lists, structs and matrices have methods and members (5.15 on, D).
+        statement_budget: Statements a thread may run in one cycle.
+        recursion_limit: Depth of calls of a recursive function.
+    """
+
+    short_circuit: bool = True
+    list_resize: Literal["free", "error"] = "error"
+    has_pause: bool = False
+    has_methods: bool = False
+    statement_budget: int = STATEMENT_BUDGET
+    recursion_limit: int = RECURSION_LIMIT
+
+
+CB3 = Dialect()
+"""CB3 3.14 and 3.15."""
+
+
+def dialect_for(version: Sequence[int]) -> Dialect:
+    """The dialect of a software version, e.g. (3, 15)."""
+    major, minor = version[0], version[1]
+    if major == 3:
+        return Dialect(list_resize="error" if minor >= 14 else "free")
+    modern = major > 5 or minor >= 15
+    # From 5.15 on a list has a capacity; until that is modelled, storing a longer list is allowed there.
+    resize: Literal["free", "error"] = "error" if not modern and minor >= 9 else "free"
+    return Dialect(list_resize=resize, has_pause=True, has_methods=modern)

@@ -1,0 +1,261 @@
+"""The tree of a program: frozen nodes, each with the stretch of text it came from.
+
+Two trees are equal when they mean the same: spans and the spelling of numbers do not count.
+A node knows nothing about names, types or execution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from urscript.source import NOWHERE, Span
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """Anything with a place in the text."""
+
+    span: Span = field(default=NOWHERE, compare=False, repr=False, kw_only=True)
+
+
+class Expression(Node):
+    """Anything with a value."""
+
+    __slots__ = ()
+
+
+class Statement(Node):
+    """Anything that stands alone in a block."""
+
+    __slots__ = ()
+
+
+Block = tuple[Statement, ...]
+
+# --- expressions ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class NoneLiteral(Expression):
+    """`None`."""
+
+
+@dataclass(frozen=True, slots=True)
+class BoolLiteral(Expression):
+    """`True`, `False`."""
+
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class IntLiteral(Expression):
+    """Decimal digits; never negative, a sign is a `Prefix`."""
+
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
+class FloatLiteral(Expression):
+    """`1.5`, `.5`, `1e-10`; `text` is the spelling, kept for printing."""
+
+    value: float
+    text: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class StringLiteral(Expression):
+    """Text between double quotes, without them; one character a byte."""
+
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class ListLiteral(Expression):
+    """`[a, b]`; a list of lists is a matrix."""
+
+    items: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PoseLiteral(Expression):
+    """`p[x, y, z, rx, ry, rz]`: always six items."""
+
+    items: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Name(Expression):
+    """A variable."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Prefix(Expression):
+    """`-x`, `+x`, `not x` (also spelt `!x`)."""
+
+    operator: Literal["-", "+", "not"]
+    operand: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Binary(Expression):
+    """Two operands: arithmetic, comparison, `and`, `or`, `xor`."""
+
+    operator: str
+    left: Expression
+    right: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Argument(Node):
+    """One argument of a call; `name` is None for a positional one."""
+
+    value: Expression
+    name: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Call(Expression):
+    """A call of a function by its name; functions are not values."""
+
+    function: str
+    arguments: tuple[Argument, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MethodCall(Expression):
+    """A call of a method of a value: `handle.method(x)`."""
+
+    target: Expression
+    method: str
+    arguments: tuple[Argument, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Index(Expression):
+    """`x[i]` or, in a matrix, `x[row, column]`."""
+
+    target: Expression
+    indices: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Member(Expression):
+    """`x.member` of a struct."""
+
+    target: Expression
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Run(Expression):
+    """`run thread_name()`: starts a thread, its value is the handle."""
+
+    thread: str
+
+
+# --- statements ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Assign(Statement):
+    """`x = value`, `x[i] = value`, `global x = value`, `local x = value`."""
+
+    target: Name | Index | Member
+    value: Expression
+    scope: Literal["global", "local"] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Declare(Statement):
+    """`global x` or `local x` without a value."""
+
+    name: str
+    scope: Literal["global", "local"]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluate(Statement):
+    """An expression for its effect."""
+
+    value: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Arm(Node):
+    """One condition of an `if` and what to do when it holds."""
+
+    condition: Expression
+    body: Block
+
+
+@dataclass(frozen=True, slots=True)
+class If(Statement):
+    """`if`, its `elif` arms in order, and the `else` part (None when absent)."""
+
+    arms: tuple[Arm, ...]
+    otherwise: Block | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class While(Statement):
+    """`while condition:`."""
+
+    condition: Expression
+    body: Block
+
+
+@dataclass(frozen=True, slots=True)
+class Return(Statement):
+    """`return value`; `value` is None for a bare `return`."""
+
+    value: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Join(Statement):
+    """`join handle`: wait for a thread."""
+
+    thread: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Kill(Statement):
+    """`kill handle`: stop a thread and its children."""
+
+    thread: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Simple(Statement):
+    """A statement that is one word."""
+
+    word: Literal["break", "continue", "halt", "enter_critical", "exit_critical"]
+
+
+@dataclass(frozen=True, slots=True)
+class Label(Statement):
+    """`$ 12 "Move"`: where PolyScope's program tree stands; `text` is the line after the `$`."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter(Node):
+    """A parameter of a function; `default` is None when the caller must give it."""
+
+    name: str
+    default: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Function(Statement):
+    """`def`, `sec` or `thread` with its body; `end_span` is the closing `end`."""
+
+    kind: Literal["def", "sec", "thread"]
+    name: str
+    parameters: tuple[Parameter, ...]
+    body: Block
+    end_span: Span = field(default=NOWHERE, compare=False, repr=False)
