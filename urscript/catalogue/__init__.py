@@ -1,0 +1,26 @@
+"""The catalogue of all URScript builtins: what exists in which version, with which arguments, modelled how well.
+
+One table module for each chapter of the script manual; `catalogue_for(version)` is the view of one release.
+"""
+
+from .catalogue import ALL_ROWS, CB3_3_15, Catalogue, catalogue_for
+from .types import REQUIRED, Builtin, BuiltinArray, ModuleVariable, Param, ParamType, Support, TimeClass
+from .versions import Generation, PerGeneration, Version
+
+__all__ = [
+    "ALL_ROWS",
+    "CB3_3_15",
+    "REQUIRED",
+    "Builtin",
+    "BuiltinArray",
+    "Catalogue",
+    "Generation",
+    "ModuleVariable",
+    "Param",
+    "ParamType",
+    "PerGeneration",
+    "Support",
+    "TimeClass",
+    "Version",
+    "catalogue_for",
+]

@@ -1,0 +1,188 @@
+"""Run-time checks of arguments against the catalogue: type, finiteness, range, with the error text.
+
+A check is compiled once for each builtin and then only runs small predicates, because motion commands pass here
+every control cycle. It never converts: an integer parameter also takes a float without fraction (programs compute
+indexes), so host functions call `int()` on it.
+
+Texts: the one for poses is the controller's own (log of 5.12: "get_inverse_kin: Parameter must be a Pose on the
+form p[x,y,z,a,b,c]"); the others are not documented and follow its pattern, adding what was given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import isfinite
+from typing import Any
+
+from urscript.errors import ScriptRuntimeError
+from urscript.values import Matrix, Pose, is_number, type_name
+
+from .types import Builtin, Param, ParamType
+
+Predicate = Callable[[Any], bool]
+
+_SHOWN_TEXT = 40
+
+
+def _is_int(value: Any) -> bool:
+    return type(value) is int or (isinstance(value, float) and value.is_integer())
+
+
+def _is_numbers(value: Any, count: int | None = None) -> bool:
+    if type(value) is not list or (count is not None and len(value) != count):
+        return False
+    for item in value:
+        kind = type(item)
+        if kind is not float and kind is not int and not is_number(item):
+            return False
+    return True
+
+
+def _is_six(value: Any) -> bool:
+    return _is_numbers(value, 6)
+
+
+def _is_pose(value: Any) -> bool:
+    return type(value) is Pose
+
+
+_PREDICATES: dict[ParamType, Predicate] = {
+    ParamType.BOOL: lambda value: type(value) is bool,
+    ParamType.INT: _is_int,
+    ParamType.NUMBER: is_number,
+    ParamType.STRING: lambda value: isinstance(value, str),
+    ParamType.POSE: _is_pose,
+    ParamType.JOINTS: _is_six,
+    ParamType.POSE_OR_JOINTS: lambda value: type(value) is Pose or _is_numbers(value, 6),
+    ParamType.VECTOR3: lambda value: _is_numbers(value, 3),
+    ParamType.VECTOR6: lambda value: type(value) is Pose or _is_numbers(value, 6),
+    ParamType.NUMBERS: _is_numbers,
+    ParamType.LIST: lambda value: type(value) is list,
+    ParamType.MATRIX: lambda value: isinstance(value, Matrix),
+    ParamType.SIZED: lambda value: isinstance(value, (list, str, Pose)),
+    ParamType.SHAPED: lambda value: isinstance(value, (Matrix, list, str, Pose)),
+    ParamType.LIST_OR_MATRIX: lambda value: isinstance(value, Matrix) or _is_numbers(value),
+    ParamType.POSE_OR_MATRIX: lambda value: isinstance(value, (Matrix, Pose)),
+    ParamType.NORMED: lambda value: type(value) is Pose or is_number(value) or _is_numbers(value),
+}
+
+
+def fits(kind: ParamType, value: Any) -> bool:
+    """Whether `value` is of the type a parameter asks for."""
+    predicate = _PREDICATES.get(kind)
+    return predicate is None or predicate(value)
+
+
+def describe(value: Any) -> str:
+    """A value in an error message: its type and, where short, itself."""
+    if value is None:
+        return "None"
+    if isinstance(value, str):
+        cut = value if len(value) <= _SHOWN_TEXT else value[:_SHOWN_TEXT] + "..."
+        return f'the string "{cut}"'
+    if isinstance(value, list):
+        if value and not all(map(is_number, value)):
+            odd = next(item for item in value if not is_number(item))
+            return f"a list of {len(value)} with a {type_name(odd)} in it"
+        return f"a list of {len(value)}"
+    if isinstance(value, (bool, int, float)):
+        return f"the {type_name(value)} {value}"
+    return f"a {type_name(value)}"
+
+
+def type_error(function: str, parameter: str, kind: ParamType, value: Any) -> ScriptRuntimeError:
+    """The error for an argument of the wrong type."""
+    if kind is ParamType.POSE:
+        return ScriptRuntimeError(f"{function}: Parameter must be {kind.value}")
+    return ScriptRuntimeError(
+        f"{function}: Parameter '{parameter}' must be {kind.value}, got {describe(value)}"
+    )
+
+
+def _numbers_in(value: Any) -> Sequence[Any]:
+    if isinstance(value, (list, Pose)):
+        return value
+    return (value,) if isinstance(value, float) else ()
+
+
+def _is_finite(value: Any) -> bool:
+    if type(value) is float:
+        return isfinite(value)
+    for item in _numbers_in(value):
+        if isinstance(item, float) and not isfinite(item):
+            return False
+    return True
+
+
+def _is_in_range(param: Param, value: Any) -> bool:
+    if param.choices and value not in param.choices:
+        return False
+    if param.low is not None and not value >= param.low:
+        return False
+    return param.high is None or bool(value <= param.high)
+
+
+def explain(builtin: Builtin, param: Param, value: Any) -> ScriptRuntimeError:
+    """The error for an argument that a check refused."""
+    if not fits(param.type, value):
+        return type_error(builtin.name, param.name, param.type, value)
+    if not builtin.nan_ok and not _is_finite(value):
+        return ScriptRuntimeError(
+            f"{builtin.name}: Parameter '{param.name}' must be finite, got {_show(value)}"
+        )
+    if param.choices:
+        allowed = "one of " + ", ".join(map(str, param.choices))
+    elif param.low is not None and param.high is not None:
+        allowed = f"in the range {param.low:g} to {param.high:g}"
+    elif param.low is not None:
+        allowed = f"at least {param.low:g}"
+    else:
+        allowed = f"at most {param.high:g}"
+    return ScriptRuntimeError(
+        f"{builtin.name}: Parameter '{param.name}' must be {allowed}, got {_show(value)}"
+    )
+
+
+def _show(value: Any) -> str:
+    return f"[{', '.join(map(str, value))}]" if isinstance(value, (list, Pose)) else str(value)
+
+
+def _accepts(builtin: Builtin, param: Param) -> Predicate | None:
+    """All conditions on one argument in one predicate, or None if there is none."""
+    of_type = _PREDICATES.get(param.type)
+    if of_type is None:
+        return None
+    needs_finite = not builtin.nan_ok and param.type not in (
+        ParamType.BOOL,
+        ParamType.STRING,
+        ParamType.MATRIX,
+    )
+    is_ranged = bool(param.choices) or param.low is not None or param.high is not None
+    may_be_left_out = param.default is None
+
+    def accepts(value: Any) -> bool:
+        if value is None:
+            return may_be_left_out
+        if not of_type(value):
+            return False
+        if needs_finite and not _is_finite(value):
+            return False
+        return not is_ranged or _is_in_range(param, value)
+
+    return accepts
+
+
+def compile_check(builtin: Builtin) -> Callable[[Sequence[Any]], None]:
+    """A function that takes bound arguments and raises ScriptRuntimeError for the first that does not fit."""
+    tests = [
+        (index, accepts)
+        for index, param in enumerate(builtin.params)
+        if (accepts := _accepts(builtin, param)) is not None
+    ]
+
+    def check(args: Sequence[Any]) -> None:
+        for index, accepts in tests:
+            if not accepts(args[index]):
+                raise explain(builtin, builtin.params[index], args[index])
+
+    return check

@@ -1,0 +1,153 @@
+"""The view of the tables that one software version has: names, signatures, binding, checks.
+
+Everything a compiler asks about builtins goes through `Catalogue`; it holds no behaviour of any builtin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from functools import lru_cache
+from typing import Any
+
+from urscript.errors import ScriptRuntimeError, ScriptTypeError
+
+from . import (
+    interfaces,
+    internals,
+    interpreter_mode,
+    ioconfiguration,
+    motion,
+    processpath,
+    urmath,
+    world_model,
+)
+from .argument_checks import compile_check
+from .binding import Slot, static_bind
+from .types import Builtin, BuiltinArray, ModuleVariable
+from .versions import Version
+
+ALL_ROWS: tuple[Builtin, ...] = (
+    motion.ROWS
+    + internals.ROWS
+    + urmath.ROWS
+    + interfaces.ROWS
+    + ioconfiguration.ROWS
+    + interpreter_mode.ROWS
+    + processpath.ROWS
+    + world_model.ROWS
+)
+
+
+class Catalogue:
+    """The builtins of one software version.
+
+    Args:
+        version: the release whose names are visible.
+        rows: rows to select from.
+        extra: names to make visible although this version does not know them, in their newest form.
+
+    Raises:
+        ValueError: for an `extra` name in no table.
+    """
+
+    def __init__(
+        self, version: Version, rows: Iterable[Builtin] = ALL_ROWS, extra: Iterable[str] = ()
+    ) -> None:
+        rows = tuple(rows)
+        self.version = version
+        self._by_name: dict[str, Builtin] = {row.name: row for row in rows if row.is_in(version)}
+        for name in extra:
+            forms = [row for row in rows if row.name == name]
+            if not forms:
+                raise ValueError(f"no builtin named {name!r} in any software version")
+            self._by_name.setdefault(name, forms[-1])
+        self.variables: Mapping[str, ModuleVariable] = {item.name: item for item in motion.VARIABLES}
+        self.arrays: Mapping[str, BuiltinArray] = {item.name: item for item in interfaces.ARRAYS}
+        self._checks = {name: compile_check(row) for name, row in self._by_name.items()}
+
+    def lookup(self, name: str) -> Builtin | None:
+        """The builtin of that name, or None."""
+        return self._by_name.get(name)
+
+    def __getitem__(self, name: str) -> Builtin:
+        return self._by_name[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._by_name
+
+    def __iter__(self) -> Iterator[Builtin]:
+        return iter(self._by_name.values())
+
+    def __len__(self) -> int:
+        return len(self._by_name)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of all builtin functions of this version."""
+        return frozenset(self._by_name)
+
+    def suggest(self, name: str, others: Iterable[str] = ()) -> str | None:
+        """The known name that looks most like a misspelt one, among builtins, variables and `others`."""
+        known = {*self._by_name, *self.variables, *self.arrays, *others}
+        matches = get_close_matches(name, sorted(known), n=1, cutoff=0.75)
+        return matches[0] if matches else None
+
+    def static_bind(self, name: str, n_positional: int, keyword_names: Sequence[str] = ()) -> list[Slot]:
+        """Where the value of each parameter comes from in a call of this shape.
+
+        Raises:
+            ScriptTypeError: the call does not fit the signature.
+        """
+        return static_bind(self._by_name[name], n_positional, keyword_names)
+
+    def bind(
+        self, name: str, args: Sequence[Any], kwargs: Mapping[str, Any] | None = None
+    ) -> tuple[Any, ...]:
+        """The arguments in the order of the signature, defaults filled in.
+
+        Raises:
+            ScriptRuntimeError: the call does not fit the signature.
+        """
+        kwargs = kwargs or {}
+        try:
+            slots = static_bind(self._by_name[name], len(args), tuple(kwargs))
+        except ScriptTypeError as error:
+            raise ScriptRuntimeError(error.log_text, hint=error.hint) from None
+        return tuple(_value(slot, args, kwargs) for slot in slots)
+
+    def check(self, builtin: Builtin, args: Sequence[Any]) -> None:
+        """Check bound arguments against the types, ranges and finiteness the table asks for.
+
+        Raises:
+            ScriptRuntimeError: with the controller's text where it is known.
+        """
+        self._checks[builtin.name](args)
+
+
+def _value(slot: Slot, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+    if slot[0] == "arg":
+        return args[slot[1]]
+    return kwargs[slot[1]] if slot[0] == "kw" else slot[1]
+
+
+@lru_cache(maxsize=32)
+def _view(version: Version, extra: frozenset[str]) -> Catalogue:
+    return Catalogue(version, extra=sorted(extra))
+
+
+def catalogue_for(version: str | Sequence[int], extra: Iterable[str] = ()) -> Catalogue:
+    """The catalogue of a software version.
+
+    Args:
+        version: "3.15", "5.11.4", or a version tuple.
+        extra: names to accept beside those of the version, e.g. `["set_tool_communication"]` for a program that
+            was exported on an e-Series.
+
+    Raises:
+        ValueError: for a version of no known generation, or an extra name in no table.
+    """
+    return _view(Version.of(version), frozenset(extra))
+
+
+CB3_3_15 = catalogue_for("3.15")

@@ -1,0 +1,519 @@
+"""Builtins of the manual's module "motion": moves, servoing, force and freedrive modes, conveyors, path offset.
+
+Defaults: script manual CB3 3.15.4, module motion, and its variables `a_joint_default` and so on.
+"""
+
+from __future__ import annotations
+
+from urscript.values import Pose
+
+from .chapter import DRIVER_SCRIPT, FIELD_USE, MANUAL_LATE, Chapter
+from .types import Builtin, ModuleVariable, Param, ParamType, Support, TimeClass
+from .versions import LATE_E_SERIES, NOT_CB3, Generation, releases
+
+_row = Chapter("motion").row
+
+BOOL, INT, NUMBER, STRING = ParamType.BOOL, ParamType.INT, ParamType.NUMBER, ParamType.STRING
+POSE, JOINTS, VECTOR6 = ParamType.POSE, ParamType.JOINTS, ParamType.VECTOR6
+POSE_OR_JOINTS, VECTOR3, ANY = ParamType.POSE_OR_JOINTS, ParamType.VECTOR3, ParamType.ANY
+MOTION, SWITCH = TimeClass.MOTION, TimeClass.SWITCH
+EXACT, APPROXIMATE = Support.EXACT, Support.APPROXIMATE
+
+A_JOINT_DEFAULT, V_JOINT_DEFAULT = 1.4, 1.05
+A_TOOL_DEFAULT, V_TOOL_DEFAULT = 1.2, 0.25
+
+_A_TOOL = Param("a", NUMBER, A_TOOL_DEFAULT, "m/s^2")
+_V_TOOL = Param("v", NUMBER, V_TOOL_DEFAULT, "m/s")
+_BLEND = Param("r", NUMBER, 0, "m")
+_A_ROTATION = Param("aRot", NUMBER, None, "rad/s^2", shown="a")
+_ENCODER = Param("encoder_index", INT, 0, "0 or 1", low=0, high=1)
+_ENCODER_REQUIRED = Param("encoder_index", INT, unit="0 or 1", low=0, high=1)
+_PIN_A = Param("A", INT, unit="digital input")
+_PIN_B = Param("B", INT, unit="digital input")
+_OFFSET_TYPE = Param("type", INT, unit="1 base, 2 TCP, 3 motion frame, 4 base inverted", low=1, high=4)
+
+
+def _servoj(t_default: float) -> tuple[Param, ...]:
+    return (
+        Param("q", JOINTS, unit="rad"),
+        # Printed without default, but ignored, and left out by callers that name the other arguments.
+        Param("a", NUMBER, 0, "not used"),
+        Param("v", NUMBER, 0, "not used"),
+        Param("t", NUMBER, t_default, "s"),
+        Param("lookahead_time", NUMBER, 0.1, "s, 0.03 to 0.2"),
+        Param("gain", NUMBER, 300, "100 to 2000"),
+    )
+
+
+_MOVES: tuple[Builtin, ...] = (
+    _row(
+        "movej",
+        (
+            Param("q", POSE_OR_JOINTS, unit="rad, or pose in m and rad"),
+            Param("a", NUMBER, A_JOINT_DEFAULT, "rad/s^2"),
+            Param("v", NUMBER, V_JOINT_DEFAULT, "rad/s"),
+            Param("t", NUMBER, 0, "s"),
+            _BLEND,
+        ),
+        "None",
+        "joint-linear move; a pose goes through inverse kinematics; t > 0 overrides a and v",
+        time=MOTION,
+        support=EXACT,
+    ),
+    _row(
+        "movel",
+        (
+            Param("pose", POSE_OR_JOINTS, unit="m, rad, or joint positions in rad"),
+            _A_TOOL,
+            _V_TOOL,
+            Param("t", NUMBER, 0, "s"),
+            _BLEND,
+        ),
+        "None",
+        "move with the tool on a straight line; joint positions go through forward kinematics",
+        time=MOTION,
+    ),
+    _row(
+        "movep",
+        (Param("pose", POSE_OR_JOINTS, unit="m, rad"), _A_TOOL, _V_TOOL, _BLEND),
+        "None",
+        "process move: lines with circular blends at constant tool speed",
+        time=MOTION,
+    ),
+    _row(
+        "movec",
+        (
+            Param("pose_via", POSE_OR_JOINTS, unit="m, rad"),
+            Param("pose_to", POSE_OR_JOINTS, unit="m, rad"),
+            _A_TOOL,
+            _V_TOOL,
+            _BLEND,
+            Param("mode", INT, 0, "0 unconstrained, 1 fixed orientation", low=0, high=1),
+        ),
+        "None",
+        "move on the arc through a via point; the rotation of the via point is ignored",
+        time=MOTION,
+    ),
+    _row(
+        "servoj",
+        _servoj(0.008),
+        "None",
+        "servo the joints towards q for the time t",
+        time=MOTION,
+        until=releases(None, "5.21"),
+        since=releases("3.0", "5.0"),
+    ),
+    _row(
+        "servoj",
+        _servoj(0.002),
+        "None",
+        "servo the joints towards q for the time t",
+        time=MOTION,
+        since=LATE_E_SERIES,
+        source=MANUAL_LATE,
+    ),
+    _row(
+        "servoc",
+        (Param("pose", POSE_OR_JOINTS, unit="m, rad"), _A_TOOL, _V_TOOL, _BLEND),
+        "None",
+        "circular servo to a tool pose",
+        time=MOTION,
+        undocumented=(Generation.CB3, Generation.E_SERIES),
+        source=FIELD_USE,
+    ),
+    _row(
+        "speedj",
+        (
+            Param("qd", JOINTS, unit="rad/s"),
+            Param("a", NUMBER, unit="rad/s^2"),
+            Param("t", NUMBER, None, "s", shown="until the speed is reached"),
+        ),
+        "None",
+        "accelerate the joints linearly to qd (a of the leading axis), then keep it",
+        time=MOTION,
+        support=APPROXIMATE,
+        note="what happens when the program goes on without a further motion command is not documented",
+    ),
+    _row(
+        "speedl",
+        (
+            Param("xd", VECTOR6, unit="m/s, rad/s"),
+            Param("a", NUMBER, unit="m/s^2"),
+            Param("t", NUMBER, None, "s", shown="until the speed is reached"),
+            _A_ROTATION,
+        ),
+        "None",
+        "accelerate the tool linearly to the spatial velocity xd in the base frame, then keep it",
+        time=MOTION,
+    ),
+    _row(
+        "stopj",
+        (Param("a", NUMBER, unit="rad/s^2"),),
+        "None",
+        "decelerate all joints to rest, a of the leading axis",
+        time=MOTION,
+        support=EXACT,
+    ),
+    _row(
+        "stopl",
+        (Param("a", NUMBER, unit="m/s^2"), _A_ROTATION),
+        "None",
+        "decelerate the tool to rest",
+        time=MOTION,
+    ),
+    _row("set_pos", (Param("q", JOINTS, unit="rad"),), "None", "put the simulated robot at q"),
+    _row(
+        "reset_revolution_counter",
+        (Param("qNear", JOINTS, None, "rad", shown="the present turns"),),
+        "None",
+        "renumber the turns of joints without position limit; nothing moves",
+    ),
+    _row(
+        "pause_on_error_code",
+        (Param("code", INT, unit="x of CxAy"), Param("argument", INT, None, "y of CxAy", shown="any")),
+        "None",
+        "pause the program when that error occurs; forgotten at program stop",
+    ),
+    _row(
+        "position_deviation_warning",
+        (
+            Param("enabled", BOOL),
+            Param("threshold", NUMBER, 0.8, "fraction of the stop limit", low=0, high=1),
+        ),
+        "None",
+        "warn in the log when the joints deviate this much from the path",
+    ),
+    _row(
+        "set_safety_mode_transition_hardness",
+        (Param("type", INT, unit="0 hard, 1 soft", low=0, high=1),),
+        "None",
+        "how hard the transition into reduced mode and safeguard stop is",
+    ),
+)
+
+_FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
+    _row(
+        "force_mode",
+        (
+            Param("task_frame", POSE, unit="m, rad"),
+            Param("selection_vector", JOINTS, unit="0 stiff, 1 compliant"),
+            Param("wrench", VECTOR6, unit="N, Nm"),
+            Param("type", INT, unit="1 toward origin, 2 as given, 3 along the motion", low=1, high=3),
+            Param("limits", JOINTS, unit="m/s and rad/s compliant, m and rad stiff"),
+        ),
+        "None",
+        "regulate the compliant axes of the task frame to a wrench",
+        time=SWITCH,
+    ),
+    _row("end_force_mode", (), "None", "back to position control", time=SWITCH),
+    _row(
+        "force_mode_set_damping",
+        (Param("damping", NUMBER, unit="0 to 1", low=0, high=1),),
+        "None",
+        "how fast force mode brakes when no force acts; 0 none",
+        since=releases("3.5", "5.0", "10.0"),
+    ),
+    _row(
+        "force_mode_set_gain_scaling",
+        (Param("scaling", NUMBER, unit="0 to 2", low=0, high=2),),
+        "None",
+        "scale the gain of the force loop",
+        since=releases("3.14", "5.0", "10.0"),
+        undocumented=(Generation.CB3,),
+        source=f"Script Manual e-Series 5.11, module motion; CB3: {DRIVER_SCRIPT}",
+    ),
+    _row(
+        "freedrive_mode",
+        (),
+        "None",
+        "hand guiding",
+        time=SWITCH,
+        since=releases("3.0", "5.0"),
+        until=releases(None, "5.10"),
+    ),
+    _row(
+        "freedrive_mode",
+        (
+            Param("freeAxes", JOINTS, [1, 1, 1, 1, 1, 1], "1 free, 0 blocked"),
+            Param("feature", ANY, Pose(0, 0, 0, 0, 0, 0), 'pose, "base" or "tool"'),
+        ),
+        "None",
+        "hand guiding along the free axes of a feature",
+        time=SWITCH,
+        since=releases(None, "5.10", "10.0"),
+    ),
+    _row(
+        "freedrive_mode_no_incorrect_payload_check",
+        (),
+        "None",
+        "hand guiding without the check of the payload",
+        time=SWITCH,
+        since=releases("3.0", "5.21", "10.0"),
+        source="URScript API Reference CB3 3.15.4, module motion; later e-Series directories",
+    ),
+    _row("end_freedrive_mode", (), "None", "back to position control", time=SWITCH),
+    _row(
+        "get_freedrive_status",
+        (),
+        "int",
+        "0 normal, 1 near, 2 too close to a singularity",
+        since=releases(None, "5.10", "10.0"),
+    ),
+    _row("teach_mode", (), "None", "old name of freedrive_mode", time=SWITCH, deprecated=True),
+    _row("end_teach_mode", (), "None", "old name of end_freedrive_mode", time=SWITCH, deprecated=True),
+    _row(
+        "screw_driving",
+        (Param("f", NUMBER, unit="N"), Param("v_limit", NUMBER, unit="m/s")),
+        "None",
+        "follow a screw along the tool's Z axis",
+        time=SWITCH,
+        since=NOT_CB3,
+    ),
+    _row("end_screw_driving", (), "None", "leave screw driving", time=SWITCH, since=NOT_CB3),
+)
+
+_PATH_OFFSET: tuple[Builtin, ...] = (
+    _row("path_offset_enable", (), "None", "superimpose an offset on all motion", since=NOT_CB3),
+    _row(
+        "path_offset_disable",
+        (Param("a", NUMBER, 20, "rad/s^2"),),
+        "None",
+        "stop superimposing; the joints stop with a",
+        time=MOTION,
+        since=NOT_CB3,
+    ),
+    _row(
+        "path_offset_set",
+        (Param("offset", VECTOR6, unit="m, rad"), _OFFSET_TYPE),
+        "None",
+        "the offset to superimpose",
+        since=NOT_CB3,
+    ),
+    _row("path_offset_get", (_OFFSET_TYPE,), "pose m, rad", "the offset in force", since=NOT_CB3),
+    _row(
+        "path_offset_set_alpha_filter",
+        (Param("alpha", NUMBER, unit="0 to 1", low=0, high=1),),
+        "None",
+        "smooth the offset by an exponentially weighted average",
+        since=NOT_CB3,
+    ),
+    _row(
+        "path_offset_set_max_offset",
+        (Param("transLimit", NUMBER, unit="m"), Param("rotLimit", NUMBER, unit="rad")),
+        "None",
+        "largest offset allowed, 0.1 m and 0.52 rad unless set",
+        since=NOT_CB3,
+    ),
+)
+
+_CONVEYORS: tuple[Builtin, ...] = (
+    _row(
+        "encoder_enable_pulse_decode",
+        (
+            _ENCODER_REQUIRED,
+            Param(
+                "decoder_type",
+                INT,
+                unit="0 off, 1 quadrature, 2 edges of A, 3 rising, 4 falling",
+                low=0,
+                high=4,
+            ),
+            _PIN_A,
+            _PIN_B,
+        ),
+        "None",
+        "count the pulses of a conveyor encoder on two digital inputs",
+    ),
+    _row(
+        "encoder_enable_set_tick_count",
+        (_ENCODER_REQUIRED, Param("range_id", INT, unit="0 int32, 1 u8, 2 u16, 3 u24, 4 u32", low=0, high=4)),
+        "None",
+        "let the program feed the encoder",
+    ),
+    _row(
+        "encoder_set_tick_count",
+        (_ENCODER_REQUIRED, Param("count", NUMBER, unit="ticks")),
+        "None",
+        "feed the encoder",
+    ),
+    _row(
+        "encoder_get_tick_count",
+        (_ENCODER_REQUIRED,),
+        "float ticks",
+        "the filtered count",
+        since=releases("3.0", "5.0"),
+        until=releases(None, "5.21"),
+    ),
+    _row(
+        "encoder_get_tick_count",
+        (_ENCODER_REQUIRED, Param("opt", STRING, "", 'empty or "raw"')),
+        "float ticks, int32 when raw",
+        "the filtered or the raw count",
+        since=LATE_E_SERIES,
+        source=MANUAL_LATE,
+    ),
+    _row(
+        "encoder_unwind_delta_tick_count",
+        (_ENCODER_REQUIRED, Param("delta_tick_count", NUMBER, unit="ticks")),
+        "float ticks, None for an encoder that is not enabled",
+        "remove the wrap from a difference of counts",
+    ),
+    _row(
+        "track_conveyor_linear",
+        (
+            Param("direction", POSE, unit="direction in base"),
+            Param("ticks_per_meter", NUMBER, unit="1/m"),
+            _ENCODER,
+        ),
+        "None",
+        "let the following moves ride on a linear conveyor",
+    ),
+    _row(
+        "track_conveyor_circular",
+        (
+            Param("center", POSE, unit="m, rad"),
+            Param("ticks_per_revolution", NUMBER, unit="ticks"),
+            Param("rotate_tool", BOOL, False),
+            _ENCODER,
+        ),
+        "None",
+        "let the following moves ride on a turning conveyor",
+    ),
+    _row(
+        "stop_conveyor_tracking",
+        (Param("a", NUMBER, 20, "rad/s^2"),),
+        "None",
+        "stop tracking and bring the joints to rest",
+        time=MOTION,
+    ),
+    _row("get_target_tcp_pose_along_path", (), "pose m, rad", "target without conveyor and path offset"),
+    _row(
+        "get_target_tcp_speed_along_path",
+        (),
+        "six-vector m/s, rad/s",
+        "speed without conveyor and path offset",
+    ),
+    _row(
+        "conveyor_pulse_decode",
+        (Param("type", INT, unit="0 off, 1 quadrature, 2 to 4 single", low=0, high=4), _PIN_A, _PIN_B),
+        "None",
+        "old form of encoder_enable_pulse_decode",
+        deprecated=True,
+    ),
+    _row("get_conveyor_tick_count", (), "float ticks", "old form of encoder_get_tick_count", deprecated=True),
+    _row(
+        "set_conveyor_tick_count",
+        (
+            Param("tick_count", NUMBER, unit="ticks"),
+            Param("absolute_encoder_resolution", INT, 0, "range, 0 to 4"),
+        ),
+        "None",
+        "old form of encoder_set_tick_count",
+        deprecated=True,
+    ),
+)
+
+_LATER: tuple[Builtin, ...] = tuple(
+    _row(
+        name,
+        (
+            Param("goal", ANY, unit="joints, pose, struct or frame name"),
+            Param("a", NUMBER, 0.3, "fraction", low=0, high=1),
+            Param("v", NUMBER, 0.3, "fraction", low=0, high=1),
+            _BLEND,
+        ),
+        "None",
+        summary,
+        time=MOTION,
+        since=releases(None, "5.21", "10.8"),
+        source=MANUAL_LATE,
+    )
+    for name, summary in (
+        ("optimovej", "jerk-limited joint move"),
+        ("optimovel", "jerk-limited straight tool move"),
+    )
+) + (
+    _row(
+        "motion_version_set",
+        (Param("version", INT, unit="1 or 2", low=1, high=2),),
+        "None",
+        "choose the planner of movej and movel",
+        since=LATE_E_SERIES,
+        source=MANUAL_LATE,
+    ),
+    _row("motion_version_get", (), "int", "the planner in force", since=LATE_E_SERIES, source=MANUAL_LATE),
+    _row(
+        "jerk_gain_scaling_set",
+        (Param("gain", NUMBER, unit="0.01 to 1", low=0.01, high=1),),
+        "None",
+        "scale the jerk limits",
+        since=LATE_E_SERIES,
+        source=MANUAL_LATE,
+    ),
+    _row("jerk_gain_scaling_get", (), "float", "the scale in force", since=LATE_E_SERIES, source=MANUAL_LATE),
+    _row(
+        "direct_torque",
+        (Param("torques", JOINTS, unit="Nm"), Param("friction_comp", BOOL, True)),
+        "None",
+        "one cycle of joint torque beside gravity compensation",
+        time=MOTION,
+        since=releases(None, "5.23", "10.11"),
+        until=releases(None, "5.25", None),
+        source=MANUAL_LATE,
+    ),
+    _row(
+        "direct_torque",
+        (
+            Param("torques", JOINTS, unit="Nm"),
+            Param("friction_comp", BOOL, True),
+            Param("viscous_scale", JOINTS, None, "factors", shown="1 for each joint"),
+            Param("coulomb_scale", JOINTS, None, "factors", shown="1 for each joint"),
+        ),
+        "None",
+        "one cycle of joint torque beside gravity compensation",
+        time=MOTION,
+        since=releases(None, "5.25"),
+        source=MANUAL_LATE,
+    ),
+    _row(
+        "tool_wrench_limit_set",
+        (
+            Param("frame_offset", POSE, unit="m, rad"),
+            *(Param(axis, NUMBER, unit="N") for axis in ("Fx", "Fy", "Fz")),
+            *(Param(axis, NUMBER, unit="Nm") for axis in ("Mx", "My", "Mz")),
+        ),
+        "None",
+        "limit the inertial wrench in a flange frame",
+        since=releases(None, "5.19", "10.0"),
+        source=MANUAL_LATE,
+    ),
+    _row(
+        "tool_wrench_limit_disable",
+        (),
+        "None",
+        "remove that limit",
+        since=releases(None, "5.19", "10.0"),
+        source=MANUAL_LATE,
+    ),
+    _row("force_mode_get_damping", (), "float", "damping in force", since=LATE_E_SERIES, source=MANUAL_LATE),
+    _row(
+        "force_mode_get_gain_scaling",
+        (),
+        "float",
+        "gain scaling in force",
+        since=LATE_E_SERIES,
+        source=MANUAL_LATE,
+    ),
+)
+
+ROWS: tuple[Builtin, ...] = _MOVES + _FORCE_AND_FREEDRIVE + _PATH_OFFSET + _CONVEYORS + _LATER
+
+VARIABLES: tuple[ModuleVariable, ...] = tuple(
+    ModuleVariable(name, value, unit, "motion", "URScript API Reference CB3 3.15.4, module motion, Variables")
+    for name, value, unit in (
+        ("a_joint_default", A_JOINT_DEFAULT, "rad/s^2"),
+        ("a_tool_default", A_TOOL_DEFAULT, "m/s^2"),
+        ("v_joint_default", V_JOINT_DEFAULT, "rad/s"),
+        ("v_tool_default", V_TOOL_DEFAULT, "m/s"),
+    )
+)

@@ -1,0 +1,194 @@
+"""The record kinds of the builtin catalogue: a builtin, its parameters, what it costs, how well it is modelled.
+
+Only declarations live here. Tables fill them (one module a chapter of the script manual), `binding` and
+`argument_checks` interpret them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from urscript.values import Pose, str_form
+
+from .versions import NEVER, Generation, PerGeneration, Version
+
+
+class TimeClass(Enum):
+    """What a call costs the calling thread.
+
+    Source: script manual, chapter "Thread scheduling" and the description of each function.
+    """
+
+    ZERO = "no physical time"
+    MOTION = "robot motion: the thread waits, physical time passes"
+    FRAMES = "uses up control cycles without moving the robot"
+    BLOCKING = "waits for something outside; other threads run on"
+    SWITCH = "switches the control mode and returns"
+
+
+class Support(Enum):
+    """How faithfully this box does what the controller does."""
+
+    EXACT = "exact"
+    APPROXIMATE = "approximate"
+    DECLARED_ONLY = "declared only"
+
+
+class ParamType(Enum):
+    """What an argument must be; the value is the phrase used in error messages."""
+
+    ANY = "any value"
+    BOOL = "True or False"
+    INT = "an integer"
+    NUMBER = "a number"
+    STRING = "a string"
+    POSE = "a Pose on the form p[x,y,z,a,b,c]"
+    JOINTS = "a list of 6 numbers"
+    POSE_OR_JOINTS = "a Pose on the form p[x,y,z,a,b,c] or a list of 6 joint positions"
+    VECTOR3 = "a list of 3 numbers"
+    VECTOR6 = "a list of 6 numbers or a Pose"
+    NUMBERS = "a list of numbers"
+    LIST = "a list"
+    MATRIX = "a matrix"
+    SIZED = "a list, a string or a Pose"
+    SHAPED = "a matrix, a list, a string or a Pose"
+    LIST_OR_MATRIX = "a matrix or a list of numbers"
+    POSE_OR_MATRIX = "a square matrix or a Pose"
+    NORMED = "a number, a list of numbers or a Pose"
+
+
+class _Required(Enum):
+    REQUIRED = "required"
+
+
+REQUIRED: Final = _Required.REQUIRED
+"""The default of a parameter that has none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Param:
+    """One parameter of a builtin.
+
+    Args:
+        name: as in keyword calls.
+        type: what the argument must be.
+        default: the value handed on when the argument is left out; None stands for "the controller fills it in"
+            (the active TCP, the present joint positions, another parameter's value), see `shown`.
+        unit: SI unit or the meaning of the codes.
+        low: smallest value allowed for a number, None for no bound.
+        high: largest value allowed.
+        choices: the only values allowed, empty for any.
+        shown: how the manual prints the default where `default` is None.
+    """
+
+    name: str
+    type: ParamType
+    default: object = REQUIRED
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[object, ...] = ()
+    shown: str = ""
+
+    @property
+    def is_required(self) -> bool:
+        """Whether a call must give it."""
+        return self.default is REQUIRED
+
+    def __str__(self) -> str:
+        if self.is_required:
+            return self.name
+        if self.default is None:
+            return f"{self.name}={self.shown or 'optional'}"
+        return f"{self.name}={default_text(self.default)}"
+
+
+def default_text(value: object) -> str:
+    """A default as the manual prints it."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str_form(value) if isinstance(value, (list, Pose)) else str(value)
+
+
+@dataclass(frozen=True, slots=True)
+class Builtin:
+    """One function that URScript programs can call.
+
+    Args:
+        name: URScript name.
+        params: in positional order.
+        returns: type and unit of the result, "None" where there is none.
+        time: what a call costs the thread.
+        module: chapter of the script manual.
+        since: first release of each generation that knows this form.
+        until: first release that no longer has this form.
+        support: how well this box models it.
+        summary: one line.
+        source: the document or observation the row rests on.
+        undocumented: generations whose controllers know the name although their manual does not list it.
+        deprecated: the manual advises a successor.
+        nan_ok: not-a-number and infinity do no harm as arguments (sums, texts, registers); otherwise they are errors.
+        note: why the support is not exact.
+    """
+
+    name: str
+    params: tuple[Param, ...]
+    returns: str
+    time: TimeClass
+    module: str
+    since: PerGeneration
+    until: PerGeneration = NEVER
+    support: Support = Support.DECLARED_ONLY
+    summary: str = ""
+    source: str = ""
+    undocumented: frozenset[Generation] = frozenset()
+    deprecated: bool = False
+    nan_ok: bool = False
+    note: str = ""
+
+    @property
+    def signature(self) -> str:
+        """As the manual heads its section, e.g. `movej(q, a=1.4, v=1.05, t=0, r=0)`."""
+        return f"{self.name}({', '.join(map(str, self.params))})"
+
+    @property
+    def may_wait(self) -> bool:
+        """Whether a call can take time, so that the host offers it as a generator function."""
+        return self.time in (TimeClass.MOTION, TimeClass.FRAMES, TimeClass.BLOCKING)
+
+    def is_in(self, version: Version) -> bool:
+        """Whether software of this version knows the function in this form."""
+        first = self.since.get(version.generation)
+        last = self.until.get(version.generation)
+        return first is not None and first <= version and (last is None or version < last)
+
+    def is_documented_in(self, version: Version) -> bool:
+        """Whether the script manual of that generation lists it."""
+        return self.is_in(version) and version.generation not in self.undocumented
+
+
+@dataclass(frozen=True, slots=True)
+class ModuleVariable:
+    """A constant that programs can read by name, e.g. `a_joint_default`."""
+
+    name: str
+    value: float
+    unit: str
+    module: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltinArray:
+    """An indexable builtin name: reading `name[n]` calls the getter, assigning calls the setter.
+
+    Source: field use of `digital_out[2]=True` as a one-line program by an early Python client; undocumented.
+    """
+
+    name: str
+    size: int
+    getter: str
+    setter: str | None
+    source: str
