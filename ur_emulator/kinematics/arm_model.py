@@ -1,0 +1,225 @@
+"""ArmModel: forward, differential and inverse kinematics of one calibrated arm.
+
+This is what the controller itself computes poses with, so it must know the calibration and nothing of the
+physics: no friction, no gear ripple, no contact. The chain is evaluated by MuJoCo's kinematic stages on a
+model without any of that, which takes about two microseconds; the rest is plain floats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, isfinite, pi, sin, sqrt
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from protocol.pose import Pose, pose_inv, pose_trans, rotvec_from_flat, rotvec_to_flat
+from ur_emulator.errors import KinematicsError
+from ur_emulator.kinematics.closed_form import closed_form_inverse
+from ur_emulator.models.calibration import NOMINAL, Calibration, calibrated_dh
+from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
+from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6
+
+_POSITION_TOLERANCE = 1e-11  # m and rad; the promise to callers is ten times wider
+_MAX_ITERATIONS = 20
+_NEAR = 0.3  # rad; a Newton result this close to its start cannot belong to another branch
+_LONGEST_STEP = 0.5  # rad; keeps Newton's method from flying off near singularities
+
+
+class ArmModel:
+    """Kinematics of one arm; poses are `[x y z rx ry rz]` in the base frame, metres and rotation vector.
+
+    Not to be shared between threads: evaluation uses one scratch state.
+
+    Args:
+        robot: type of the arm.
+        calibration: differences of this very arm; NOMINAL for the table's arm.
+
+    `tcp` in all methods: pose of the tool centre point in the flange frame; None for the flange itself.
+    """
+
+    def __init__(self, robot: RobotModel, calibration: Calibration = NOMINAL) -> None:
+        self.robot = robot
+        self.calibration = calibration
+        self._model = arm_spec(robot, calibrated_dh(robot, calibration), (1.0,) * 6).compile()
+        self._data = mujoco.MjData(self._model)
+        data = self._data
+        self._flange_link: int = self._model.body(LINKS[5]).id
+        elbow_link: int = self._model.joint(JOINTS[2]).bodyid[0]
+        root: int = self._model.body(LINKS[0]).id
+        # Views into MuJoCo's memory: one attribute lookup each, once.
+        site: int = self._model.site(FLANGE).id
+        self._qpos = data.qpos
+        self._qvel = data.qvel
+        self._flange_position = data.site_xpos[site]
+        self._flange_rotation = data.site_xmat[site]
+        self._elbow_position = data.xpos[elbow_link]
+        self._flange_motion = data.cvel[self._flange_link]
+        self._elbow_motion = data.cvel[elbow_link]
+        self._centre = data.subtree_com[root]
+        self._tcp: Sequence[float] | None = None
+        self._tcp_offset: Vector3 = (0.0, 0.0, 0.0)
+        self._tcp_rotation: Sequence[float] = rotvec_to_flat(0.0, 0.0, 0.0)
+
+    def fk(self, q: Sequence[float], tcp: Pose | None = None) -> Pose:
+        """Forward kinematics: the pose of the tool centre point at joint angles q (6,) [rad]."""
+        self._qpos[:] = q
+        mujoco.mj_kinematics(self._model, self._data)
+        return self._tcp_pose(tcp)
+
+    def state(
+        self, q: Sequence[float], qd: Sequence[float], tcp: Pose | None = None
+    ) -> tuple[Pose, Vector6, Vector3, Vector3]:
+        """Evaluate everything a frame tells about the arm in space.
+
+        Args:
+            q: joint angles (6,) [rad].
+            qd: joint speeds (6,) [rad/s].
+            tcp: tool centre point in the flange frame.
+
+        Returns:
+            tcp_pose, tcp_speed (twist of the tool centre point in base axes, linear first [m/s, rad/s]),
+            elbow_position [m] and elbow_velocity [m/s], both in the base frame. The elbow is the origin of
+            the second DH frame, on the axis of joint 3.
+        """
+        model, data = self._model, self._data
+        self._qpos[:] = q
+        self._qvel[:] = qd
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        pose = self._tcp_pose(tcp)
+        # MuJoCo's cvel is (angular, linear) of the point of the body that passes the chain's centre of mass.
+        cx, cy, cz = self._centre.tolist()
+        wx, wy, wz, vx, vy, vz = self._flange_motion.tolist()
+        rx, ry, rz = pose[0] - cx, pose[1] - cy, pose[2] - cz
+        speed = (vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx, wx, wy, wz)
+        ex, ey, ez = self._elbow_position.tolist()
+        wx, wy, wz, vx, vy, vz = self._elbow_motion.tolist()
+        rx, ry, rz = ex - cx, ey - cy, ez - cz
+        elbow_velocity = (vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx)
+        return pose, speed, (ex, ey, ez), elbow_velocity
+
+    def jacobian(self, q: Sequence[float], tcp: Pose | None = None) -> NDArray[np.float64]:
+        """Geometric Jacobian (6, 6) at q (6,) [rad]: twist of the tool centre point in base = J @ qd."""
+        self._qpos[:] = q
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        jacobian = np.empty((6, 6))
+        point = np.array(self._tcp_pose(tcp)[:3])
+        mujoco.mj_jac(self._model, self._data, jacobian[:3], jacobian[3:], point, self._flange_link)
+        return jacobian
+
+    def inverse(self, pose: Pose, q_near: Sequence[float], tcp: Pose | None = None) -> Vector6 | None:
+        """Inverse kinematics: the solution next to given joint angles.
+
+        Starts from `q_near` itself, which settles it along a path; else from the closed-form branches of the
+        nominal arm in the order of their distance.
+
+        Args:
+            pose: wanted pose of the tool centre point in the base frame.
+            q_near: joint angles (6,) [rad] to stay close to.
+            tcp: tool centre point in the flange frame.
+
+        Returns:
+            Joint angles within the joint ranges, pose error at most 1e-10 m and 1e-10 rad; None when the
+            pose cannot be reached.
+
+        Raises:
+            KinematicsError: when the pose is not six finite numbers.
+        """
+        if len(pose) != 6 or not all(isfinite(value) for value in pose):
+            raise KinematicsError(f"pose {list(pose)} given: six finite numbers are needed")
+        flange = pose if tcp is None else pose_trans(pose, pose_inv(tcp))
+        near = [float(angle) for angle in q_near]
+        rotation = rotvec_to_flat(*flange[3:])
+        found = self._refine(near, flange[:3], rotation)
+        if found is not None and max(map(_distance, found, near)) < _NEAR:
+            inside = self._into_range(found, near)
+            if inside is not None:
+                return inside
+        starts = [
+            start
+            for branch in closed_form_inverse(self.robot.dh, rotation, flange[:3], near[5])
+            if (start := self._into_range(branch, near)) is not None
+        ]
+        starts.sort(key=lambda start: sum((a - b) ** 2 for a, b in zip(start, near, strict=True)))
+        for start in starts:
+            found = self._refine(start, flange[:3], rotation)
+            if found is not None and (inside := self._into_range(found, near)) is not None:
+                return inside
+        return None
+
+    def _tcp_pose(self, tcp: Pose | None) -> Pose:
+        """Pose of the tool centre point for the kinematics evaluated last."""
+        x, y, z = self._flange_position.tolist()
+        r00, r01, r02, r10, r11, r12, r20, r21, r22 = self._flange_rotation.tolist()
+        if tcp is None:
+            rx, ry, rz = rotvec_from_flat(r00, r01, r02, r10, r11, r12, r20, r21, r22)
+            return (x, y, z, rx, ry, rz)
+        if tcp != self._tcp:
+            self._tcp = tuple(tcp)
+            self._tcp_offset = (tcp[0], tcp[1], tcp[2])
+            self._tcp_rotation = rotvec_to_flat(tcp[3], tcp[4], tcp[5])
+        ox, oy, oz = self._tcp_offset
+        t00, t01, t02, t10, t11, t12, t20, t21, t22 = self._tcp_rotation
+        rx, ry, rz = rotvec_from_flat(
+            r00 * t00 + r01 * t10 + r02 * t20,
+            r00 * t01 + r01 * t11 + r02 * t21,
+            r00 * t02 + r01 * t12 + r02 * t22,
+            r10 * t00 + r11 * t10 + r12 * t20,
+            r10 * t01 + r11 * t11 + r12 * t21,
+            r10 * t02 + r11 * t12 + r12 * t22,
+            r20 * t00 + r21 * t10 + r22 * t20,
+            r20 * t01 + r21 * t11 + r22 * t21,
+            r20 * t02 + r21 * t12 + r22 * t22,
+        )
+        return (
+            x + r00 * ox + r01 * oy + r02 * oz,
+            y + r10 * ox + r11 * oy + r12 * oz,
+            z + r20 * ox + r21 * oy + r22 * oz,
+            rx,
+            ry,
+            rz,
+        )
+
+    def _refine(
+        self, start: Sequence[float], position: Sequence[float], rotation: Sequence[float]
+    ) -> Vector6 | None:
+        """Newton's method on the calibrated arm, for a flange pose; None when it does not converge."""
+        q = np.array(start)
+        wanted = np.array(rotation).reshape(3, 3)
+        error = np.empty(6)
+        for _ in range(_MAX_ITERATIONS):
+            jacobian = self.jacobian(q)
+            error[:3] = position - self._flange_position
+            error[3:] = rotvec_from_flat(*(wanted @ self._flange_rotation.reshape(3, 3).T).ravel().tolist())
+            size = sqrt(float(error @ error))
+            if size < _POSITION_TOLERANCE:
+                a, b, c, d, e, f = q.tolist()
+                return (a, b, c, d, e, f)
+            # A whiff of damping: no effect on convergence away from singularities, finite steps at them.
+            step = np.linalg.solve(jacobian.T @ jacobian + 1e-12 * np.eye(6), jacobian.T @ error)
+            longest = float(np.abs(step).max())
+            q += step if longest < _LONGEST_STEP else step * (_LONGEST_STEP / longest)
+        return None
+
+    def _into_range(self, q: Sequence[float], near: Sequence[float]) -> Vector6 | None:
+        """Unwrap each angle to the turn next to `near` that lies in the joint's range."""
+        angles: list[float] = []
+        for angle, reference, low, high in zip(q, near, self.robot.q_min, self.robot.q_max, strict=True):
+            turned = angle + 2.0 * pi * round((reference - angle) / (2.0 * pi))
+            while turned > high:
+                turned -= 2.0 * pi
+            while turned < low:
+                turned += 2.0 * pi
+            if turned > high:
+                return None
+            angles.append(turned)
+        a, b, c, d, e, f = angles
+        return (a, b, c, d, e, f)
+
+
+def _distance(a: float, b: float) -> float:
+    return abs(a - b)
