@@ -1,0 +1,13 @@
+"""From recordings to figures of merit, Table I and the report.
+
+    track    the TCP path of one recording, reference and actual at the same time stamps
+    snr      the signal-to-noise ratio of the TCP velocity, Eq. 10, and its companions
+    metrics  lag, position errors, joint errors, noise floor
+    budget   where the rest of the signal-to-noise ratio is lost
+    run      all of these for one recording
+    table    Table I: ours beside the paper's
+    figures  the plots (the only module that loads matplotlib, and only when a plot is drawn)
+    report   one self-contained page from a folder of recordings
+
+Everything is computed from recordings alone; nothing here talks to a robot.
+"""

@@ -1,0 +1,115 @@
+"""The TCP path of one recording: reference and actual position at the same controller time stamps.
+
+Both go through the same operator, the first difference over the time between two frames, so that a perfect
+arm gives a perfect figure. Nothing here smooths or shifts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from pc_client.errors import RecordingError
+from pc_client.recording.layout import Phase
+from pc_client.recording.loader import Recording
+
+# Fewer samples than this are no movement: 80 ms at 125 Hz.
+MIN_MOVEMENT_ROWS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class TcpTrack:
+    """Positions of the tool centre point in the base frame.
+
+    Attributes:
+        t: (n,) controller time in s, strictly rising.
+        p_ref: (n, 3) reference position at these times, m.
+        p_actual: (n, 3) position that the robot reported at these times, m.
+        rows: index of each sample's row in the recording, (n,).
+        movement: samples first..last of the movement phase, as a slice.
+    """
+
+    t: NDArray[np.float64]
+    p_ref: NDArray[np.float64]
+    p_actual: NDArray[np.float64]
+    rows: NDArray[np.intp]
+    movement: slice
+
+    @property
+    def movement_steps(self) -> slice:
+        """The first differences that lie wholly inside the movement: step k is sample k to k + 1."""
+        return slice(self.movement.start, self.movement.stop - 1)
+
+    @property
+    def t_start(self) -> float:
+        """Time of the first sample of the movement, s."""
+        return float(self.t[self.movement.start])
+
+    @property
+    def t_end(self) -> float:
+        """Time of the last sample of the movement, s."""
+        return float(self.t[self.movement.stop - 1])
+
+
+def track_of(recording: Recording) -> TcpTrack:
+    """Take the TCP path out of a recording.
+
+    Rows that repeat a time stamp (a heartbeat of a standing controller) are left out.
+
+    Raises:
+        RecordingError: signals are missing, or the movement phase is too short to be judged.
+    """
+    t = recording.t
+    rows = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)
+    moving = np.flatnonzero(recording.rows_of(Phase.MOVEMENT)[rows])
+    if len(moving) < MIN_MOVEMENT_ROWS:
+        raise RecordingError(
+            f"{recording.path} has {len(moving)} samples of movement; at least {MIN_MOVEMENT_ROWS} are needed"
+        )
+    return TcpTrack(
+        t=t[rows],
+        p_ref=recording.column("ref_tcp_position")[rows],
+        p_actual=recording.column("actual_TCP_pose")[rows, :3],
+        rows=rows,
+        movement=slice(int(moving[0]), int(moving[-1]) + 1),
+    )
+
+
+def velocity(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """First differences of positions over time.
+
+    Args:
+        t: (n,) s.
+        p: (n, 3) m.
+
+    Returns:
+        (n - 1, 3) m/s; step k is from sample k to k + 1.
+    """
+    return np.diff(p, axis=0) / np.diff(t)[:, None]
+
+
+def speed(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Length of `velocity`, (n - 1,) m/s: the scalar TCP speed."""
+    length: NDArray[np.float64] = np.linalg.norm(velocity(t, p), axis=1)
+    return length
+
+
+class ShiftedReference:
+    """The reference path, delayed by any time: what an arm would do whose only fault is a lag.
+
+    The reference is shifted rather than the measurement, because it is smooth: interpolating it changes
+    nothing, while interpolating noisy positions would smooth them.
+    """
+
+    def __init__(self, track: TcpTrack) -> None:
+        self._t = track.t
+        self._spline = CubicSpline(track.t, track.p_ref)
+
+    def at(self, lag_s: float, samples: slice = slice(None)) -> NDArray[np.float64]:
+        """Return the reference position at `t - lag_s`, (n, 3) m; at rest before and after the recording."""
+        t = np.clip(self._t[samples] - lag_s, self._t[0], self._t[-1])
+        positions: NDArray[np.float64] = self._spline(t)
+        return positions
