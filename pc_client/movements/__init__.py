@@ -1,0 +1,52 @@
+"""Movements of the TCP: human-like (Sigma-Lognormal), robot-like (trapezoids) or brought along as samples.
+
+A `Movement` gives position and velocity at any time in closed form. This package knows no robot: no joints,
+no limits, no sockets.
+
+    lognormal, timing, stroke, sigma_lognormal   the human-like model, from one bell to a whole movement
+    path, robotic                                the robot-like model: geometry, and the law of speed
+    samples                                      (x, y, z, t) files
+    movement, files, description                 the `Movement`, its files and its figures
+    targets, generate, fit, geometry             new movements by a seed, and movements into a workspace
+
+Names are loaded when they are first asked for, so that importing the package costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pc_client.movements.description import describe as describe
+    from pc_client.movements.files import library_names as library_names
+    from pc_client.movements.files import load_movement as load_movement
+    from pc_client.movements.files import save_movement as save_movement
+    from pc_client.movements.fit import fit_movement as fit_movement
+    from pc_client.movements.generate import generate_library as generate_library
+    from pc_client.movements.generate import generate_movement as generate_movement
+    from pc_client.movements.generate import robotic_twin as robotic_twin
+    from pc_client.movements.movement import Movement as Movement
+    from pc_client.movements.movement import MovementSample as MovementSample
+    from pc_client.movements.movement import export_samples as export_samples
+
+_HOMES = {
+    "Movement": "movement",
+    "MovementSample": "movement",
+    "describe": "description",
+    "export_samples": "movement",
+    "fit_movement": "fit",
+    "generate_library": "generate",
+    "generate_movement": "generate",
+    "library_names": "files",
+    "load_movement": "files",
+    "robotic_twin": "generate",
+    "save_movement": "files",
+}
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

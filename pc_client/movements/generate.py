@@ -1,0 +1,177 @@
+"""New movements by a seed, and the ten of the library.
+
+Run as a program it writes the library's files again: `python -m pc_client.movements.generate [FOLDER]`. The
+same seed gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import sys
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.errors import MovementError
+from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_NAMES, save_movement
+from pc_client.movements.geometry import UR3_BOX, Box
+from pc_client.movements.movement import Movement
+from pc_client.movements.robotic import Corners, RoboticLaw
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.stroke import Stroke
+from pc_client.movements.targets import TargetRules, random_targets
+from pc_client.movements.timing import TwoSidedTiming
+
+__all__ = [
+    "HumanRules",
+    "RobotRules",
+    "generate_library",
+    "generate_movement",
+    "robotic_twin",
+    "write_library",
+]
+
+#: First seed of the library; its five pairs take this and the next four. Chosen once, never searched.
+LIBRARY_SEED = 1
+
+
+@dataclass(frozen=True, slots=True)
+class HumanRules:
+    """Ranges from which strokes are drawn evenly; (low, high) each.
+
+    Attributes:
+        reference_leg: distance (m) that is run in `reference_window`.
+        reference_window: window (s) of a stroke of that distance, both tails included; the visible part
+            between two least speeds is shorter by the overlap. Such a slow hand keeps a UR3 far from its
+            joint limits.
+        isochrony: window = reference_window (leg / reference_leg)^isochrony: people hardly need longer for
+            longer ways.
+        variability: factors on the window from stroke to stroke.
+        sigma: widths of the bells.
+        overlap: share of the shorter of two windows in which both strokes move.
+        turn: bending of the arcs, rad.
+        rest: time at rest before the first and after the last window, s.
+    """
+
+    reference_leg: float = 0.15
+    reference_window: float = 2.7
+    isochrony: float = 0.3
+    variability: tuple[float, float] = (0.92, 1.08)
+    sigma: tuple[float, float] = (0.10, 0.20)
+    overlap: tuple[float, float] = (0.35, 0.50)
+    turn: tuple[float, float] = (0.1, 0.6)
+    rest: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class RobotRules:
+    """The profile of robot-like movements: see `RoboticLaw`."""
+
+    ramps: tuple[float, ...] = (0.2, 0.1)
+    corners: Corners = "stop"
+    blend: float = 0.0
+
+
+def generate_movement(
+    kind: str,
+    n_targets: int,
+    seed: int,
+    *,
+    name: str | None = None,
+    box: Box = UR3_BOX,
+    margin: float = 0.015,
+    target_rules: TargetRules | None = None,
+    human_rules: HumanRules | None = None,
+    robot_rules: RobotRules | None = None,
+) -> Movement:
+    """A random movement; the two kinds of one seed are twins: same target points, same stroke durations.
+
+    Args:
+        kind: "lognormal" or "uniform".
+        n_targets: number of target points, at least 2.
+        seed: 0 or more; the same seed gives the same movement everywhere.
+        name: e.g. "lognorm_5_1"; made from kind, n_targets and seed if None.
+        box: where, base frame, m.
+        margin: how far (m) target points keep from the box's faces, so that arcs and cut corners stay inside.
+        target_rules: rules for the points; defaults if None.
+        human_rules: ranges of the strokes; defaults if None.
+        robot_rules: profile of a "uniform" movement; defaults if None.
+    """
+    if kind not in ("lognormal", "uniform"):
+        raise MovementError(f'kind "{kind}": give "lognormal" or "uniform"')
+    if seed < 0:
+        raise MovementError(f"seed {seed}: give a whole number, 0 or more")
+    source = random.Random(seed)
+    targets = random_targets(n_targets, box.shrunk(margin), source, target_rules)
+    law = _draw_strokes(targets, source, human_rules or HumanRules())
+    boundaries = np.concatenate(([0.0], np.round(law.speed_minima(), 3), [law.duration]))
+    durations = [round(duration, 3) for duration in np.diff(boundaries).tolist()]
+    provenance: dict[str, str | int | float] = {"generator": "pc_client.movements.generate", "seed": seed}
+    human = Movement(name or f"lognorm_{n_targets}_seed{seed}", law, np.array(durations), provenance)
+    if kind == "lognormal":
+        return human
+    return robotic_twin(human, name or f"uniform_{n_targets}_seed{seed}", robot_rules)
+
+
+def robotic_twin(movement: Movement, name: str, rules: RobotRules | None = None) -> Movement:
+    """The robot-like movement along the same target points with the same stroke durations.
+
+    Args:
+        movement: any movement with a stroke between each two target points.
+        name: the twin's.
+        rules: its profile; defaults if None.
+    """
+    rules = rules or RobotRules()
+    law = RoboticLaw(
+        movement.target_points, movement.stroke_durations, rules.ramps, rules.corners, rules.blend
+    )
+    return Movement(name, law, movement.stroke_durations, {**movement.provenance, "twin": movement.name})
+
+
+def generate_library(seed: int = LIBRARY_SEED) -> dict[str, Movement]:
+    """The ten movements by name, made afresh; with the default seed they are those of the package's files.
+
+    Args:
+        seed: of the first pair; the other four take the next four.
+    """
+    made: dict[str, Movement] = {}
+    for offset, number in enumerate(
+        name.removeprefix("lognorm_") for name in LIBRARY_NAMES if "lognorm" in name
+    ):
+        human = generate_movement("lognormal", int(number[0]), seed + offset, name=f"lognorm_{number}")
+        made[human.name] = human
+        made[f"uniform_{number}"] = robotic_twin(human, f"uniform_{number}")
+    return {name: made[name] for name in LIBRARY_NAMES}
+
+
+def write_library(folder: Path = LIBRARY_FOLDER, seed: int = LIBRARY_SEED) -> None:
+    """Write the ten files into a folder."""
+    for name, movement in generate_library(seed).items():
+        save_movement(movement, folder / f"{name}.toml")
+
+
+def _draw_strokes(targets: NDArray[np.float64], source: random.Random, rules: HumanRules) -> SigmaLognormal:
+    """Strokes between the targets, drawn from the rules; rounded to three decimals for readable files."""
+
+    def draw(low: float, high: float) -> float:
+        return round(low + (high - low) * source.random(), 3)
+
+    strokes: list[Stroke] = []
+    end, window_before = rules.rest, math.inf
+    for a, b in pairwise(targets):
+        ease = (math.dist(a, b) / rules.reference_leg) ** rules.isochrony
+        window = round(rules.reference_window * ease * draw(*rules.variability), 3)
+        overlap = draw(*rules.overlap) * min(window, window_before) if strokes else 0.0
+        start = round(end - overlap, 3)
+        timing = TwoSidedTiming(start, window, draw(*rules.sigma))
+        strokes.append(Stroke(timing, turn=draw(*rules.turn), tilt=draw(-math.pi, math.pi)))
+        end, window_before = start + window, window
+    return SigmaLognormal(targets, tuple(strokes), round(end + rules.rest, 3))
+
+
+if __name__ == "__main__":
+    write_library(Path(sys.argv[1]) if len(sys.argv) > 1 else LIBRARY_FOLDER)

@@ -1,0 +1,104 @@
+"""Boxes and similarity transforms of space: the little geometry that movements need."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pc_client.errors import MovementError
+
+__all__ = ["UR3_BOX", "Box", "Similarity", "read_only"]
+
+
+def read_only(values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
+    """A private float64 copy that nobody can write to."""
+    array = np.array(values, dtype=np.float64)
+    if shape is not None:
+        array = array.reshape(shape)
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """An axis-parallel box by its lowest and highest corner, m, in the robot's base frame."""
+
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        if not all(
+            math.isfinite(a) and math.isfinite(b) and a < b for a, b in zip(self.low, self.high, strict=True)
+        ):
+            raise MovementError(
+                f"box from {self.low} to {self.high} m: each low edge must lie below its high edge"
+            )
+
+    @property
+    def size(self) -> NDArray[np.float64]:
+        """Edge lengths, (3,), m."""
+        return np.subtract(self.high, self.low)
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """Midpoint, (3,), m."""
+        return 0.5 * np.add(self.high, self.low)
+
+    def shrunk(self, margin: float) -> Box:
+        """The box less a margin (m) on every side."""
+        return Box(
+            (self.low[0] + margin, self.low[1] + margin, self.low[2] + margin),
+            (self.high[0] - margin, self.high[1] - margin, self.high[2] - margin),
+        )
+
+    def contains(self, p: ArrayLike, tolerance: float = 0.0) -> bool:
+        """Whether all points p, (..., 3), m, lie inside, or outside by no more than the tolerance (m)."""
+        points = np.asarray(p, dtype=np.float64)
+        return bool(
+            np.all(points >= np.subtract(self.low, tolerance))
+            and np.all(points <= np.add(self.high, tolerance))
+        )
+
+
+#: Where a UR3 with the tool at RPY(0, 3/4 pi, 0) runs .35 m/s in every direction below its joint speed
+#: limits, in one branch of its inverse kinematics, clear of itself and of the table. Source: a search on a 25
+#: mm grid with the nominal kinematics.
+UR3_BOX = Box((0.275, -0.2, 0.15), (0.425, 0.2, 0.35))
+
+
+@dataclass(frozen=True, slots=True)
+class Similarity:
+    """p -> scale * R p + shift: moves, scales and rotates, and changes no angle and no ratio of lengths.
+
+    Attributes:
+        scale: > 0.
+        R: rotation, (3, 3).
+        shift: m, (3,).
+    """
+
+    scale: float
+    R: NDArray[np.float64]
+    shift: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "R", read_only(self.R, (3, 3)))
+        object.__setattr__(self, "shift", read_only(self.shift, (3,)))
+        if not (math.isfinite(self.scale) and self.scale > 0.0):
+            raise MovementError(f"scale {self.scale}: a movement is scaled by a number greater than 0")
+        if not np.allclose(self.R @ self.R.T, np.eye(3), atol=1e-9) or np.linalg.det(self.R) < 0.0:
+            raise MovementError(
+                "the rotation of a similarity must be a proper rotation matrix (orthonormal, determinant +1)"
+            )
+        if not np.all(np.isfinite(self.shift)):
+            raise MovementError(f"shift {self.shift.tolist()} m: give finite numbers")
+
+    def points(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3), m, where they go."""
+        return self.scale * p @ self.R.T + self.shift
+
+    def vectors(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Differences of points, velocities, accelerations (n, 3), where they go."""
+        return self.scale * v @ self.R.T

@@ -1,0 +1,183 @@
+"""`Movement`: a named path of the TCP in time, whatever law made it.
+
+This is what planning, running and analysis know of a movement. Files are read and written by `files.py`; new
+ones are made by `generate.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pc_client.errors import MovementError
+from pc_client.movements.geometry import Similarity, read_only
+from pc_client.movements.robotic import RoboticLaw
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.stroke import Motion
+
+__all__ = ["Kind", "Movement", "MovementLaw", "MovementSample", "SampleColumns", "export_samples"]
+
+#: Human-like, robot-like, or brought along as samples.
+Kind = Literal["lognormal", "uniform", "samples"]
+
+
+class MovementSample(NamedTuple):
+    """Position (m) and velocity (m/s) of the TCP in the base frame, each (n, 3)."""
+
+    p: NDArray[np.float64]
+    v: NDArray[np.float64]
+
+
+class SampleColumns(NamedTuple):
+    """A movement as columns, each (n,): time (s) and position (m)."""
+
+    t: NDArray[np.float64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    z: NDArray[np.float64]
+
+
+class MovementLaw(Protocol):
+    """What makes a movement: a closed form of position, velocity and acceleration in time."""
+
+    @property
+    def duration(self) -> float:
+        """Total time, s."""
+        ...
+
+    @property
+    def target_points(self) -> NDArray[np.float64]:
+        """(n, 3), m."""
+        ...
+
+    def evaluate(self, t: ArrayLike) -> Motion:
+        """Position, velocity and acceleration at the times t (n,), s."""
+        ...
+
+    def transformed(self, similarity: Similarity) -> MovementLaw:
+        """The same movement elsewhere."""
+        ...
+
+    def stretched(self, factor: float) -> MovementLaw:
+        """The same movement, slower."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Movement:
+    """A movement of the TCP from rest to rest; its orientation is fixed elsewhere.
+
+    Attributes:
+        name: as in tables and file names.
+        law: the closed form behind it.
+        stroke_durations: (n_strokes,), s: times between the least speeds of the movement; their sum is the
+            duration.
+        provenance: how it was made, as short facts; written into its file.
+    """
+
+    name: str
+    law: MovementLaw
+    stroke_durations: NDArray[np.float64]
+    provenance: Mapping[str, str | int | float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        durations = read_only(self.stroke_durations)
+        if not self.name:
+            raise MovementError("movement without a name: give it one")
+        if not (math.isfinite(self.duration) and self.duration > 0.0):
+            raise MovementError(
+                f"movement {self.name} with a duration of {self.duration} s: it must last longer than 0 s"
+            )
+        if durations.ndim != 1 or not len(durations) or not np.all(durations > 0.0):
+            raise MovementError(
+                f"movement {self.name} with stroke durations {durations.tolist()} s: give times above 0 s"
+            )
+        if abs(math.fsum(durations) - self.duration) > 1e-6:
+            raise MovementError(
+                f"movement {self.name}: stroke durations add up to {math.fsum(durations):.6f} s, "
+                f"but it lasts {self.duration:.6f} s; they must be equal"
+            )
+        object.__setattr__(self, "stroke_durations", durations)
+        object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
+
+    @property
+    def kind(self) -> Kind:
+        """Human-like, robot-like or samples."""
+        if isinstance(self.law, SigmaLognormal):
+            return "lognormal"
+        return "uniform" if isinstance(self.law, RoboticLaw) else "samples"
+
+    @property
+    def duration(self) -> float:
+        """Total time, s; the movement begins at 0."""
+        return self.law.duration
+
+    @property
+    def target_points(self) -> NDArray[np.float64]:
+        """Target points, (n, 3), m. Inner ones of a human-like movement are aimed at, not reached."""
+        return self.law.target_points
+
+    def motion(self, t: ArrayLike) -> Motion:
+        """Position, velocity and acceleration at the times t, s; each (n, 3).
+
+        Before 0 and after `duration` the TCP rests at the begin and the end.
+        """
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        if not np.all(np.isfinite(times)):
+            raise MovementError(f"movement {self.name} sampled at a time that is not finite")
+        motion = self.law.evaluate(np.clip(times, 0.0, self.duration))
+        moving = ((times >= 0.0) & (times <= self.duration))[:, None]
+        return Motion(motion.p, np.where(moving, motion.v, 0.0), np.where(moving, motion.a, 0.0))
+
+    def sample(self, t: ArrayLike) -> MovementSample:
+        """Position (m) and velocity (m/s) at the times t, s, a number or (n,); each (n, 3).
+
+        Before 0 and after `duration` the TCP rests at the begin and the end.
+        """
+        motion = self.motion(t)
+        return MovementSample(motion.p, motion.v)
+
+    def speed(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Speed of the TCP at the times t, m/s, (n,)."""
+        velocity = self.motion(t).v
+        speed: NDArray[np.float64] = np.linalg.norm(velocity, axis=1)
+        return speed
+
+    def transformed(self, similarity: Similarity) -> Movement:
+        """Moved, scaled and rotated; the time is untouched, so the shape of the speed is too."""
+        return Movement(self.name, self.law.transformed(similarity), self.stroke_durations, self.provenance)
+
+    def stretched(self, factor: float) -> Movement:
+        """`factor` times as slow on the same path (the theory's own scaling of time): speeds / factor."""
+        if not (math.isfinite(factor) and factor > 0.0):
+            raise MovementError(f"time stretch of {factor}: give a number greater than 0")
+        return Movement(
+            self.name, self.law.stretched(factor), self.stroke_durations * factor, self.provenance
+        )
+
+    def renamed(self, name: str) -> Movement:
+        """The same movement under another name."""
+        return Movement(name, self.law, self.stroke_durations, self.provenance)
+
+
+def export_samples(movement: Movement, dt: float) -> SampleColumns:
+    """The movement as columns t, x, y, z at 0, dt, 2 dt ... and at its end.
+
+    Args:
+        movement: what to sample.
+        dt: sampling time, s, > 0.
+    """
+    if not (math.isfinite(dt) and dt > 0.0):
+        raise MovementError(f"sampling time of {dt} s: give a number greater than 0")
+    if movement.duration / dt > 1e7:
+        raise MovementError(f"sampling time of {dt} s gives more than 10 million samples: give a longer one")
+    t = dt * np.arange(math.floor(movement.duration / dt + 1e-9) + 1, dtype=np.float64)
+    t = np.append(t[t < movement.duration - 1e-9 * dt], movement.duration)
+    x, y, z = movement.sample(t).p.T
+    return SampleColumns(t, x, y, z)
