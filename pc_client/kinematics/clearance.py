@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
@@ -24,20 +23,27 @@ Array = NDArray[np.float64]
 _FIRST_LINK_ABOVE_FLOOR = 2
 
 
+class Nearest(NamedTuple):
+    """What came near: its name for people, and the joint 0..5 that carries it (the outer of two links)."""
+
+    name: str
+    joint: int
+
+
 class Clearance(NamedTuple):
     """Distances along a joint path; negative when bodies overlap.
 
     Attributes:
         floor: (n,) lowest point of upper arm, forearm and wrists above the base plane [m].
-        floor_link: (n,) names of the links that come lowest.
+        floor_nearest: (n,) the link that comes lowest.
         own: (n,) smallest distance between links that are not neighbours [m].
-        own_links: (n,) names of those two links, `a and b`.
+        own_nearest: (n,) the two links that come closest.
     """
 
     floor: Array
-    floor_link: tuple[str, ...]
+    floor_nearest: tuple[Nearest, ...]
     own: Array
-    own_links: tuple[str, ...]
+    own_nearest: tuple[Nearest, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +55,8 @@ class ClearanceModel:
     _own_data: Any = field(repr=False)
     _floor_pairs: Any = field(repr=False)
     _floor_data: Any = field(repr=False)
-    _own_names: tuple[str, ...] = field(repr=False)
-    _floor_names: tuple[str, ...] = field(repr=False)
+    _own_names: tuple[Nearest, ...] = field(repr=False)
+    _floor_names: tuple[Nearest, ...] = field(repr=False)
 
     def along(self, q: ArrayLike) -> Clearance:
         """Measure the clearance at each posture of a joint path.
@@ -63,16 +69,16 @@ class ClearanceModel:
         """
         path = np.atleast_2d(np.asarray(q, dtype=np.float64))
         own, floor = np.empty(len(path)), np.empty(len(path))
-        own_links, floor_links = [], []
+        own_nearest, floor_nearest = [], []
         model, data = self.robot.pin_model, self.robot.pin_data
         for k, q_k in enumerate(path):
             nearest = pin.computeDistances(model, data, self._own_pairs, self._own_data, q_k)
             own[k] = self._own_data.distanceResults[nearest].min_distance
-            own_links.append(self._own_names[nearest])
+            own_nearest.append(self._own_names[nearest])
             lowest = pin.computeDistances(model, data, self._floor_pairs, self._floor_data, q_k)
             floor[k] = self._floor_data.distanceResults[lowest].min_distance
-            floor_links.append(self._floor_names[lowest])
-        return Clearance(floor, tuple(floor_links), own, tuple(own_links))
+            floor_nearest.append(self._floor_names[lowest])
+        return Clearance(floor, tuple(floor_nearest), own, tuple(own_nearest))
 
 
 def clearance_model(robot: RobotModel) -> ClearanceModel:
@@ -88,29 +94,33 @@ def clearance_model(robot: RobotModel) -> ClearanceModel:
         own_pairs.createData(),
         floor_pairs,
         floor_pairs.createData(),
-        tuple(f"{_link(own_pairs, p.first)} and {_link(own_pairs, p.second)}" for p in own_pairs.collisionPairs),
-        tuple(_link(floor_pairs, p.second) for p in floor_pairs.collisionPairs),
+        tuple(_nearest(own_pairs, pair.first, pair.second) for pair in own_pairs.collisionPairs),
+        tuple(_nearest(floor_pairs, pair.second) for pair in floor_pairs.collisionPairs),
     )
 
 
 @lru_cache(maxsize=4)
 def _load_hulls(urdf: str) -> tuple[Any, Any]:
-    """Read the meshes of a URDF: link-against-link pairs, and floor-against-link pairs (shared, unchanged)."""
+    """Read the meshes of a URDF: link-against-link and floor-against-link pairs (shared, never changed)."""
     model, T_base_root = load_pinocchio_model(urdf)
     meshes = pin.buildGeomFromUrdf(
         model, str(find_robot_file(urdf)), pin.GeometryType.COLLISION, package_dirs=[str(find_share_folder())]
     )
     own_pairs, floor_pairs = pin.GeometryModel(), pin.GeometryModel()
     floor_pairs.addGeometryObject(
-        pin.GeometryObject("floor", 0, 0, pin.SE3.Identity(), coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0))
+        pin.GeometryObject(
+            "floor", 0, 0, pin.SE3.Identity(), pin.coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        )
     )
     for mesh in meshes.geometryObjects:
-        if not isinstance(mesh.geometry, coal.BVHModelBase):
+        if not isinstance(mesh.geometry, pin.coal.BVHModelBase):
             continue  # ee_link carries a token box, not a part of the arm
         mesh.geometry.buildConvexRepresentation(False)
         if mesh.parentJoint == 0:
             mesh.placement = T_base_root * mesh.placement
-        hull = pin.GeometryObject(mesh.name, mesh.parentJoint, mesh.parentFrame, mesh.placement, mesh.geometry.convex)
+        hull = pin.GeometryObject(
+            mesh.name, mesh.parentJoint, mesh.parentFrame, mesh.placement, mesh.geometry.convex
+        )
         own_pairs.addGeometryObject(hull)
         if mesh.parentJoint >= _FIRST_LINK_ABOVE_FLOOR:
             index = floor_pairs.addGeometryObject(hull)
@@ -124,7 +134,8 @@ def _load_hulls(urdf: str) -> tuple[Any, Any]:
     return own_pairs, floor_pairs
 
 
-def _link(geometry: Any, index: int) -> str:
-    """Return a link's name for people: `wrist_1_link_0` becomes `wrist 1`."""
-    name: str = geometry.geometryObjects[index].name
-    return name.split("_link")[0].replace("_", " ")
+def _nearest(geometry: Any, *indices: int) -> Nearest:
+    """Name one link or two of a geometry model: `wrist_1_link_0` becomes `wrist 1`."""
+    links = [geometry.geometryObjects[index] for index in indices]
+    names = [str(link.name).split("_link")[0].replace("_", " ") for link in links]
+    return Nearest(" and ".join(names), max(int(link.parentJoint) for link in links) - 1)

@@ -39,7 +39,11 @@ def tcp_jacobian(model: RobotModel, q: ArrayLike) -> Array:
         (6, 6); rows 0-2 in m, rows 3-5 dimensionless.
     """
     jacobian = pin.computeFrameJacobian(
-        model.pin_model, model.pin_data, np.asarray(q, dtype=np.float64), model.tcp_frame, pin.LOCAL_WORLD_ALIGNED
+        model.pin_model,
+        model.pin_data,
+        np.asarray(q, dtype=np.float64),
+        model.tcp_frame,
+        pin.LOCAL_WORLD_ALIGNED,
     )
     return np.array(jacobian)
 

@@ -1,10 +1,11 @@
 """Iterative Jacobian inverse kinematics, as the paper used, on Pinocchio.
 
 A damped Newton (Levenberg-Marquardt) iteration on the pose error log6(T_tcp_goal): near a solution the
-damping is zero and convergence quadratic, so a seed from the previous sample of a path needs two or three steps.
+damping is zero and convergence quadratic, so a seed from the previous sample of a path needs two steps.
 It finds the solution nearest to the seed; which branch that is, is the caller's business.
 
-Source: paper section III ("an iterative Jacobian solver"); log6 on SE(3) as in Pinocchio's inverse kinematics example.
+Source: paper section III ("an iterative Jacobian solver"); log6 on SE(3) as in Pinocchio's example of inverse
+kinematics.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ class IkSolution(NamedTuple):
     converged: bool
 
 
-def solve_ik(model: RobotModel, T_base_tcp: ArrayLike, q_seed: ArrayLike, *, max_iterations: int = MAX_ITERATIONS) -> IkSolution:
+def solve_ik(
+    model: RobotModel, T_base_tcp: ArrayLike, q_seed: ArrayLike, *, max_iterations: int = MAX_ITERATIONS
+) -> IkSolution:
     """Find joint angles that bring the TCP to T_base_tcp, starting from q_seed.
 
     Args:
@@ -69,10 +72,14 @@ def solve_ik(model: RobotModel, T_base_tcp: ArrayLike, q_seed: ArrayLike, *, max
         The solution; check `.converged`.
     """
     goal = np.asarray(T_base_tcp, dtype=np.float64)
-    return solve_ik_se3(model, pin.SE3(goal[:3, :3], goal[:3, 3]), np.asarray(q_seed, dtype=np.float64), max_iterations)
+    return solve_ik_se3(
+        model, pin.SE3(goal[:3, :3], goal[:3, 3]), np.asarray(q_seed, dtype=np.float64), max_iterations
+    )
 
 
-def solve_ik_se3(model: RobotModel, T_base_goal: Any, q_seed: Array, max_iterations: int = MAX_ITERATIONS) -> IkSolution:
+def solve_ik_se3(
+    model: RobotModel, T_base_goal: Any, q_seed: Array, max_iterations: int = MAX_ITERATIONS
+) -> IkSolution:
     """Do as `solve_ik` for a goal that is already a pin.SE3: the inner call of path following."""
     q = q_seed
     error = _pose_error(model, T_base_goal, q)
@@ -101,7 +108,7 @@ def _pose_error(model: RobotModel, T_base_goal: Any, q: Array) -> Array:
 
 
 def _step(model: RobotModel, q: Array, error: Array, damping: float) -> Array:
-    """Return the joint step [rad] that removes `error`: Newton's for zero damping, else Levenberg-Marquardt's."""
+    """Return the joint step [rad] that removes `error`: Newton's without damping, else a damped one."""
     J = pin.computeFrameJacobian(model.pin_model, model.pin_data, q, model.tcp_frame, pin.LOCAL)
     step: Array
     if damping == 0.0:
@@ -119,11 +126,12 @@ def _step(model: RobotModel, q: Array, error: Array, damping: float) -> Array:
 def _is_small(error: Array) -> bool:
     """Tell whether a pose error is within both tolerances."""
     x, y, z, rx, ry, rz = error.tolist()
-    return (
-        x * x + y * y + z * z <= POSITION_TOLERANCE**2 and rx * rx + ry * ry + rz * rz <= ROTATION_TOLERANCE**2
-    )
+    off_position, off_rotation = x * x + y * y + z * z, rx * rx + ry * ry + rz * rz
+    return bool(off_position <= POSITION_TOLERANCE**2 and off_rotation <= ROTATION_TOLERANCE**2)
 
 
 def _solution(q: Array, error: Array, iterations: int, *, converged: bool) -> IkSolution:
     """Put the end of an iteration into a record."""
-    return IkSolution(q, float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])), iterations, converged)
+    return IkSolution(
+        q, float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])), iterations, converged
+    )

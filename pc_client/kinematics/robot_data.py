@@ -38,14 +38,16 @@ def find_share_folder() -> Path:
 
 
 def find_robot_file(relative: str) -> Path:
-    """Return the path of a file below `example-robot-data/robots/`, e.g. `ur_description/urdf/ur3_robot.urdf`.
+    """Return the path of a file below `example-robot-data/robots/`, e.g. ur_description/urdf/ur3_robot.urdf.
 
     Raises:
         PlanningError: the package is missing, or this version of it has no such file.
     """
     path = find_share_folder() / _PACKAGE_FOLDER / "robots" / relative
     if not path.is_file():
-        raise PlanningError(f"example-robot-data has no {relative} ({path}); install example-robot-data >= 6.0")
+        raise PlanningError(
+            f"example-robot-data has no {relative} ({path}); install example-robot-data >= 6.0"
+        )
     return path
 
 

@@ -5,7 +5,8 @@ wrong (the UR3 file carries UR10 torques and 124-183 deg/s) and its masses are g
 Nothing here may be fed with the kinematics of an emulated box: a client of a real arm does not know them.
 
 Frames: everything is expressed in UR's `base` frame, the frame of the DH table and of the TCP poses that a
-control box reports. (The URDF's own root, `base_link`, is turned by pi about z against it.) TCP = flange = `tool0`.
+control box reports. (The URDF's own root, `base_link`, is turned by pi about z against it.) The TCP is the
+flange, `tool0`.
 """
 
 from __future__ import annotations
@@ -91,8 +92,8 @@ def _six_degrees(*angles: float) -> Six:
     return (a, b, c, d, e, f)
 
 
-# Source: UR user manuals CB3 3.13, section "Joint limits" / technical specifications: working range +-360 deg of
-# all joints (wrist 3 of the UR3 turns without end, but streaming needs no more than this).
+# Source: UR user manuals CB3 3.13, technical specifications: working range +-360 deg of all joints (wrist 3
+# of the UR3 turns without end, but streaming needs no more than this).
 _ANY_TURN_MIN: Six = (-2 * pi,) * 6
 _ANY_TURN_MAX: Six = (2 * pi,) * 6
 

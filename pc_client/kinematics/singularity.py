@@ -18,9 +18,10 @@ class SingularityMeasure(NamedTuple):
     """Measures of a stack of Jacobians (n, 6, 6).
 
     Attributes:
-        sigma_min: (n,) smallest singular value: the TCP twist that one unit of joint speed gives in the worst direction.
+        sigma_min: (n,) smallest singular value: the twist that joint speed 1 gives in the worst direction.
         condition: (n,) largest over smallest singular value; inf when singular.
-        manipulability: (n,) product of all singular values, |det J|. Source: Yoshikawa, "Manipulability of robotic mechanisms", 1985.
+        manipulability: (n,) product of all singular values, |det J|.
+            Source: Yoshikawa, "Manipulability of robotic mechanisms", 1985.
         racing_joint: (n,) index of the joint that moves most for the worst direction.
     """
 

@@ -1,7 +1,7 @@
 """Inverse kinematics along a whole path, on one continuous branch.
 
-Each sample is solved from a linear prediction of the samples before it, so the solution stays on the branch
-that the first sample was put on; leaving it, coming near a singularity or out of reach is refused, never repaired.
+Each sample is solved from a linear prediction by the samples before it, so the solution stays on the branch
+that the first sample was put on; leaving it, coming near a singularity or out of reach is refused.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def follow_path(
         seed = 2.0 * solution.q - q_before if k else solution.q
         q_before = solution.q
 
-    # A singularity usually shows first as a small measure, then as failing steps: name the first sample of the two.
+    # A singularity shows first as a small measure, then as failing steps: name the first sample of the two.
     singularity = measure_singularity(jacobians)
     _refuse_singular(names, singularity, limits)
     if refusal is not None:
@@ -99,7 +99,9 @@ def follow_path(
     return JointPath(q, errors[:, 0].copy(), errors[:, 1].copy(), singularity, iterations)
 
 
-def _lead_in(model: RobotModel, names: PathNames, R_base_tcp: Array, q_branch: Array, limits: PlanLimits) -> Array:
+def _lead_in(
+    model: RobotModel, names: PathNames, R_base_tcp: Array, q_branch: Array, limits: PlanLimits
+) -> Array:
     """Carry the branch of `q_branch` along a straight line to the first sample; return the posture there."""
     p_branch = tcp_pose(model, q_branch)[:3, 3]
     steps = max(1, int(np.ceil(np.linalg.norm(names.p[0] - p_branch) / _LEAD_IN_STEP)))
@@ -112,8 +114,8 @@ def _lead_in(model: RobotModel, names: PathNames, R_base_tcp: Array, q_branch: A
         if not solution.converged or measure.sigma_min[0] < limits.sigma_min:
             raise names.refuse(
                 0,
-                "the start cannot be reached from the preferred posture without passing a singularity or leaving the"
-                " reach; move the movement into the arm's working box or give another q_branch",
+                "the start cannot be reached from the preferred posture without passing a singularity or"
+                " leaving the reach; move the movement into the arm's working box or give another q_branch",
                 joint=int(measure.racing_joint[0]),
             )
         q = solution.q
@@ -130,7 +132,7 @@ def _refuse_not_finite(names: PathNames) -> None:
 def _refuse_step(
     model: RobotModel, names: PathNames, k: int, solution: IkSolution, q_before: Array, limits: PlanLimits
 ) -> PlanningError | None:
-    """Return the error of a sample that is out of reach or too far from the one before; None if it is good."""
+    """Return the error of a sample that is out of reach or too far from the one before; None if good."""
     if not (
         solution.converged
         or (
@@ -142,7 +144,7 @@ def _refuse_step(
         return names.refuse(
             k,
             f"out of reach: the nearest posture misses by {solution.position_error * 1e3:.2f} mm and"
-            f" {np.degrees(solution.rotation_error):.2f} deg; move or scale the movement into the arm's working box",
+            f" {np.degrees(solution.rotation_error):.2f} deg; move or scale the movement into the box",
             joint=joint,
         )
     step = np.abs(solution.q - q_before)
@@ -150,8 +152,8 @@ def _refuse_step(
     if step[joint] > limits.joint_step_max:
         return names.refuse(
             k,
-            f"the joint path jumps by {step[joint]:.3f} rad to another branch (at most {limits.joint_step_max:g} rad a"
-            " sample); keep the path continuous and away from singularities",
+            f"the joint path jumps by {step[joint]:.3f} rad to another branch (at most"
+            f" {limits.joint_step_max:g} rad a sample); keep the path continuous and away from singularities",
             joint=joint,
         )
     return None

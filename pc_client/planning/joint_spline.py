@@ -28,7 +28,16 @@ class JointSpline:
         PlanningError: no positive duration, fewer than two knots, or values that are not finite.
     """
 
-    __slots__ = ("_at_end", "_at_start", "_coefficients", "_intervals", "_rate", "_step", "duration", "q_knots")
+    __slots__ = (
+        "_at_end",
+        "_at_start",
+        "_coefficients",
+        "_intervals",
+        "_rate",
+        "_step",
+        "duration",
+        "q_knots",
+    )
 
     def __init__(self, duration: float, q: ArrayLike) -> None:
         knots = np.array(q, dtype=np.float64)
@@ -62,7 +71,7 @@ class JointSpline:
         return np.linspace(0.0, self.duration, self._intervals + 1)
 
     def at(self, t: float) -> tuple[Array, Array]:
-        """Return q (6,) [rad] and qd (6,) [rad/s] at one time; outside [0, duration] the end posture at rest."""
+        """Return q (6,) [rad] and qd (6,) [rad/s] at one time; outside [0, duration] an end at rest."""
         if t <= 0.0:
             return self._at_start
         if t >= self.duration:
@@ -83,7 +92,10 @@ class JointSpline:
         rows = np.einsum("np,npj->nj", powers, self._coefficients[i])
         n = rows.shape[1] // 2
         q, qd = rows[:, :n], rows[:, n:]
-        for outside, (q_end, rest) in ((times <= 0.0, self._at_start), (times >= self.duration, self._at_end)):
+        for outside, (q_end, rest) in (
+            (times <= 0.0, self._at_start),
+            (times >= self.duration, self._at_end),
+        ):
             q[outside], qd[outside] = q_end, rest
         return q, qd
 

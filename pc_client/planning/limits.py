@@ -20,7 +20,7 @@ class PlanLimits:
         position_margin: distance to keep from the ends of the joint ranges [rad].
         qdd_max: joint acceleration limits [rad/s²].
         tcp_speed_max: TCP speed limit [m/s].
-        rest_speed_max: TCP speed at which a movement may begin and end, since the spline is clamped there [m/s].
+        rest_speed_max: TCP speed at which a movement may begin and end; the spline is clamped there [m/s].
         joint_step_max: largest joint step between samples; more is a jump to another branch [rad].
         sigma_min: smallest singular value of the Jacobian to keep (m and rad mixed).
         position_error_max: error of the inverse kinematics at a sample [m].
@@ -48,21 +48,21 @@ DEFAULT_LIMITS = PlanLimits(
     speed_fraction=0.9,
     position_margin=0.1,
     # UR publishes none. UR's own driver streams speedj with a = 40 rad/s² (Universal_Robots_Client_Library,
-    # external_control.urscript); for the three big joints less, from torque: base and shoulder (56 - 19 gravity - 10
-    # friction) Nm over ~.95 kg m² with rotor, elbow (28 - 7 - 4) Nm over ~.4 kg m².
+    # external_control.urscript); for base and shoulder less, from torque: (56 - 19 gravity - 10 friction) Nm
+    # over about .95 kg m² with rotor; the elbow has (28 - 7 - 4) Nm over about .4 kg m².
     qdd_max=(28.0, 28.0, 40.0, 40.0, 40.0, 40.0),
     # UR3 data sheet: "typical tool speed 1 m/s".
     tcp_speed_max=1.0,
     rest_speed_max=0.01,
     # 25 rad/s at 4 ms: four times what any joint can do, and far less than the way between two branches.
     joint_step_max=0.1,
-    # At .03 a TCP speed of .1 m/s in the worst direction needs about 3.3 rad/s, the limit of a big joint. The box
-    # recommended for movements keeps .08.
+    # At .03 a TCP speed of .1 m/s in the worst direction needs about 3.3 rad/s, the limit of a big joint. The
+    # box recommended for movements keeps .08.
     sigma_min=0.03,
     position_error_max=1e-9,
     rotation_error_max=1e-9,
     interpolation_error_max=1e-4,
-    # Hulls are exact to a few mm, calibration and tracking add as much; 30 mm leaves room for a hand's reaction.
+    # Hulls are good to a few mm, calibration and tracking add as much.
     floor_clearance_min=0.03,
     own_clearance_min=0.01,
 )

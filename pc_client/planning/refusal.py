@@ -1,4 +1,4 @@
-"""How a plan says no: one line with the movement, the sample, its time and point, the joint, and what to do."""
+"""How a plan says no: one line with movement, sample, time, point, joint, what is wrong and what to do."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ class PathNames:
             joint: index of the offending joint, named in the text.
         """
         x, y, z = self.p[sample]
-        at = f"sample {sample} of {len(self.t)} (t = {self.t[sample]:.3f} s, TCP at ({x:.4f}, {y:.4f}, {z:.4f}) m)"
+        where = f"t = {self.t[sample]:.3f} s, TCP at ({x:.4f}, {y:.4f}, {z:.4f}) m"
+        at = f"sample {sample} of {len(self.t)} ({where})"
         who = "" if joint is None else f"{JOINT_NAMES[joint]}: "
         return PlanningError(f"{self.movement}: {at}: {who}{what}", sample=sample, joint=joint)

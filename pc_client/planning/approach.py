@@ -1,0 +1,209 @@
+"""The slow way from where the arm is to where a plan begins.
+
+A movej of the control box moves all joints on a straight line in joint space, whatever stands there; so the
+line is checked here, posture by posture, before it is asked for. Two rules keep it short and harmless: of the
+start postures that differ by whole turns the nearest is taken (the plan is shifted to match), and when the
+direct line is not clear, one posture with the arm raised is tried on the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import inf, pi, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pc_client.errors import PlanningError
+from pc_client.kinematics.clearance import ClearanceModel, clearance_model
+from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.planning.plan import JointPlan
+from protocol.ur_types import JOINT_NAMES
+
+Array = NDArray[np.float64]
+
+APPROACH_SPEED = 0.5
+"""Speed of the leading joint on the way [rad/s]: 29 deg/s, the order of UR's recovery mode (30 deg/s)."""
+
+APPROACH_ACCELERATION = 0.8
+"""Acceleration of the leading joint [rad/s²]."""
+
+FLOOR_MARGIN = 0.02
+"""Least distance of upper arm, forearm and wrists from the base plane on the way [m]."""
+
+OWN_MARGIN = 0.01
+"""Least distance of the arm from itself on the way [m]."""
+
+_CHECK_STEP = 0.02  # rad between checked postures: at most 10 mm at the reach of a UR3
+_TURN = 2.0 * pi
+_RAISED_SHOULDER = -pi / 2
+_RAISED_ELBOW = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """A checked way to the begin of a plan.
+
+    Attributes:
+        plan: the plan to run afterwards, shifted by whole turns to begin where the way ends.
+        q_from: (6,) joint angles where the way begins [rad].
+        waypoints: one movej each, resting in between; the last is `plan.start_q` [rad].
+        v: speed of the leading joint for movej [rad/s].
+        a: acceleration of the leading joint for movej [rad/s²].
+        duration: expected time of all movej together [s].
+        floor_clearance: least distance from the base plane on the way [m].
+        own_clearance: least distance of the arm from itself on the way [m].
+    """
+
+    plan: JointPlan
+    q_from: Array = field(repr=False)
+    waypoints: tuple[Array, ...] = field(repr=False)
+    v: float
+    a: float
+    duration: float
+    floor_clearance: float
+    own_clearance: float
+
+
+def plan_approach(
+    plan: JointPlan,
+    q_now: ArrayLike,
+    *,
+    model: RobotModel | None = None,
+    v: float = APPROACH_SPEED,
+    a: float = APPROACH_ACCELERATION,
+) -> Approach:
+    """Plan a slow joint move from the present posture to the begin of a plan.
+
+    Args:
+        plan: the plan that shall begin afterwards.
+        q_now: (6,) present joint angles [rad].
+        model: nominal arm; by default the one that the plan was made for.
+        v: speed of the leading joint [rad/s], at most APPROACH_SPEED.
+        a: acceleration of the leading joint [rad/s²], at most APPROACH_ACCELERATION.
+
+    Returns:
+        One waypoint, or two when the direct line is not clear; use `.plan` instead of `plan` from then on.
+
+    Raises:
+        PlanningError: the present posture or every tried way is not clear; names posture and joint.
+    """
+    arm = robot_model(plan.report.robot) if model is None else model
+    q_from = np.array(q_now, dtype=np.float64)
+    _refuse_arguments(plan, arm, q_from, v, a)
+    shifted = _nearest_turns(plan, arm, q_from)
+    hulls = clearance_model(arm)
+    refusals = []
+    for via in ((), *((raised,) for raised in _raised_postures(q_from, shifted.start_q))):
+        waypoints = (*via, shifted.start_q)
+        clearance = _check_way(plan.name, hulls, (q_from, *waypoints))
+        if isinstance(clearance, PlanningError):
+            refusals.append(clearance)
+            continue
+        legs = pairwise((q_from, *waypoints))
+        duration = sum(movej_duration(begin, end, v, a) for begin, end in legs)
+        return Approach(shifted, q_from, waypoints, v, a, duration, *clearance)
+    # The direct way tells best what is wrong.
+    raise refusals[0]
+
+
+def movej_duration(q_from: ArrayLike, q_to: ArrayLike, v: float, a: float) -> float:
+    """Return the time of a movej with a trapezoid of speed for the leading joint [s].
+
+    Args:
+        q_from: (6,) begin [rad].
+        q_to: (6,) end [rad].
+        v: speed of the leading joint [rad/s].
+        a: its acceleration [rad/s²].
+    """
+    way = float(np.abs(np.subtract(q_to, q_from)).max())
+    return way / v + v / a if way >= v * v / a else 2.0 * sqrt(way / a)
+
+
+def _refuse_arguments(plan: JointPlan, arm: RobotModel, q_from: Array, v: float, a: float) -> None:
+    """Raise for speeds above the slow ones, and for a present posture that no arm can have."""
+    if not (0.0 < v <= APPROACH_SPEED and 0.0 < a <= APPROACH_ACCELERATION):
+        raise PlanningError(
+            f"{plan.name}: approach with v = {v!r} rad/s, a = {a!r} rad/s²; allowed are"
+            f" 0 < v <= {APPROACH_SPEED} and 0 < a <= {APPROACH_ACCELERATION}"
+        )
+    if q_from.shape != (6,):
+        raise PlanningError(
+            f"{plan.name}: the present posture must be six joint angles, not shape {q_from.shape}"
+        )
+    inside = (q_from >= np.array(arm.limits.q_min)) & (q_from <= np.array(arm.limits.q_max))
+    if not inside.all():
+        joint = int((~inside).argmax())
+        raise PlanningError(
+            f"{plan.name}: {JOINT_NAMES[joint]} stands at {np.degrees(q_from[joint]):.1f} deg, outside its"
+            f" range of {np.degrees(arm.limits.q_min[joint]):.0f} to"
+            f" {np.degrees(arm.limits.q_max[joint]):.0f}"
+            " deg; move it back by hand first",
+            joint=joint,
+        )
+
+
+def _nearest_turns(plan: JointPlan, arm: RobotModel, q_from: Array) -> JointPlan:
+    """Shift a plan by the whole turns that bring its begin nearest to q_from and keep its range margin."""
+    margin = plan.report.limits.position_margin
+    turns = np.zeros(6)
+    for joint in range(6):
+        low, high = float(plan.report.q_min[joint]), float(plan.report.q_max[joint])
+        best = inf
+        for turn in (0, -1, 1, -2, 2):
+            offset = _TURN * turn
+            distance = abs(float(plan.start_q[joint]) + offset - float(q_from[joint]))
+            fits = (
+                low + offset >= arm.limits.q_min[joint] + margin
+                and high + offset <= arm.limits.q_max[joint] - margin
+            )
+            if fits and distance < best:
+                best, turns[joint] = distance, turn
+    return plan.shifted(turns)
+
+
+def _raised_postures(q_from: Array, q_to: Array) -> tuple[Array, ...]:
+    """Return postures with the arm straight up, where it is far from the plane and from itself.
+
+    The first swings the base while the arm is raised, on the second leg; the second on the first leg.
+    """
+    raised = []
+    for base in (q_from[0], q_to[0]):
+        posture = q_to.copy()
+        posture[0] = base
+        # Keep the turn in which the shoulder and elbow of the plan are: -90 deg may be 270 deg there.
+        posture[1] = _RAISED_SHOULDER + _TURN * round((q_to[1] - _RAISED_SHOULDER) / _TURN)
+        posture[2] = _RAISED_ELBOW + _TURN * round((q_to[2] - _RAISED_ELBOW) / _TURN)
+        raised.append(posture)
+    return tuple(raised)
+
+
+def _check_way(
+    name: str, hulls: ClearanceModel, postures: tuple[Array, ...]
+) -> tuple[float, float] | PlanningError:
+    """Return the least floor and own clearance on straight joint lines, or the first bad posture's error."""
+    lines = []
+    for begin, end in pairwise(postures):
+        n = max(2, int(np.ceil(np.abs(end - begin).max() / _CHECK_STEP)) + 1)
+        lines.append(begin + np.linspace(0.0, 1.0, n)[:, None] * (end - begin))
+    q = np.concatenate(lines)
+    clearance = hulls.along(q)
+    for distance, nearest, margin, what in (
+        (clearance.floor, clearance.floor_nearest, FLOOR_MARGIN, "above the base plane"),
+        (clearance.own, clearance.own_nearest, OWN_MARGIN, "between them"),
+    ):
+        bad = np.flatnonzero(distance < margin)
+        if bad.size:
+            k = int(bad[0])
+            where = (
+                "the present posture"
+                if k == 0
+                else f"the way to the start, {100 * k / (len(q) - 1):.0f} % along"
+            )
+            return PlanningError(
+                f"{name}: {where} is not clear: {nearest[k].name}, {distance[k] * 1e3:.0f} mm {what}"
+                f" (at least {margin * 1e3:.0f} mm); move the arm by hand to an open posture, elbow up",
+                joint=nearest[k].joint,
+            )
+    return float(clearance.floor.min()), float(clearance.own.min())

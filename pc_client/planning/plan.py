@@ -1,0 +1,167 @@
+"""From a movement to a joint plan: sample, solve, spline, check. The door to this package."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import ceil
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pc_client.errors import PlanningError
+from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.planning.checks import CartesianSamples, check_motion, check_samples, measure_joint_range
+from pc_client.planning.joint_path import follow_path
+from pc_client.planning.joint_spline import JointSpline
+from pc_client.planning.limits import DEFAULT_LIMITS, PlanLimits
+from pc_client.planning.orientation import fixed_tcp_rotation
+from pc_client.planning.plan_report import PlanReport
+from pc_client.planning.refusal import PathNames
+
+Array = NDArray[np.float64]
+
+DEFAULT_DT = 0.004
+"""Time between samples of a plan [s]: half a control cycle; the spline between is then good to < 1 um."""
+
+
+class PlannableMovement(Protocol):
+    """What planning needs of a movement; `movements.Movement` is one."""
+
+    @property
+    def name(self) -> str:
+        """For messages and file names."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        ...
+
+    def sample(self, t: Array, /) -> tuple[Array, Array]:
+        """Return positions (n, 3) [m] and velocities (n, 3) [m/s] at times (n,) in [0, duration]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class JointPlan:
+    """A checked motion of the joints.
+
+    Attributes:
+        name: name of the movement.
+        t: (n,) sample times [s].
+        p: (n, 3) TCP positions at the samples [m].
+        q: (n, 6) joint angles at the samples [rad].
+        spline: the reference to follow, through q.
+        report: what was checked, and how much room is left.
+    """
+
+    name: str
+    t: Array = field(repr=False)
+    p: Array = field(repr=False)
+    q: Array = field(repr=False)
+    spline: JointSpline = field(repr=False)
+    report: PlanReport = field(repr=False)
+
+    @property
+    def start_q(self) -> Array:
+        """(6,) joint angles at the begin [rad]: where the arm must be before the stream starts."""
+        start: Array = self.q[0]
+        return start
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.spline.duration
+
+    def shifted(self, turns: ArrayLike) -> JointPlan:
+        """Return the same motion with whole turns added to the joints.
+
+        The arm is in the same places; only the distance from the ends of the joint ranges changes.
+
+        Args:
+            turns: (6,) whole numbers of turns.
+
+        Raises:
+            PlanningError: turns that are not whole, or a joint that would come too near the end of its range.
+        """
+        whole = np.asarray(turns, dtype=np.float64)
+        if not np.array_equal(whole, np.rint(whole)):
+            raise PlanningError(
+                f"{self.name}: a plan can be shifted by whole turns only, not {whole.tolist()}"
+            )
+        if not whole.any():
+            return self
+        offset = 2.0 * np.pi * whole
+        report = self.report
+        q = self.q + offset
+        joint_range = measure_joint_range(q, report.joint_limits, report.limits)
+        if joint_range.share > 1.0:
+            raise PathNames(self.name, self.t, self.p).refuse(
+                joint_range.sample,
+                f"{np.degrees(joint_range.value):.1f} deg from the end of its range after the shift by"
+                f" {whole.tolist()} turns; use other turns",
+                joint=joint_range.joint,
+            )
+        report = replace(
+            report, q_min=report.q_min + offset, q_max=report.q_max + offset, joint_range=joint_range
+        )
+        return replace(self, q=_frozen(q), spline=self.spline.shifted(offset), report=report)
+
+
+def plan_movement(
+    movement: PlannableMovement,
+    *,
+    model: RobotModel | None = None,
+    dt: float = DEFAULT_DT,
+    limits: PlanLimits = DEFAULT_LIMITS,
+    q_branch: ArrayLike | None = None,
+) -> JointPlan:
+    """Plan a movement of the TCP with the fixed orientation of the experiment.
+
+    Args:
+        movement: what the TCP shall do.
+        model: nominal arm; a UR3 by default.
+        dt: wanted time between samples [s]; shortened a little to make the duration a whole number of steps.
+        limits: what the plan must keep.
+        q_branch: (6,) posture whose IK branch is followed [rad]; the arm's preferred one by default.
+
+    Returns:
+        The plan, all limits kept.
+
+    Raises:
+        PlanningError: the movement cannot be done; names the sample, its time and point, and the joint.
+    """
+    arm = robot_model() if model is None else model
+    samples = _sample(movement, dt)
+    names = PathNames(movement.name, samples.t, samples.p)
+    tcp_speed = check_samples(names, samples, limits)
+    path = follow_path(arm, names, fixed_tcp_rotation(), q_branch=q_branch, limits=limits)
+    spline = JointSpline(float(samples.t[-1]), path.q)
+    report = check_motion(arm, names, samples, tcp_speed, path, spline, limits)
+    return JointPlan(movement.name, _frozen(samples.t), _frozen(samples.p), _frozen(path.q), spline, report)
+
+
+def _sample(movement: PlannableMovement, dt: float) -> CartesianSamples:
+    """Sample a movement on a grid and half way between, and check the shapes."""
+    duration = float(movement.duration)
+    if not (np.isfinite(duration) and duration > 0.0):
+        raise PlanningError(f"{movement.name}: a movement needs a positive duration in s, not {duration!r}")
+    if not (np.isfinite(dt) and dt > 0.0):
+        raise PlanningError(f"{movement.name}: the time between samples must be positive in s, not {dt!r}")
+    steps = max(2, ceil(duration / dt - 1e-9))
+    # One call for the samples and the points between them: every second one is a sample.
+    t = np.linspace(0.0, duration, 2 * steps + 1)
+    p, v = (np.asarray(values, dtype=np.float64) for values in movement.sample(t))
+    if p.shape != (len(t), 3) or v.shape != (len(t), 3):
+        raise PlanningError(
+            f"{movement.name}: sample(t) of {len(t)} times must give two arrays of shape ({len(t)}, 3),"
+            f" not {p.shape} and {v.shape}"
+        )
+    return CartesianSamples(t[::2].copy(), p[::2].copy(), v[::2].copy(), p[1::2].copy())
+
+
+def _frozen(values: Array) -> Array:
+    """Make an array read-only: plans are shared between controller, log and report."""
+    values.setflags(write=False)
+    return values
