@@ -1,0 +1,298 @@
+"""Sub-packages of the robot state (package type 16) on the primary and secondary ports, one record each.
+
+Every class is the table of its bytes after the five-byte header (`i32 size | u8 sub-type`): order, types,
+units and the software that first had a field. Defaults are what an idle CB3 may send. To add a field: add a
+row. How records become packages is in `primary_packages`; what a value means for the robot is the box's
+business.
+
+Sources: UR "Primary/Secondary Client Interface" (2021, chapters 5.9 and 5.10) and UR "Client_Interface"
+workbook (software 1.6 to 3.2); sizes checked against totals seen on robots and simulators from 3.1 to 5.8.
+Inferred: that masterboard data and additional info grew with 3.10 / 5.4 (seen as 74 and 8 bytes up to 3.9
+and 5.3, as 75 and 9 bytes in 5.8; UR's client library needs 75 on 3.14).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from protocol.ur_types import RobotMode, SafetyMode
+from protocol.wire_record import ALWAYS, Since, since, wire
+
+__all__ = [
+    "NO_TIME",
+    "SUB_PACKAGES",
+    "AdditionalInfo",
+    "CalibrationData",
+    "CartesianInfo",
+    "ConfigurationData",
+    "ForceModeData",
+    "JointData",
+    "KinematicsInfo",
+    "MasterboardData",
+    "RobotModeData",
+    "SafetyData",
+    "SubPackage",
+    "ToolCommunicationInfo",
+    "ToolData",
+    "ToolModeInfo",
+]
+
+NO_TIME = 2**64 - 1
+"""Timestamp of a package that has none: all ones."""
+
+_SINCE_3_1 = since((3, 1))
+_SINCE_3_2 = since((3, 2))
+_SINCE_3_5 = since((3, 5))
+_SINCE_3_10 = since((3, 10), (5, 4))
+
+
+@dataclass(frozen=True, slots=True)
+class SubPackage:
+    """What all sub-packages share.
+
+    Attributes:
+        SUB_TYPE: number on the wire.
+        SINCE: software that first sent the sub-package.
+        FIRST_STATE_ONLY: sent in the first state of a connection and when the configuration changes.
+    """
+
+    SUB_TYPE: ClassVar[int]
+    SINCE: ClassVar[Since] = ALWAYS
+    FIRST_STATE_ONLY: ClassVar[bool] = False
+
+
+@dataclass(frozen=True, slots=True)
+class RobotModeData(SubPackage):
+    """Modes, flags and speed scaling; clients pick their whole parser by its size."""
+
+    SUB_TYPE: ClassVar[int] = 0
+
+    timestamp: int = wire("Q", "since controller start, a multiple of the cycle", unit="us")
+    is_real_robot_connected: bool = wire("?", "control box and arm talk", default=True)
+    is_real_robot_enabled: bool = wire("?", "true from POWER_ON to RUNNING (inferred)", default=False)
+    is_robot_power_on: bool = wire("?", "true from POWER_ON to RUNNING (inferred)", default=False)
+    is_emergency_stopped: bool = wire("?", default=False)
+    is_protective_stopped: bool = wire("?", default=False)
+    is_program_running: bool = wire("?", default=False)
+    is_program_paused: bool = wire("?", default=False)
+    robot_mode: int = wire("b", "RobotMode; signed, so that NO_CONTROLLER fits", default=RobotMode.POWER_OFF)
+    control_mode: int = wire("B", "ControlMode")
+    target_speed_fraction: float = wire("d", "speed slider, 0 to 1", default=1.0)
+    speed_scaling: float = wire("d", "resulting scaling, 0 to 1", default=1.0)
+    target_speed_fraction_limit: float = wire("d", default=1.0, since=_SINCE_3_2)
+    reserved: int = wire("B", since=_SINCE_3_5)
+
+
+@dataclass(frozen=True, slots=True)
+class JointData(SubPackage):
+    """Six joints, base first; on the wire all values of one joint stand together."""
+
+    SUB_TYPE: ClassVar[int] = 1
+
+    q_actual: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="joint", default=0.0)
+    q_target: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="joint", default=0.0)
+    qd_actual: tuple[float, ...] = wire("d", count=6, unit="rad/s", interleaved="joint", default=0.0)
+    current_actual: tuple[float, ...] = wire("f", count=6, unit="A", interleaved="joint", default=0.0)
+    voltage_actual: tuple[float, ...] = wire(
+        "f", "0 on simulators", count=6, unit="V", interleaved="joint", default=0.0
+    )
+    temperature_motor: tuple[float, ...] = wire("f", count=6, unit="degC", interleaved="joint", default=25.0)
+    temperature_micro: tuple[float, ...] = wire(
+        "f", "obsolete", count=6, unit="degC", interleaved="joint", default=0.0
+    )
+    joint_mode: tuple[int, ...] = wire("B", "JointMode", count=6, interleaved="joint", default=239)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolData(SubPackage):
+    """Tool connector: analogue inputs, supply, temperature."""
+
+    SUB_TYPE: ClassVar[int] = 2
+
+    analog_input_range2: int = wire("B", "0 current, 1 voltage")
+    analog_input_range3: int = wire("B", "0 current, 1 voltage")
+    analog_input2: float = wire("d", unit="A or V", default=0.0)
+    analog_input3: float = wire("d", unit="A or V", default=0.0)
+    tool_voltage_48v: float = wire("f", unit="V", default=48.0)
+    tool_output_voltage: int = wire("B", "0, 12 or 24", unit="V")
+    tool_current: float = wire("f", unit="A", default=0.0)
+    tool_temperature: float = wire("f", unit="degC", default=25.0)
+    tool_mode: int = wire("B", "JointMode, the tool's subset", default=239)
+
+
+@dataclass(frozen=True, slots=True)
+class MasterboardData(SubPackage):
+    """Inputs, outputs and supply of the control box; Euromap67 fields only where the board is installed."""
+
+    SUB_TYPE: ClassVar[int] = 3
+
+    digital_input_bits: int = wire("i", "0-7 standard, 8-15 configurable, 16-17 tool")
+    digital_output_bits: int = wire("i", "as the inputs")
+    analog_input_range0: int = wire("B", "0 current, 1 voltage", default=1)
+    analog_input_range1: int = wire("B", "0 current, 1 voltage", default=1)
+    analog_input0: float = wire("d", unit="A or V", default=0.0)
+    analog_input1: float = wire("d", unit="A or V", default=0.0)
+    analog_output_domain0: int = wire("b", "0 current, 1 voltage")
+    analog_output_domain1: int = wire("b", "0 current, 1 voltage")
+    analog_output0: float = wire("d", unit="A or V", default=0.004)
+    analog_output1: float = wire("d", unit="A or V", default=0.004)
+    masterboard_temperature: float = wire("f", unit="degC", default=24.0)
+    robot_voltage_48v: float = wire("f", unit="V", default=48.0)
+    robot_current: float = wire("f", unit="A", default=0.0)
+    master_io_current: float = wire("f", unit="A", default=0.0)
+    safety_mode: int = wire("B", "SafetyMode", default=SafetyMode.NORMAL)
+    in_reduced_mode: bool = wire("?", default=False)
+    euromap67_installed: bool = wire("?", "true: the next four fields are there", default=False)
+    euromap67_input_bits: int = wire("I", only_if="euromap67_installed")
+    euromap67_output_bits: int = wire("I", only_if="euromap67_installed")
+    euromap67_voltage_24v: float = wire("f", unit="V", default=0.0, only_if="euromap67_installed")
+    euromap67_current: float = wire("f", unit="A", default=0.0, only_if="euromap67_installed")
+    safety_checksum: int = wire("I", "internal; repeats in SafetyData")
+    operational_mode_selector_input: int = wire("B", default=1, since=_SINCE_3_2)
+    three_position_enabling_device_input: int = wire("B", default=1, since=_SINCE_3_2)
+    reserved: int = wire("B", default=1, since=_SINCE_3_10)
+
+
+@dataclass(frozen=True, slots=True)
+class CartesianInfo(SubPackage):
+    """Tool centre point."""
+
+    SUB_TYPE: ClassVar[int] = 4
+
+    tcp_pose: tuple[float, ...] = wire("d", "in base", count=6, unit="m, rad", default=0.0)
+    tcp_offset: tuple[float, ...] = wire(
+        "d", "in flange", count=6, unit="m, rad", default=0.0, since=_SINCE_3_1
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class KinematicsInfo(SubPackage):
+    """Denavit-Hartenberg parameters of this very arm; clients make their calibration check from it."""
+
+    SUB_TYPE: ClassVar[int] = 5
+    FIRST_STATE_ONLY: ClassVar[bool] = True
+
+    checksum: tuple[int, ...] = wire("I", "all ones on simulators", count=6, default=0xFFFFFFFF)
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0)
+    calibration_status: int = wire("I")
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigurationData(SubPackage):
+    """Limits, defaults and nominal kinematics; the order of the DH columns differs from KinematicsInfo."""
+
+    SUB_TYPE: ClassVar[int] = 6
+    FIRST_STATE_ONLY: ClassVar[bool] = True
+
+    joint_min_limit: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="limits", default=0.0)
+    joint_max_limit: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="limits", default=0.0)
+    joint_max_speed: tuple[float, ...] = wire("d", count=6, unit="rad/s", interleaved="rates", default=0.0)
+    joint_max_acceleration: tuple[float, ...] = wire(
+        "d", count=6, unit="rad/s2", interleaved="rates", default=40.0
+    )
+    v_joint_default: float = wire("d", unit="rad/s", default=1.0471975511965976)
+    a_joint_default: float = wire("d", unit="rad/s2", default=1.3962634015954636)
+    v_tool_default: float = wire("d", unit="m/s", default=0.25)
+    a_tool_default: float = wire("d", unit="m/s2", default=1.2)
+    eq_radius: float = wire("d", unit="m", default=0.25)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0)
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0)
+    masterboard_version: int = wire("i", "6 in a UR5e capture; the CB3 value is unknown", default=6)
+    controller_box_type: int = wire("i", "4 UR5, 5 UR10, 6 UR3", default=6)
+    robot_type: int = wire("i", "RobotType", default=3)
+    robot_sub_type: int = wire("i", "1 CB2, 2 CB3, 3 e-Series", default=2)
+
+
+@dataclass(frozen=True, slots=True)
+class ForceModeData(SubPackage):
+    """Generalised forces at the TCP."""
+
+    SUB_TYPE: ClassVar[int] = 7
+
+    wrench: tuple[float, ...] = wire("d", "in base axes", count=6, unit="N, Nm", default=0.0)
+    robot_dexterity: float = wire("d", default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class AdditionalInfo(SubPackage):
+    """Buttons of the teach pendant. Up to 3.9 the first two are named teach button pressed and enabled."""
+
+    SUB_TYPE: ClassVar[int] = 8
+
+    teach_button_state: int = wire("B")
+    freedrive_button_enabled: bool = wire("?", default=True)
+    io_enabled_freedrive: bool = wire("?", default=False, since=since((3, 3)))
+    reserved: int = wire("B", default=1, since=_SINCE_3_10)
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationData(SubPackage):
+    """Internal."""
+
+    SUB_TYPE: ClassVar[int] = 9
+
+    wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyData(SubPackage):
+    """Internal; names are ours, from one capture."""
+
+    SUB_TYPE: ClassVar[int] = 10
+    SINCE: ClassVar[Since] = _SINCE_3_5
+
+    safety_checksum: int = wire("I", "repeats in MasterboardData")
+    flag0: int = wire("B", default=1)
+    flag1: int = wire("B", default=1)
+    values: tuple[float, ...] = wire("d", count=4, default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolCommunicationInfo(SubPackage):
+    """Serial line at the tool, e-Series."""
+
+    SUB_TYPE: ClassVar[int] = 11
+    SINCE: ClassVar[Since] = since(None, (5, 0))
+
+    is_enabled: bool = wire("?", default=False)
+    baud_rate: int = wire("i", default=115200)
+    parity: int = wire("i", "0 none, 1 odd, 2 even")
+    stop_bits: int = wire("i", default=1)
+    rx_idle_chars: float = wire("f", default=1.5)
+    tx_idle_chars: float = wire("f", default=3.5)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolModeInfo(SubPackage):
+    """Digital outputs at the tool, e-Series."""
+
+    SUB_TYPE: ClassVar[int] = 12
+    SINCE: ClassVar[Since] = since(None, (5, 1))
+
+    output_mode: int = wire("B", "0 digital, 1 dual-pin power")
+    digital_output_mode0: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1)
+    digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1)
+
+
+SUB_PACKAGES: tuple[type[SubPackage], ...] = (
+    RobotModeData,
+    JointData,
+    CartesianInfo,
+    KinematicsInfo,
+    CalibrationData,
+    MasterboardData,
+    ToolData,
+    ConfigurationData,
+    ForceModeData,
+    AdditionalInfo,
+    SafetyData,
+    ToolCommunicationInfo,
+    ToolModeInfo,
+)
+"""In the order in which a controller puts them into a state. Source: first state of a 5.8 simulator."""

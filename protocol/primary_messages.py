@@ -1,0 +1,277 @@
+"""Robot messages (package type 20) of the primary port, one record each.
+
+    i32 size | u8 20 | u64 timestamp | i8 source | u8 message type | fields
+
+Every class is the table of its fields; `encode_message` and `decode_message` interpret them, for the box
+and for the client. Messages with text at the end use what the package size leaves. Software up to 3.2 had
+shorter forms; the rows say which fields came with 3.3.
+
+Sources: UR "Primary/Secondary Client Interface" (2021), UR "Client_Interface" workbook, UR client library;
+byte captures named at the classes.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar
+
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.primary_layout import NO_TIME
+from protocol.ur_types import SafetyMode, SoftwareVersion
+from protocol.wire_record import codec_for, since, wire
+
+__all__ = [
+    "MESSAGES",
+    "ErrorCodeMessage",
+    "KeyMessage",
+    "MessageSource",
+    "PopupMessage",
+    "ReportLevel",
+    "RequestedType",
+    "RobotMessage",
+    "RuntimeExceptionMessage",
+    "SafetyModeMessage",
+    "StartupMessage",
+    "TextMessage",
+    "UnknownMessage",
+    "VersionMessage",
+    "decode_message",
+    "encode_message",
+    "version_message",
+]
+
+
+class MessageSource(IntEnum):
+    """Who speaks; joints and boards have further numbers from 20 to 127."""
+
+    GUI = -5
+    SIMULATED_ROBOT = -4
+    RTMACHINE = -3
+    ROBOTINTERFACE = -2
+    CONTROLLER = 7
+    RTDE = 8
+
+
+class ReportLevel(IntEnum):
+    """Weight of an error code; a client stops its script from VIOLATION on."""
+
+    DEBUG = 0
+    INFO = 1
+    WARNING = 2
+    VIOLATION = 3
+    FAULT = 4
+    CRITICAL_FAULT = 5
+
+
+class RequestedType(IntEnum):
+    """What a popup or value request wants to be answered with; NONE is a popup."""
+
+    BOOLEAN = 0
+    INTEGER = 1
+    FLOAT = 2
+    STRING = 3
+    POSE = 4
+    JOINT_VECTOR = 5
+    NONE = 8
+
+
+_SINCE_3_3 = since((3, 3))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotMessage:
+    """What all messages share.
+
+    Attributes:
+        MESSAGE_TYPE: number on the wire.
+        timestamp: microseconds since controller start, or NO_TIME.
+        source: who speaks, see MessageSource.
+    """
+
+    MESSAGE_TYPE: ClassVar[int]
+
+    timestamp: int = NO_TIME
+    source: int = MessageSource.RTMACHINE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextMessage(RobotMessage):
+    """Output of the script function `textmsg`."""
+
+    MESSAGE_TYPE: ClassVar[int] = 0
+
+    text: str = wire("s", default="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PopupMessage(RobotMessage):
+    """Output of the script function `popup`."""
+
+    MESSAGE_TYPE: ClassVar[int] = 2
+
+    request_id: int = wire("I", since=_SINCE_3_3)
+    requested_type: int = wire("I", "RequestedType", default=RequestedType.NONE, since=_SINCE_3_3)
+    is_warning: bool = wire("?", default=False)
+    is_error: bool = wire("?", default=False)
+    is_blocking: bool = wire("?", default=False, since=_SINCE_3_3)
+    title: str = wire("p", default="")
+    text: str = wire("s", default="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VersionMessage(RobotMessage):
+    """The first package of every connection; use `version_message` to make one.
+
+    Source of the form: captures of 3.3, 3.10, 5.11 and 5.12.
+    """
+
+    MESSAGE_TYPE: ClassVar[int] = 3
+
+    source: int = MessageSource.ROBOTINTERFACE
+    project_name: str = wire("p", "clients want URControl", default="URControl")
+    major: int = wire("B")
+    minor: int = wire("B")
+    bugfix: int = wire("i", "up to 3.2 the source revision stands here")
+    build: int = wire("i", "0 in newer software", since=_SINCE_3_3)
+    build_date: str = wire("s", "dd-mm-yyyy, hh:mm:ss; old clients hold 20 characters", default="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyModeMessage(RobotMessage):
+    """The safety mode changed."""
+
+    MESSAGE_TYPE: ClassVar[int] = 5
+
+    code: int = wire("i", "printed as C<code>A<argument>")
+    argument: int = wire("i")
+    safety_mode: int = wire("B", "SafetyMode", default=SafetyMode.NORMAL)
+    data_type: int = wire("I", "2 signed, 3 float, 4 hexadecimal, else unsigned", since=_SINCE_3_3)
+    data: int = wire("I", "bits of the datum", since=_SINCE_3_3)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorCodeMessage(RobotMessage):
+    """An entry of the error log ("RobotComm" in the documents)."""
+
+    MESSAGE_TYPE: ClassVar[int] = 6
+
+    code: int = wire("i", "printed as C<code>A<argument>")
+    argument: int = wire("i")
+    report_level: int = wire("i", "ReportLevel", default=ReportLevel.INFO, since=_SINCE_3_3)
+    data_type: int = wire("I", "2 signed, 3 float, 4 hexadecimal, else unsigned", since=_SINCE_3_3)
+    data: int = wire("I", "bits of the datum", since=_SINCE_3_3)
+    text: str = wire("s", default="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyMessage(RobotMessage):
+    """Life of a program: title PROGRAM_XXX_STARTED, _PAUSED or _STOPPED, text its name."""
+
+    MESSAGE_TYPE: ClassVar[int] = 7
+
+    code: int = wire("i")
+    argument: int = wire("i")
+    title: str = wire("p", default="")
+    text: str = wire("s", default="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RuntimeExceptionMessage(RobotMessage):
+    """A program failed, while compiling or while running; line 1 is the `def` line, columns count from 1."""
+
+    MESSAGE_TYPE: ClassVar[int] = 10
+
+    line: int = wire("i", since=_SINCE_3_3)
+    column: int = wire("i", since=_SINCE_3_3)
+    text: str = wire("s", default="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartupMessage(RobotMessage):
+    """Undocumented; follows the version message once.
+
+    Source: captures: (489, 239, 1) on 3.3, (510, 259, 1) on 3.10, (0, 0, 1) on simulators.
+    """
+
+    MESSAGE_TYPE: ClassVar[int] = 12
+
+    source: int = MessageSource.ROBOTINTERFACE
+    first: int = wire("i")
+    second: int = wire("i")
+    flag: int = wire("B", default=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnknownMessage(RobotMessage):
+    """A message that this package has no table for; `body` is what follows the message type."""
+
+    MESSAGE_TYPE: ClassVar[int] = -1
+
+    message_type: int
+    body: bytes
+
+
+MESSAGES: tuple[type[RobotMessage], ...] = (
+    TextMessage,
+    PopupMessage,
+    VersionMessage,
+    SafetyModeMessage,
+    ErrorCodeMessage,
+    KeyMessage,
+    RuntimeExceptionMessage,
+    StartupMessage,
+)
+"""All messages with a table."""
+
+_BY_TYPE = {message.MESSAGE_TYPE: message for message in MESSAGES}
+_HEADER = struct.Struct(">QbB")  # timestamp, source, message type
+
+
+def version_message(version: SoftwareVersion, build_date: str = "03-05-2019, 06:39:00") -> VersionMessage:
+    """The version message of a controller; the date has the form of software 3.10 and later."""
+    return VersionMessage(
+        major=version.major,
+        minor=version.minor,
+        bugfix=version.bugfix,
+        build=version.build,
+        build_date=build_date,
+    )
+
+
+def encode_message(message: RobotMessage, version: SoftwareVersion) -> bytes:
+    """Body of a message package, from the timestamp on, as software `version` sends it.
+
+    Raises:
+        LocalProtocolError: a value does not fit its field, or the message has no table.
+    """
+    if message.MESSAGE_TYPE not in _BY_TYPE:
+        raise LocalProtocolError(f"{type(message).__name__} has no table and cannot be sent")
+    try:
+        header = _HEADER.pack(message.timestamp, message.source, message.MESSAGE_TYPE)
+    except struct.error as problem:
+        raise LocalProtocolError(
+            f"timestamp {message.timestamp} or source {message.source} cannot be sent: {problem}"
+        ) from None
+    return header + codec_for(type(message), version).encode(message)
+
+
+def decode_message(body: bytes, version: SoftwareVersion) -> RobotMessage:
+    """The inverse of `encode_message`; a version message is read by the version that it says itself.
+
+    Raises:
+        RemoteProtocolError: the body ends before the fields do.
+    """
+    if len(body) < _HEADER.size:
+        raise RemoteProtocolError(f"a robot message of {len(body)} bytes is shorter than its header")
+    timestamp, source, message_type = _HEADER.unpack_from(body)
+    data = body[_HEADER.size :]
+    record = _BY_TYPE.get(message_type)
+    if record is None:
+        return UnknownMessage(timestamp=timestamp, source=source, message_type=message_type, body=data)
+    if record is VersionMessage:
+        name_end = 1 + data[0] if data else 0
+        version = SoftwareVersion(*data[name_end : name_end + 2].ljust(2, b"\0"))
+    fields = codec_for(record, version).decode_fields(data)
+    return record(timestamp=timestamp, source=source, **fields)

@@ -1,0 +1,229 @@
+r"""Where one program ends and the next begins on a script port (30001, 30002, 30003).
+
+The ports carry plain text without any frame. What makes a program is this:
+
+* Lines end in `\n`; a `\r` before it is dropped. A line without its `\n` does not exist yet.
+* A line that begins with `def` or `sec` starts a program. It ends with the line of the `end` that closes all
+  blocks: `def sec thread if while` open one, `end` closes one; comments, strings and `$` labels do not count.
+  Indentation does not decide, because programs in the field break it (python-urx writes bodies in column 1).
+* Outside a program, a line is a program of one statement, or one of the controller's own words
+  (`controller_words`). Blank lines, comments and labels are nothing.
+* A program whose blocks never close would swallow everything after it. So a `def`, a `sec` or a controller's
+  word in column 1 hands out the open text as it is (its compiler will name the error) and starts afresh:
+  nested functions are indented in every program we know, and no statement looks like a controller's word.
+* Nothing may grow without bound: a line or program beyond the limits is dropped and reported as `Overflow`.
+  The rest of a dropped program is dropped too, up to an `end` in column 1, lest its body runs line by line.
+
+Sources: URScript manual CB3, chapter 2; the exceptions from python-urx, ur_rtde and ur_modern_driver.
+Nothing here judges the text: whatever does not compile is the compiler's to report, at the right line.
+"""
+
+from __future__ import annotations
+
+import re
+from enum import Enum
+from typing import Literal, NamedTuple, TypeAlias
+
+from protocol.controller_words import match_controller_word
+
+__all__ = ["ControlLine", "Overflow", "ProgramKind", "ProgramText", "ScriptChannel", "ScriptItem"]
+
+ProgramKind: TypeAlias = Literal["def", "sec", "statement"]
+
+
+class ProgramText(NamedTuple):
+    r"""One complete program.
+
+    Attributes:
+        text: the lines, each ended by `\n`; line 1 is the `def` line. Bytes above 127 are Latin-1 characters.
+        name: after `def` or `sec`; of a statement, the function it calls. "" if the text has none.
+        kind: "def" and "statement" replace the running program, "sec" runs beside it.
+    """
+
+    text: str
+    name: str
+    kind: ProgramKind
+
+
+class ControlLine(NamedTuple):
+    """One of the controller's own words.
+
+    Attributes:
+        text: the line with single blanks, such as `set speed 0.5`.
+        word: the row's fixed part, such as `set speed`.
+        argument: the number as text, "" for words without.
+    """
+
+    text: str
+    word: str
+    argument: str
+
+
+class Overflow(NamedTuple):
+    """Something was too long and has been dropped.
+
+    Attributes:
+        what: "line" or "program".
+        limit: the limit in bytes that it broke.
+    """
+
+    what: Literal["line", "program"]
+    limit: int
+
+
+ScriptItem: TypeAlias = ProgramText | ControlLine | Overflow
+
+MAX_LINE = 1 << 20
+"""Longest line in bytes; the longest in the field (a matrix literal) has some kilobytes."""
+
+MAX_PROGRAM = 4 << 20
+"""Longest program in bytes; the longest in the field has 50 kB."""
+
+_HEADER = re.compile(r"[ \t]*(def|sec)(?![A-Za-z0-9_])[ \t]*([A-Za-z_][A-Za-z0-9_]*)?")
+_COUNTED = re.compile(
+    r'"[^"]*"?'  # a string; one that is not closed ends with its line, so that a missing quote stays local
+    r"|#.*"
+    r"|(?<![A-Za-z0-9_.])(def|sec|thread|if|while|end)(?![A-Za-z0-9_])"
+)
+_CALL = re.compile(r"(?<![A-Za-z0-9_])([A-Za-z_][A-Za-z0-9_]*)[ \t]*\(")
+_NAME = re.compile(r"[ \t]*([A-Za-z_][A-Za-z0-9_]*)")
+_COLUMN_1_END = re.compile(r"end(?![A-Za-z0-9_])")
+
+
+class _State(Enum):
+    OUTSIDE = "outside"
+    IN_PROGRAM = "in a program"
+    DROPPING = "dropping the rest of a program that was too long"
+
+
+class ScriptChannel:
+    """Bytes of one connection in, programs and controller words out. The split of the bytes does not matter.
+
+    Args:
+        max_line: longest line in bytes.
+        max_program: longest program in bytes.
+    """
+
+    def __init__(self, max_line: int = MAX_LINE, max_program: int = MAX_PROGRAM) -> None:
+        self._max_line = max_line
+        self._max_program = max_program
+        self._partial = bytearray()  # the line whose end has not come
+        self._skipping_line = False
+        self._state = _State.OUTSIDE
+        self._lines: list[str] = []
+        self._size = 0
+        self._depth = 0
+        self._kind: ProgramKind = "def"
+        self._name = ""
+
+    @property
+    def pending(self) -> int:
+        """Bytes of a line or program that is not complete; they are lost if the connection ends now."""
+        return self._size + len(self._partial)
+
+    def feed(self, data: bytes) -> list[ScriptItem]:
+        """Take what the socket gave and return what has become complete. Never raises."""
+        items: list[ScriptItem] = []
+        if b"\n" not in data:
+            if not self._skipping_line:
+                self._partial += data
+                self._check_partial(items)
+            return items
+        # Joined once per newline, so a long line in many pieces stays linear.
+        *lines, rest = (bytes(self._partial) + data).split(b"\n")
+        self._partial.clear()
+        if self._skipping_line:
+            del lines[0]
+            self._skipping_line = False
+        for line in lines:
+            if len(line) > self._max_line:
+                self._overflow("line", items)
+            else:
+                self._take_line(line.removesuffix(b"\r").decode("latin-1"), items)
+        self._partial += rest
+        self._check_partial(items)
+        return items
+
+    def _check_partial(self, items: list[ScriptItem]) -> None:
+        if len(self._partial) > self._max_line:
+            self._partial.clear()
+            self._skipping_line = True
+            self._overflow("line", items)
+
+    def _overflow(self, what: Literal["line", "program"], items: list[ScriptItem]) -> None:
+        if self._state is _State.IN_PROGRAM:
+            self._state = _State.DROPPING
+            self._forget()
+        items.append(Overflow(what, self._max_line if what == "line" else self._max_program))
+
+    def _take_line(self, line: str, items: list[ScriptItem]) -> None:
+        if self._state is _State.OUTSIDE:
+            self._take_outside(line, items)
+        elif self._starts_afresh(line):
+            if self._state is _State.IN_PROGRAM:
+                items.append(self._finish())
+            self._state = _State.OUTSIDE
+            self._take_outside(line, items)
+        elif self._state is _State.IN_PROGRAM:
+            self._take_body(line, items)
+        elif _COLUMN_1_END.match(line):  # of the program that we are dropping
+            self._state = _State.OUTSIDE
+
+    def _take_outside(self, line: str, items: list[ScriptItem]) -> None:
+        stripped = line.strip()
+        if not stripped or stripped[0] in "#$":
+            return
+        header = _HEADER.match(line)
+        if header:
+            self._state = _State.IN_PROGRAM
+            self._kind = "def" if header[1] == "def" else "sec"
+            self._name = header[2] or ""
+            self._depth = 0
+            self._take_body(line, items)
+            return
+        matched = match_controller_word(line)
+        if matched:
+            word, argument = matched
+            items.append(ControlLine(f"{word.text} {argument}".rstrip(), word.text, argument))
+            return
+        code = line.partition("#")[0]
+        called = _CALL.search(code) or _NAME.match(code)
+        items.append(ProgramText(line + "\n", called[1] if called else "", "statement"))
+
+    def _take_body(self, line: str, items: list[ScriptItem]) -> None:
+        self._lines.append(line)
+        self._size += len(line) + 1
+        if self._size > self._max_program:
+            self._overflow("program", items)
+        elif self._closes(line):
+            self._state = _State.OUTSIDE
+            items.append(self._finish())
+
+    def _closes(self, line: str) -> bool:
+        """Count the blocks of one line; True when the last one closes. What follows is the compiler's."""
+        if line.lstrip().startswith("$"):
+            return False
+        for counted in _COUNTED.finditer(line):
+            keyword = counted[1]
+            if keyword == "end":
+                self._depth -= 1
+                if self._depth <= 0:
+                    return True
+            elif keyword:
+                self._depth += 1
+        return False
+
+    @staticmethod
+    def _starts_afresh(line: str) -> bool:
+        if not line or line[0] in " \t":
+            return False
+        return _HEADER.match(line) is not None or match_controller_word(line) is not None
+
+    def _finish(self) -> ProgramText:
+        program = ProgramText("\n".join(self._lines) + "\n", self._name, self._kind)
+        self._forget()
+        return program
+
+    def _forget(self) -> None:
+        self._lines = []
+        self._size = 0
