@@ -1,0 +1,148 @@
+"""The dashboard server's commands as CB3 has them: names, reply texts, first versions.
+
+One row a command. A reply is chosen by its key and filled in: `find("load").reply("ok",
+path="/programs/a.urp")`. What a command does to the robot and when it fails is the box's business.
+
+Sources: UR "Dashboard Server, port 29999" (support page, CB series) and "Dashboard Server Remote Control
+Interface e-Series" (2022) for the wording; first versions from UR's client library; where the two documents
+differ, what that library's tests expect of a CB3 3.14/3.15 simulator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from protocol.errors import LocalProtocolError
+from protocol.ur_types import SoftwareVersion
+
+__all__ = [
+    "COMMANDS",
+    "GREETING",
+    "USER_ROLES",
+    "DashboardCommand",
+    "find",
+    "match_command",
+    "unknown_command_reply",
+]
+
+GREETING = "Connected: Universal Robots Dashboard Server"
+"""The line that the server sends on accept; clients read it before their first command."""
+
+
+@dataclass(frozen=True, slots=True)
+class DashboardCommand:
+    """One row.
+
+    Attributes:
+        name: the fixed words, spelled as on the wire.
+        argument: what may follow, for people; "" if nothing may.
+        since: first CB3 software.
+        replies: templates by key; "ok" is always there. Braces name what the box fills in.
+    """
+
+    name: str
+    argument: str
+    since: SoftwareVersion
+    replies: Mapping[str, str]
+
+    def reply(self, key: str = "ok", /, **values: object) -> str:
+        """The reply line.
+
+        Raises:
+            LocalProtocolError: no such key, or a value that the template names is missing.
+        """
+        template = self.replies.get(key)
+        if template is None:
+            raise LocalProtocolError(f"{self.name!r} has no reply {key!r}: use {', '.join(self.replies)}")
+        try:
+            return template.format(**values)
+        except KeyError as missing:
+            raise LocalProtocolError(f"reply {template!r} of {self.name!r} needs {missing}") from None
+
+
+def _row(name: str, argument: str, since: tuple[int, int], ok: str, **failures: str) -> DashboardCommand:
+    replies = MappingProxyType({"ok": ok, **failures})
+    return DashboardCommand(name, argument, SoftwareVersion(*since), replies)
+
+
+_NOT_FOUND = "File not found: {name}"
+
+COMMANDS: tuple[DashboardCommand, ...] = (
+    _row("load", "program.urp", (1, 4), "Loading program: {path}",
+         not_found=_NOT_FOUND, failed="Error while loading program: {name}"),
+    _row("play", "", (1, 4), "Starting program", failed="Failed to execute: play"),
+    _row("stop", "", (1, 4), "Stopped", failed="Failed to execute: stop"),
+    _row("pause", "", (1, 4), "Pausing program", failed="Failed to execute: pause"),
+    _row("quit", "", (1, 4), "Disconnected"),
+    _row("shutdown", "", (1, 4), "Shutting down"),
+    _row("running", "", (1, 6), "Program running: {running}"),  # true or false
+    _row("robotmode", "", (1, 6), "Robotmode: {mode}"),
+    _row("get loaded program", "", (1, 6), "Loaded program: {path}", none="No program loaded"),
+    _row("popup", "text", (1, 6), "showing popup"),
+    _row("close popup", "", (1, 6), "closing popup"),
+    _row("addToLog", "text", (1, 8), "Added log message", empty="No log message to add"),
+    _row("isProgramSaved", "", (1, 8), "{saved} {program}"),  # true or false; name without folder
+    _row("programState", "", (1, 8), "{state} {program}"),  # STOPPED, PLAYING, PAUSED; <unnamed> if none
+    _row("PolyscopeVersion", "", (1, 8), "URSoftware {version} ({date})"),  # four numbers; Mon dd yyyy
+    _row("setUserRole", "role", (3, 1), "Setting user role: {role}",
+         failed="Failed setting user role: {role}"),
+    _row("getUserRole", "", (3, 1), "{role}"),
+    _row("power on", "", (3, 0), "Powering on"),
+    _row("power off", "", (3, 0), "Powering off"),
+    _row("brake release", "", (3, 0), "Brake releasing"),
+    _row("safetymode", "", (3, 0), "Safetymode: {mode}"),
+    _row("safetystatus", "", (3, 11), "Safetystatus: {status}"),
+    _row("unlock protective stop", "", (3, 1), "Protective stop releasing",
+         too_early="Cannot unlock protective stop until 5s after occurrence. "
+                   "Always inspect cause of protective stop before unlocking"),
+    _row("close safety popup", "", (3, 1), "closing safety popup"),
+    _row("load installation", "file.installation", (3, 2), "Loading installation: {path}",
+         not_found=_NOT_FOUND, failed="Failed to load installation: {name}"),
+    _row("restart safety", "", (3, 7), "Restarting safety"),
+    _row("get serial number", "", (3, 12), "{serial}"),
+    _row("get robot model", "", (3, 12), "{model}"),  # UR3, UR5, UR10
+    _row("generate flight report", "controller|software|system", (3, 13),
+         "Flight Report generated with id:{id}", failed="{reason}"),
+    _row("generate support file", "directory", (3, 13), "Completed successfully:{file}", failed="{reason}"),
+    _row("saveLog", "", (3, 13), "Log saved to disk"),
+)  # fmt: skip
+"""All commands of CB3 software. What newer software renamed or added for e-Series is not here."""
+
+USER_ROLES = ("PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED")
+"""What `setUserRole` accepts."""
+
+_BY_NAME = {command.name: command for command in COMMANDS}
+_LONGEST_NAME = max(len(command.name.split()) for command in COMMANDS)
+
+
+def find(name: str) -> DashboardCommand:
+    """The row of a command; raises LocalProtocolError for a name that is not in the table."""
+    try:
+        return _BY_NAME[name]
+    except KeyError:
+        raise LocalProtocolError(f"there is no dashboard command {name!r}") from None
+
+
+def match_command(line: str, version: SoftwareVersion) -> tuple[DashboardCommand, str] | None:
+    """The command that a line is, and its argument; None if software `version` would not understand it.
+
+    The longest name wins, so `load installation x` is not a program called `installation x`. Names are
+    case-sensitive; the argument runs to the end of the line and may hold blanks.
+    """
+    words = line.split(None, _LONGEST_NAME)
+    for count in range(min(len(words), _LONGEST_NAME), 0, -1):
+        command = _BY_NAME.get(" ".join(words[:count]))
+        if command is None or version < command.since:
+            continue
+        rest = line.split(None, count)[count:]
+        argument = rest[0].strip() if rest else ""
+        if command.argument or not argument:
+            return command, argument
+    return None
+
+
+def unknown_command_reply(line: str) -> str:
+    """The answer to anything else. Its wording is believed, not documented; clients only need one line."""
+    return f"could not understand: '{line}'"
