@@ -1,4 +1,4 @@
-"""The catalogue of all URScript builtins: what exists in which version, with which arguments, modelled how well.
+"""The catalogue of all URScript builtins: which version has what, how it is called, how well it is modelled.
 
 One table module for each chapter of the script manual; `catalogue_for(version)` is the view of one release.
 """

@@ -1,11 +1,11 @@
 """Run-time checks of arguments against the catalogue: type, finiteness, range, with the error text.
 
-A check is compiled once for each builtin and then only runs small predicates, because motion commands pass here
-every control cycle. It never converts: an integer parameter also takes a float without fraction (programs compute
-indexes), so host functions call `int()` on it.
+A check is compiled once for each builtin and then only runs small predicates, because motion commands pass
+here every control cycle. It never converts: an integer parameter also takes a float without fraction,
+because programs compute indexes (dialect: INDEX_TAKES_WHOLE_FLOATS), so host functions call `int()` on it.
 
-Texts: the one for poses is the controller's own (log of 5.12: "get_inverse_kin: Parameter must be a Pose on the
-form p[x,y,z,a,b,c]"); the others are not documented and follow its pattern, adding what was given.
+Texts: the one for poses is the controller's own (log of 5.12: "get_inverse_kin: Parameter must be a Pose on
+the form p[x,y,z,a,b,c]"); the others are not documented and follow its pattern, adding what was given.
 """
 
 from __future__ import annotations
@@ -57,14 +57,28 @@ _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.VECTOR3: lambda value: _is_numbers(value, 3),
     ParamType.VECTOR6: lambda value: type(value) is Pose or _is_numbers(value, 6),
     ParamType.NUMBERS: _is_numbers,
+    ParamType.BOOLS: lambda value: type(value) is list and all(type(item) is bool for item in value),
     ParamType.LIST: lambda value: type(value) is list,
     ParamType.MATRIX: lambda value: isinstance(value, Matrix),
+    ParamType.ARRAY: lambda value: isinstance(value, (list, Pose)),
     ParamType.SIZED: lambda value: isinstance(value, (list, str, Pose)),
     ParamType.SHAPED: lambda value: isinstance(value, (Matrix, list, str, Pose)),
     ParamType.LIST_OR_MATRIX: lambda value: isinstance(value, Matrix) or _is_numbers(value),
     ParamType.POSE_OR_MATRIX: lambda value: isinstance(value, (Matrix, Pose)),
     ParamType.NORMED: lambda value: type(value) is Pose or is_number(value) or _is_numbers(value),
 }
+
+_NUMERIC = frozenset(
+    {
+        ParamType.NUMBER,
+        ParamType.POSE,
+        ParamType.JOINTS,
+        ParamType.POSE_OR_JOINTS,
+        ParamType.VECTOR3,
+        ParamType.VECTOR6,
+        ParamType.NUMBERS,
+    }
+)
 
 
 def fits(kind: ParamType, value: Any) -> bool:
@@ -99,19 +113,15 @@ def type_error(function: str, parameter: str, kind: ParamType, value: Any) -> Sc
     )
 
 
-def _numbers_in(value: Any) -> Sequence[Any]:
-    if isinstance(value, (list, Pose)):
-        return value
-    return (value,) if isinstance(value, float) else ()
-
-
 def _is_finite(value: Any) -> bool:
-    if type(value) is float:
+    """For a number, a list of numbers or a pose."""
+    if isinstance(value, float):
         return isfinite(value)
-    for item in _numbers_in(value):
-        if isinstance(item, float) and not isfinite(item):
-            return False
-    return True
+    return all(map(isfinite, value)) if isinstance(value, (list, Pose)) else True
+
+
+def _must_be_finite(builtin: Builtin, param: Param) -> bool:
+    return not builtin.nan_ok and param.type in _NUMERIC
 
 
 def _is_in_range(param: Param, value: Any) -> bool:
@@ -126,7 +136,7 @@ def explain(builtin: Builtin, param: Param, value: Any) -> ScriptRuntimeError:
     """The error for an argument that a check refused."""
     if not fits(param.type, value):
         return type_error(builtin.name, param.name, param.type, value)
-    if not builtin.nan_ok and not _is_finite(value):
+    if _must_be_finite(builtin, param) and not _is_finite(value):
         return ScriptRuntimeError(
             f"{builtin.name}: Parameter '{param.name}' must be finite, got {_show(value)}"
         )
@@ -152,11 +162,7 @@ def _accepts(builtin: Builtin, param: Param) -> Predicate | None:
     of_type = _PREDICATES.get(param.type)
     if of_type is None:
         return None
-    needs_finite = not builtin.nan_ok and param.type not in (
-        ParamType.BOOL,
-        ParamType.STRING,
-        ParamType.MATRIX,
-    )
+    needs_finite = _must_be_finite(builtin, param)
     is_ranged = bool(param.choices) or param.low is not None or param.high is not None
     may_be_left_out = param.default is None
 

@@ -2,8 +2,8 @@
 
 The compiler calls `static_bind` once for each call in a program; at run time nothing is left to decide.
 
-Texts: "speedl() got an unexpected keyword argument 't_min'" and "Type error: str_sub takes exact..." were seen from
-controllers; the words after "exact" and the other cases follow the same, Python-like, pattern.
+Texts: "speedl() got an unexpected keyword argument 't_min'" and "Type error: str_sub takes exact..." were
+seen from controllers; the words after "exact" and the other cases follow the same, Python-like, pattern.
 """
 
 from __future__ import annotations

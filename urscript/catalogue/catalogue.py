@@ -12,30 +12,30 @@ from typing import Any
 
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
 
-from . import (
-    interfaces,
-    internals,
-    interpreter_mode,
-    ioconfiguration,
-    motion,
-    processpath,
-    urmath,
-    world_model,
-)
 from .argument_checks import compile_check
 from .binding import Slot, static_bind
+from .interfaces import ARRAYS
+from .interfaces import ROWS as INTERFACES
+from .internals import ROWS as INTERNALS
+from .interpreter_mode import ROWS as INTERPRETER_MODE
+from .ioconfiguration import ROWS as IOCONFIGURATION
+from .motion import ROWS as MOTION
+from .motion import VARIABLES
+from .processpath import ROWS as PROCESSPATH
 from .types import Builtin, BuiltinArray, ModuleVariable
+from .urmath import ROWS as URMATH
 from .versions import Version
+from .world_model import ROWS as WORLD_MODEL
 
 ALL_ROWS: tuple[Builtin, ...] = (
-    motion.ROWS
-    + internals.ROWS
-    + urmath.ROWS
-    + interfaces.ROWS
-    + ioconfiguration.ROWS
-    + interpreter_mode.ROWS
-    + processpath.ROWS
-    + world_model.ROWS
+    *MOTION,
+    *INTERNALS,
+    *URMATH,
+    *INTERFACES,
+    *IOCONFIGURATION,
+    *INTERPRETER_MODE,
+    *PROCESSPATH,
+    *WORLD_MODEL,
 )
 
 
@@ -62,8 +62,8 @@ class Catalogue:
             if not forms:
                 raise ValueError(f"no builtin named {name!r} in any software version")
             self._by_name.setdefault(name, forms[-1])
-        self.variables: Mapping[str, ModuleVariable] = {item.name: item for item in motion.VARIABLES}
-        self.arrays: Mapping[str, BuiltinArray] = {item.name: item for item in interfaces.ARRAYS}
+        self.variables: Mapping[str, ModuleVariable] = {item.name: item for item in VARIABLES}
+        self.arrays: Mapping[str, BuiltinArray] = {item.name: item for item in ARRAYS}
         self._checks = {name: compile_check(row) for name, row in self._by_name.items()}
 
     def lookup(self, name: str) -> Builtin | None:
@@ -141,8 +141,8 @@ def catalogue_for(version: str | Sequence[int], extra: Iterable[str] = ()) -> Ca
 
     Args:
         version: "3.15", "5.11.4", or a version tuple.
-        extra: names to accept beside those of the version, e.g. `["set_tool_communication"]` for a program that
-            was exported on an e-Series.
+        extra: names to accept beside those of the version, e.g. `["set_tool_communication"]` for a program
+            that was exported on an e-Series.
 
     Raises:
         ValueError: for a version of no known generation, or an extra name in no table.

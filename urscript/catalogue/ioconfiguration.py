@@ -1,4 +1,4 @@
-"""Builtins of the manual's module "ioconfiguration": domains, input actions, outputs that follow the program."""
+"""Builtins of the module "ioconfiguration": domains, input actions, outputs that follow the program."""
 
 from __future__ import annotations
 
@@ -41,16 +41,17 @@ def _runstate_rows(since: PerGeneration, last_choice: int) -> tuple[Builtin, ...
         ("standard_analog_output", 1),
         ("gp_boolean_output", 127),
     )
-    return tuple(
-        _row(
-            f"set_runstate_{output}_to_value",
-            (_port(last, "outputId"), state),
-            "None",
-            "what an output does when programs start and stop",
-            since=since,
-        )
-        for output, last in outputs
-    ) + (
+    return (
+        *tuple(
+            _row(
+                f"set_runstate_{output}_to_value",
+                (_port(last, "outputId"), state),
+                "None",
+                "what an output does when programs start and stop",
+                since=since,
+            )
+            for output, last in outputs
+        ),
         _row(
             "modbus_set_runstate_dependent_choice",
             (

@@ -1,4 +1,4 @@
-"""Builtins of the manual's module "motion": moves, servoing, force and freedrive modes, conveyors, path offset.
+"""Builtins of the module "motion": moves, servoing, force and freedrive modes, conveyors, path offset.
 
 Defaults: script manual CB3 3.15.4, module motion, and its variables `a_joint_default` and so on.
 """
@@ -413,26 +413,27 @@ _CONVEYORS: tuple[Builtin, ...] = (
     ),
 )
 
-_LATER: tuple[Builtin, ...] = tuple(
-    _row(
-        name,
-        (
-            Param("goal", ANY, unit="joints, pose, struct or frame name"),
-            Param("a", NUMBER, 0.3, "fraction", low=0, high=1),
-            Param("v", NUMBER, 0.3, "fraction", low=0, high=1),
-            _BLEND,
-        ),
-        "None",
-        summary,
-        time=MOTION,
-        since=releases(None, "5.21", "10.8"),
-        source=MANUAL_LATE,
-    )
-    for name, summary in (
-        ("optimovej", "jerk-limited joint move"),
-        ("optimovel", "jerk-limited straight tool move"),
-    )
-) + (
+_LATER: tuple[Builtin, ...] = (
+    *tuple(
+        _row(
+            name,
+            (
+                Param("goal", ANY, unit="joints, pose, struct or frame name"),
+                Param("a", NUMBER, 0.3, "fraction", low=0, high=1),
+                Param("v", NUMBER, 0.3, "fraction", low=0, high=1),
+                _BLEND,
+            ),
+            "None",
+            summary,
+            time=MOTION,
+            since=releases(None, "5.21", "10.8"),
+            source=MANUAL_LATE,
+        )
+        for name, summary in (
+            ("optimovej", "jerk-limited joint move"),
+            ("optimovel", "jerk-limited straight tool move"),
+        )
+    ),
     _row(
         "motion_version_set",
         (Param("version", INT, unit="1 or 2", low=1, high=2),),

@@ -1,4 +1,4 @@
-"""The record kinds of the builtin catalogue: a builtin, its parameters, what it costs, how well it is modelled.
+"""The record kinds of the catalogue: a builtin, its parameters, what it costs, how well it is modelled.
 
 Only declarations live here. Tables fill them (one module a chapter of the script manual), `binding` and
 `argument_checks` interpret them.
@@ -51,7 +51,9 @@ class ParamType(Enum):
     VECTOR6 = "a list of 6 numbers or a Pose"
     NUMBERS = "a list of numbers"
     LIST = "a list"
+    BOOLS = "a list of bools"
     MATRIX = "a matrix"
+    ARRAY = "a list or a Pose"
     SIZED = "a list, a string or a Pose"
     SHAPED = "a matrix, a list, a string or a Pose"
     LIST_OR_MATRIX = "a matrix or a list of numbers"
@@ -74,8 +76,8 @@ class Param:
     Args:
         name: as in keyword calls.
         type: what the argument must be.
-        default: the value handed on when the argument is left out; None stands for "the controller fills it in"
-            (the active TCP, the present joint positions, another parameter's value), see `shown`.
+        default: the value handed on when the argument is left out; None stands for "the controller fills it
+            in" (the active TCP, the present joint positions, another parameter's value), see `shown`.
         unit: SI unit or the meaning of the codes.
         low: smallest value allowed for a number, None for no bound.
         high: largest value allowed.
@@ -129,7 +131,7 @@ class Builtin:
         source: the document or observation the row rests on.
         undocumented: generations whose controllers know the name although their manual does not list it.
         deprecated: the manual advises a successor.
-        nan_ok: not-a-number and infinity do no harm as arguments (sums, texts, registers); otherwise they are errors.
+        nan_ok: NaN and infinity do no harm as arguments (sums, texts, registers); else they are errors.
         note: why the support is not exact.
     """
 

@@ -1,7 +1,7 @@
 """Software versions and robot generations: when a builtin exists.
 
-A row of the catalogue says for each generation from which release on a name is known, and, where it was dropped
-or its signature changed, until which. This module only compares; it knows no names.
+A row of the catalogue says for each generation from which release on a name is known, and, where it was
+dropped or its signature changed, until which. This module only compares; it knows no names.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def releases(
 
 
 NEVER = PerGeneration()
-# "3.0", "5.0" and "10.0" stand for "since the first release": the manuals give a later first release only rarely.
+# "3.0", "5.0" and "10.0" stand for "since the first release": the manuals rarely give a later one.
 EVERYWHERE = releases("3.0", "5.0", "10.0")
 CB3_ONLY = releases("3.0")
 NOT_CB3 = releases(None, "5.0", "10.0")

@@ -1,4 +1,4 @@
-"""Builtins of the world model: named frames that can be attached, moved and tracked (late 5.2x and PolyScope X)."""
+"""Builtins of the world model: named frames to attach, move and track (late 5.2x and PolyScope X)."""
 
 from __future__ import annotations
 

@@ -1,0 +1,122 @@
+"""Builtins on lists and matrices: lengths, norms, transpose, inverse, bits.
+
+Values are never changed in place; every result is new. Source: script manual CB3 3.15.4, module urmath.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from protocol.pose import pose_inv
+from urscript.catalogue.argument_checks import type_error
+from urscript.catalogue.types import ParamType
+from urscript.errors import ScriptRuntimeError
+from urscript.values import Matrix, Pose, is_number
+
+from .arguments import integer, numbers
+
+_WORD = 32
+
+
+def norm(a: Any) -> float:
+    """Absolute value of a number (an int stays int), Euclidean length of a list or of all six of a pose."""
+    if is_number(a):
+        return abs(a)  # type: ignore[no-any-return]
+    if type(a) is Pose or (type(a) is list and all(map(is_number, a))):
+        return math.hypot(*a)
+    raise type_error("norm", "a", ParamType.NORMED, a)
+
+
+def normalize(v: Any) -> list[float]:
+    """The unit vector in the direction of v.
+
+    Raises:
+        ScriptRuntimeError: the sum of the squares is zero.
+    """
+    values = numbers("normalize", "v", v)
+    square = sum(value * value for value in values)
+    if square == 0:
+        raise ScriptRuntimeError("normalize: the sum of all squared elements is zero")
+    length = math.sqrt(square)
+    return [value / length for value in values]
+
+
+def length(v: Any) -> int:
+    """Number of elements of a list or pose, or of bytes of a string."""
+    if isinstance(v, (list, str, Pose)):
+        return len(v)
+    raise type_error("length", "v", ParamType.SIZED, v)
+
+
+def get_list_length(v: Any) -> int:
+    """Number of elements of a list or pose."""
+    if isinstance(v, (list, Pose)):
+        return len(v)
+    raise type_error("get_list_length", "v", ParamType.ARRAY, v)
+
+
+def size(v: Any) -> int | list[int]:
+    """[rows, columns] of a matrix, else the number of elements or bytes."""
+    if isinstance(v, Matrix):
+        return list(v.shape)
+    if isinstance(v, (list, str, Pose)):
+        return len(v)
+    raise type_error("size", "v", ParamType.SHAPED, v)
+
+
+def transpose(m: Any) -> Matrix | list[Any]:
+    """Rows become columns; a list becomes a column matrix, and a column matrix becomes a list."""
+    if isinstance(m, Matrix):
+        if m.shape[1] == 1:
+            return [row[0] for row in m.rows]
+        return Matrix(list(zip(*m.rows, strict=True)))
+    return Matrix([[value] for value in numbers("transpose", "m", m, ParamType.LIST_OR_MATRIX)])
+
+
+def inv(m: Any) -> Matrix | Pose:
+    """Inverse of a pose or of a square, non-singular matrix."""
+    if type(m) is Pose:
+        return Pose.of(pose_inv(m))
+    if not isinstance(m, Matrix):
+        raise type_error("inv", "m", ParamType.POSE_OR_MATRIX, m)
+    rows, columns = m.shape
+    if rows != columns or rows == 0:
+        raise ScriptRuntimeError(f"inv: the matrix must be square, got {rows} x {columns}")
+    array = np.array(m.rows, dtype=np.float64)
+    if not np.isfinite(array).all():
+        raise ScriptRuntimeError("inv: the matrix must be finite")
+    # Rounding hides exact singularity from the inversion itself: ask for the rank first.
+    if np.linalg.matrix_rank(array) < rows:
+        raise ScriptRuntimeError("inv: the matrix is singular")
+    return Matrix(np.linalg.inv(array).tolist())
+
+
+def integer_to_binary_list(x: Any) -> list[bool]:
+    """The 32 bits of an int in two's complement, least significant first."""
+    value = integer("integer_to_binary_list", "x", x)
+    return [bool(value >> bit & 1) for bit in range(_WORD)]
+
+
+def binary_list_to_integer(l: Any) -> int:  # noqa: E741 - the manual's name of the parameter
+    """Signed value of bits, least significant first; missing bits are 0, those after the 32nd are ignored."""
+    if type(l) is not list or not all(type(bit) is bool for bit in l):
+        raise type_error("binary_list_to_integer", "l", ParamType.BOOLS, l)
+    value = sum(1 << place for place, bit in enumerate(l[:_WORD]) if bit)
+    return value - (1 << _WORD) if value >> (_WORD - 1) else value
+
+
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "norm": norm,
+    "normalize": normalize,
+    "length": length,
+    "get_list_length": get_list_length,
+    "size": size,
+    "transpose": transpose,
+    "inv": inv,
+    "integer_to_binary_list": integer_to_binary_list,
+    "binary_list_to_integer": binary_list_to_integer,
+}

@@ -1,0 +1,133 @@
+"""The string functions: bytes in, bytes out; positions count bytes from 0.
+
+Source: script manual CB3 3.15.4, module internals, str_at to to_str. The manual says which cases are errors,
+not their texts.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+from urscript.errors import ScriptRuntimeError
+from urscript.values import INT_MAX, INT_MIN
+
+from .arguments import integer, string
+from .text import limited, operand_text
+
+_NUMBER = re.compile(
+    r"""[ \t\n\v\f\r]*
+    (?P<sign>[+-]?)
+    (?: 0[xX](?P<hex>[0-9a-fA-F]+)
+      | (?P<decimal>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
+      | (?P<word>inf|infinity|nan)
+    )""",
+    re.VERBOSE | re.IGNORECASE | re.ASCII,
+)
+
+
+def str_at(src: Any, index: Any) -> str:
+    """One byte of a string; run-time error for an empty string or an index past its ends."""
+    text, place = string("str_at", "src", src), integer("str_at", "index", index)
+    if not text:
+        raise ScriptRuntimeError("str_at: source string is empty")
+    if not 0 <= place < len(text):
+        raise ScriptRuntimeError(f"str_at: index {place} is out of bounds, the string has {len(text)} bytes")
+    return text[place]
+
+
+def str_cat(op1: Any, op2: Any) -> str:
+    """The texts of two values, joined; at most 1023 characters."""
+    return limited("str_cat", operand_text("str_cat", op1) + operand_text("str_cat", op2))
+
+
+def to_str(val: Any) -> str:
+    """The text of a value; at most 1023 characters."""
+    return limited("to_str", operand_text("to_str", val))
+
+
+def str_empty(text: Any) -> bool:
+    """Whether a string has no bytes."""
+    return not string("str_empty", "str", text)
+
+
+def str_len(text: Any) -> int:
+    """Number of bytes."""
+    return len(string("str_len", "str", text))
+
+
+def str_find(src: Any, target: Any, start_from: Any = 0) -> int:
+    """Index of the first occurrence of target from start_from on, -1 if there is none.
+
+    A start past either end finds nothing; the manual lists no error.
+    """
+    text, wanted = string("str_find", "src", src), string("str_find", "target", target)
+    start = integer("str_find", "start_from", start_from)
+    return text.find(wanted, start) if 0 <= start <= len(text) else -1
+
+
+def str_sub(src: Any, index: Any, count: Any = None) -> str:
+    """At most `count` bytes from `index` on, all to the end without it.
+
+    Raises:
+        ScriptRuntimeError: index outside [0, length], negative count.
+    """
+    text, start = string("str_sub", "src", src), integer("str_sub", "index", index)
+    if not 0 <= start <= len(text):
+        raise ScriptRuntimeError(f"str_sub: index {start} is out of bounds, the string has {len(text)} bytes")
+    if count is None:
+        return text[start:]
+    at_most = integer("str_sub", "len", count)
+    if at_most < 0:
+        raise ScriptRuntimeError(f"str_sub: len {at_most} is out of bounds, it must not be negative")
+    return text[start : start + at_most]
+
+
+def to_num(spelt: Any) -> int | float:
+    """The number a string spells: a float if it has a decimal point, else an int.
+
+    Leading blanks, a sign, an exponent, 0x..., inf and nan are allowed. An exponent without a point that
+    leaves a fraction ("5e-4") gives a float: the manual allows the text and names no type.
+
+    Raises:
+        ScriptRuntimeError: no valid number, or out of range for its type.
+    """
+    text = string("to_num", "str", spelt)
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise ScriptRuntimeError(f'to_num: string doesn\'t contain a valid number: "{text[:40]}"')
+    sign = -1 if match["sign"] == "-" else 1
+    if match["word"]:
+        return sign * float(match["word"])
+    if match["hex"]:
+        return _in_range(sign * int(match["hex"], 16), text)
+    value = sign * float(match["decimal"])
+    if math.isinf(value):
+        raise _out_of_range(text)
+    if "." in match["decimal"] or not value.is_integer():
+        return value
+    return _in_range(int(value), text)
+
+
+def _in_range(value: int, text: str) -> int:
+    if not INT_MIN <= value <= INT_MAX:
+        raise _out_of_range(text)
+    return value
+
+
+def _out_of_range(text: str) -> ScriptRuntimeError:
+    return ScriptRuntimeError(f'to_num: the number is out of range: "{text[:40]}"')
+
+
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "str_at": str_at,
+    "str_cat": str_cat,
+    "str_empty": str_empty,
+    "str_len": str_len,
+    "str_find": str_find,
+    "str_sub": str_sub,
+    "to_num": to_num,
+    "to_str": to_str,
+}

@@ -1,0 +1,66 @@
+"""What values look like where a program turns them into text: to_str and str_cat, textmsg, socket_send_string.
+
+The two text forms are `urscript.values.str_form` and `log_form`; here is which operation takes which values in
+which form.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from urscript.errors import ScriptRuntimeError
+from urscript.values import TEXT_LIMIT, Pose, is_number, log_form, str_form, type_name
+
+_ALLOWED = "a string, bool, int, float or pose, or a list of bools, ints, floats or poses"
+
+
+def _is_scalar(value: Any) -> bool:
+    return isinstance(value, (bool, Pose)) or is_number(value)
+
+
+def operand_text(function: str, value: Any) -> str:
+    """The text of an operand of to_str or str_cat: six decimals at most, trailing zeros removed.
+
+    Raises:
+        ScriptRuntimeError: any type but those the manual lists (none, matrices and lists of strings are not).
+
+    Source: script manual CB3 3.15.4, str_cat and to_str.
+    """
+    if not isinstance(value, str) and not _is_scalar(value):
+        if not isinstance(value, list):
+            raise ScriptRuntimeError(f"{function}: operand must be {_ALLOWED}, got a {type_name(value)}")
+        for item in value:
+            if not _is_scalar(item):
+                raise ScriptRuntimeError(
+                    f"{function}: operand must be {_ALLOWED}, got a list with a {type_name(item)}"
+                )
+    return str_form(value)
+
+
+def limited(function: str, text: str) -> str:
+    """The text, if it is not longer than a script string may become.
+
+    Raises:
+        ScriptRuntimeError: more than 1023 characters.
+    """
+    if len(text) > TEXT_LIMIT:
+        raise ScriptRuntimeError(
+            f"{function}: the resulting string has {len(text)} characters, the limit is {TEXT_LIMIT}"
+        )
+    return text
+
+
+def message_text(s1: Any, s2: Any = "") -> str:
+    """The line that `textmsg(s1, s2)` writes: both texts without a separator, floats with 6 significant digits.
+
+    Source: script manual CB3 3.15.4, textmsg; primary interface captures.
+    """
+    return log_form(s1) + log_form(s2)
+
+
+def wire_text(value: Any) -> str:
+    """The characters `socket_send_string` and `socket_send_line` send; each stands for one byte (latin-1).
+
+    Source: field use: numbers go out in decimal, lists as `[a,b,...]`, so in the form of textmsg.
+    """
+    return log_form(value)
