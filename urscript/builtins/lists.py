@@ -101,11 +101,11 @@ def integer_to_binary_list(x: Any) -> list[bool]:
     return [bool(value >> bit & 1) for bit in range(_WORD)]
 
 
-def binary_list_to_integer(l: Any) -> int:  # noqa: E741 - the manual's name of the parameter
-    """Signed value of bits, least significant first; missing bits are 0, those after the 32nd are ignored."""
-    if type(l) is not list or not all(type(bit) is bool for bit in l):
-        raise type_error("binary_list_to_integer", "l", ParamType.BOOLS, l)
-    value = sum(1 << place for place, bit in enumerate(l[:_WORD]) if bit)
+def binary_list_to_integer(bits: Any) -> int:
+    """Signed value of bits, least significant first; missing ones are 0, those after the 32nd are ignored."""
+    if type(bits) is not list or not all(type(bit) is bool for bit in bits):
+        raise type_error("binary_list_to_integer", "l", ParamType.BOOLS, bits)
+    value = sum(1 << place for place, bit in enumerate(bits[:_WORD]) if bit)
     return value - (1 << _WORD) if value >> (_WORD - 1) else value
 
 

@@ -1,7 +1,7 @@
-"""What values look like where a program turns them into text: to_str and str_cat, textmsg, socket_send_string.
+"""What values look like where a program makes text of them: to_str and str_cat, textmsg, sockets.
 
-The two text forms are `urscript.values.str_form` and `log_form`; here is which operation takes which values in
-which form.
+The two text forms are `urscript.values.str_form` and `log_form`; here is which operation takes which values
+in which form.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ def operand_text(function: str, value: Any) -> str:
     if not isinstance(value, str) and not _is_scalar(value):
         if not isinstance(value, list):
             raise ScriptRuntimeError(f"{function}: operand must be {_ALLOWED}, got a {type_name(value)}")
-        for item in value:
-            if not _is_scalar(item):
-                raise ScriptRuntimeError(
-                    f"{function}: operand must be {_ALLOWED}, got a list with a {type_name(item)}"
-                )
+        odd = [item for item in value if not _is_scalar(item)]
+        if odd:
+            raise ScriptRuntimeError(
+                f"{function}: operand must be {_ALLOWED}, got a list with a {type_name(odd[0])} in it"
+            )
     return str_form(value)
 
 
@@ -51,7 +51,7 @@ def limited(function: str, text: str) -> str:
 
 
 def message_text(s1: Any, s2: Any = "") -> str:
-    """The line that `textmsg(s1, s2)` writes: both texts without a separator, floats with 6 significant digits.
+    """The line that `textmsg(s1, s2)` writes: both texts with nothing between, floats with 6 digits.
 
     Source: script manual CB3 3.15.4, textmsg; primary interface captures.
     """

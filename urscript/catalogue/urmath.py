@@ -56,7 +56,7 @@ ROWS: tuple[Builtin, ...] = (
     _row(
         "pose_add", (Param("p_1", POSE), Param("p_2", POSE)), "pose", "positions added, rotations multiplied"
     ),
-    _row("pose_sub", (_P_TO, _P_FROM), "pose", "positions subtracted, rotation from the second to the first"),
+    _row("pose_sub", (_P_TO, _P_FROM), "pose", "positions subtracted, rotation between the two"),
     _row("pose_trans", (_P_FROM, Param("p_from_to", POSE)), "pose", "the second pose seen from the first"),
     _row("pose_inv", (_P_FROM,), "pose", "inverse transformation"),
     _row(
