@@ -1,0 +1,60 @@
+"""GearRipple: the kinematic transmission error of the strain wave gears.
+
+A strain wave gear does not divide exactly: the joint runs ahead of and behind the motor by up to a tenth of a
+milliradian, once and twice per motor turn, i.e. 101 and 202 times per joint turn. The motor is what the drive
+holds; the joint is what the encoder at the output reports. The phases are the box's own, by its seed; the
+sizes are those of its fidelity.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.random_streams import random_stream
+from ur_emulator.models.robot_model import RobotModel
+
+
+class GearRipple:
+    """q_joint = q_motor + e(q_motor), both counted at the joint [rad].
+
+    Args:
+        robot: gives the gear ratio.
+        fidelity: gives the rms speed ripple of both harmonics.
+        seed: gives the phases.
+    """
+
+    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
+        self._cycles = np.array([[robot.gear_ratio], [2.0 * robot.gear_ratio]])
+        self._phases = random_stream(seed, "gear").uniform(0.0, 2.0 * np.pi, (2, 6))
+        # A speed ripple of rms r has the slope amplitude sqrt(2) r.
+        self._slopes = sqrt(2.0) * np.array([[fidelity.ripple_first], [fidelity.ripple_second]])
+        self._sizes = self._slopes / self._cycles
+        self._angles = np.empty((2, 6))
+        self._waves = np.empty((2, 6))
+        self.error: NDArray[np.float64] = np.zeros(6)
+        self.slope: NDArray[np.float64] = np.zeros(6)
+
+    def evaluate(self, q_motor: NDArray[np.float64]) -> None:
+        """Set `error` e [rad] and `slope` de/dq [1] for motor positions q_motor (6,)."""
+        angles, waves = self._angles, self._waves
+        np.multiply(self._cycles, q_motor, out=angles)
+        np.add(angles, self._phases, out=angles)
+        np.sin(angles, out=waves)
+        np.multiply(waves, self._sizes, out=waves)
+        np.add(waves[0], waves[1], out=self.error)
+        np.cos(angles, out=waves)
+        np.multiply(waves, self._slopes, out=waves)
+        np.add(waves[0], waves[1], out=self.slope)
+
+    def motor_position(self, q_joint: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Invert the gear: motor positions (6,) that put the joints at q_joint (6,) [rad]."""
+        q_motor = np.array(q_joint, dtype=np.float64)
+        # The slope of e is a few percent, so this contracts to rounding within a dozen turns.
+        for _ in range(12):
+            self.evaluate(q_motor)
+            q_motor = q_joint - self.error
+        return q_motor

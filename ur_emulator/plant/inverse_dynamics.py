@@ -1,0 +1,51 @@
+"""InverseDynamics: the torque that the controller's own model of the arm asks for.
+
+The model has the calibrated geometry, the table's masses, the declared payload and the rotors' inertia, but
+neither friction nor the true masses of the arm: where it is wrong, the joint loops must make up for it.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_emulator.models.calibration import Calibration, calibrated_dh
+from ur_emulator.models.mjcf import arm_spec
+from ur_emulator.models.robot_model import RobotModel, Vector3
+from ur_emulator.plant.payload import set_payload_body
+
+
+class InverseDynamics:
+    """tau = M(q) qdd + c(q, qd) + g(q), rotor inertia included."""
+
+    def __init__(self, robot: RobotModel, calibration: Calibration) -> None:
+        self._model = arm_spec(robot, calibrated_dh(robot, calibration), (1.0,) * 6).compile()
+        self._data = mujoco.MjData(self._model)
+        self._armature = np.array(robot.armature)
+        self._rotor = np.zeros(6)
+        self._qpos = self._data.qpos
+        self._qvel = self._data.qvel
+        self._qacc = self._data.qacc
+        self.torque: NDArray[np.float64] = np.zeros(6)
+        """Result of the last evaluation (6,) [Nm]."""
+
+    def set_payload(self, mass: float, cog: Vector3) -> None:
+        """Declare what hangs at the flange: mass [kg], centre of gravity in the flange frame [m]."""
+        set_payload_body(self._model, mass, cog)
+
+    def evaluate(
+        self, q: NDArray[np.float64], qd: NDArray[np.float64], qdd: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Set and return `torque` for a state of motion; each argument (6,), SI."""
+        model, data = self._model, self._data
+        self._qpos[:] = q
+        self._qvel[:] = qd
+        self._qacc[:] = qdd
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 1, self.torque)
+        np.multiply(self._armature, qdd, out=self._rotor)
+        np.add(self.torque, self._rotor, out=self.torque)
+        return self.torque

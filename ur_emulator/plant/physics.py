@@ -1,0 +1,127 @@
+"""The plant's MuJoCo model: the mechanism with hull, friction, drives, table and raw sensors.
+
+The joint servo's proportional and speed terms are MuJoCo actuators (force = ctrl - kp q - kv qd), so that they
+act within every sub-step, in C, and implicitly in speed. What goes into `ctrl` is the business of `plant.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
+from ur_emulator.models.robot_model import DhRow, RobotModel
+
+TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
+
+# Raw sensors, in this order in `sensordata`. MuJoCo evaluates them at the start of a sub-step.
+RAW_Q = slice(0, 6)
+RAW_QD = slice(6, 12)
+RAW_FORCE = slice(12, 18)
+RAW_ACCELERATION = slice(18, 21)
+RAW_VELOCITY = slice(21, 24)
+N_RAW = 24
+
+
+@dataclass(frozen=True, slots=True)
+class ServoGains:
+    """Gains of the joint servos, (6,) each: kp [Nm/rad], kv [Nm s/rad]."""
+
+    kp: NDArray[np.float64]
+    kv: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, robot: RobotModel) -> ServoGains:
+        """Gains that give the robot's servo frequency and damping at its layout inertia."""
+        omega = 2.0 * pi * robot.servo_frequency
+        inertia = np.array(robot.servo_inertia)
+        return cls(kp=omega**2 * inertia, kv=2.0 * robot.servo_damping * omega * inertia)
+
+
+def build_physics(
+    robot: RobotModel, dh: Sequence[DhRow], mass_scale: Sequence[float], gains: ServoGains, substep: float
+) -> mujoco.MjModel:
+    """Compile the plant's model; see `arm_spec` for the mechanism.
+
+    Args:
+        robot: the type of arm.
+        dh: its six true rows.
+        mass_scale: six factors on the link masses.
+        gains: of the joint servos.
+        substep: physics time step [s].
+    """
+    spec = arm_spec(robot, dh, mass_scale)
+    option = spec.option
+    option.timestep = substep
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # A diverged state must reach the caller instead of being reset behind his back; one arm is one island.
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND
+    _add_joint_physics(spec, robot)
+    _add_drives(spec, robot, gains)
+    _add_hulls(spec, robot, dh)
+    _add_sensors(spec)
+    return spec.compile()
+
+
+def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:
+    for i, name in enumerate(JOINTS):
+        joint = spec.joint(name)
+        joint.armature = robot.armature[i]
+        joint.damping = [robot.viscous[i], 0.0, 0.0]
+        joint.frictionloss = robot.coulomb[i]
+
+
+def _add_drives(spec: mujoco.MjSpec, robot: RobotModel, gains: ServoGains) -> None:
+    for i, name in enumerate(JOINTS):
+        drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        drive.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+        drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        drive.gainprm[0] = 1.0
+        drive.biasprm[1] = -gains.kp[i]
+        drive.biasprm[2] = -gains.kv[i]
+        drive.forcelimited = True
+        drive.forcerange = [-robot.tau_max[i], robot.tau_max[i]]
+
+
+def _add_hulls(spec: mujoco.MjSpec, robot: RobotModel, dh: Sequence[DhRow]) -> None:
+    world = spec.worldbody
+    world.add_geom(
+        name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2.0, 2.0, 0.1], pos=[0.0, 0.0, TABLE_HEIGHT]
+    )
+    for piece in robot.base_hull:
+        _add_capsule(world, piece.start, piece.end, piece.radius)
+    for name, link, row in zip(LINKS, robot.links, dh, strict=True):
+        body = spec.body(name)
+        for piece in link.hull:
+            _add_capsule(body, to_body(row, piece.start), to_body(row, piece.end), piece.radius)
+    # Neighbours touch in their common joint by construction.
+    chain = ("world", *LINKS)
+    for one, other in zip(chain, chain[1:], strict=False):
+        spec.add_exclude(bodyname1=one, bodyname2=other)
+
+
+def _add_capsule(body: mujoco.MjsBody, start: Sequence[float], end: Sequence[float], radius: float) -> None:
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=[*start, *end], size=[radius, 0.0, 0.0], mass=0.0
+    )
+
+
+def _add_sensors(spec: mujoco.MjSpec) -> None:
+    kinds, objects = mujoco.mjtSensor, mujoco.mjtObj
+    for kind, of in (
+        (kinds.mjSENS_JOINTPOS, objects.mjOBJ_JOINT),
+        (kinds.mjSENS_JOINTVEL, objects.mjOBJ_JOINT),
+        (kinds.mjSENS_ACTUATORFRC, objects.mjOBJ_ACTUATOR),
+    ):
+        for name in JOINTS:
+            spec.add_sensor(type=kind, objtype=of, objname=name)
+    for kind, of in (
+        (kinds.mjSENS_ACCELEROMETER, objects.mjOBJ_SITE),
+        (kinds.mjSENS_FRAMELINVEL, objects.mjOBJ_SITE),
+    ):
+        spec.add_sensor(type=kind, objtype=of, objname=FLANGE)
