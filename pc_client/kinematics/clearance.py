@@ -19,8 +19,14 @@ from pc_client.kinematics.robot_model import RobotModel, load_pinocchio_model
 
 Array = NDArray[np.float64]
 
-# The base stands on the plane and the shoulder cannot come near it; from the upper arm on, links can.
-_FIRST_LINK_ABOVE_FLOOR = 2
+# The shoulder end of the upper arm cannot move up or down (on a UR5 it is 30 mm above the plane in every
+# posture), and its elbow end lies beside the forearm's: from the forearm on, links are watched.
+_FIRST_LINK_ABOVE_FLOOR = 3
+
+# Neighbours touch at their common joint. Of the wrist's links those two joints apart pass each other closely but
+# freely: the full meshes of a UR3 keep 6.7 mm in every posture, while the hull of the forearm, which bridges its
+# hollow side, would not. Numbers are the joints that carry the links (forearm 3, wrist 3 is 6).
+_FREE_BY_DESIGN = {(3, 5), (4, 6)}
 
 
 class Nearest(NamedTuple):
@@ -34,7 +40,7 @@ class Clearance(NamedTuple):
     """Distances along a joint path; negative when bodies overlap.
 
     Attributes:
-        floor: (n,) lowest point of upper arm, forearm and wrists above the base plane [m].
+        floor: (n,) lowest point of forearm and wrists above the base plane [m].
         floor_nearest: (n,) the link that comes lowest.
         own: (n,) smallest distance between links that are not neighbours [m].
         own_nearest: (n,) the two links that come closest.
@@ -115,7 +121,7 @@ def _load_hulls(urdf: str) -> tuple[Any, Any]:
     for mesh in meshes.geometryObjects:
         if not isinstance(mesh.geometry, pin.coal.BVHModelBase):
             continue  # ee_link carries a token box, not a part of the arm
-        mesh.geometry.buildConvexRepresentation(False)
+        mesh.geometry.buildConvexHull(True, "Qt")  # Qt: triangles only, as coal needs
         if mesh.parentJoint == 0:
             mesh.placement = T_base_root * mesh.placement
         hull = pin.GeometryObject(
@@ -128,8 +134,7 @@ def _load_hulls(urdf: str) -> tuple[Any, Any]:
     joints = [hull.parentJoint for hull in own_pairs.geometryObjects]
     for i, joint_i in enumerate(joints):
         for j, joint_j in enumerate(joints):
-            # Neighbours touch at their common joint by construction.
-            if joint_j > joint_i + 1:
+            if joint_j > joint_i + 1 and (joint_i, joint_j) not in _FREE_BY_DESIGN:
                 own_pairs.addCollisionPair(pin.CollisionPair(i, j))
     return own_pairs, floor_pairs
 

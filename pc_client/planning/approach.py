@@ -30,7 +30,7 @@ APPROACH_ACCELERATION = 0.8
 """Acceleration of the leading joint [rad/s²]."""
 
 FLOOR_MARGIN = 0.02
-"""Least distance of upper arm, forearm and wrists from the base plane on the way [m]."""
+"""Least distance of forearm and wrists from the base plane on the way [m]."""
 
 OWN_MARGIN = 0.01
 """Least distance of the arm from itself on the way [m]."""

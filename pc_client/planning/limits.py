@@ -26,7 +26,7 @@ class PlanLimits:
         position_error_max: error of the inverse kinematics at a sample [m].
         rotation_error_max: the same for the orientation [rad].
         interpolation_error_max: distance of the spline from the movement between samples [m].
-        floor_clearance_min: distance of upper arm, forearm and wrists from the base plane [m].
+        floor_clearance_min: distance of forearm and wrists from the base plane [m].
         own_clearance_min: distance between links of the arm that are not neighbours [m].
     """
 

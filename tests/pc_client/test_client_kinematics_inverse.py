@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import numpy as np
+from closed_form_ik import branch_error, dh_pose
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from pc_client.kinematics.forward import tcp_jacobian
+from pc_client.kinematics.inverse import solve_ik
+from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.singularity import measure_singularity
+
+UR3 = robot_model("ur3")
+ANGLES = st.lists(st.floats(-2 * np.pi, 2 * np.pi), min_size=6, max_size=6).map(np.array)
+OFFSETS = st.lists(st.floats(-0.03, 0.03), min_size=6, max_size=6).map(np.array)
+
+
+@settings(deadline=None)
+@given(ANGLES, OFFSETS)
+def test_a_near_seed_comes_back_to_the_same_posture(q, offset):
+    assume(measure_singularity(tcp_jacobian(UR3, q)[None]).sigma_min[0] > 0.05)
+    solution = solve_ik(UR3, dh_pose(q), q + offset)
+    assert solution.converged
+    assert solution.iterations <= 8
+    np.testing.assert_allclose(solution.q, q, rtol=0, atol=1e-8)
+
+
+def test_from_anywhere_it_ends_on_a_true_solution_or_says_that_it_did_not():
+    rng = np.random.default_rng(4)
+    solved = 0
+    for _ in range(200):
+        T = dh_pose(rng.uniform(-3, 3, 6))
+        solution = solve_ik(UR3, T, rng.uniform(-3, 3, 6))
+        reached = dh_pose(solution.q)
+        assert np.isclose(np.linalg.norm(reached[:3, 3] - T[:3, 3]), solution.position_error, atol=0.3 * 2.0)
+        if solution.converged:
+            solved += 1
+            np.testing.assert_allclose(reached, T, rtol=0, atol=1e-9)
+            assert max(solution.position_error, solution.rotation_error) <= 1e-9
+    assert solved > 150
+
+
+def test_a_solution_is_one_of_the_closed_form_branches():
+    rng = np.random.default_rng(5)
+    seed = np.array(UR3.description.q_branch)
+    T = dh_pose(seed)
+    for _ in range(50):
+        T[:3, 3] = rng.uniform((0.275, -0.2, 0.15), (0.425, 0.2, 0.35))
+        solution = solve_ik(UR3, T, seed)
+        assert solution.converged
+        assert branch_error(solution.q, T)[1] < 1e-8
+
+
+def test_out_of_reach_it_stops_at_the_nearest_it_can_do():
+    T = dh_pose(UR3.description.q_branch)
+    T[:3, 3] = (0.9, 0.0, 0.3)
+    solution = solve_ik(UR3, T, UR3.description.q_branch)
+    assert not solution.converged
+    assert 0.2 < solution.position_error < 1.0
+    assert np.isfinite(solution.q).all()
+
+
+def test_a_singular_seed_is_no_dead_end():
+    goal = np.radians((22.6, -101.1, -120.3, -5.9, 74.2, 106.4))
+    solution = solve_ik(UR3, dh_pose(goal), np.radians((20.0, -90.0, 0.0, -90.0, 0.0, 0.0)))
+    assert solution.converged
+
+
+def test_the_seed_is_left_alone():
+    seed = np.array(UR3.description.q_branch)
+    before = seed.copy()
+    solve_ik(UR3, dh_pose(seed + 0.1), seed)
+    np.testing.assert_array_equal(seed, before)

@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+from importlib import metadata
+
+import numpy as np
+import pytest
+
+from pc_client.errors import PlanningError
+from pc_client.kinematics import robot_data
+from pc_client.kinematics.clearance import clearance_model
+from pc_client.kinematics.forward import tcp_pose
+from pc_client.kinematics.robot_model import ROBOTS, robot_model
+
+UR3 = robot_model("ur3")
+HULLS = clearance_model(UR3)
+
+
+def test_limits_are_the_manuals_and_not_the_urdfs():
+    np.testing.assert_allclose(np.degrees(UR3.limits.qd_max), (180, 180, 180, 360, 360, 360))
+    np.testing.assert_allclose(np.degrees(UR3.limits.q_max), 360)
+    assert UR3.limits.qd_max[0] != pytest.approx(float(UR3.pin_model.velocityLimit[0]))
+
+
+def test_an_unknown_arm_is_refused_with_the_known_ones():
+    with pytest.raises(PlanningError, match=r"'ur4'.*ur10, ur3, ur5"):
+        robot_model("ur4")
+
+
+def test_models_share_no_scratch_memory():
+    assert robot_model("ur3").pin_data is not UR3.pin_data
+
+
+@pytest.fixture
+def nothing_installed(monkeypatch, tmp_path):
+    def not_found(name):
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(robot_data.metadata, "distribution", not_found)
+    monkeypatch.setattr(robot_data.sys, "path", [str(tmp_path)])
+    monkeypatch.setattr(robot_data.sys, "prefix", str(tmp_path))
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    monkeypatch.delenv(robot_data.SHARE_VARIABLE, raising=False)
+    return tmp_path
+
+
+def test_a_missing_package_is_one_line_that_says_what_to_install(nothing_installed):
+    with pytest.raises(PlanningError, match=r"pip install 'ur-hil\[client\]'") as error:
+        robot_data.find_share_folder()
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("place", ["variable", "sys.path", "prefix", "ros"])
+def test_the_share_folder_is_found_where_installers_put_it(nothing_installed, monkeypatch, place):
+    if place == "sys.path":
+        share = nothing_installed / "cmeel.prefix" / "share"
+    elif place == "prefix":
+        share = nothing_installed / "share"
+    else:
+        share = nothing_installed / "elsewhere" / "share"
+        name = robot_data.SHARE_VARIABLE if place == "variable" else "AMENT_PREFIX_PATH"
+        monkeypatch.setenv(name, str(share if place == "variable" else share.parent))
+    (share / "example-robot-data" / "robots").mkdir(parents=True)
+    assert robot_data.find_share_folder() == share
+    with pytest.raises(PlanningError, match=r"no arm\.urdf"):
+        robot_data.find_robot_file("arm.urdf")
+
+
+@pytest.mark.parametrize("name", sorted(ROBOTS))
+def test_the_preferred_branch_is_elbow_up_clear_and_points_forward_and_down(name):
+    model = robot_model(name)
+    q = np.array(model.description.q_branch)
+    tool_z = tcp_pose(model, q)[:3, 2]
+    np.testing.assert_allclose(tool_z, (np.sqrt(0.5), 0, -np.sqrt(0.5)), atol=2e-3)
+    clearance = clearance_model(model).along(q)
+    assert clearance.floor[0] > 0.08
+    assert clearance.own[0] > 0.01
+
+
+def test_the_flange_face_tells_the_floor_distance_of_a_tool_that_points_down():
+    # Flange face down (tool z = -z): the lowest point of the last link is the face, 0 to 2 mm below the TCP.
+    q = np.radians((0, -90, -90, -90, 90, 0))
+    T = tcp_pose(UR3, q)
+    np.testing.assert_allclose(T[:3, 2], (0, 0, -1), atol=1e-9)
+    clearance = HULLS.along(q)
+    assert clearance.floor_nearest[0] == ("wrist 3", 5)
+    assert clearance.floor[0] == pytest.approx(T[2, 3], abs=3e-3)
+
+
+def test_an_arm_in_the_floor_has_negative_clearance():
+    clearance = HULLS.along(np.radians((0, 40, 0, 0, 0, 0)))
+    assert clearance.floor[0] < -0.1
+
+
+def test_turning_the_base_changes_no_clearance_from_the_floor():
+    # Holds only if floor and arm are in the same frame.
+    q = np.tile(UR3.description.q_branch, (8, 1))
+    q[:, 0] = np.linspace(-3, 3, 8)
+    np.testing.assert_allclose(HULLS.along(q).floor, HULLS.along(q).floor[0], atol=1e-6)
+
+
+def test_a_folded_arm_hits_itself_and_an_upright_one_does_not():
+    clearance = HULLS.along(np.radians([(0, -90, 160, -90, -90, 0), (0, -90, 0, -90, 0, 0)]))
+    assert clearance.own[0] < 0.0
+    assert clearance.own_nearest[0].name == "shoulder and forearm"
+    assert clearance.own_nearest[0].joint == 2
+    assert clearance.own[1] > 0.05
+
+
+def test_a_wrist_that_bends_into_the_base_is_seen_in_the_base_frame():
+    # Reaching backwards down to the own base: base hull and wrist would miss each other if the base were turned.
+    folded = np.radians((0, -150, -100, -60, 90, 0))
+    clearance = HULLS.along(folded)
+    assert clearance.own[0] < HULLS.along(np.array(UR3.description.q_branch)).own[0]
