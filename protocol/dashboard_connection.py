@@ -6,7 +6,8 @@ r"""The dashboard server's line protocol without I/O, for either end.
 
 The robot's side: `greet`, then `receive_data`, `next_event` until it gives None, one `reply` for each event.
 The PC's side: `receive_data` until a `Greeting` comes, then `command` and wait for the `Reply`.
-Bytes that a method returns are to be sent; a method that raises has sent nothing and changed nothing.
+Bytes that a method returns are to be sent. After a LocalProtocolError nothing has changed; after a
+RemoteProtocolError the connection is to be closed.
 """
 
 from __future__ import annotations
