@@ -14,6 +14,7 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
+from rich.text import Text
 
 from pc_client.analysis.run import Run
 from pc_client.errors import RecordingError
@@ -147,11 +148,12 @@ class Table:
     def to_rich(self) -> RichTable:
         """Return the table for the terminal."""
         columns, rows = self._cells()
-        table = RichTable(
-            title=self.title, caption="SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed"
-        )
+        caption = "SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed"
+        caption = "SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed"
+        table = RichTable(title=self.title, caption=caption, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for i, column in enumerate(columns):
-            table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
+            heading = Text(column.replace(" [", "\n["))
+            table.add_column(heading, justify="left" if i == 0 else "right", no_wrap=True)
         for i, row in enumerate(rows):
             is_mean = row[0].startswith("mean")
             table.add_row(*row, style="bold" if is_mean else None, end_section=is_mean and i < len(rows) - 1)

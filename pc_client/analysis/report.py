@@ -1,0 +1,202 @@
+"""The report: tables and one self-contained page, rebuilt from a folder of recordings.
+
+`report.html` needs no network: style and figures are inside it, and it holds no date, host or path, so the
+same recordings give the same page. The plotting libraries are loaded only when a report is built.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rich.console import Console
+from rich.progress import track as progress
+
+from pc_client.analysis.budget import PARTS, SPLIT_HZ
+from pc_client.analysis.run import Run, analyse_run
+from pc_client.analysis.table import KINDS, Row, Table, build_table
+from pc_client.errors import RecordingError
+from pc_client.recording.loader import Recording, load_recording
+from protocol.ur_types import JOINT_NAMES
+
+TABLE_JSON, TABLE_MARKDOWN, REPORT_HTML = "table1.json", "table1.md", "report.html"
+_TEMPLATE = "report.html.j2"
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What `build_report` made.
+
+    Attributes:
+        table: Table I of the runs.
+        paths: the files written: table1.json, table1.md, report.html.
+        left_out: one line for each recording that is not in the table, with the reason.
+    """
+
+    table: Table
+    paths: tuple[Path, Path, Path]
+    left_out: tuple[str, ...]
+
+
+def build_report(run_dir: Path | str, console: Console | None = None) -> Report:
+    """Rebuild all tables and figures from the recordings `<movement>_r<k>.mcap` in a folder.
+
+    Recordings that were cut off, or of runs that were given up, are left out of the table and named on the
+    page: half a movement has no SNR that could stand beside the others.
+
+    Args:
+        run_dir: the folder; the results are written into it.
+        console: where progress is shown; None shows none.
+
+    Raises:
+        RecordingError: no usable recording, recordings of different experiments, matplotlib or jinja2
+            missing, or a file cannot be written.
+    """
+    run_dir = Path(run_dir)
+    files = sorted(run_dir.glob("*.mcap"))
+    if not files:
+        raise RecordingError(
+            f"{run_dir} holds no recordings (*.mcap); give the folder that an experiment wrote"
+        )
+    runs: list[Run] = []
+    left_out: list[str] = []
+    for path in _shown(files, "reading", console):
+        try:
+            runs.append(analyse_run(_whole(load_recording(path))))
+        except RecordingError as error:
+            left_out.append(f"{path.name}: {str(error).removeprefix(f'{path} ')}")
+    if not runs:
+        raise RecordingError(f"{run_dir} holds no usable recording; {left_out[0]}")
+    table = build_table(runs)
+    html = render_page(table, left_out, console)
+    paths = (run_dir / TABLE_JSON, run_dir / TABLE_MARKDOWN, run_dir / REPORT_HTML)
+    texts = (json.dumps(table.to_json(), indent=2, allow_nan=False) + "\n", table.to_markdown(), html)
+    for path, text in zip(paths, texts, strict=True):
+        try:
+            path.write_text(text, encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from error
+    return Report(table, paths, tuple(left_out))
+
+
+def render_page(table: Table, left_out: Iterable[str] = (), console: Console | None = None) -> str:
+    """Return the text of `report.html`.
+
+    Raises:
+        RecordingError: matplotlib or jinja2 is not installed.
+    """
+    try:
+        from jinja2 import Environment, StrictUndefined
+
+        from pc_client.analysis import figures
+    except ImportError as error:
+        raise RecordingError(
+            f"the report needs {error.name}; install it with: pip install 'ur-hil[report]'"
+        ) from error
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["db"] = _decibels
+    template = environment.from_string(
+        resources.files("pc_client.analysis").joinpath(_TEMPLATE).read_text(encoding="utf-8")
+    )
+    movements = [
+        {"row": row, "figure": _data_uri(figures.draw_movement(row)), "parts": _parts(row)}
+        for row in _shown(table.rows, "drawing", console)
+    ]
+    return template.render(
+        table=table,
+        groups=[(kind, rows) for kind in _kinds(table) if (rows := table.rows_of(kind))],
+        n_runs=max(len(row.runs) for row in table.rows),
+        movements=movements,
+        part_names=PARTS,
+        split_hz=SPLIT_HZ,
+        joint_names=JOINT_NAMES,
+        table_figure=_data_uri(figures.draw_table(table)),
+        definitions_figure=_data_uri(figures.draw_definitions(table)),
+        budget_figure=_data_uri(figures.draw_budget(table)),
+        provenance=_provenance_facts(table),
+        left_out=list(left_out),
+    )
+
+
+def _whole(recording: Recording) -> Recording:
+    """Return the recording when its run came to its end.
+
+    Raises:
+        RecordingError: the file is cut off, or the run was given up.
+    """
+    if not recording.complete:
+        raise RecordingError(f"left out, {recording.damage}")
+    if "aborted" in recording.summary:
+        raise RecordingError(f"left out, the run was given up ({recording.summary['aborted']})")
+    return recording
+
+
+def _kinds(table: Table) -> list[str]:
+    """Return the kinds of movement in the table, the paper's first."""
+    others = sorted({row.kind for row in table.rows} - set(KINDS))
+    return [*KINDS, *others]
+
+
+def _parts(row: Row) -> list[tuple[str, float, float]]:
+    """Return for each part of the error budget its mean share in % and the SNR that it alone would leave."""
+    n = len(row.runs)
+    return [
+        (
+            part,
+            sum(100.0 * run.budget.share(part) for run in row.runs) / n,
+            sum(run.budget.alone_db(part) for run in row.runs) / n,
+        )
+        for part in PARTS
+    ]
+
+
+def _provenance_facts(table: Table) -> Mapping[str, Any]:
+    """Return what all runs have in common, and what differs, as texts by name."""
+    runs = [run for row in table.rows for run in row.runs]
+    first = runs[0].provenance
+    delays = sorted(
+        {p.identified_delay_s for run in runs if (p := run.provenance).identified_delay_s is not None}
+    )
+    delay = "not identified"
+    if delays:
+        low, high = 1e3 * delays[0], 1e3 * delays[-1]
+        delay = f"{low:.1f} ms" if low == high else f"{low:.1f} to {high:.1f} ms"
+    return {
+        "robot": first.robot_model,
+        "controller software": first.firmware,
+        "serial number": ", ".join(sorted({run.provenance.serial for run in runs})),
+        "data": "SIMULATED: an emulated arm, no real robot moved"
+        if first.simulated
+        else "measured on a real arm",
+        "seed of the emulated arm": "none" if first.seed is None else str(first.seed),
+        "pace": first.pace,
+        "control cycle": f"{1e3 * first.cycle_time_s:g} ms",
+        "controller": first.controller,
+        "controller settings": ", ".join(f"{k} = {v}" for k, v in sorted(first.controller_config.items())),
+        "loop delay identified by the client": delay,
+        "client version": ", ".join(sorted({run.provenance.client_version for run in runs})),
+        "runs": f"{len(runs)}, of {len(table.rows)} movements",
+    }
+
+
+def _data_uri(svg: str) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode()
+
+
+def _decibels(value: float | None) -> str:
+    """Format a level; one that is beyond all measure (no error at all) is a dash."""
+    return "–" if value is None or not -200.0 < value < 200.0 else f"{value:.1f}"
+
+
+def _shown(items: Iterable[_T], what: str, console: Console | None) -> Iterable[_T]:
+    """Iterate with a progress bar when there is a console."""
+    items = list(items)
+    return items if console is None else progress(items, description=what, console=console, transient=True)
