@@ -71,6 +71,7 @@ def record_movement(
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
     duration: float = 2.0,
     length: float = 0.3,
+    rest: float = 0.8,
     seed: int = 0,
     distort: Callable[[np.ndarray], np.ndarray] | None = None,
     prov: Provenance | None = None,
@@ -80,7 +81,7 @@ def record_movement(
     `distort` maps the times (n,) to extra actual positions (n, 3) in m.
     """
     rng = np.random.default_rng(seed)
-    t = np.arange(-0.8, duration + 0.8 + PERIOD / 2, PERIOD)
+    t = PERIOD * np.arange(-round(rest / PERIOD), round((duration + rest) / PERIOD) + 1)
     ref = np.column_stack([np.full_like(t, 0.3), length * bell(t, duration), np.full_like(t, 0.2)])
     velocity = np.gradient(ref, t, axis=0)
     actual = np.column_stack(
@@ -96,7 +97,11 @@ def record_movement(
             frame[1:7] = actual[i, 1]
             frame[7:10] = actual[i]
             phase = (
-                Phase.SETTLE_BEFORE if now < 0 else Phase.MOVEMENT if now <= duration else Phase.SETTLE_AFTER
+                Phase.SETTLE_BEFORE
+                if now < 0
+                else Phase.MOVEMENT
+                if now < duration + PERIOD / 2
+                else Phase.SETTLE_AFTER
             )
             recorder.append(
                 frame, now, np.full(6, ref[i, 1]), np.zeros(6), ref[i], velocity[i], np.zeros(6), phase

@@ -1,0 +1,227 @@
+"""Table I in its three forms, and the report."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from recording_samples import SIGNALS, append_rows, provenance, record_movement
+from rich.console import Console
+
+from pc_client.analysis.report import build_report
+from pc_client.analysis.run import Run, analyse_run
+from pc_client.analysis.table import PAPER_SNR_DB, Table, build_table
+from pc_client.errors import RecordingError
+from pc_client.recording.loader import load_recording
+from pc_client.recording.recorder import Recorder
+
+
+def record(folder: Path, movement: str, repetition: int, **changes: object) -> Path:
+    kind = "uniform" if movement.startswith("uniform") else "lognormal"
+    prov = provenance(movement=movement, kind=kind, repetition=repetition, **changes)
+    path = folder / f"{movement}_r{repetition}.mcap"
+    return record_movement(path, lag=0.01 * repetition, noise=5e-6, seed=repetition, prov=prov)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
+    folder = tmp_path_factory.mktemp("runs")
+    names = ["lognorm_5_1", "zigzag", "uniform_5_1", "lognorm_4_1", "uniform_4_2"]
+    paths = [record(folder, name, k) for name in names for k in (2, 1, 3)]
+    return [analyse_run(load_recording(path)) for path in paths]
+
+
+@pytest.fixture
+def table(runs: list[Run]) -> Table:
+    return build_table(runs)
+
+
+def test_the_papers_means() -> None:
+    uniform = [v for name, v in PAPER_SNR_DB.items() if name.startswith("uniform")]
+    lognormal = [v for name, v in PAPER_SNR_DB.items() if name.startswith("lognorm")]
+    assert sum(uniform) / 5 == pytest.approx(19.34, abs=0.005)
+    assert sum(lognormal) / 5 == pytest.approx(22.16, abs=0.005)
+
+
+def test_rows_stand_in_the_papers_order_and_repetitions_in_theirs(table: Table) -> None:
+    assert [r.name for r in table.rows] == [
+        "uniform_4_2",
+        "uniform_5_1",
+        "lognorm_4_1",
+        "lognorm_5_1",
+        "zigzag",
+    ]
+    for row in table.rows:
+        assert [run.provenance.repetition for run in row.runs] == [1, 2, 3]
+        assert row.snr_db == sorted(row.snr_db, reverse=True)  # the lag grows with the repetition
+        assert row.lag_ms == pytest.approx(20.0, abs=0.5)
+
+
+def test_json_is_what_others_rely_on(table: Table) -> None:
+    data = json.loads(json.dumps(table.to_json(), allow_nan=False))
+    assert {k: data[k] for k in ("controller", "robot", "seed", "pace", "simulated")} == {
+        "controller": "preview",
+        "robot": "UR3 3.15.8",
+        "seed": 7,
+        "pace": "lockstep",
+        "simulated": True,
+    }
+    for row in data["rows"]:
+        assert set(row) >= {
+            "name",
+            "kind",
+            "snr_db",
+            "mean_snr_db",
+            "paper_snr_db",
+            "max_position_error_mm",
+            "lag_ms",
+        }
+        assert len(row["snr_db"]) == 3
+        assert row["mean_snr_db"] == pytest.approx(sum(row["snr_db"]) / 3, abs=1e-5)
+        assert row["paper_snr_db"] == PAPER_SNR_DB.get(row["name"])
+        assert row["kind"] in {"uniform", "lognormal"}
+    assert set(data["mean_snr_db"]) == {"uniform", "lognormal"}
+    uniform = [row["mean_snr_db"] for row in data["rows"] if row["kind"] == "uniform"]
+    assert data["mean_snr_db"]["uniform"] == pytest.approx(sum(uniform) / 2, abs=1e-5)
+
+
+def test_a_kind_without_rows_has_no_mean(runs: list[Run]) -> None:
+    table = build_table([run for run in runs if run.provenance.kind == "uniform"])
+    assert table.to_json()["mean_snr_db"]["lognormal"] is None
+
+
+def test_no_error_at_all_is_null_in_json(tmp_path: Path) -> None:
+    table = build_table([analyse_run(load_recording(record_movement(tmp_path / "a.mcap")))])
+    assert table.to_json()["rows"][0]["snr_db"] == [None]
+
+
+def test_markdown(table: Table) -> None:
+    lines = table.to_markdown().splitlines()
+    assert lines[0] == "# Table I: SIMULATED UR3 3.15.8, seed 7, controller preview"
+    rows = [line for line in lines if line.startswith("|")]
+    assert len({line.count("|") for line in rows}) == 1
+    assert len(rows) == 2 + 5 + 2  # head, movements, means
+    mean = next(line for line in rows if line.startswith("| mean uniform"))
+    assert f"| {(17.58 + 21.44) / 2:.2f} |" in mean
+
+
+def test_terminal_table_fits_eighty_columns(table: Table) -> None:
+    console = Console(width=80)
+    with console.capture() as capture:
+        console.print(table.to_rich())
+    text = capture.get()
+    assert "…" not in text
+    assert "[mm]" in text
+    assert "SIMULATED" in text
+    assert f"{table.rows[0].difference_db:+.2f}" in text
+
+
+@pytest.mark.parametrize(
+    "change", [{"controller": "paper"}, {"seed": 8}, {"simulated": False}, {"firmware": "3.14.3"}]
+)
+def test_different_experiments_do_not_mix(tmp_path: Path, runs: list[Run], change: dict[str, object]) -> None:
+    stranger = analyse_run(load_recording(record(tmp_path, "lognorm_5_2", 1, **change)))
+    with pytest.raises(RecordingError, match=r"lognorm_5_2_r1\.mcap is of another experiment"):
+        build_table([*runs, stranger])
+
+
+def test_a_table_needs_runs() -> None:
+    with pytest.raises(RecordingError, match="no run"):
+        build_table([])
+
+
+def figures_of(html: str) -> list[str]:
+    return [
+        base64.b64decode(data).decode() for data in re.findall(r'"data:image/svg\+xml;base64,([^"]+)"', html)
+    ]
+
+
+def test_report_is_one_page_that_needs_nothing_else(tmp_path: Path) -> None:
+    for movement in ("uniform_4_1", "lognorm_4_1"):
+        for k in (1, 2, 3):
+            record(tmp_path, movement, k)
+    report = build_report(tmp_path)
+    assert [p.name for p in report.paths] == ["table1.json", "table1.md", "report.html"]
+    html = report.paths[2].read_text()
+    assert re.findall(r"(?:https?:)?//|@import|url\(|<script|<link", re.sub(r"base64,[^\"]+", "", html)) == []
+    assert re.findall(r'(?:src|href)="(?!data:image/svg\+xml;base64,|#)', html) == []
+    assert len(html) < 3_000_000
+    figures = figures_of(html)
+    assert len(figures) == 3 + 2
+    for svg in figures:
+        assert "<!-- SIMULATED -->" in svg  # the text as drawn
+        assert re.findall(r'(?:xlink:)?href="(?!#)', svg) == []
+    assert "SIMULATED" in html
+    assert str(tmp_path) not in html
+    assert json.loads(report.paths[0].read_text()) == report.table.to_json()
+    again = build_report(tmp_path, Console(quiet=True))
+    assert again.paths[2].read_text() == html
+
+
+def test_report_of_a_real_arm_does_not_say_simulated(tmp_path: Path) -> None:
+    record(tmp_path, "lognorm_4_1", 1, simulated=False, seed=None, serial="2016330001")
+    html = build_report(tmp_path).paths[2].read_text()
+    assert "SIMULATED" not in html
+    assert "measured on a real arm" in html
+    assert not any("SIMULATED" in svg for svg in figures_of(html))
+
+
+def test_names_from_a_recording_cannot_break_the_page(tmp_path: Path) -> None:
+    prov = provenance(movement="<b>evil", serial="<script>")
+    record_movement(tmp_path / "evil_r1.mcap", lag=0.01, prov=prov)
+    html = build_report(tmp_path).paths[2].read_text()
+    assert "<script>" not in html
+    assert "<b>evil" not in html
+
+
+def test_cut_and_aborted_recordings_are_left_out_and_named(tmp_path: Path) -> None:
+    record(tmp_path, "lognorm_4_1", 1)
+    cut = record(tmp_path, "lognorm_4_1", 2)
+    cut.write_bytes(cut.read_bytes()[:-100])
+    with Recorder(tmp_path / "lognorm_4_1_r3.mcap", provenance(repetition=3), SIGNALS) as recorder:
+        append_rows(recorder, 60)
+        recorder.close({"aborted": "RobotStoppedError"})
+    (tmp_path / "notes.mcap").write_text("hello")
+    report = build_report(tmp_path)
+    assert len(report.table.rows[0].runs) == 1
+    assert [line.split(":")[0] for line in report.left_out] == [
+        "lognorm_4_1_r2.mcap",
+        "lognorm_4_1_r3.mcap",
+        "notes.mcap",
+    ]
+    html = report.paths[2].read_text()
+    assert "the run was given up (RobotStoppedError)" in html
+    assert str(tmp_path) not in html
+
+
+def test_folders_without_recordings(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="holds no recordings"):
+        build_report(tmp_path)
+    (tmp_path / "a.mcap").write_text("hello")
+    with pytest.raises(RecordingError, match="holds no usable recording"):
+        build_report(tmp_path)
+
+
+def test_missing_library_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record(tmp_path, "lognorm_4_1", 1)
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    with pytest.raises(
+        RecordingError, match=r"needs jinja2; install it with: pip install 'ur-hil\[report\]'"
+    ):
+        build_report(tmp_path)
+
+
+def test_plotting_is_loaded_only_to_plot() -> None:
+    code = (
+        "import sys, pc_client.recording.recorder, pc_client.recording.export, pc_client.analysis.report\n"
+        "print([m for m in ('matplotlib', 'jinja2', 'pyarrow') if m in sys.modules])"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path.cwd()
+    )
+    assert run.stdout.strip() == "[]"
