@@ -1,0 +1,52 @@
+"""`ur-client doctor`: what answers at an address, and whether it is safe to stream."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pc_client.commands.options import PortBaseOption, RobotOption, console, ports_of
+
+if TYPE_CHECKING:
+    from pc_client.driver.probe import FrameRhythm
+
+
+def doctor(
+    robot: RobotOption,
+    port_base: PortBaseOption = 0,
+    seconds: Annotated[
+        float, typer.Option("--seconds", min=0.1, max=600.0, help="How long to listen.")
+    ] = 2.0,
+) -> None:
+    """Say what answers on which port, firmware, cycle time and jitter, and whether it is safe to stream."""
+    from pc_client.driver.probe import probe
+    from pc_client.driver.transport import TcpNetwork
+
+    found = probe(TcpNetwork(), robot, ports_of(port_base), seconds)
+    for name, number in found.open_ports.items():
+        console.print(f"port {number:5}  {name:13} open")
+    for name, number in found.closed_ports.items():
+        console.print(f"port {number:5}  {name:13} closed")
+    if found.info is not None:
+        console.print(f"robot       {found.info}", markup=False)
+    if found.rhythm is not None:
+        _show_rhythm(found.rhythm)
+    if found.obstacle:
+        console.print(f"streaming   NOT NOW: {found.obstacle}", markup=False)
+        raise typer.Exit(1)
+    console.print("streaming   ready: RUNNING, no safety stop, no program running")
+
+
+def _show_rhythm(rhythm: FrameRhythm) -> None:
+    console.print(
+        f"frames      {rhythm.frame_size} bytes, {rhythm.n_new} new, {rhythm.n_heartbeats} heartbeats"
+    )
+    if rhythm.cycle is None:
+        console.print("cycle       the robot's time stands still until a program runs (lockstep)")
+    else:
+        console.print(f"cycle       {rhythm.cycle * 1e3:.3f} ms, {rhythm.lost} cycles lost")
+    console.print(
+        f"arrival     jitter {rhythm.arrival_sd * 1e3:.2f} ms (standard deviation), "
+        f"longest pause {rhythm.arrival_worst * 1e3:.1f} ms"
+    )

@@ -1,0 +1,109 @@
+"""`ur-client experiment` and `ur-client run`: movements on a robot, recordings and tables in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pc_client.commands.options import (
+    ControllerOption,
+    OutOption,
+    PortBaseOption,
+    RepeatOption,
+    RobotOption,
+    YesOption,
+    console,
+    ports_of,
+    show_report,
+)
+
+if TYPE_CHECKING:
+    from pc_client.experiment.prepare import Experiment
+    from protocol.ur_types import Ports
+
+
+def experiment(
+    robot: RobotOption,
+    out: OutOption,
+    movements: Annotated[
+        str | None, typer.Option("--movements", metavar="A,B,...", help="Names or files; all ten by default.")
+    ] = None,
+    repeat: RepeatOption = 3,
+    controller: ControllerOption = "preview",
+    port_base: PortBaseOption = 0,
+    yes: YesOption = False,
+) -> None:
+    """Run the paper's experiment: ten movements, three times each, Table I and a report."""
+    from pc_client.movements.files import library_names
+
+    chosen = [name.strip() for name in movements.split(",")] if movements else library_names()
+    _run([name for name in chosen if name], robot, out, repeat, controller, port_base, yes)
+
+
+def run(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="Movement file, or a name of the library.")],
+    robot: RobotOption,
+    out: OutOption,
+    repeat: RepeatOption = 1,
+    controller: ControllerOption = "preview",
+    port_base: PortBaseOption = 0,
+    yes: YesOption = False,
+) -> None:
+    """Run one movement."""
+    _run([file], robot, out, repeat, controller, port_base, yes)
+
+
+def _run(
+    movements: Sequence[str], robot: str, out: Path, repeat: int, controller: str, port_base: int, yes: bool
+) -> None:
+    from pc_client.control.controller_config import controller_config
+    from pc_client.driver.ur_driver import UrDriver
+    from pc_client.experiment.preflight import is_loopback
+    from pc_client.experiment.prepare import prepare_experiment
+    from pc_client.experiment.progress import Progress
+    from pc_client.experiment.runner import ExperimentRunner
+
+    config = controller_config(controller)
+    ports = ports_of(port_base)
+    with console.status("planning"):
+        planned = prepare_experiment(movements, repeat=repeat, out=out)
+    if not yes and not is_loopback(robot):
+        _ask(planned, robot, ports)
+    with Progress(console, planned.n_runs) as progress, UrDriver(robot, ports) as driver:
+        report = ExperimentRunner(driver, planned, config, progress).run()
+    robot_time = sum(stream.robot_time for stream in report.streams)
+    wall_time = sum(stream.wall_time for stream in report.streams)
+    late = sum(stream.late_frames for stream in report.streams)
+    lost = sum(stream.lost_frames for stream in report.streams)
+    console.print(
+        f"{robot_time:.1f} s of robot time in {wall_time:.1f} s "
+        f"({robot_time / max(wall_time, 1e-9):.1f} x real time), "
+        f"loop delay {report.delay.delay * 1e3:.1f} ms, {late} late and {lost} lost frames"
+    )
+    show_report(out)
+
+
+def _ask(planned: Experiment, robot: str, ports: Ports) -> None:
+    """Show what is going to happen and ask; nothing has moved and no connection stays open meanwhile.
+
+    Raises:
+        typer.Abort: the answer is no.
+    """
+    from pc_client.driver.ur_driver import UrDriver
+    from pc_client.experiment.preflight import experiment_text
+    from pc_client.planning.approach import plan_approach
+    from pc_client.planning.plan_text import approach_text
+
+    with UrDriver(robot, ports) as driver:
+        info, q_now = driver.info, driver.actual_q()
+        driver.check_ready()
+    approach = plan_approach(planned.planned[0].plan, q_now, model=planned.model)
+    console.print(f"robot at {robot}: {info}")
+    console.print(experiment_text(planned))
+    console.print(approach_text(approach))
+    typer.confirm(
+        "The arm is going to move. Is the space around it free, and the emergency stop at hand?", abort=True
+    )

@@ -1,0 +1,52 @@
+"""Options that several commands share, and the terminal they write to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from protocol.errors import ProtocolError
+from protocol.ur_types import Ports
+
+console = Console(highlight=False)
+
+RobotOption = Annotated[
+    str, typer.Option("--robot", metavar="HOST", help="Name or address of the control box.")
+]
+PortBaseOption = Annotated[
+    int, typer.Option("--port-base", metavar="N", help="Offset of all ports, as given to the box.")
+]
+OutOption = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Folder for recordings, tables and report.")
+]
+ControllerOption = Annotated[
+    str, typer.Option("--controller", metavar="NAME", help="preview or paper.", show_default=True)
+]
+RepeatOption = Annotated[int, typer.Option("--repeat", min=1, max=99, help="Runs of each movement.")]
+YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a real arm moves.")]
+
+
+def show_report(folder: Path) -> None:
+    """Build tables and report from a folder of recordings, and print Table I beside the paper's."""
+    from pc_client.analysis.report import build_report
+
+    report = build_report(folder, console)
+    console.print(report.table.to_rich())
+    for line in report.left_out:
+        console.print(line, markup=False)
+    console.print(f"report: {report.paths[-1]}", markup=False)
+
+
+def ports_of(port_base: int) -> Ports:
+    """The robot's ports.
+
+    Raises:
+        typer.BadParameter: the offset leaves the TCP ports.
+    """
+    try:
+        return Ports.standard(offset=port_base)
+    except ProtocolError as error:
+        raise typer.BadParameter(str(error)) from error

@@ -1,0 +1,39 @@
+"""`ur-client report` and `ur-client export`: what is done with recordings, without a robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pc_client.commands.options import console, show_report
+
+
+def report(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder with the recordings of an experiment.")
+    ],
+) -> None:
+    """Build tables and report again from the recordings of an experiment."""
+    show_report(folder)
+
+
+def export(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording, .mcap.")],
+    to: Annotated[str, typer.Option("--to", metavar="csv|parquet", help="Format of the table.")] = "csv",
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Beside the recording by default.")
+    ] = None,
+) -> None:
+    """Write the rows of a recording as a table."""
+    from pc_client.recording.export import export as write_table
+    from pc_client.recording.loader import load_recording
+
+    if to not in ("csv", "parquet"):
+        raise typer.BadParameter(f"cannot export to {to!r}: use csv or parquet")
+    recording = load_recording(file)
+    if recording.damage:
+        console.print(f"{file}: {recording.damage}; exporting {recording.n_rows} rows", markup=False)
+    path = write_table(recording, out or file.with_suffix(f".{to}"), "csv" if to == "csv" else "parquet")
+    console.print(str(path), markup=False)

@@ -1,0 +1,133 @@
+"""What the arm should do at any time, prepared so that the control loop only looks it up.
+
+Frames come on a fixed grid, so the whole reference is computed before the arm moves; a time off the grid
+(jitter of a real controller's stamp) is computed when it comes, by the same function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class JointReference(Protocol):
+    """Joint positions over time; before 0 and after `duration` the arm stands still."""
+
+    @property
+    def duration(self) -> float:
+        """Length of the movement [s]."""
+        ...
+
+    def at(
+        self, t: float
+    ) -> tuple[Sequence[float] | NDArray[np.float64], Sequence[float] | NDArray[np.float64]]:
+        """Positions (6,) [rad] and velocities (6,) [rad/s] at time t [s]."""
+        ...
+
+
+class TcpReference(Protocol):
+    """The TCP's desired motion over time, for the log; `movements.Movement` is one."""
+
+    def sample(self, t: NDArray[np.float64], /) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions (n, 3) [m] and velocities (n, 3) [m/s], base frame, at times (n,) [s]."""
+        ...
+
+
+class ReferencePoint(NamedTuple):
+    """The reference at one time.
+
+    Attributes:
+        q: (6,) desired joint positions as plain floats [rad].
+        qd_feedforward: (6,) velocities to command now, before feedback, as plain floats [rad/s].
+        q_array: (6,) the same positions for the log [rad].
+        qd_array: (6,) desired joint velocities [rad/s].
+        p: (3,) desired TCP position, base frame [m].
+        v: (3,) desired TCP velocity, base frame [m/s].
+    """
+
+    q: tuple[float, ...]
+    qd_feedforward: tuple[float, ...]
+    q_array: NDArray[np.float64]
+    qd_array: NDArray[np.float64]
+    p: NDArray[np.float64]
+    v: NDArray[np.float64]
+
+
+# Time stamps are multiples of the cycle up to rounding; one microsecond tells neighbours apart and is
+# 1e-4 of a cycle.
+_TICKS_PER_SECOND = 1_000_000
+
+
+class ReferenceTable:
+    """A reference sampled on the control grid, with its feed-forward.
+
+    Args:
+        joints: the joint reference.
+        period: control cycle of the robot [s].
+        lead: time before the movement that is needed [s].
+        settle: time after it [s].
+        lookahead: None: feed-forward is the reference velocity at the current time. A number: it is the
+            mean reference velocity over the cycle that begins this much later [s].
+        tcp: the TCP reference to log, or None when there is none.
+    """
+
+    __slots__ = ("_joints", "_lookahead", "_period", "_points", "_tcp", "duration", "lead", "settle")
+
+    def __init__(
+        self,
+        joints: JointReference,
+        *,
+        period: float,
+        lead: float,
+        settle: float,
+        lookahead: float | None = None,
+        tcp: TcpReference | None = None,
+    ) -> None:
+        self.duration = joints.duration
+        self.lead = lead
+        self.settle = settle
+        self._joints = joints
+        self._tcp = tcp
+        self._period = period
+        self._lookahead = lookahead
+        self._points: dict[int, ReferencePoint] = {}
+        grid = np.arange(round((lead + self.duration + settle) / period) + 2) * period - lead
+        self._compute(np.round(grid * _TICKS_PER_SECOND).astype(int).tolist())
+
+    @property
+    def period(self) -> float:
+        """Control cycle of the robot [s]."""
+        return self._period
+
+    def at(self, t: float) -> ReferencePoint:
+        """The reference at time t [s] since the movement began, negative before it."""
+        tick = round(t * _TICKS_PER_SECOND)
+        point = self._points.get(tick)
+        if point is None:
+            self._compute([tick])
+            point = self._points[tick]
+        return point
+
+    def _compute(self, ticks: list[int]) -> None:
+        """Add the points at these times [us]."""
+        times = np.array(ticks) / _TICKS_PER_SECOND
+        if self._tcp is None:
+            p = v = np.full((len(times), 3), np.nan)
+        else:
+            p, v = self._tcp.sample(times)
+        for i, tick in enumerate(ticks):
+            t = float(times[i])
+            q, qd = (np.array(x, dtype=np.float64) for x in self._joints.at(t))
+            feedforward = qd if self._lookahead is None else self._mean_velocity(t + self._lookahead)
+            self._points[tick] = ReferencePoint(
+                tuple(q.tolist()), tuple(feedforward.tolist()), q, qd, p[i], v[i]
+            )
+
+    def _mean_velocity(self, t: float) -> NDArray[np.float64]:
+        """Mean reference velocity (6,) [rad/s] over the cycle that begins at t [s]."""
+        now, later = (np.asarray(self._joints.at(at)[0], dtype=np.float64) for at in (t, t + self._period))
+        mean: NDArray[np.float64] = (later - now) / self._period
+        return mean

@@ -1,0 +1,114 @@
+"""One frame in, one command out: reference, controller and the phases of a run. No I/O, no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.pi_feedforward import PiState, step_pi
+from pc_client.control.reference import ReferencePoint, ReferenceTable
+from pc_client.errors import DriverError
+from pc_client.recording.layout import Phase
+from protocol.ur_types import JOINT_NAMES
+
+# After a gap in the frames the integral must not jump: no more than this many cycles count.
+_MOST_CYCLES_PER_STEP = 3
+
+
+class TrackerStep(NamedTuple):
+    """What the tracker made of one frame.
+
+    Attributes:
+        t: time since the movement began [s], negative before it.
+        phase: settle before, movement or settle after.
+        point: the reference at t.
+        qd_cmd: (6,) velocities to send, or in force [rad/s].
+        finished: True: the run is over, send the stop word instead of `qd_cmd`.
+    """
+
+    t: float
+    phase: Phase
+    point: ReferencePoint
+    qd_cmd: list[float]
+    finished: bool
+
+
+class Tracker:
+    """Follows one reference once.
+
+    Time is the robot's own: the first time stamp is `reference.lead` seconds before the movement begins.
+
+    Args:
+        reference: what to follow.
+        config: the controller.
+        qd_max: (6,) joint speed limits of the arm [rad/s]; the controller uses its share of them.
+    """
+
+    __slots__ = ("_config", "_end", "_last_stamp", "_qd_max", "_reference", "_start", "_state")
+
+    def __init__(self, reference: ReferenceTable, config: ControllerConfig, qd_max: Sequence[float]) -> None:
+        self._reference = reference
+        self._config = config
+        self._qd_max = tuple(limit * config.speed_share for limit in qd_max)
+        self._state = PiState()
+        self._start: float | None = None
+        self._last_stamp = 0.0
+        # Half a microsecond: the same grid as the reference, whatever rounding the stamps carry.
+        self._end = reference.duration + reference.settle - 0.5e-6
+
+    @property
+    def qd_max(self) -> tuple[float, ...]:
+        """(6,) the largest speeds that a step can command [rad/s]."""
+        return self._qd_max
+
+    def step(self, stamp: float, q: Sequence[float]) -> TrackerStep:
+        """Answer a new frame with a command.
+
+        Args:
+            stamp: the frame's time stamp [s], later than the last one.
+            q: (6,) reported joint positions [rad].
+
+        Raises:
+            DriverError: a joint is further from its reference than the controller's `abort_error`.
+        """
+        reference = self._reference
+        if self._start is None:
+            self._start = stamp + reference.lead
+            dt = reference.period
+        else:
+            dt = min(stamp - self._last_stamp, _MOST_CYCLES_PER_STEP * reference.period)
+        self._last_stamp = stamp
+        t = stamp - self._start
+        point = reference.at(t)
+        abort = self._config.abort_error
+        for wanted, actual in zip(point.q, q, strict=True):
+            # Written so that NaN aborts too.
+            if not -abort < wanted - actual < abort:
+                raise DriverError(_describe_error(point.q, q, t, abort))
+        command = step_pi(self._config, self._qd_max, self._state, point.q, point.qd_feedforward, q, dt)
+        return TrackerStep(t, self._phase(t), point, command, t >= self._end)
+
+    def observe(self, stamp: float) -> TrackerStep:
+        """Describe a frame that gets no command of its own because a newer one is already here.
+
+        Its `qd_cmd` is the command in force. Nothing in the controller changes.
+        """
+        t = stamp - self._start if self._start is not None else -self._reference.lead
+        return TrackerStep(t, self._phase(t), self._reference.at(t), self._state.qd_cmd, False)
+
+    def _phase(self, t: float) -> Phase:
+        if t < -0.5e-6:
+            return Phase.SETTLE_BEFORE
+        return Phase.MOVEMENT if t <= self._reference.duration + 0.5e-6 else Phase.SETTLE_AFTER
+
+
+def _describe_error(q_ref: Sequence[float], q: Sequence[float], t: float, abort: float) -> str:
+    joint, error = 0, 0.0
+    for j, (wanted, actual) in enumerate(zip(q_ref, q, strict=True)):
+        if not abs(wanted - actual) <= abs(error):
+            joint, error = j, wanted - actual
+    return (
+        f"the {JOINT_NAMES[joint]} joint is {error:+.3f} rad from its reference at t = {t:.3f} s; "
+        f"allowed is {abort} rad: the run was ended"
+    )

@@ -1,0 +1,142 @@
+"""Ports 30001 and 30002: the robot's messages come in, our programs go out.
+
+State packages are passed over: the realtime port tells more, and in time. Both connections must be read
+now and then, or the robot has to hold back what it wants to tell.
+"""
+
+from __future__ import annotations
+
+from pc_client.driver.transport import Network, Transport
+from pc_client.errors import DriverError, RobotStoppedError
+from protocol.errors import RemoteProtocolError
+from protocol.frame_buffer import FrameBuffer
+from protocol.primary_messages import (
+    ErrorCodeMessage,
+    ReportLevel,
+    RobotMessage,
+    RuntimeExceptionMessage,
+    VersionMessage,
+    decode_message,
+)
+from protocol.ur_types import SoftwareVersion
+
+VERSION_TIMEOUT = 5.0
+"""The version message is the first package of a connection; a box sends it at once."""
+
+_HEADER_SIZE = 5
+_ROBOT_MESSAGE = 20
+_LONGEST_PACKAGE = 1 << 20
+_OLDEST = SoftwareVersion(3, 3)
+"""Form of messages before the version is known."""
+
+
+class PackageStream:
+    """One connection to a primary or secondary port.
+
+    Args:
+        transport: the connected port.
+        network: its clock.
+        name: the port's name for messages, e.g. "primary".
+
+    Attributes:
+        version: software of the controller, once its version message came.
+    """
+
+    __slots__ = ("_buffer", "_early", "_name", "_network", "_transport", "version")
+
+    def __init__(self, transport: Transport, network: Network, name: str) -> None:
+        self._transport = transport
+        self._network = network
+        self._name = name
+        self._buffer = FrameBuffer(_LONGEST_PACKAGE, _HEADER_SIZE)
+        self._early: list[RobotMessage] = []
+        self.version: SoftwareVersion | None = None
+
+    def wait_for_version(self) -> SoftwareVersion:
+        """Return the controller's software version from its greeting.
+
+        Raises:
+            DriverError: no version message in time, or this is no Universal Robots port.
+        """
+        deadline = self._network.now() + VERSION_TIMEOUT
+        while self.version is None:
+            if self._network.now() > deadline:
+                raise DriverError(
+                    f"the {self._name} port says nothing about its version: is this a control box?"
+                )
+            self._early += self._read(0.1) or []
+        return self.version
+
+    def poll(self) -> list[RobotMessage]:
+        """Messages that have arrived, without waiting.
+
+        Raises:
+            DriverError: the connection broke, or it carries another protocol.
+        """
+        messages, self._early = self._early, []
+        while (more := self._read(0.0)) is not None:
+            messages += more
+        return messages
+
+    def send_program(self, text: str) -> None:
+        """Send a whole program; it must end with a line break, or the robot waits for more.
+
+        Raises:
+            DriverError: the connection is gone.
+        """
+        self._transport.send(text.encode("latin-1"))
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._transport.close()
+
+    def _read(self, timeout: float) -> list[RobotMessage] | None:
+        """Messages in the next piece of the stream, or None when nothing came for `timeout` [s]."""
+        data = self._transport.receive(timeout)
+        if data == b"":
+            raise DriverError(f"the robot closed the {self._name} connection")
+        if data is None:
+            return None
+        messages: list[RobotMessage] = []
+        try:
+            self._buffer.feed(data)
+            while (package := self._buffer.next_frame()) is not None:
+                if package[4] != _ROBOT_MESSAGE:
+                    continue
+                message = decode_message(package[_HEADER_SIZE:], self.version or _OLDEST)
+                if isinstance(message, VersionMessage):
+                    self.version = SoftwareVersion(
+                        message.major, message.minor, message.bugfix, message.build
+                    )
+                messages.append(message)
+        except RemoteProtocolError as error:
+            raise DriverError(f"the {self._name} port does not speak its protocol: {error}") from error
+        return messages
+
+
+def raise_on_error(messages: list[RobotMessage], program: str = "") -> None:
+    """Turn what a robot reports about a failed program into an exception.
+
+    Args:
+        messages: what came from the primary port.
+        program: the text that we sent, to quote the line that failed.
+
+    Raises:
+        RobotStoppedError: a runtime exception, or an error code of a serious level.
+    """
+    for message in messages:
+        if isinstance(message, RuntimeExceptionMessage):
+            lines = program.splitlines()
+            quoted = f" ({lines[message.line - 1].strip()})" if 1 <= message.line <= len(lines) else ""
+            raise RobotStoppedError(
+                f"the robot's program failed in line {message.line}, column {message.column}: "
+                f"{message.text}{quoted}"
+            )
+        if isinstance(message, ErrorCodeMessage) and _is_serious(message.report_level):
+            raise RobotStoppedError(
+                f"the robot reports C{message.code}A{message.argument} {message.text}".rstrip()
+            )
+
+
+def _is_serious(level: int) -> bool:
+    return ReportLevel.VIOLATION <= level <= ReportLevel.CRITICAL_FAULT

@@ -1,0 +1,131 @@
+"""What answers at an address: every port, firmware, the rhythm of the frames, and whether streaming is safe.
+
+Looks only; sends nothing that could move an arm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from pc_client.driver.package_stream import PackageStream
+from pc_client.driver.realtime_client import RealtimeClient
+from pc_client.driver.robot_info import RobotInfo, read_robot_info
+from pc_client.driver.transport import Network
+from pc_client.driver.watchdog import check_idle, check_safety
+from pc_client.errors import DriverError
+from protocol.realtime_layout import RealtimeFrame
+from protocol.ur_types import Ports
+
+_CONNECT_TIMEOUT = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRhythm:
+    """How the realtime frames came in.
+
+    Attributes:
+        frame_size: bytes of a frame.
+        n_new: frames with a new time stamp.
+        n_heartbeats: frames that repeated one: the robot's time stands still between programs.
+        cycle: median step of the time stamps [s]; None when time stood still.
+        lost: cycles whose frame never came.
+        arrival_sd: standard deviation of the time between two arrivals [s].
+        arrival_worst: longest time between two arrivals [s].
+    """
+
+    frame_size: int
+    n_new: int
+    n_heartbeats: int
+    cycle: float | None
+    lost: int
+    arrival_sd: float
+    arrival_worst: float
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What answers at an address.
+
+    Attributes:
+        open_ports: name and number of every port that accepts a connection.
+        closed_ports: the others.
+        info: which robot; None when its primary port does not answer.
+        rhythm: of the frames; None when none come.
+        obstacle: why velocities must not be streamed now, or "" when they may.
+    """
+
+    open_ports: dict[str, int]
+    closed_ports: dict[str, int]
+    info: RobotInfo | None
+    rhythm: FrameRhythm | None
+    obstacle: str
+
+
+def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosis:
+    """Look at everything that a session would need.
+
+    Args:
+        network: makes the connections.
+        host: the robot.
+        ports: its ports.
+        seconds: how long to listen to the frames [s].
+    """
+    found: dict[str, int] = {}
+    absent: dict[str, int] = {}
+    for item in fields(ports):
+        number = getattr(ports, item.name)
+        try:
+            network.connect(host, number, _CONNECT_TIMEOUT).close()
+            found[item.name] = number
+        except DriverError:
+            absent[item.name] = number
+    obstacles: list[str] = []
+    info: RobotInfo | None = None
+    rhythm: FrameRhythm | None = None
+    try:
+        info = _read_info(network, host, ports)
+    except DriverError as error:
+        obstacles.append(str(error))
+    try:
+        rhythm, frame = _listen(network, host, ports.realtime, seconds)
+        check_safety(frame)
+        check_idle(frame)
+    except DriverError as error:
+        obstacles.append(str(error))
+    if "secondary" in absent:
+        obstacles.append(f"the secondary port {ports.secondary} takes no programs")
+    return Diagnosis(found, absent, info, rhythm, obstacles[0] if obstacles else "")
+
+
+def _read_info(network: Network, host: str, ports: Ports) -> RobotInfo:
+    primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
+    try:
+        return read_robot_info(network, host, ports.dashboard, primary.wait_for_version())
+    finally:
+        primary.close()
+
+
+def _listen(network: Network, host: str, port: int, seconds: float) -> tuple[FrameRhythm, RealtimeFrame]:
+    frames = RealtimeClient(network.connect(host, port, _CONNECT_TIMEOUT), network)
+    stamps: list[float] = []
+    arrivals: list[float] = []
+    n_heartbeats = 0
+    try:
+        size = frames.layout.size
+        deadline = network.now() + seconds
+        while True:
+            arrival = frames.receive()
+            arrivals.append(network.now())
+            stamps += [frame.timestamp for frame in arrival.new]
+            n_heartbeats += arrival.n_heartbeats
+            if arrivals[-1] > deadline:
+                break
+    finally:
+        frames.close()
+    steps, waits = np.diff(stamps), np.diff(arrivals)
+    cycle = float(np.median(steps)) if len(steps) else None
+    lost = 0 if cycle is None else int(np.sum(np.rint(steps / cycle) - 1))
+    spread = (float(waits.std()), float(waits.max())) if len(waits) else (0.0, 0.0)
+    return FrameRhythm(size, len(stamps), n_heartbeats, cycle, lost, *spread), arrival.latest

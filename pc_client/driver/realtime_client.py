@@ -1,0 +1,156 @@
+"""Frames of the realtime port: in order, decoded, each known to be new or a heartbeat.
+
+A heartbeat is a frame that repeats the last time stamp: the robot's time stands still while it waits for us.
+Frames are never dropped here; the caller decides what late ones are worth.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from pc_client.driver.transport import Network, Transport
+from pc_client.errors import DriverError
+from protocol.errors import RemoteProtocolError
+from protocol.frame_buffer import FrameBuffer
+from protocol.realtime_layout import MAX_FRAME_SIZE, RealtimeFrame, RealtimeLayout, layout_for_size
+
+FRAME_TIMEOUT = 1.0
+"""Without a frame for this long [s] the robot counts as gone (125 frames of a CB3 box)."""
+
+
+class Arrival(NamedTuple):
+    """What came from the realtime port.
+
+    Attributes:
+        new: frames with a time stamp of their own, oldest first.
+        latest: the last frame of all, possibly a heartbeat.
+        n_heartbeats: how many frames repeated a time stamp.
+    """
+
+    new: list[RealtimeFrame]
+    latest: RealtimeFrame
+    n_heartbeats: int
+
+
+class RealtimeClient:
+    """Reads one realtime connection.
+
+    Args:
+        transport: the connected port.
+        network: its clock, for the time-outs.
+
+    Attributes:
+        last_stamp: newest time stamp seen [s], or None before the first frame.
+    """
+
+    __slots__ = ("_buffer", "_layout", "_network", "_transport", "last_stamp")
+
+    def __init__(self, transport: Transport, network: Network) -> None:
+        self._transport = transport
+        self._network = network
+        self._buffer = FrameBuffer(MAX_FRAME_SIZE)
+        self._layout: RealtimeLayout | None = None
+        self.last_stamp: float | None = None
+
+    @property
+    def layout(self) -> RealtimeLayout:
+        """Columns of this robot's frames; waits for the first frame if none came yet.
+
+        Raises:
+            DriverError: no frame comes, or it is none of a known size.
+        """
+        if self._layout is None:
+            self.receive()
+        assert self._layout is not None
+        return self._layout
+
+    @property
+    def local_address(self) -> str:
+        """Our address as the robot sees it."""
+        return self._transport.local_address
+
+    @property
+    def robot_address(self) -> str:
+        """The robot's address."""
+        return self._transport.peer_address
+
+    def receive(self, timeout: float = FRAME_TIMEOUT) -> Arrival:
+        """Wait for at least one frame and take all that are there.
+
+        Raises:
+            DriverError: no whole frame within `timeout` [s], the stream ended, or it is no realtime stream.
+        """
+        buffer = self._buffer
+        data = self._transport.receive(timeout)
+        try:
+            if data:
+                buffer.feed(data)
+                first = buffer.next_frame()
+                if first is not None:  # the usual case: exactly one frame
+                    return self._sort(first)
+            return self._receive_slowly(data, timeout)
+        except RemoteProtocolError as error:
+            raise DriverError(f"the realtime port sends no realtime frames: {error}") from error
+
+    def drain(self) -> Arrival | None:
+        """Take what has already arrived, without waiting; None when nothing has.
+
+        Raises:
+            DriverError: as `receive`.
+        """
+        taken: Arrival | None = None
+        while data := self._transport.receive(0.0):
+            try:
+                self._buffer.feed(data)
+                first = self._buffer.next_frame()
+                if first is None:
+                    continue
+                arrival = self._sort(first)
+            except RemoteProtocolError as error:
+                raise DriverError(f"the realtime port sends no realtime frames: {error}") from error
+            if taken is not None:
+                arrival = Arrival(
+                    taken.new + arrival.new, arrival.latest, taken.n_heartbeats + arrival.n_heartbeats
+                )
+            taken = arrival
+        return taken
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._transport.close()
+
+    def _receive_slowly(self, data: bytes | None, timeout: float) -> Arrival:
+        """Go on until a whole frame is there."""
+        deadline = self._network.now() + timeout
+        while True:
+            if data == b"":
+                raise DriverError("the robot closed the realtime connection")
+            if data is None or self._network.now() > deadline:
+                raise DriverError(
+                    f"no realtime frame for {timeout:g} s: the robot or the network to it is gone"
+                )
+            data = self._transport.receive(timeout)
+            if data:
+                self._buffer.feed(data)
+                first = self._buffer.next_frame()
+                if first is not None:
+                    return self._sort(first)
+
+    def _sort(self, first: bytes) -> Arrival:
+        """Decode this frame and all that follow in the buffer; tell new ones from heartbeats."""
+        layout = self._layout
+        if layout is None:
+            layout = self._layout = layout_for_size(len(first))
+        new: list[RealtimeFrame] = []
+        n_heartbeats = 0
+        raw: bytes | None = first
+        while raw is not None:
+            frame = layout.decode(raw)
+            stamp: float = frame.timestamp
+            if stamp != self.last_stamp:
+                new.append(frame)
+                self.last_stamp = stamp
+            else:
+                n_heartbeats += 1
+            raw = self._buffer.next_frame()
+        return Arrival(new, frame, n_heartbeats)

@@ -1,0 +1,203 @@
+"""The network as the driver sees it: a few methods, so that tests can put a robot in memory behind them.
+
+No protocol here: bytes in, bytes out, and every failure is a DriverError that names address and port.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from typing import Protocol
+
+from pc_client.errors import DriverError
+
+RECEIVE_SIZE = 16384
+"""Bytes taken at once: more than ten realtime frames, so one call shows all that is waiting."""
+
+
+class Transport(Protocol):
+    """One connected byte stream."""
+
+    @property
+    def local_address(self) -> str:
+        """Our end's address, as the other end sees it."""
+        ...
+
+    @property
+    def peer_address(self) -> str:
+        """The other end's address."""
+        ...
+
+    def send(self, data: bytes) -> None:
+        """Send everything. Raises DriverError when the connection is gone."""
+        ...
+
+    def receive(self, timeout: float) -> bytes | None:
+        """Bytes that arrived, b"" at the end of the stream, None when nothing came for `timeout` seconds."""
+        ...
+
+    def close(self) -> None:
+        """Close; harmless when closed."""
+        ...
+
+
+class Listener(Protocol):
+    """Waits for the robot to dial us."""
+
+    @property
+    def port(self) -> int:
+        """The TCP port that is open."""
+        ...
+
+    def accept(self, timeout: float) -> Transport | None:
+        """The next caller, or None when nobody called for `timeout` seconds."""
+        ...
+
+    def close(self) -> None:
+        """Close; harmless when closed."""
+        ...
+
+
+class Network(Protocol):
+    """Makes connections and tells the time that passes while waiting for them."""
+
+    def connect(self, host: str, port: int, timeout: float) -> Transport:
+        """Connect. Raises DriverError."""
+        ...
+
+    def listen(self, address: str) -> Listener:
+        """Listen on a free port of one of our own addresses. Raises DriverError."""
+        ...
+
+    def now(self) -> float:
+        """Seconds of a monotonic clock."""
+        ...
+
+
+class TcpTransport:
+    """A connected TCP socket without Nagle's delay."""
+
+    __slots__ = ("_name", "_socket", "_timeout")
+
+    def __init__(self, connected: socket.socket, name: str) -> None:
+        self._socket = connected
+        self._name = name
+        self._timeout: float | None = -1.0
+        connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    @property
+    def local_address(self) -> str:
+        """Our end's address, as the other end sees it."""
+        return str(self._socket.getsockname()[0])
+
+    @property
+    def peer_address(self) -> str:
+        """The other end's address."""
+        return str(self._socket.getpeername()[0])
+
+    def send(self, data: bytes) -> None:
+        """Send everything.
+
+        Raises:
+            DriverError: the connection is gone, or the peer took nothing for the time-out.
+        """
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise DriverError(f"{self._name}: cannot send, {_reason(error)}") from error
+
+    def receive(self, timeout: float) -> bytes | None:
+        """Bytes that arrived, b"" at the end of the stream, None when nothing came for `timeout` seconds.
+
+        Raises:
+            DriverError: the connection broke.
+        """
+        try:
+            if timeout != self._timeout:  # a system call that is not needed every cycle
+                self._socket.settimeout(timeout)
+                self._timeout = timeout
+            return self._socket.recv(RECEIVE_SIZE)
+        except (TimeoutError, BlockingIOError):
+            return None
+        except OSError as error:
+            raise DriverError(f"{self._name}: {_reason(error)}") from error
+
+    def close(self) -> None:
+        """Close; harmless when closed."""
+        self._socket.close()
+
+
+class TcpListener:
+    """A listening TCP socket on a free port."""
+
+    __slots__ = ("_socket",)
+
+    def __init__(self, listening: socket.socket) -> None:
+        self._socket = listening
+
+    @property
+    def port(self) -> int:
+        """The TCP port that is open."""
+        return int(self._socket.getsockname()[1])
+
+    def accept(self, timeout: float) -> TcpTransport | None:
+        """The next caller, or None when nobody called for `timeout` seconds."""
+        self._socket.settimeout(timeout)
+        try:
+            connected, address = self._socket.accept()
+        except (TimeoutError, BlockingIOError):
+            return None
+        return TcpTransport(connected, f"reverse connection from {address[0]}")
+
+    def close(self) -> None:
+        """Close; harmless when closed."""
+        self._socket.close()
+
+
+class TcpNetwork:
+    """The real network."""
+
+    def connect(self, host: str, port: int, timeout: float) -> TcpTransport:
+        """Connect.
+
+        Raises:
+            DriverError: unknown name, nobody answers, connection refused.
+        """
+        try:
+            connected = socket.create_connection((host, port), timeout)
+        except OSError as error:
+            raise DriverError(f"{host}:{port} {_reason(error)}") from error
+        return TcpTransport(connected, f"{host}:{port}")
+
+    def listen(self, address: str) -> TcpListener:
+        """Listen on a free port of one of our own addresses.
+
+        Raises:
+            DriverError: not an address of this machine.
+        """
+        family = socket.AF_INET6 if ":" in address else socket.AF_INET
+        listening = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            listening.bind((address, 0))
+            listening.listen(4)
+        except OSError as error:
+            listening.close()
+            raise DriverError(f"cannot listen on {address}: {_reason(error)}") from error
+        return TcpListener(listening)
+
+    def now(self) -> float:
+        """Seconds of a monotonic clock."""
+        return time.monotonic()
+
+
+def _reason(error: OSError) -> str:
+    """Say in a few words what went wrong and what to look at."""
+    if isinstance(error, socket.gaierror):
+        return "cannot be looked up: check the robot's name or address"
+    if isinstance(error, TimeoutError):
+        return "does not answer: check the address, the cable and that the robot is switched on"
+    if isinstance(error, ConnectionRefusedError):
+        return "refuses the connection: is the control box up, and is --port-base right?"
+    if isinstance(error, (ConnectionResetError, BrokenPipeError, ConnectionAbortedError)):
+        return "the other end closed the connection"
+    return error.strerror or str(error) or type(error).__name__

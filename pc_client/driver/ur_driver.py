@@ -1,0 +1,339 @@
+"""A session with one robot: connect, move to a posture, stream, and always leave the arm stopped.
+
+Works by the real protocol only. Every way out of a motion (done, refused, Ctrl-C, lost robot) goes through
+`stop`: first the stop word to the program, then a program of our own that stops the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.control.tracker import Tracker
+from pc_client.driver.approach_script import approach_script, stop_script
+from pc_client.driver.package_stream import PackageStream, raise_on_error
+from pc_client.driver.realtime_client import RealtimeClient
+from pc_client.driver.receiver_script import receiver_script
+from pc_client.driver.reverse_server import ReverseServer
+from pc_client.driver.robot_info import RobotInfo, read_robot_info
+from pc_client.driver.transport import Network, TcpNetwork, Transport
+from pc_client.driver.velocity_stream import RowSink, StreamReport, VelocityStream
+from pc_client.driver.watchdog import check_idle, check_safety, has_ended, is_at_rest, is_stopped
+from pc_client.errors import DriverError
+from protocol.realtime_layout import RealtimeFrame, RealtimeLayout
+from protocol.ur_types import Ports
+from protocol.velocity_stream import VelocityMode, encode_velocity
+
+CONNECT_TIMEOUT = 5.0
+START_TIMEOUT = 5.0
+"""A program that does not show as running within this [s] was not accepted."""
+
+REST_TIMEOUT = 5.0
+"""[s] for the arm to come to rest after the stop word, and again after the stop program."""
+
+_REST_TIME = 0.5
+"""The arm rests after this [s] of frames without motion, or at once when time itself stands still."""
+
+_ARRIVAL_TOLERANCE = 5e-3
+"""Largest distance of a joint from the posture after an approach [rad]; a blocked arm is far off."""
+
+_APPROACH_RESERVE = 10.0
+"""An approach may take this many seconds longer than computed."""
+
+
+class UrDriver:
+    """A session with one robot.
+
+    Use as a context manager; leaving it stops the arm if it is still moving and closes all connections.
+
+    Args:
+        host: the robot's name or address.
+        ports: its ports.
+        network: tests hand in a network in memory.
+
+    Attributes:
+        info: which robot answered.
+        layout: columns of its realtime frames.
+    """
+
+    info: RobotInfo
+    layout: RealtimeLayout
+
+    def __init__(self, host: str, ports: Ports | None = None, *, network: Network | None = None) -> None:
+        self._host = host
+        self._ports = ports or Ports.standard()
+        self._network: Network = network or TcpNetwork()
+        self._open: list[RealtimeClient | PackageStream | ReverseServer] = []
+        self._in_motion = False
+        self._program = ""
+        try:
+            self._connect()
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop the arm if we left it in motion, and close all connections."""
+        try:
+            if self._in_motion:
+                self.stop(None)
+        finally:
+            for connection in self._open:
+                connection.close()
+            self._open.clear()
+
+    def read_frame(self) -> RealtimeFrame:
+        """The state of the robot now.
+
+        Raises:
+            DriverError: no frames come.
+        """
+        self._frames.drain()
+        return self._frames.receive().latest
+
+    def actual_q(self) -> NDArray[np.float64]:
+        """Joint positions (6,) as reported now [rad]."""
+        q: NDArray[np.float64] = self.read_frame().actual_q
+        return q.copy()
+
+    def check_ready(self) -> None:
+        """Refuse a robot that may not move now.
+
+        Raises:
+            RobotStoppedError: safety mode or robot mode forbids it.
+            DriverError: a program is running.
+        """
+        frame = self.read_frame()
+        check_safety(frame)
+        check_idle(frame)
+
+    def move_to(self, q: Sequence[float], *, speed: float, acceleration: float, expected: float) -> None:
+        """Move the joints straight to a posture and wait until the arm rests there.
+
+        The way must have been checked by the caller (`planning.approach`).
+
+        Args:
+            q: (6,) where to [rad].
+            speed: of the joint with the longest way [rad/s].
+            acceleration: of the same joint [rad/s2].
+            expected: how long it should take [s]; much longer is an error.
+
+        Raises:
+            RobotStoppedError: the robot stopped or refused the program.
+            DriverError: the arm did not arrive, or the connection broke.
+        """
+        text = approach_script(q, speed, acceleration)
+        self.check_ready()
+        with _AlwaysStopped(self, None):
+            self._start(text)
+            limit = expected + _APPROACH_RESERVE
+            self._wait(is_stopped, limit, f"the approach did not end within {limit:.0f} s")
+            self._wait_for_rest()
+        reached = self.actual_q()
+        error = float(np.abs(reached - np.asarray(q, dtype=np.float64)).max())
+        if not error <= _ARRIVAL_TOLERANCE:
+            raise DriverError(
+                f"the arm is {error:.4f} rad away from the posture it was sent to, allowed is "
+                f"{_ARRIVAL_TOLERANCE} rad: is it blocked?"
+            )
+
+    def stream(self, tracker: Tracker, on_row: RowSink, *, acceleration: float) -> StreamReport:
+        """Run one reference: start the receiver program, stream, stop, wait for rest.
+
+        Args:
+            tracker: a fresh tracker; the arm must stand at the begin of its reference.
+            on_row: takes every new frame with the command sent; what it raises ends the run.
+            acceleration: of the robot's `speedj` [rad/s2].
+
+        Returns:
+            What happened on the wire; the arm rests and no program runs.
+
+        Raises:
+            RobotStoppedError: the robot stopped, or its program failed.
+            DriverError: anything else that ended the run; the arm has been stopped.
+        """
+        self.check_ready()
+        server = ReverseServer(self._network, self._frames.local_address, self._frames.robot_address)
+        reverse: Transport | None = None
+        try:
+            with _AlwaysStopped(self, None) as guard:
+                self._send(receiver_script(server.address, server.port, acceleration=acceleration))
+                reverse = server.accept_program(self._look_after)
+                guard.reverse = reverse
+                stream = VelocityStream(
+                    self._frames, reverse, self._network, self.info.period, self._raise_robot_errors
+                )
+                report = stream.run(tracker, on_row)
+                self._wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
+                self._wait_for_rest()
+        finally:
+            server.close()
+            if reverse is not None:
+                reverse.close()
+        return report
+
+    def stop(self, reverse: Transport | None) -> None:
+        """Bring the arm to rest, by all means we have.
+
+        Args:
+            reverse: connection to the receiver program, when one runs.
+
+        Raises:
+            DriverError: the arm could not be seen to come to rest.
+        """
+        if reverse is not None and self._attempt(
+            lambda: reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
+        ):
+            return
+        if self._attempt(lambda: self._scripts.send_program(stop_script())):
+            return
+        raise DriverError("the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves")
+
+    def _attempt(self, act: Callable[[], object]) -> bool:
+        """Try one way to stop; True when the arm then rests and no program runs."""
+        try:
+            act()
+            self._wait(has_ended, REST_TIMEOUT, "the robot's program goes on", checked=False)
+            self._wait_for_rest()
+        except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
+            return False
+        self._in_motion = False
+        return True
+
+    def _connect(self) -> None:
+        network, ports = self._network, self._ports
+        primary = PackageStream(
+            network.connect(self._host, ports.primary, CONNECT_TIMEOUT), network, "primary"
+        )
+        self._open.append(primary)
+        version = primary.wait_for_version()
+        scripts = PackageStream(
+            network.connect(self._host, ports.secondary, CONNECT_TIMEOUT), network, "secondary"
+        )
+        self._open.append(scripts)
+        self._primary, self._scripts = primary, scripts
+        self.info = read_robot_info(network, self._host, ports.dashboard, version)
+        frames = RealtimeClient(network.connect(self._host, ports.realtime, CONNECT_TIMEOUT), network)
+        self._open.append(frames)
+        self._frames = frames
+        self.layout = frames.layout
+
+    def _send(self, text: str) -> None:
+        """Send a program; what was reported before it is of no interest any more."""
+        self._primary.poll()
+        self._scripts.poll()
+        self._program = text
+        self._scripts.send_program(text)
+
+    def _start(self, text: str) -> None:
+        """Send a program and wait until it shows as running."""
+        self._frames.drain()
+        self._send(text)
+        self._wait(
+            lambda frame: not is_stopped(frame),
+            START_TIMEOUT,
+            f"the robot did not start the program within {START_TIMEOUT:g} s: is it in local control?",
+        )
+
+    def _raise_robot_errors(self) -> None:
+        """Read both script ports; raise what the robot reports about our program."""
+        self._scripts.poll()
+        raise_on_error(self._primary.poll(), self._program)
+
+    def _look_after(self) -> None:
+        """Read everything that has come, while waiting for something else."""
+        arrival = self._frames.drain()
+        if arrival is not None:
+            check_safety(arrival.latest)
+        self._raise_robot_errors()
+
+    def _wait(
+        self,
+        condition: Callable[[RealtimeFrame], bool],
+        timeout: float,
+        complaint: str,
+        *,
+        checked: bool = True,
+    ) -> None:
+        """Read frames until one meets the condition.
+
+        Time-outs count by our clock, which in a faster than real-time world is the patient one.
+
+        Args:
+            condition: on every single frame, so that no short state is missed.
+            timeout: [s].
+            complaint: message of the DriverError when it takes longer.
+            checked: also raise on safety stops and on errors that the robot reports.
+        """
+        deadline = self._network.now() + timeout
+        while True:
+            arrival = self._frames.receive()
+            if any(condition(frame) for frame in arrival.new) or condition(arrival.latest):
+                return
+            if checked:
+                check_safety(arrival.latest)
+                self._raise_robot_errors()
+            if self._network.now() > deadline:
+                raise DriverError(complaint)
+
+    def _wait_for_rest(self) -> None:
+        """Wait until the arm has been at rest for a while, or rests while time itself stands still."""
+        at_rest_since: float | None = None
+
+        def rests(frame: RealtimeFrame) -> bool:
+            nonlocal at_rest_since
+            stamp: float = frame.timestamp
+            if not is_at_rest(frame):
+                at_rest_since = None
+                return False
+            if at_rest_since is None:
+                at_rest_since = stamp
+            return stamp - at_rest_since >= _REST_TIME
+
+        deadline = self._network.now() + REST_TIMEOUT
+        while True:
+            arrival = self._frames.receive()
+            settled = [rests(frame) for frame in arrival.new]
+            stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
+            if any(settled) or (stands_still and is_at_rest(arrival.latest)):
+                return
+            if self._network.now() > deadline:
+                raise DriverError(f"the arm did not come to rest within {REST_TIMEOUT:g} s")
+
+
+class _AlwaysStopped:
+    """Stops the arm when the block is left by an exception of any kind, Ctrl-C included."""
+
+    def __init__(self, driver: UrDriver, reverse: Transport | None) -> None:
+        self._driver = driver
+        self.reverse = reverse
+
+    def __enter__(self) -> Self:
+        self._driver._in_motion = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self._driver._in_motion = False
+            return
+        try:
+            self._driver.stop(self.reverse)
+        except DriverError as not_stopped:
+            error.add_note(str(not_stopped))
+        finally:
+            # Tried once with everything there is; closing the session would only try the same again.
+            self._driver._in_motion = False

@@ -1,0 +1,203 @@
+"""The control loop of one run: a new frame comes, a command goes out, a row is logged.
+
+Paced by frames alone. A heartbeat (repeated time stamp) is neither answered nor logged; when several new
+frames wait, we were late: all are logged, the newest is answered. So at most one command is on its way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from pc_client.control.tracker import Tracker, TrackerStep
+from pc_client.driver.realtime_client import RealtimeClient
+from pc_client.driver.transport import Network, Transport
+from pc_client.driver.watchdog import check_streaming
+from pc_client.errors import DriverError
+from protocol.realtime_layout import RealtimeFrame
+from protocol.velocity_stream import VelocityMode, encode_velocity
+
+RowSink = Callable[[RealtimeFrame, TrackerStep], None]
+"""Takes every new frame with what the tracker made of it."""
+
+LONGEST_GAP = 0.25
+"""A hole in the time stamps longer than this [s] ends the run; by then the program has stopped the arm."""
+
+LONGEST_STANDSTILL = 5.0
+"""Seconds of our clock that the robot's time may stand still: a command must have been lost."""
+
+_FRAMES_BEFORE_START = 3
+"""New frames after which a robot counts as one whose time runs by itself."""
+
+_HOUSEKEEPING = 64
+"""New frames between two looks at the other connections: half a second."""
+
+
+@dataclass(slots=True)
+class StreamReport:
+    """What happened on the wire during one run.
+
+    Attributes:
+        n_commands: commands sent, the stop word not counted.
+        late_frames: new frames that got no command of their own because a newer one was already there.
+        lost_frames: cycles whose frame never came.
+        heartbeats: frames that repeated a time stamp; only a robot whose time waits for us sends them.
+        robot_time: [s] from the first to the last frame, by the robot's stamps.
+        wall_time: [s] of the same by our clock.
+    """
+
+    n_commands: int = 0
+    late_frames: int = 0
+    lost_frames: int = 0
+    heartbeats: int = 0
+    robot_time: float = 0.0
+    wall_time: float = 0.0
+
+
+class VelocityStream:
+    """Streams velocities to a program that has just said hello.
+
+    Args:
+        frames: the realtime port.
+        reverse: the program's connection.
+        network: the clock that bounds standstill.
+        period: control cycle of the robot [s].
+        housekeeping: called now and then; raises when the robot reports an error.
+    """
+
+    __slots__ = ("_frames", "_housekeeping", "_network", "_period", "_reverse")
+
+    def __init__(
+        self,
+        frames: RealtimeClient,
+        reverse: Transport,
+        network: Network,
+        period: float,
+        housekeeping: Callable[[], None],
+    ) -> None:
+        self._frames = frames
+        self._reverse = reverse
+        self._network = network
+        self._period = period
+        self._housekeeping = housekeeping
+
+    def run(self, tracker: Tracker, on_row: RowSink) -> StreamReport:
+        """Stream until the tracker has finished; then the stop word is sent.
+
+        Args:
+            tracker: a fresh tracker.
+            on_row: takes every row; what it raises ends the run.
+
+        Returns:
+            What happened on the wire. The arm may still be coming to rest.
+
+        Raises:
+            RobotStoppedError: safety stop, or the program ended.
+            DriverError: lost frames, closed sockets, a command that is not safe to send.
+        """
+        report = StreamReport()
+        frame = self._wait_for_trigger(report)
+        began = self._network.now()
+        receive, send, limits = self._frames.receive, self._reverse.send, tracker.qd_max
+        first_stamp = last_stamp = frame.timestamp
+        while True:
+            stamp = frame.timestamp
+            check_streaming(frame)
+            step = tracker.step(stamp, frame.actual_q.tolist())
+            if step.finished:
+                break
+            check_command(step.qd_cmd, limits)
+            send(encode_velocity(VelocityMode.VELOCITY, step.qd_cmd))
+            on_row(frame, step)
+            report.n_commands += 1
+            if report.n_commands % _HOUSEKEEPING == 0:
+                self._housekeeping()
+
+            arrival = receive()
+            new = arrival.new
+            if arrival.n_heartbeats:
+                report.heartbeats += arrival.n_heartbeats
+                if not new:
+                    new = self._wait_for_new(report)
+            last_stamp = self._count_gaps(new, last_stamp, report)
+            if len(new) > 1:
+                report.late_frames += len(new) - 1
+                for late in new[:-1]:
+                    on_row(late, tracker.observe(late.timestamp))
+            frame = new[-1]
+        self.send_stop()
+        report.robot_time = last_stamp - first_stamp
+        report.wall_time = self._network.now() - began
+        return report
+
+    def send_stop(self) -> None:
+        """Send the stop word: the program ramps the arm down and ends.
+
+        Raises:
+            DriverError: the connection is gone.
+        """
+        self._reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
+
+    def _wait_for_trigger(self, report: StreamReport) -> RealtimeFrame:
+        """Find the frame that the first command answers.
+
+        After its hello the program waits for a command. A robot whose time waits too repeats its last frame:
+        that one is the trigger, whenever the hello came between the frames. A robot whose time
+        runs on sends new frames: the third is the trigger.
+        """
+        self._frames.drain()
+        n_new = 0
+        while True:
+            arrival = self._frames.receive()
+            report.heartbeats += arrival.n_heartbeats
+            n_new += len(arrival.new)
+            stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
+            if stands_still or n_new >= _FRAMES_BEFORE_START:
+                return arrival.latest
+
+    def _wait_for_new(self, report: StreamReport) -> list[RealtimeFrame]:
+        """Sit out heartbeats until time goes on."""
+        deadline = self._network.now() + LONGEST_STANDSTILL
+        while True:
+            arrival = self._frames.receive()
+            report.heartbeats += arrival.n_heartbeats
+            if arrival.new:
+                return arrival.new
+            check_streaming(arrival.latest)
+            if self._network.now() > deadline:
+                raise DriverError(
+                    f"the robot's time has stood still for {LONGEST_STANDSTILL:g} s although it has a command"
+                )
+
+    def _count_gaps(self, new: list[RealtimeFrame], last_stamp: float, report: StreamReport) -> float:
+        """Count the cycles that are missing; returns the newest stamp."""
+        for frame in new:
+            stamp = frame.timestamp
+            gap = stamp - last_stamp
+            if gap > 1.5 * self._period or gap < 0.0:
+                if not 0.0 < gap <= LONGEST_GAP:
+                    raise DriverError(
+                        f"the robot's frames jump from {last_stamp:.3f} s to {stamp:.3f} s: "
+                        "the stream is broken"
+                    )
+                report.lost_frames += round(gap / self._period) - 1
+            last_stamp = stamp
+        return last_stamp
+
+
+def check_command(qd: Sequence[float], limits: Sequence[float]) -> None:
+    """The last look at a command before it goes out.
+
+    Args:
+        qd: (6,) velocities [rad/s].
+        limits: (6,) largest speeds [rad/s].
+
+    Raises:
+        DriverError: a velocity is NaN or beyond its limit; a controller must never produce that.
+    """
+    for value, limit in zip(qd, limits, strict=True):
+        if not -limit <= value <= limit:  # NaN fails too
+            raise DriverError(
+                f"a command of {[round(v, 3) for v in qd]} rad/s is not safe to send: "
+                f"allowed is +-{[round(v, 3) for v in limits]}"
+            )

@@ -1,0 +1,11 @@
+"""The experiment as a whole: which movements, how often, on which robot, into which folder.
+
+    prepare         plan all movements and look at the folder, before anything moves
+    preflight       what a bystander must know and agree to, before a real arm moves
+    identification  the loop delay of this session
+    runner          approach, stream, record, for every movement and repetition
+    observer        what the runner tells while it works
+    progress        shows it on the terminal
+
+Knows the driver only as a session; opens no socket and reads no clock itself.
+"""

@@ -1,0 +1,118 @@
+"""Everything that can be refused before the arm moves: movements that cannot be planned, a folder in use."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pc_client.errors import ClientError, RecordingError
+from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.movements.files import load_movement, movement_text
+from pc_client.movements.movement import Movement
+from pc_client.planning.plan import JointPlan, plan_movement
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMovement:
+    """A movement and its checked plan.
+
+    Attributes:
+        movement: what the TCP shall do.
+        plan: what the joints shall do.
+        text: the movement as its file says it; empty for one made of samples.
+    """
+
+    movement: Movement
+    plan: JointPlan
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """What is to be done.
+
+    Attributes:
+        model: the nominal arm that the plans were made for.
+        planned: the movements, in order.
+        repeat: runs of each.
+        out: folder of the recordings.
+    """
+
+    model: RobotModel
+    planned: tuple[PlannedMovement, ...]
+    repeat: int
+    out: Path
+
+    def recording_path(self, planned: PlannedMovement, repetition: int) -> Path:
+        """The file of one run; repetitions count from 1."""
+        return self.out / f"{planned.movement.name}_r{repetition}.mcap"
+
+    @property
+    def n_runs(self) -> int:
+        """Runs in all."""
+        return len(self.planned) * self.repeat
+
+
+def prepare_experiment(
+    movements: Sequence[str | Path], *, repeat: int, out: Path, robot: str = "ur3"
+) -> Experiment:
+    """Load and plan all movements.
+
+    Args:
+        movements: names of the library or movement files.
+        repeat: runs of each, at least 1.
+        out: folder of the recordings; need not exist.
+        robot: nominal arm.
+
+    Raises:
+        MovementError: a movement is unknown or makes no sense.
+        PlanningError: a movement cannot be done by the arm.
+        ClientError: nothing to do, or two movements of the same name.
+    """
+    if repeat < 1 or not movements:
+        raise ClientError(
+            f"{len(movements)} movements {repeat} times is nothing to do; give at least one of each"
+        )
+    model = robot_model(robot)
+    loaded = [load_movement(movement) for movement in movements]
+    names = [movement.name for movement in loaded]
+    for name in names:
+        if names.count(name) > 1:
+            raise ClientError(
+                f"two movements are called {name!r}; their recordings would overwrite each other"
+            )
+    planned = tuple(
+        PlannedMovement(movement, plan_movement(movement, model=model), _text_of(movement))
+        for movement in loaded
+    )
+    return Experiment(model, planned, repeat, out)
+
+
+def clear_folder(experiment: Experiment) -> None:
+    """Make the folder ready: create it, take away recordings that this experiment records again.
+
+    Raises:
+        RecordingError: the folder cannot be written, or holds recordings of another experiment.
+    """
+    ours = {
+        experiment.recording_path(planned, k + 1)
+        for planned in experiment.planned
+        for k in range(experiment.repeat)
+    }
+    try:
+        experiment.out.mkdir(parents=True, exist_ok=True)
+        old = set(experiment.out.glob("*.mcap"))
+        if foreign := sorted(old - ours):
+            raise RecordingError(
+                f"{experiment.out} holds recordings of another experiment ({foreign[0].name}); "
+                "give another folder, or delete them"
+            )
+        for path in old:
+            path.unlink()
+    except OSError as error:
+        raise RecordingError(f"cannot use the folder {experiment.out}: {error.strerror or error}") from error
+
+
+def _text_of(movement: Movement) -> str:
+    return "" if movement.kind == "samples" else movement_text(movement)

@@ -1,0 +1,186 @@
+"""Runs an experiment on one session: for every movement approach, stream, record, as often as asked.
+
+Whatever ends it early, what is recorded until then stays readable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.delay import DelayEstimate
+from pc_client.control.reference import ReferenceTable
+from pc_client.control.tracker import Tracker, TrackerStep
+from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.velocity_stream import StreamReport
+from pc_client.experiment.identification import identify_delay
+from pc_client.experiment.observer import Observer, Silent
+from pc_client.experiment.prepare import Experiment, PlannedMovement, clear_folder
+from pc_client.planning.approach import Approach, plan_approach
+from pc_client.planning.plan import JointPlan
+from pc_client.recording.provenance import Provenance
+from pc_client.recording.recorder import Recorder
+from protocol.realtime_layout import RealtimeFrame
+
+LEAD = 0.2
+"""Time at rest before a movement, position loop closed [s]: takes up what the approach left."""
+
+SETTLE = 0.3
+"""Time at rest after it, position loop closed [s]."""
+
+
+@dataclass(slots=True)
+class ExperimentReport:
+    """What an experiment came to.
+
+    Attributes:
+        delay: the identified loop delay.
+        paths: recordings, in order.
+        streams: what happened on the wire in each run.
+    """
+
+    delay: DelayEstimate
+    paths: list[Path] = field(default_factory=list)
+    streams: list[StreamReport] = field(default_factory=list)
+
+
+class ExperimentRunner:
+    """Runs one experiment.
+
+    Args:
+        driver: a session with the robot; it stays open.
+        experiment: what to do.
+        config: the controller, the same for all runs.
+        observer: is told what goes on.
+    """
+
+    def __init__(
+        self,
+        driver: UrDriver,
+        experiment: Experiment,
+        config: ControllerConfig,
+        observer: Observer | None = None,
+    ) -> None:
+        self._driver = driver
+        self._experiment = experiment
+        self._config = config
+        self._observer = observer or Silent()
+        self._qd_max = experiment.model.limits.qd_max
+        self._signals = [(column.name, column.count) for column in driver.layout.columns]
+
+    def run(self) -> ExperimentReport:
+        """Do everything.
+
+        Raises:
+            ClientError: a check failed or the robot stopped; the arm rests, earlier recordings are complete.
+        """
+        experiment, driver = self._experiment, self._driver
+        driver.check_ready()
+        clear_folder(experiment)
+        self._observer.connected(driver.info)
+        report: ExperimentReport | None = None
+        pace = "realtime"
+        for planned in experiment.planned:
+            for repetition in range(1, experiment.repeat + 1):
+                plan = self._approach(planned.plan)
+                if report is None:
+                    delay, stream = identify_delay(driver, self._config, self._qd_max)
+                    self._observer.identified(delay)
+                    report = ExperimentReport(delay)
+                    # Only a robot whose time waits for its client repeats a frame.
+                    pace = "lockstep" if stream.heartbeats else "realtime"
+                self._observer.running(planned.movement.name, repetition)
+                path = experiment.recording_path(planned, repetition)
+                stream = self._record(
+                    path, planned, plan, self._provenance(planned, repetition, report.delay, pace)
+                )
+                report.paths.append(path)
+                report.streams.append(stream)
+                self._observer.finished(planned.movement.name, repetition, path, stream)
+        assert report is not None  # an experiment has at least one run
+        return report
+
+    def _approach(self, plan: JointPlan) -> JointPlan:
+        """Move slowly to the begin of the plan; returns it in the turns where the arm is."""
+        approach: Approach = plan_approach(plan, self._driver.actual_q(), model=self._experiment.model)
+        self._observer.approaching(approach)
+        for waypoint in approach.waypoints:
+            self._driver.move_to(
+                waypoint.tolist(), speed=approach.v, acceleration=approach.a, expected=approach.duration
+            )
+        return approach.plan
+
+    def _record(
+        self, path: Path, planned: PlannedMovement, plan: JointPlan, provenance: Provenance
+    ) -> StreamReport:
+        """Stream one run into one file."""
+        config = self._config
+        table = ReferenceTable(
+            plan.spline,
+            period=self._driver.info.period,
+            lead=LEAD,
+            settle=SETTLE,
+            lookahead=provenance.identified_delay_s if config.looks_ahead else None,
+            tcp=planned.movement,
+        )
+        with Recorder(path, provenance, self._signals) as recorder:
+            stream = self._driver.stream(
+                Tracker(table, config, self._qd_max),
+                _row_sink(recorder),
+                acceleration=config.speedj_acceleration,
+            )
+            recorder.close(
+                {
+                    "late_frames": stream.late_frames,
+                    "lost_frames": stream.lost_frames,
+                    "n_commands": stream.n_commands,
+                }
+            )
+        return stream
+
+    def _provenance(
+        self, planned: PlannedMovement, repetition: int, delay: DelayEstimate, pace: str
+    ) -> Provenance:
+        info, movement = self._driver.info, planned.movement
+        points = tuple((float(x), float(y), float(z)) for x, y, z in movement.target_points)
+        return Provenance(
+            movement=movement.name,
+            kind=movement.kind,
+            repetition=repetition,
+            controller=self._config.name,
+            robot_model=info.model,
+            firmware=str(info.version),
+            serial=info.serial.text,
+            simulated=info.serial.simulated,
+            seed=info.serial.seed,
+            pace=pace,
+            client_version=_client_version(),
+            cycle_time_s=info.period,
+            identified_delay_s=delay.delay,
+            controller_config=asdict(self._config),
+            movement_text=planned.text,
+            target_points=points,
+        )
+
+
+def _row_sink(recorder: Recorder) -> Callable[[RealtimeFrame, TrackerStep], None]:
+    """A function that records a row, and ends the run when the disk fails."""
+    append = recorder.append
+
+    def record(frame: RealtimeFrame, step: TrackerStep) -> None:
+        point = step.point
+        append(frame.values, step.t, point.q_array, point.qd_array, point.p, point.v, step.qd_cmd, step.phase)
+        if recorder.error is not None:
+            raise recorder.error
+
+    return record
+
+
+def _client_version() -> str:
+    try:
+        return version("ur-hil")
+    except PackageNotFoundError:  # run from a source tree
+        return "unknown"
