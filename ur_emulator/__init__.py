@@ -1,1 +1,25 @@
+"""An emulated Universal Robots control box.
 
+from ur_emulator import ControlBox
+
+with ControlBox(robot="ur3", pace="lockstep", seed=7) as box:
+    print(box.host, box.ports.realtime)
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ur_emulator.emulator import ControlBox
+
+__all__ = ["ControlBox"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the box when it is first asked for: tools that only read tables stay light."""
+    if name == "ControlBox":
+        from ur_emulator.emulator import ControlBox
+
+        return ControlBox
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,46 @@
+# Every target sets up what it needs by itself, in .venv/, on a machine with Python 3.11+, pip and make.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test check check-static bench format docs clean
+
+help: ## list the targets
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+
+$(STAMP): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@touch $@
+
+setup: $(STAMP) ## install everything that the other targets use
+
+demo: $(STAMP) ## the paper's experiment: box and client, ten movements, three times each, into out/demo
+	$(BIN)/python examples/demo.py
+
+test: $(STAMP) ## all tests
+	$(BIN)/python -m pytest
+
+check-static: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+check: check-static ## lint, types, fast tests
+	$(BIN)/python -m pytest -m "not slow"
+
+bench: $(STAMP) ## measure speed, lateness, memory; writes bench/results.json
+	$(BIN)/python -m bench
+
+format: $(STAMP) ## put the code into its canonical layout
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+docs: $(STAMP) ## rewrite the generated pages
+	$(BIN)/python -m urscript.catalogue.coverage > docs/urscript-coverage.md
+
+clean: ## remove what the targets made
+	rm -rf $(VENV) out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,0 +1,67 @@
+"""What connections may ask of the controller: frozen records, applied at the start of a cycle in order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from urscript import CompiledProgram
+
+
+@dataclass(frozen=True, slots=True)
+class StartProgram:
+    """Run a compiled program; a primary program replaces the one that runs, a `sec` runs beside it."""
+
+    program: CompiledProgram
+
+
+@dataclass(frozen=True, slots=True)
+class StopProgram:
+    """End the running program, as the `stop program` line and the dashboard's `stop` do."""
+
+
+@dataclass(frozen=True, slots=True)
+class PowerOn:
+    """Power the joints: POWER_OFF to IDLE; nothing happens when they are powered already."""
+
+
+@dataclass(frozen=True, slots=True)
+class PowerOff:
+    """Apply the brakes and cut the power from any mode."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReleaseBrakes:
+    """Go to RUNNING, powering on first if need be."""
+
+
+@dataclass(frozen=True, slots=True)
+class UnlockProtectiveStop:
+    """Return from a protective stop to normal."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetSpeedSlider:
+    """Set the speed slider.
+
+    Attributes:
+        fraction: 0..1.
+    """
+
+    fraction: float
+
+
+@dataclass(frozen=True, slots=True)
+class TriggerProtectiveStop:
+    """Stop the arm as a safety function would."""
+
+
+Command = (
+    StartProgram
+    | StopProgram
+    | PowerOn
+    | PowerOff
+    | ReleaseBrakes
+    | UnlockProtectiveStop
+    | SetSpeedSlider
+    | TriggerProtectiveStop
+)

@@ -1,0 +1,270 @@
+"""The control box as a function of its commands: `tick(commands)` advances one cycle, gives a snapshot.
+
+The order of a cycle is written here and nowhere else: commands, modes, script threads, motion, safety, plant,
+sensors, snapshot. Must not know sockets, threads or a clock: time is the tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from protocol.ur_types import RobotMode, SafetyMode
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller.events import ErrorReported, Event, ReportLevel, SafetyModeChanged, ScriptFailed
+from ur_emulator.controller.robot_mode import JOINT_MODE, POWERED, ModeCommand, RobotModeMachine
+from ur_emulator.controller.safety import (
+    PROTECTIVE_STOP_DECELERATION,
+    UNLOCK_DELAY,
+    Violation,
+    find_violation,
+)
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.calibration import draw_calibration
+from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, ArmMotion
+from ur_emulator.motion.target import ZERO6, Vector6, vector6
+from ur_emulator.plant.plant import Plant
+from ur_emulator.scripting.network import Network
+from ur_emulator.scripting.program_slot import ProgramSlot
+from urscript import CompiledProgram
+
+PERIOD_US = 8_000  # control cycle of a CB3: 125 Hz
+# A box that serves has booted a minute ago: clients distrust a controller clock below 40 s (public client
+# library).
+BOOT_TICK = 60 * 1_000_000 // PERIOD_US
+# After the last activity the arm gets this many cycles to come to rest before time may stand still (0.2 s).
+SETTLE_CYCLES = 25
+# A protective stop can be unlocked after a while; time must not stand still before that.
+UNLOCK_CYCLES = round(UNLOCK_DELAY * 1_000_000 / PERIOD_US)
+# Bus voltage and idle current of the box; modelled, chosen from captures of resting arms (48 V bus).
+BUS_VOLTAGE = 48.0
+IDLE_CURRENT = 0.25
+
+
+class Controller:
+    """One control box without its ports."""
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        fidelity: Fidelity,
+        seed: int,
+        network: Network,
+        *,
+        mode: RobotMode = RobotMode.RUNNING,
+    ) -> None:
+        """Assemble the box.
+
+        Args:
+            robot: the arm.
+            fidelity: how far it is from a perfect one.
+            seed: of everything random in it: calibration, phases, noise.
+            network: opens the sockets of scripts.
+            mode: robot mode to start in.
+        """
+        self.period_s = PERIOD_US * 1e-6
+        self.plant = Plant(robot, fidelity, seed, self.period_s)
+        arm = ArmModel(robot, draw_calibration(fidelity, seed))
+        q = vector6(robot.home_q)
+        self.plant.reset(q)
+        self._saturated_s = 0.0
+        self._settle = 0
+        self.state = ControllerState(
+            robot=robot,
+            arm=arm,
+            period_s=self.period_s,
+            motion=ArmMotion(q),
+            mode=RobotModeMachine(mode, self.period_s),
+            tick=BOOT_TICK,
+        )
+        self.programs = ProgramSlot(self.state, network)
+        # The first cycle only makes the first snapshot; nothing moves in it.
+        self.tick(())
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """State at the end of the last cycle."""
+        return self.state.snapshot
+
+    @property
+    def is_active(self) -> bool:
+        """True while a program runs, the arm moves or a mode changes: why time passes in lockstep."""
+        return (
+            self.programs.has_work
+            or self.state.motion.is_moving
+            or self.state.mode.is_changing
+            or self._settle > 0
+        )
+
+    @property
+    def waits_outside(self) -> bool:
+        """True while a script waits for something that only the outside can bring."""
+        return self.programs.waits_outside
+
+    def take_events(self) -> list[Event]:
+        """Return what was said since the last call and forget it."""
+        events, self.state.events = self.state.events, []
+        return events
+
+    def tick(self, commands: Iterable[cmd.Command]) -> Snapshot:
+        """Advance one control cycle.
+
+        Args:
+            commands: what was asked since the last cycle, in order of arrival.
+
+        Returns:
+            The state at the end of the cycle.
+        """
+        state = self.state
+        state.tick += 1
+        for command in commands:
+            self._apply(command)
+        state.mode.step()
+        running = state.mode.mode is RobotMode.RUNNING
+        if self.programs.has_work:
+            self.programs.step()
+        was_active = self.programs.has_work or state.motion.is_moving or state.mode.is_changing
+        target = state.motion.step(self.period_s, state.speed_slider)
+        self.plant.step(target if running else None)
+        sensed = self.plant.sense()
+        self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
+        if running and not state.safety.is_stopped:
+            violation = find_violation(state.robot, target, sensed.position_error, self._saturated_s)
+            if violation is None and state.stop_requested:
+                violation = _REQUESTED_STOP
+            if violation is not None:
+                self._stop_for(violation, sensed.actual_q)
+        state.stop_requested = False
+        state.steady_cycles = 0 if any(target.qd) else state.steady_cycles + 1
+        self._settle = max(self._settle - 1, SETTLE_CYCLES if was_active else 0)
+
+        arm = state.arm
+        tcp = state.tcp_offset if any(state.tcp_offset) else None
+        target_pose, target_speed, _, _ = arm.state(target.q, target.qd, tcp)
+        pose, speed, elbow_position, elbow_velocity = arm.state(sensed.actual_q, sensed.actual_qd, tcp)
+        t = state.tick * PERIOD_US / 1e6
+        mode = state.mode.mode
+        powered = mode in POWERED
+        state.snapshot = Snapshot(
+            tick=state.tick,
+            timestamp=t,
+            target_q=target.q,
+            target_qd=target.qd,
+            target_qdd=target.qdd,
+            target_current=sensed.target_current,
+            target_moment=sensed.target_moment,
+            actual_q=sensed.actual_q,
+            actual_qd=sensed.actual_qd,
+            actual_current=sensed.actual_current,
+            joint_control_output=sensed.joint_control_output,
+            actual_tcp_pose=pose,
+            actual_tcp_speed=speed,
+            actual_tcp_force=_wrench_at_tcp(sensed.tcp_force, pose, arm, sensed.actual_q, tcp),
+            target_tcp_pose=target_pose,
+            target_tcp_speed=target_speed,
+            actual_digital_input_bits=state.io.digital_in,
+            joint_temperatures=sensed.joint_temperatures,
+            actual_execution_time=0.0,
+            robot_mode=int(mode),
+            joint_mode=(int(JOINT_MODE[mode]),) * 6,
+            safety_mode=int(state.safety.mode),
+            actual_tool_accelerometer=sensed.tool_accelerometer,
+            speed_scaling=state.speed_slider,
+            actual_momentum=0.0,
+            actual_main_voltage=BUS_VOLTAGE,
+            actual_robot_voltage=BUS_VOLTAGE if powered else 0.0,
+            actual_robot_current=IDLE_CURRENT + _bus_current(sensed.actual_current) if powered else 0.0,
+            actual_joint_voltage=sensed.joint_voltage if powered else ZERO6,
+            actual_digital_output_bits=state.io.digital_out,
+            runtime_state=int(self.programs.runtime_state),
+            elbow_position=elbow_position,
+            elbow_velocity=elbow_velocity,
+            safety_status=int(state.safety.mode),
+            payload=state.payload.mass,
+            payload_cog=state.payload.cog,
+            payload_inertia=ZERO6,
+            target_speed_fraction=state.speed_slider,
+            tcp_offset=state.tcp_offset,
+            program_name=self.programs.name,
+        )
+        return state.snapshot
+
+    # --- commands
+
+    def _apply(self, command: cmd.Command) -> None:
+        state = self.state
+        match command:
+            case cmd.StartProgram(program):
+                self._start(program)
+            case cmd.StopProgram():
+                self.programs.stop()
+            case cmd.PowerOn():
+                state.mode.command(ModeCommand.POWER_ON)
+            case cmd.PowerOff():
+                self.programs.stop()
+                state.mode.command(ModeCommand.POWER_OFF)
+                self._hold_here()
+            case cmd.ReleaseBrakes():
+                state.mode.command(ModeCommand.BRAKE_RELEASE)
+            case cmd.UnlockProtectiveStop():
+                if state.safety.mode is SafetyMode.PROTECTIVE_STOP:
+                    state.safety.unlock()
+                    state.events.append(SafetyModeChanged(int(state.safety.mode)))
+            case cmd.SetSpeedSlider(fraction):
+                state.speed_slider = min(1.0, max(0.0, fraction))
+            case cmd.TriggerProtectiveStop():
+                state.stop_requested = True
+
+    def _start(self, program: CompiledProgram) -> None:
+        """Start a program if the box is in a state to run one; say so if it is not."""
+        state = self.state
+        if state.mode.mode is not RobotMode.RUNNING or state.safety.is_stopped:
+            why = state.mode.mode.name if not state.safety.is_stopped else state.safety.mode.name
+            state.events.append(
+                ScriptFailed(
+                    1, 1, f"program {program.name} not started: the robot is in {why}, it must be RUNNING"
+                )
+            )
+            return
+        self.programs.start(program)
+
+    # --- stops
+
+    def _stop_for(self, violation: Violation, actual_q: Vector6) -> None:
+        state = self.state
+        state.safety.protective_stop(state.tick * self.period_s)
+        self._settle = UNLOCK_CYCLES
+        state.events.append(violation.error)
+        state.events.append(SafetyModeChanged(int(state.safety.mode)))
+        self.programs.stop()
+        state.motion.stop(PROTECTIVE_STOP_DECELERATION)
+        if violation.blocked:
+            state.motion.place(actual_q)
+
+    def _hold_here(self) -> None:
+        """Drop the target: the brakes hold the arm where it is."""
+        self.state.motion.stop(PROGRAM_END_DECELERATION)
+        self.state.motion.place(self.state.snapshot.actual_q)
+
+
+def _bus_current(currents: Iterable[float]) -> float:
+    """Return a plausible current on the 48 V bus for joint currents [A]: the drives chop, a tenth shows."""
+    return 0.1 * sum(map(abs, currents))
+
+
+_REQUESTED_STOP = Violation(ErrorReported(209, 0, ReportLevel.WARNING, "Protective stop requested"))
+
+
+def _wrench_at_tcp(
+    wrench: Vector6, tcp_pose: Vector6, arm: ArmModel, q: Vector6, tcp: Vector6 | None
+) -> Vector6:
+    """Move a wrench at the flange (base axes, N and Nm) to the TCP: the moment loses lever times force."""
+    if tcp is None:
+        return wrench
+    flange = arm.fk(q)
+    rx, ry, rz = (a - b for a, b in zip(tcp_pose[:3], flange[:3], strict=True))
+    fx, fy, fz, mx, my, mz = wrench
+    return (fx, fy, fz, mx - ry * fz + rz * fy, my - rz * fx + rx * fz, mz - rx * fy + ry * fx)

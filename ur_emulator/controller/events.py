@@ -1,0 +1,93 @@
+"""What the controller has to say beside its state: frozen records that the ports turn into messages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class ReportLevel(IntEnum):
+    """Severity of an error code. Source: UR primary/secondary client interface, robot message "RobotComm"."""
+
+    DEBUG = 0
+    INFO = 1
+    WARNING = 2
+    VIOLATION = 3
+    FAULT = 4
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramStarted:
+    """A primary program began. `name`: of its `def`, or of the function called by a one-line program."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramStopped:
+    """A primary program ended, by itself or not."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class TextPrinted:
+    """A script called `textmsg`."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptFailed:
+    """A program did not compile or died.
+
+    Attributes:
+        line: 1-based line in the text as sent, the `def` line being 1.
+        column: 1-based column.
+        text: as the controller words it on the wire.
+        secondary: the program was a `sec`: only logged, the primary program goes on.
+    """
+
+    line: int
+    column: int
+    text: str
+    secondary: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorReported:
+    """The controller reports code C<code>A<argument>."""
+
+    code: int
+    argument: int
+    level: ReportLevel
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyModeChanged:
+    """The safety mode changed, for the safety-mode message of the primary port."""
+
+    safety_mode: int
+
+
+@dataclass(frozen=True, slots=True)
+class PopupShown:
+    """A script called `popup`."""
+
+    title: str
+    text: str
+    warning: bool
+    error: bool
+    blocking: bool
+
+
+Event = (
+    ProgramStarted
+    | ProgramStopped
+    | TextPrinted
+    | ScriptFailed
+    | ErrorReported
+    | SafetyModeChanged
+    | PopupShown
+)

@@ -1,0 +1,109 @@
+"""What stops the arm by itself: limit checks, and the protective stop they lead to.
+
+Pure: `find_violation` looks at one cycle and says what is wrong; `SafetyState` remembers the stop.
+Sources: joint limits and torque limits of the robot model; C153 "position deviates from path" and C204
+"invalid setpoints" from user reports. The thresholds of the deviation are not published; those here are the
+proposal of the arm's notes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from protocol.ur_types import JOINT_NAMES, SafetyMode
+from ur_emulator.controller.events import ErrorReported, ReportLevel
+from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.motion.target import JointTarget
+
+# A joint this far from its (delayed) target is blocked or pushed [rad].
+MAX_POSITION_DEVIATION = 0.15
+# A joint whose drive gives all it has for this long cannot follow [s].
+MAX_SATURATION_TIME = 0.1
+# The dashboard refuses to unlock a protective stop sooner than this [s]. Source: UR dashboard documents.
+UNLOCK_DELAY = 5.0
+# A target above the rated joint speed by more than rounding is an invalid set-point.
+SPEED_TOLERANCE = 1.0 + 1e-6
+# Deceleration of the leading axis in a protective stop [rad/s^2]; mean of UR's stop category 0 tests,
+# UR3/CB3 manual 3.10.
+PROTECTIVE_STOP_DECELERATION = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """Why a protective stop begins.
+
+    Attributes:
+        error: the error code to report.
+        blocked: the arm is away from its target, which must be dropped.
+    """
+
+    error: ErrorReported
+    blocked: bool = False
+
+
+def _stop(code: int, argument: int, text: str, *, blocked: bool = False) -> Violation:
+    return Violation(ErrorReported(code, argument, ReportLevel.WARNING, text), blocked)
+
+
+def find_violation(
+    robot: RobotModel, target: JointTarget, position_error: tuple[float, ...], saturated_s: float
+) -> Violation | None:
+    """Return what is wrong in this cycle, or None.
+
+    Args:
+        robot: limits of the arm.
+        target: set-point at the end of the cycle.
+        position_error: delayed target minus true position [rad], (6,).
+        saturated_s: for how long a drive has been at its torque limit without a break [s].
+    """
+    for i, (speed, limit) in enumerate(zip(target.qd, robot.qd_max, strict=True)):
+        if abs(speed) > limit * SPEED_TOLERANCE:
+            return _stop(
+                204,
+                i,
+                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {speed:.3f} rad/s, limit {limit:.3f}",
+            )
+    for i, (q, low, high) in enumerate(zip(target.q, robot.q_min, robot.q_max, strict=True)):
+        if not low <= q <= high:
+            return _stop(
+                204,
+                i,
+                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {q:.3f} rad, "
+                f"limits {low:.3f} to {high:.3f}",
+            )
+    for i, error in enumerate(position_error):
+        if abs(error) > MAX_POSITION_DEVIATION:
+            return _stop(
+                153, i, f"Protective stop: position deviates from path: {JOINT_NAMES[i]}", blocked=True
+            )
+    if saturated_s > MAX_SATURATION_TIME:
+        return _stop(157, 0, "Protective stop: joint torque limit", blocked=True)
+    return None
+
+
+class SafetyState:
+    """The safety mode and, while stopped, since when."""
+
+    def __init__(self) -> None:
+        self.mode = SafetyMode.NORMAL
+        self._stopped_since = 0.0
+
+    @property
+    def is_stopped(self) -> bool:
+        """True when the safety system does not let the arm move."""
+        return self.mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY)
+
+    def protective_stop(self, now: float) -> None:
+        """Enter the protective stop at controller time `now` [s]; a stop already entered keeps its time."""
+        if not self.is_stopped:
+            self.mode = SafetyMode.PROTECTIVE_STOP
+            self._stopped_since = now
+
+    def may_unlock(self, now: float) -> bool:
+        """True when the dashboard's `unlock protective stop` is allowed."""
+        return self.mode is SafetyMode.PROTECTIVE_STOP and now - self._stopped_since >= UNLOCK_DELAY
+
+    def unlock(self) -> None:
+        """Leave a protective stop; any other mode stays."""
+        if self.mode is SafetyMode.PROTECTIVE_STOP:
+            self.mode = SafetyMode.NORMAL

@@ -1,0 +1,64 @@
+"""All that a control cycle reads and writes, in one place.
+
+The controller owns the one instance; the script functions of a running program get it to act on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ur_emulator.controller.events import Event
+from ur_emulator.controller.io import InputOutput
+from ur_emulator.controller.registers import Registers
+from ur_emulator.controller.robot_mode import RobotModeMachine
+from ur_emulator.controller.safety import SafetyState
+from ur_emulator.controller.snapshot import Snapshot, Vector3
+from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.target import ZERO6, Vector6
+
+
+@dataclass(slots=True)
+class Payload:
+    """What the controller believes to hang at the flange: mass [kg], centre of gravity [m] in its frame."""
+
+    mass: float = 0.0
+    cog: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(slots=True)
+class ControllerState:
+    """The mutable state of one control box.
+
+    Attributes:
+        robot: numbers of the arm.
+        arm: the controller's (calibrated) kinematics.
+        period_s: duration of a control cycle [s].
+        motion: where the joints are asked to go, and by whom.
+        mode: robot mode and its way.
+        safety: safety mode.
+        snapshot: state at the end of the last cycle; what scripts see as "actual" during this one.
+        events: what was said since the last cycle ended, in order.
+        speed_slider: 0..1.
+        stop_requested: a script or a client asked for a protective stop in this cycle.
+        steady_cycles: for how many cycles the target has stood still.
+    """
+
+    robot: RobotModel
+    arm: ArmModel
+    period_s: float
+    motion: ArmMotion
+    mode: RobotModeMachine
+    snapshot: Snapshot = field(init=False)
+    safety: SafetyState = field(default_factory=SafetyState)
+    registers: Registers = field(default_factory=Registers)
+    io: InputOutput = field(default_factory=InputOutput)
+    payload: Payload = field(default_factory=Payload)
+    gravity: Vector3 = (0.0, 0.0, 9.82)
+    tcp_offset: Vector6 = ZERO6
+    speed_slider: float = 1.0
+    steady_cycles: int = 0
+    tick: int = 0
+    stop_requested: bool = False
+    events: list[Event] = field(default_factory=list)

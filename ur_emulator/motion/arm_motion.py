@@ -1,0 +1,105 @@
+"""Who moves the arm, and where to: the current generator, its owner, and the running joint target.
+
+The rules of ownership come from the controller's behaviour as users report it:
+
+* only one script thread moves the arm at a time; a second one gets "Another thread is already controlling
+  the robot";
+* ownership ends when the motion has brought the arm to rest, or when the owner ends or is killed;
+* a velocity command lives only as long as it is renewed in every cycle: when the next `speedj` is late the
+  arm
+  begins to stop (the stutter seen by every driver that streams too slowly), and when the program ends it
+  stops.
+
+Must not know scripts or physics: an owner is any object, compared by identity.
+"""
+
+from __future__ import annotations
+
+from ur_emulator.motion.generators import Generator, Hold, SpeedJ, StopJ
+from ur_emulator.motion.target import JointTarget, Vector6
+
+# Deceleration of the leading axis when a program ends, is replaced or killed while the arm moves. Users
+# call the real one "abrupt"; the number is not published. Chosen: the mean of UR's stop category 0 tests on
+# the base joint (183 deg/s in 159 ms, UR3/CB3 manual 3.10, appendix "stopping time").
+PROGRAM_END_DECELERATION = 20.0  # rad/s^2
+
+_HOLD = Hold()
+
+
+class OwnershipError(Exception):
+    """A second owner asked for the arm while the first still has it."""
+
+
+class ArmMotion:
+    """The motion state of the arm: one generator, one owner, one target."""
+
+    def __init__(self, q: Vector6) -> None:
+        self.target = JointTarget(q)
+        self._generator: Generator = _HOLD
+        self._owner: object | None = None
+        self._renewed = False
+
+    @property
+    def is_moving(self) -> bool:
+        """True unless the target stands still and nothing is about to move it."""
+        return self._generator is not _HOLD
+
+    @property
+    def owner(self) -> object | None:
+        """The object that controls the arm at present, or None."""
+        return self._owner
+
+    def command(self, owner: object, generator: Generator) -> None:
+        """Let `owner` move the arm with `generator` from the next cycle on.
+
+        Raises:
+            OwnershipError: somebody else has the arm.
+        """
+        if self._owner is not None and self._owner is not owner:
+            raise OwnershipError
+        self._owner = owner
+        self._generator = generator
+        self._renewed = True
+
+    def renew(self) -> None:
+        """Keep a streamed velocity alive for one more cycle."""
+        self._renewed = True
+
+    def release(self, owner: object) -> None:
+        """End the ownership of `owner`, if it has it; a motion still under way is stopped at once."""
+        if self._owner is owner:
+            self.stop(PROGRAM_END_DECELERATION)
+
+    def stop(self, deceleration: float) -> None:
+        """Take the arm from whoever has it and ramp it to rest, leading axis at `deceleration` [rad/s^2]."""
+        self._owner = None
+        if self._generator is not _HOLD:
+            self._generator = StopJ(deceleration)
+
+    def place(self, q: Vector6) -> None:
+        """Set the target to `q` at rest, without a path: the joints were moved by something else."""
+        self._owner = None
+        self._generator = _HOLD
+        self.target = JointTarget(q)
+
+    def step(self, dt: float, scale: float) -> JointTarget:
+        """Advance one cycle and return the new target.
+
+        Args:
+            dt: duration of a cycle [s].
+            scale: speed scaling of the trajectory, 0..1.
+        """
+        generator = self._generator
+        if generator is _HOLD:
+            if any(self.target.qd) or any(self.target.qdd):
+                self.target = self.target.at_rest()
+            return self.target
+        if isinstance(generator, SpeedJ):
+            if not self._renewed:
+                generator = self._generator = StopJ(generator.a)
+            self._renewed = False
+        self.target = generator.step(self.target, dt, scale)
+        if generator.done and not isinstance(generator, SpeedJ):
+            self._generator = _HOLD
+            self._owner = None
+        return self.target

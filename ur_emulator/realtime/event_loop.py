@@ -1,0 +1,127 @@
+"""The one loop: wait for sockets or the next deadline, hand bytes on, let the boxes advance.
+
+One thread owns the loop and all that is registered with it; other threads may only use
+`call_soon_threadsafe`. The loop knows no robot: a service is anything that says when it wants to be called
+next.
+"""
+
+from __future__ import annotations
+
+import gc
+import select
+import selectors
+import socket
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Protocol
+
+# epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
+# microseconds.
+_COARSE = 0.050
+# Collect garbage rarely: a full collection over a large heap costs more than a cycle has to spare.
+_GC_THRESHOLD = (50_000, 20, 100)
+
+
+class Service(Protocol):
+    """Something that advances in the loop."""
+
+    def advance(self, now: float) -> float:
+        """Do what is due at monotonic time `now` [s]; return when to be called next at the latest."""
+        ...
+
+
+class EventLoop:
+    """A selector, deadlines, and calls from other threads."""
+
+    def __init__(self) -> None:
+        self._selector = selectors.DefaultSelector()
+        self._services: list[Service] = []
+        self._calls: deque[Callable[[], None]] = deque()
+        self._stopping = False
+        self._waker, self._wake_end = socket.socketpair()
+        for end in (self._waker, self._wake_end):
+            end.setblocking(False)
+        self.watch(self._wake_end, selectors.EVENT_READ, self._drain_wakes)
+        # Sub-millisecond waits need the selector's own descriptor to be selectable; that is so for epoll
+        # and kqueue.
+        descriptor = getattr(self._selector, "fileno", None)
+        self._descriptor: int | None = descriptor() if descriptor is not None else None
+
+    # --- sockets
+
+    def watch(self, sock: socket.socket, events: int, callback: Callable[[int], None]) -> None:
+        """Call `callback(events)` whenever `sock` is ready for one of `events`; replaces an earlier watch."""
+        try:
+            self._selector.register(sock, events, callback)
+        except KeyError:
+            self._selector.modify(sock, events, callback)
+
+    def unwatch(self, sock: socket.socket) -> None:
+        """Stop watching `sock`; harmless if it is not watched."""
+        with suppress(KeyError, ValueError):
+            self._selector.unregister(sock)
+
+    # --- services
+
+    def add(self, service: Service) -> None:
+        """Let `service` advance in this loop."""
+        self._services.append(service)
+
+    def remove(self, service: Service) -> None:
+        """Take `service` out of this loop."""
+        if service in self._services:
+            self._services.remove(service)
+
+    # --- other threads
+
+    def call_soon_threadsafe(self, call: Callable[[], None]) -> None:
+        """Run `call` in the loop's thread, soon; beside `stop` the only method for other threads."""
+        self._calls.append(call)
+        self._wake()
+
+    def stop(self) -> None:
+        """Let `run` return, soon."""
+        self._stopping = True
+        self._wake()
+
+    # --- running
+
+    def run(self) -> None:
+        """Run until `stop`. An exception in a callback or a service ends the loop and is raised here."""
+        gc.collect()
+        gc.freeze()
+        gc.set_threshold(*_GC_THRESHOLD)
+        while not self._stopping:
+            now = time.monotonic()
+            deadline = now + 1.0
+            for service in tuple(self._services):
+                deadline = min(deadline, service.advance(now))
+            self._dispatch(deadline)
+
+    def close(self) -> None:
+        """Release the selector and the wake-up pipe; the loop must not run any more."""
+        self._selector.close()
+        self._waker.close()
+        self._wake_end.close()
+
+    def _dispatch(self, deadline: float) -> None:
+        """Wait for a ready socket until `deadline`, then run all callbacks that are ready."""
+        timeout = max(0.0, deadline - time.monotonic()) if not self._calls else 0.0
+        if self._descriptor is not None and 0.0 < timeout < _COARSE:
+            select.select([self._descriptor], [], [], timeout)
+            timeout = 0.0
+        for key, events in self._selector.select(timeout):
+            key.data(events)
+        while self._calls:
+            self._calls.popleft()()
+
+    def _wake(self) -> None:
+        # A full pipe wakes the loop as well; a closed one has no loop to wake.
+        with suppress(OSError):
+            self._waker.send(b"\0")
+
+    def _drain_wakes(self, events: int) -> None:
+        with suppress(BlockingIOError):
+            self._wake_end.recv(4096)

@@ -1,0 +1,138 @@
+"""Pacers: when may the next cycle begin? Each answers with a time; none of them ticks by itself.
+
+| pace       | the next cycle begins                                                                        |
+|------------|----------------------------------------------------------------------------------------------|
+| realtime   | at absolute deadlines t0 + k * period (divided by the speed), so lateness does not add up     |
+| lockstep   | at once while something is going on, never past a script that waits for the outside           |
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from typing import Protocol
+
+# A box that could not tick for this long (a suspended laptop, a debugger) starts a new time base instead of
+# racing after the old one.
+MAX_BACKLOG = 0.5  # s
+# In lockstep, a script that has waited this long in real seconds for bytes gets time anyway, at real pace,
+# so that its own time-out can end the hang.
+HANG_LIMIT = 10.0  # s
+# In lockstep, a client that has not read for this long in real seconds is not waited for any more.
+READER_LIMIT = 5.0  # s
+
+
+class Pace(Enum):
+    """Names of the pacers on the command line."""
+
+    REALTIME = "realtime"
+    LOCKSTEP = "lockstep"
+
+
+class Situation(Protocol):
+    """What a pacer needs to know of its box; asked only when it matters."""
+
+    @property
+    def is_active(self) -> bool:
+        """Something is going on: a command waits, a program runs, the arm moves."""
+        ...
+
+    @property
+    def waits_outside(self) -> bool:
+        """A script waits for bytes that have not come."""
+        ...
+
+    @property
+    def readers_full(self) -> bool:
+        """A client that reads has not taken its frames yet."""
+        ...
+
+    def give_up_readers(self) -> None:
+        """Wait no longer for the clients that are behind; they lose frames until they have caught up."""
+        ...
+
+
+class Pacer(Protocol):
+    """Decides when a cycle may begin."""
+
+    def may_tick(self, now: float, situation: Situation) -> bool:
+        """True if a cycle may begin at monotonic time `now` [s]; the caller then ticks once."""
+        ...
+
+    def next_call(self, now: float) -> float:
+        """When to ask again at the latest, if nothing comes from the sockets before [s]."""
+        ...
+
+
+class RealtimePacer:
+    """Cycles at absolute deadlines."""
+
+    def __init__(self, period_s: float, speed: float = 1.0) -> None:
+        """Set the rate.
+
+        Args:
+            period_s: control cycle [s].
+            speed: how many times as fast as real time, > 0.
+        """
+        self._period = period_s / speed
+        self._deadline = math.nan
+        self.lost_cycles = 0
+
+    def may_tick(self, now: float, situation: Situation) -> bool:
+        """True at and after the deadline; each call that says so uses up one deadline."""
+        if math.isnan(self._deadline):
+            self._deadline = now
+        if now < self._deadline:
+            return False
+        behind = now - self._deadline
+        if behind > MAX_BACKLOG:
+            skipped = int(behind / self._period)
+            self.lost_cycles += skipped
+            self._deadline += skipped * self._period
+        self._deadline += self._period
+        return True
+
+    def next_call(self, now: float) -> float:
+        """The next deadline."""
+        return self._deadline
+
+
+class LockstepPacer:
+    """Cycles as fast as the processor allows, every one caused by a program; time stands still otherwise."""
+
+    def __init__(self, period_s: float) -> None:
+        self._period = period_s
+        self._waiting_since = math.nan
+        self._full_since = math.nan
+        self._last_tick = -math.inf
+
+    def may_tick(self, now: float, situation: Situation) -> bool:
+        """True when something is going on and nothing outside holds time still."""
+        if not situation.is_active:
+            self._waiting_since = self._full_since = math.nan
+            return False
+        if situation.readers_full:
+            if math.isnan(self._full_since):
+                self._full_since = now
+            if now - self._full_since < READER_LIMIT:
+                return False
+            situation.give_up_readers()
+        self._full_since = math.nan
+        if situation.waits_outside:
+            if math.isnan(self._waiting_since):
+                self._waiting_since = now
+            if now - self._waiting_since < HANG_LIMIT or now - self._last_tick < self._period:
+                return False
+        else:
+            self._waiting_since = math.nan
+        self._last_tick = now
+        return True
+
+    def next_call(self, now: float) -> float:
+        """One real period on: time for the heartbeat and for the real-seconds limits."""
+        return now + self._period
+
+
+def make_pacer(pace: Pace, period_s: float, speed: float = 1.0) -> Pacer:
+    """Return the pacer of that name."""
+    return LockstepPacer(period_s) if pace is Pace.LOCKSTEP else RealtimePacer(period_s, speed)

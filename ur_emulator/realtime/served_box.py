@@ -1,0 +1,111 @@
+"""One box in the loop: its controller, its pacer and its ports. Decides when to tick and who is told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Protocol
+
+from ur_emulator.controller.commands import Command
+from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.events import Event
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.realtime.pacing import Pacer, RealtimePacer
+from ur_emulator.servers.connection import Connection
+
+# While time stands still, every port repeats itself at its own rate, in real seconds: clients take silence
+# for a dead robot.
+HEARTBEAT = 0.008  # s
+
+
+class Publisher(Protocol):
+    """A port that wants snapshots and events."""
+
+    @property
+    def clients(self) -> Iterable[Connection]:
+        """Connected clients that read a stream."""
+        ...
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Send what is due for this cycle."""
+        ...
+
+    def say(self, event: Event) -> None:
+        """Send a message."""
+        ...
+
+
+class ServedBox:
+    """Advances a controller in an event loop and publishes what it does."""
+
+    def __init__(self, controller: Controller, pacer: Pacer) -> None:
+        self.controller = controller
+        self._pacer = pacer
+        self._repeats = not isinstance(pacer, RealtimePacer)
+        self._publishers: list[Publisher] = []
+        self._commands: list[Command] = []
+        self._given_up: set[Connection] = set()
+        self._last_frame = -math.inf
+
+    def attach(self, publisher: Publisher) -> None:
+        """Let a port hear of every cycle."""
+        self._publishers.append(publisher)
+
+    def submit(self, command: Command) -> None:
+        """Take a command for the next cycle."""
+        self._commands.append(command)
+
+    def announce(self, event: Event) -> None:
+        """Publish an event at once, outside of a cycle."""
+        for publisher in self._publishers:
+            publisher.say(event)
+
+    # --- what the pacer asks
+
+    @property
+    def is_active(self) -> bool:
+        """True while there is a reason for time to pass."""
+        return bool(self._commands) or self.controller.is_active
+
+    @property
+    def waits_outside(self) -> bool:
+        """True while a script waits for the outside and no command wants a cycle."""
+        return not self._commands and self.controller.waits_outside
+
+    @property
+    def readers_full(self) -> bool:
+        """True while a client has frames waiting that it has not read, unless it was given up."""
+        full = False
+        for publisher in self._publishers:
+            for connection in publisher.clients:
+                if not connection.is_behind:
+                    self._given_up.discard(connection)
+                elif connection not in self._given_up:
+                    full = True
+        return full
+
+    def give_up_readers(self) -> None:
+        """Wait no longer for clients that are behind, until they have caught up."""
+        self._given_up = {c for publisher in self._publishers for c in publisher.clients if c.is_behind}
+
+    # --- the loop
+
+    def advance(self, now: float) -> float:
+        """Tick if it is time to, or repeat the last frame if time stands still; return the next deadline."""
+        if self._pacer.may_tick(now, self):
+            commands, self._commands = self._commands, []
+            self._publish(self.controller.tick(commands), now)
+            # Sockets get their turn between any two cycles.
+            return now if self._repeats else self._pacer.next_call(now)
+        if self._repeats and now - self._last_frame >= HEARTBEAT:
+            self._publish(self.controller.snapshot, now)
+        return self._pacer.next_call(now)
+
+    def _publish(self, snapshot: Snapshot, now: float) -> None:
+        self._last_frame = now
+        # Events first: an error must have arrived before the state that shows its effect.
+        if self.controller.state.events:
+            for event in self.controller.take_events():
+                self.announce(event)
+        for publisher in self._publishers:
+            publisher.publish(snapshot)

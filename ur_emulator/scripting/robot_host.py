@@ -1,0 +1,48 @@
+"""The robot as a URScript program sees it: all builtin groups, and the end of threads and programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ur_emulator.controller.events import TextPrinted
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.scripting.io_functions import io_functions, register_functions
+from ur_emulator.scripting.motion_functions import motion_functions
+from ur_emulator.scripting.network import Network
+from ur_emulator.scripting.settings_functions import settings_functions
+from ur_emulator.scripting.socket_functions import ProgramSockets
+from ur_emulator.scripting.state_functions import state_functions
+
+
+class RobotHost:
+    """The host of one running program (see urscript.host.Host)."""
+
+    def __init__(self, state: ControllerState, network: Network) -> None:
+        self.step_time = state.period_s
+        self._state = state
+        self._sockets = ProgramSockets(state, network)
+        self._builtins: Mapping[str, Callable[..., Any]] = {
+            **motion_functions(state),
+            **state_functions(state),
+            **settings_functions(state),
+            **io_functions(state),
+            **register_functions(state),
+            **self._sockets.functions(),
+        }
+
+    def builtins(self) -> Mapping[str, Callable[..., Any]]:
+        """Return the effects that this robot offers, by URScript name."""
+        return self._builtins
+
+    def textmsg(self, text: str) -> None:
+        """Publish a text message."""
+        self._state.events.append(TextPrinted(text))
+
+    def thread_ended(self, thread: object) -> None:
+        """Take the arm from a thread that ended or was killed."""
+        self._state.motion.release(thread)
+
+    def program_ended(self) -> None:
+        """Close what the program opened."""
+        self._sockets.close_all()

@@ -1,0 +1,60 @@
+"""Builtins that change what the controller assumes or ask it for something: TCP, payload, stops, popups."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ur_emulator.controller.events import PopupShown
+from ur_emulator.controller.state import ControllerState, Payload
+from ur_emulator.motion.target import vector6
+from urscript.errors import ScriptRuntimeError
+
+
+def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
+    """Return the setting builtins bound to one controller."""
+
+    def set_tcp(thread: object, pose: Any) -> None:
+        state.tcp_offset = vector6(pose)
+
+    def cog_of(value: Any) -> tuple[float, float, float]:
+        x, y, z = value if value is not None else state.tcp_offset[:3]
+        return (float(x), float(y), float(z))
+
+    def mass_of(mass: float) -> float:
+        if not 0.0 <= mass <= state.robot.payload_max:
+            raise ScriptRuntimeError(
+                f"payload of {mass:g} kg is outside 0 to {state.robot.payload_max:g} kg of a {state.robot.title}"
+            )
+        return float(mass)
+
+    def set_payload(thread: object, m: float, cog: Any) -> None:
+        state.payload = Payload(mass_of(m), cog_of(cog))
+
+    def set_payload_mass(thread: object, m: float) -> None:
+        state.payload = Payload(mass_of(m), state.payload.cog)
+
+    def set_payload_cog(thread: object, cog: Any) -> None:
+        state.payload = Payload(state.payload.mass, cog_of(cog))
+
+    def set_gravity(thread: object, d: Any) -> None:
+        x, y, z = d
+        state.gravity = (float(x), float(y), float(z))
+
+    def protective_stop(thread: object) -> None:
+        state.stop_requested = True
+
+    def popup(thread: object, s: Any, title: str, warning: bool, error: bool, blocking: bool) -> None:
+        if blocking:
+            raise ScriptRuntimeError("popup(blocking=True) is declared only: no operator can answer it yet")
+        state.events.append(PopupShown(title, str(s), warning, error, blocking))
+
+    return {
+        "set_tcp": set_tcp,
+        "set_payload": set_payload,
+        "set_payload_mass": set_payload_mass,
+        "set_payload_cog": set_payload_cog,
+        "set_gravity": set_gravity,
+        "protective_stop": protective_stop,
+        "popup": popup,
+    }

@@ -1,0 +1,108 @@
+"""Builtins that read the robot: state getters and kinematics. They take no robot time.
+
+Actual and target values are those of the last cycle, constant while the scripts of a cycle run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from protocol.pose import pose_inv, pose_trans
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.motion.target import vector6
+from urscript.errors import ScriptRuntimeError
+from urscript.values import Pose
+
+# is_steady(): zero target velocity for this long [s]. Source: URScript manual, later text of is_steady.
+STEADY_TIME = 0.5
+
+
+def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
+    """Return the reading builtins bound to one controller."""
+    arm = state.arm
+
+    def joints(value: Any) -> tuple[float, ...]:
+        return state.snapshot.actual_q if value is None else vector6(value)
+
+    def tool(value: Any) -> tuple[float, ...]:
+        return state.tcp_offset if value is None else tuple(value)
+
+    def get_forward_kin(thread: object, q: Any, tcp: Any) -> Pose:
+        return Pose.of(arm.fk(joints(q), tool(tcp)))
+
+    def inverse(pose: Pose, q_near: Any, tcp: Any) -> tuple[float, ...] | None:
+        return arm.inverse(tuple(pose), joints(q_near), tool(tcp))
+
+    def get_inverse_kin(
+        thread: object, x: Pose, qnear: Any, max_position_error: float, max_orientation_error: float, tcp: Any
+    ) -> list[float]:
+        solution = inverse(x, qnear, tcp)
+        if solution is None:
+            raise ScriptRuntimeError(
+                "get_inverse_kin: unable to find an inverse kinematics solution for the requested pose"
+            )
+        return list(solution)
+
+    def get_inverse_kin_has_solution(
+        thread: object,
+        pose: Pose,
+        qnear: Any,
+        max_position_error: float,
+        max_orientation_error: float,
+        tcp: Any,
+    ) -> bool:
+        return inverse(pose, qnear, tcp) is not None
+
+    def get_actual_tool_flange_pose(thread: object) -> Pose:
+        return Pose.of(pose_trans(state.snapshot.actual_tcp_pose, pose_inv(state.tcp_offset)))
+
+    def is_within_safety_limits(thread: object, pose: Any, qnear: Any) -> bool:
+        q = inverse(pose, qnear, None) if isinstance(pose, Pose) else tuple(pose)
+        return q is not None and all(
+            low <= x <= high for x, low, high in zip(q, state.robot.q_min, state.robot.q_max, strict=True)
+        )
+
+    def get_joint_temp(thread: object, j: int) -> float:
+        if not 0 <= j <= 5:
+            raise ScriptRuntimeError(f"get_joint_temp: joint {j} does not exist, allowed are 0 to 5")
+        return state.snapshot.joint_temperatures[j]
+
+    def get_joint_torques(thread: object) -> list[float]:
+        snap = state.snapshot
+        return [
+            k * (actual - target)
+            for k, actual, target in zip(
+                state.robot.torque_constant, snap.actual_current, snap.target_current, strict=True
+            )
+        ]
+
+    return {
+        "get_actual_joint_positions": lambda thread: list(state.snapshot.actual_q),
+        "get_target_joint_positions": lambda thread: list(state.motion.target.q),
+        "get_joint_positions": lambda thread: list(state.motion.target.q),
+        "get_actual_joint_speeds": lambda thread: list(state.snapshot.actual_qd),
+        "get_target_joint_speeds": lambda thread: list(state.motion.target.qd),
+        "get_joint_torques": get_joint_torques,
+        "get_joint_temp": get_joint_temp,
+        "get_controller_temp": lambda thread: 30.0,
+        "get_actual_tcp_pose": lambda thread: Pose.of(state.snapshot.actual_tcp_pose),
+        "get_target_tcp_pose": lambda thread: Pose.of(state.snapshot.target_tcp_pose),
+        "get_actual_tool_flange_pose": get_actual_tool_flange_pose,
+        "get_actual_tcp_speed": lambda thread: Pose.of(state.snapshot.actual_tcp_speed),
+        "get_target_tcp_speed": lambda thread: Pose.of(state.snapshot.target_tcp_speed),
+        "get_tcp_force": lambda thread: Pose.of(state.snapshot.actual_tcp_force),
+        "force": lambda thread: math.hypot(*state.snapshot.actual_tcp_force[:3]),
+        "get_tcp_offset": lambda thread: Pose.of(state.tcp_offset),
+        "get_tool_accelerometer_reading": lambda thread: list(state.snapshot.actual_tool_accelerometer),
+        "get_tool_current": lambda thread: 0.0,
+        "get_steptime": lambda thread: state.period_s,
+        "get_target_payload": lambda thread: state.payload.mass,
+        "get_target_payload_cog": lambda thread: list(state.payload.cog),
+        "get_forward_kin": get_forward_kin,
+        "get_inverse_kin": get_inverse_kin,
+        "get_inverse_kin_has_solution": get_inverse_kin_has_solution,
+        "is_steady": lambda thread: state.steady_cycles * state.period_s >= STEADY_TIME,
+        "is_within_safety_limits": is_within_safety_limits,
+    }

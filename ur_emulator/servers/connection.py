@@ -1,0 +1,153 @@
+"""One TCP connection of a client: it never blocks, its outbox is bounded, and packages stay whole."""
+
+from __future__ import annotations
+
+import selectors
+import socket
+from collections import deque
+from collections.abc import Callable
+
+from ur_emulator.realtime.event_loop import EventLoop
+
+# Bytes that may wait for a client that does not read; further packages are dropped for it.
+OUTBOX_LIMIT = 64 * 1024
+# Kernel buffer for sending: small, so that a slow reader gets fresh data and a silent one costs little
+# memory.
+SEND_BUFFER = 64 * 1024
+_READ_SIZE = 64 * 1024
+
+
+class Connection:
+    """A connected client.
+
+    Attributes:
+        peer: address of the client, for logs.
+        dropped: packages that were dropped because the client did not read.
+    """
+
+    def __init__(
+        self,
+        loop: EventLoop,
+        sock: socket.socket,
+        on_data: Callable[[Connection, bytes], None],
+        on_close: Callable[[Connection], None],
+    ) -> None:
+        """Take over a connected socket.
+
+        Args:
+            loop: watches the socket.
+            sock: connected; becomes non-blocking and belongs to this object.
+            on_data: called with what has come.
+            on_close: called once when the connection is gone, for whatever reason.
+        """
+        self._loop = loop
+        self._sock = sock
+        self._on_data = on_data
+        self._on_close = on_close
+        self._outbox: deque[memoryview] = deque()
+        self._pending = 0
+        self._closing = False
+        self._open = True
+        self.dropped = 0
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+        try:
+            self.peer = "{}:{}".format(*sock.getpeername()[:2])
+        except OSError:
+            self.peer = "gone"
+        loop.watch(sock, selectors.EVENT_READ, self._on_ready)
+
+    @property
+    def is_open(self) -> bool:
+        """True until the connection is closed by either side."""
+        return self._open
+
+    @property
+    def is_behind(self) -> bool:
+        """True while something waits in the outbox because the client has not read."""
+        return self._pending > 0
+
+    def send(self, package: bytes) -> bool:
+        """Send a package, whole or not at all.
+
+        Returns:
+            False if the package was dropped: the outbox is full or the connection is closed.
+        """
+        if not self._open:
+            return False
+        if self._pending:
+            if self._pending + len(package) > OUTBOX_LIMIT:
+                self.dropped += 1
+                return False
+            self._queue(memoryview(package))
+            return True
+        try:
+            sent = self._sock.send(package)
+        except BlockingIOError:
+            sent = 0
+        except OSError:
+            self.close()
+            return False
+        if sent < len(package):
+            self._queue(memoryview(package)[sent:])
+            self._loop.watch(self._sock, selectors.EVENT_READ | selectors.EVENT_WRITE, self._on_ready)
+        return True
+
+    def close_when_sent(self) -> None:
+        """Close as soon as the outbox is empty."""
+        self._closing = True
+        if not self._pending:
+            self.close()
+
+    def close(self) -> None:
+        """Close at once; harmless if closed already."""
+        if self._open:
+            self._open = False
+            self._loop.unwatch(self._sock)
+            self._sock.close()
+            self._outbox.clear()
+            self._pending = 0
+            self._on_close(self)
+
+    def _queue(self, data: memoryview) -> None:
+        self._outbox.append(data)
+        self._pending += len(data)
+
+    def _on_ready(self, events: int) -> None:
+        if events & selectors.EVENT_WRITE:
+            self._flush()
+        if events & selectors.EVENT_READ and self._open:
+            self._receive()
+
+    def _receive(self) -> None:
+        try:
+            data = self._sock.recv(_READ_SIZE)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self._on_data(self, data)
+        else:
+            self.close()
+
+    def _flush(self) -> None:
+        try:
+            while self._outbox:
+                data = self._outbox[0]
+                sent = self._sock.send(data)
+                self._pending -= sent
+                if sent < len(data):
+                    self._outbox[0] = data[sent:]
+                    return
+                self._outbox.popleft()
+        except BlockingIOError:
+            return
+        except OSError:
+            self.close()
+            return
+        if self._closing:
+            self.close()
+        else:
+            self._loop.watch(self._sock, selectors.EVENT_READ, self._on_ready)

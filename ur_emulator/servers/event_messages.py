@@ -1,0 +1,64 @@
+"""Controller events as robot messages of the primary port."""
+
+from __future__ import annotations
+
+from protocol.primary_messages import (
+    NO_TIME,
+    ErrorCodeMessage,
+    KeyMessage,
+    MessageSource,
+    PopupMessage,
+    RobotMessage,
+    RuntimeExceptionMessage,
+    SafetyModeMessage,
+    TextMessage,
+)
+from ur_emulator.controller import events
+
+# Titles of the key messages about a program's life. Source: captures quoted by the public client library.
+STARTED_TITLE = "PROGRAM_XXX_STARTED"
+STOPPED_TITLE = "PROGRAM_XXX_STOPPED"
+SECONDARY_EXCEPTION_TITLE = "SECONDARY_PROGRAM_EXCEPTION_XXX"
+
+
+def message_for(event: events.Event, timestamp: int) -> RobotMessage:
+    """Return the message that tells clients of an event.
+
+    Args:
+        event: what happened.
+        timestamp: microseconds since controller start.
+    """
+    match event:
+        case events.ProgramStarted(name):
+            return KeyMessage(timestamp=timestamp, title=STARTED_TITLE, text=name)
+        case events.ProgramStopped(name):
+            return KeyMessage(timestamp=timestamp, title=STOPPED_TITLE, text=name)
+        case events.TextPrinted(text):
+            return TextMessage(timestamp=timestamp, text=text)
+        case events.ScriptFailed(line, column, text, secondary):
+            if secondary:
+                return KeyMessage(timestamp=timestamp, title=SECONDARY_EXCEPTION_TITLE, text=text)
+            # A capture shows "no time" on these.
+            return RuntimeExceptionMessage(timestamp=NO_TIME, line=line, column=column, text=text)
+        case events.ErrorReported(code, argument, level, text):
+            return ErrorCodeMessage(
+                timestamp=timestamp,
+                source=MessageSource.CONTROLLER,
+                code=code,
+                argument=argument,
+                report_level=level,
+                text=text,
+            )
+        case events.SafetyModeChanged(safety_mode):
+            return SafetyModeMessage(
+                timestamp=timestamp, source=MessageSource.CONTROLLER, safety_mode=safety_mode
+            )
+        case events.PopupShown(title, text, warning, error, blocking):
+            return PopupMessage(
+                timestamp=timestamp,
+                is_warning=warning,
+                is_error=error,
+                is_blocking=blocking,
+                title=title,
+                text=text,
+            )

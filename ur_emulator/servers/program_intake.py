@@ -1,0 +1,106 @@
+"""From bytes on a script port to commands: split, compile in a worker, hand over in the order of arrival.
+
+Compiling a long script takes longer than a cycle, so it happens in one worker thread. Everything that
+arrives on a script port goes through that thread's queue, also what needs no compiling: a `stop program`
+sent after a program must stop it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+
+from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptItem
+from protocol.ur_types import SoftwareVersion
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller.events import ErrorReported, Event, ReportLevel, ScriptFailed
+from ur_emulator.realtime.event_loop import EventLoop
+from urscript import compile_program
+from urscript.catalogue import catalogue_for
+from urscript.errors import ScriptError
+
+# The controller's own words and the command each stands for; words that change nothing here map to None.
+# Source: what PolyScope and public clients send on the script ports (protocol.controller_words).
+WORDS: dict[str, cmd.Command | None] = {
+    "power on": cmd.PowerOn(),
+    "power off": cmd.PowerOff(),
+    "set robotmode run": cmd.ReleaseBrakes(),
+    "set unlock protective stop": cmd.UnlockProtectiveStop(),
+    "stop program": cmd.StopProgram(),
+    "set real": None,
+    "set sim": None,
+    "confirm user safety parameters": None,
+}
+SPEED_WORD = "set speed"
+
+
+class ProgramIntake:
+    """Turns script items into commands for one box."""
+
+    def __init__(
+        self,
+        loop: EventLoop,
+        version: SoftwareVersion,
+        submit: Callable[[cmd.Command], None],
+        announce: Callable[[Event], None],
+    ) -> None:
+        """Start the worker.
+
+        Args:
+            loop: results come back in its thread.
+            version: of the controller software; decides which builtins exist.
+            submit: takes a command for the next cycle.
+            announce: takes an event that needs no cycle, such as a syntax error.
+        """
+        self._loop = loop
+        self._catalogue = catalogue_for(version)
+        self._submit = submit
+        self._announce = announce
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="compile")
+
+    def take(self, items: Iterable[ScriptItem]) -> None:
+        """Queue what one connection has sent."""
+        for item in items:
+            self._worker.submit(self._process, item)
+
+    def close(self) -> None:
+        """End the worker; what is still queued is dropped."""
+        self._worker.shutdown(wait=True, cancel_futures=True)
+
+    def _process(self, item: ScriptItem) -> None:
+        """Compile or translate one item; runs in the worker, hands the result to the loop."""
+        result = self._translate(item)
+        if isinstance(result, cmd.Command):
+            self._loop.call_soon_threadsafe(lambda: self._submit(result))
+        elif result is not None:
+            self._loop.call_soon_threadsafe(lambda: self._announce(result))
+
+    def _translate(self, item: ScriptItem) -> cmd.Command | Event | None:
+        match item:
+            case ProgramText(text):
+                try:
+                    return cmd.StartProgram(compile_program(text, catalogue=self._catalogue))
+                except ScriptError as error:
+                    return ScriptFailed(error.line, error.column, error.wire_text)
+            case ControlLine(text, word, argument):
+                if word == SPEED_WORD:
+                    return _speed_command(text, argument)
+                if word in WORDS:
+                    return WORDS[word]
+                return _warning(f"'{text}' is declared only: this box does not model it yet")
+            case Overflow(what, limit):
+                return _warning(f"a script {what} of more than {limit} bytes was dropped")
+
+
+def _speed_command(text: str, argument: str) -> cmd.Command | Event:
+    try:
+        fraction = float(argument)
+    except ValueError:
+        fraction = float("nan")
+    if 0.0 <= fraction <= 1.0:
+        return cmd.SetSpeedSlider(fraction)
+    return _warning(f"'{text}' was ignored: the speed slider takes 0 to 1")
+
+
+def _warning(text: str) -> Event:
+    return ErrorReported(0, 0, ReportLevel.WARNING, text)

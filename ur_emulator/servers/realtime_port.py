@@ -1,0 +1,54 @@
+"""Port 30003 and its read-only twin 30013: one frame per cycle to every client; script text comes in."""
+
+from __future__ import annotations
+
+from protocol.realtime_layout import layout_for_version
+from protocol.script_channel import ScriptChannel
+from protocol.ur_types import SoftwareVersion
+from ur_emulator.controller.events import Event
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.servers.connection import Connection
+from ur_emulator.servers.program_intake import ProgramIntake
+
+
+class RealtimePort:
+    """Streams realtime frames."""
+
+    def __init__(self, version: SoftwareVersion, intake: ProgramIntake | None) -> None:
+        """Prepare the encoder.
+
+        Args:
+            version: decides the layout of the frames.
+            intake: takes script text; None makes the port read-only.
+        """
+        self._encode = layout_for_version(version).encoder()
+        self._intake = intake
+        self._channels: dict[Connection, ScriptChannel] = {}
+
+    @property
+    def clients(self) -> tuple[Connection, ...]:
+        """Connected clients."""
+        return tuple(self._channels)
+
+    def opened(self, connection: Connection) -> None:
+        """The stream to this client starts with the next frame; there is no greeting."""
+        self._channels[connection] = ScriptChannel()
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """Take script text."""
+        if self._intake is not None:
+            self._intake.take(self._channels[connection].feed(data))
+
+    def closed(self, connection: Connection) -> None:
+        """Forget the client; a program it sent goes on."""
+        self._channels.pop(connection, None)
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Send the frame of this cycle."""
+        if self._channels:
+            frame = self._encode(snapshot)
+            for connection in tuple(self._channels):
+                connection.send(frame)
+
+    def say(self, event: Event) -> None:
+        """Nothing is answered on this port; errors appear on the primary port only."""

@@ -1,0 +1,101 @@
+"""The robot state of the primary and secondary ports as a function of a snapshot."""
+
+from __future__ import annotations
+
+from protocol.primary_layout import (
+    AdditionalInfo,
+    CalibrationData,
+    CartesianInfo,
+    ConfigurationData,
+    ForceModeData,
+    JointData,
+    KinematicsInfo,
+    MasterboardData,
+    RobotModeData,
+    SafetyData,
+    SubPackage,
+    ToolData,
+)
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode
+from ur_emulator.controller.controller import PERIOD_US
+from ur_emulator.controller.robot_mode import POWERED
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.models.robot_model import DhRow, RobotModel
+
+# Largest joint acceleration in the configuration data; the CB3 value is unknown, this is the one of a UR5e
+# capture.
+MAX_ACCELERATION = 40.0  # rad/s^2
+
+
+def state_records(snapshot: Snapshot) -> tuple[SubPackage, ...]:
+    """Return the sub-packages that change from state to state."""
+    snap = snapshot
+    powered = snap.robot_mode in POWERED
+    return (
+        RobotModeData(
+            timestamp=snap.tick * PERIOD_US,
+            is_real_robot_enabled=powered,
+            is_robot_power_on=powered,
+            is_protective_stopped=snap.safety_mode == SafetyMode.PROTECTIVE_STOP,
+            is_program_running=snap.runtime_state == ProgramState.PLAYING,
+            robot_mode=RobotMode(snap.robot_mode),
+            target_speed_fraction=snap.target_speed_fraction,
+            speed_scaling=snap.speed_scaling,
+        ),
+        JointData(
+            q_actual=snap.actual_q,
+            q_target=snap.target_q,
+            qd_actual=snap.actual_qd,
+            current_actual=snap.actual_current,
+            voltage_actual=snap.actual_joint_voltage,
+            temperature_motor=snap.joint_temperatures,
+            joint_mode=snap.joint_mode,
+        ),
+        CartesianInfo(tcp_pose=snap.actual_tcp_pose, tcp_offset=snap.tcp_offset),
+        CalibrationData(),
+        MasterboardData(
+            digital_input_bits=snap.actual_digital_input_bits,
+            digital_output_bits=snap.actual_digital_output_bits,
+            robot_voltage_48v=snap.actual_robot_voltage,
+            robot_current=snap.actual_robot_current,
+            safety_mode=SafetyMode(snap.safety_mode),
+        ),
+        ToolData(tool_mode=snap.joint_mode[-1]),
+        ForceModeData(wrench=snap.actual_tcp_force),
+        AdditionalInfo(),
+        SafetyData(),
+    )
+
+
+def setup_records(
+    robot: RobotModel, calibrated_dh: tuple[DhRow, ...], checksum: int
+) -> tuple[SubPackage, ...]:
+    """Return the sub-packages of the first state of a connection.
+
+    Args:
+        robot: limits and nominal kinematics.
+        calibrated_dh: kinematics of this very arm.
+        checksum: of the calibration, the same for every joint.
+    """
+    return (
+        KinematicsInfo(
+            checksum=(checksum,) * 6,
+            dh_theta=tuple(row.theta for row in calibrated_dh),
+            dh_a=tuple(row.a for row in calibrated_dh),
+            dh_d=tuple(row.d for row in calibrated_dh),
+            dh_alpha=tuple(row.alpha for row in calibrated_dh),
+        ),
+        ConfigurationData(
+            joint_min_limit=robot.q_min,
+            joint_max_limit=robot.q_max,
+            joint_max_speed=robot.qd_max,
+            joint_max_acceleration=(MAX_ACCELERATION,) * 6,
+            dh_a=tuple(row.a for row in robot.dh),
+            dh_d=tuple(row.d for row in robot.dh),
+            dh_alpha=tuple(row.alpha for row in robot.dh),
+            dh_theta=tuple(row.theta for row in robot.dh),
+            controller_box_type=robot.box_type,
+            robot_type=robot.robot_type,
+            robot_sub_type=robot.robot_subtype,
+        ),
+    )

@@ -1,0 +1,145 @@
+"""Sockets that scripts open: the network that `scripting` asks for, made of non-blocking sockets."""
+
+from __future__ import annotations
+
+import errno
+import selectors
+import socket
+import threading
+
+from ur_emulator.realtime.event_loop import EventLoop
+
+_READ_SIZE = 64 * 1024
+# Bytes a script may have in flight to a peer that does not read; further sends fail.
+_SEND_LIMIT = 256 * 1024
+_IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOULDBLOCK", errno.EINPROGRESS)}
+
+
+class LoopSocket:
+    """One client connection of a script."""
+
+    def __init__(self, loop: EventLoop, host: str, port: int) -> None:
+        """Begin to connect; a name is looked up in a thread of its own, the loop never waits for it."""
+        self._loop = loop
+        self.inbox = bytearray()
+        self.is_open = False
+        self.is_connecting = True
+        self._outbox = bytearray()
+        self._sock: socket.socket | None = None
+        if _is_numeric(host):
+            self._connect(host, port)
+        else:
+            threading.Thread(
+                target=self._look_up, args=(host, port), name="script-lookup", daemon=True
+            ).start()
+
+    def send(self, data: bytes) -> bool:
+        """Send now what the kernel takes, queue the rest."""
+        sock = self._sock
+        if sock is None or not self.is_open or len(self._outbox) > _SEND_LIMIT:
+            return False
+        sent = 0
+        if not self._outbox:
+            try:
+                sent = sock.send(data)
+            except BlockingIOError:
+                pass
+            except OSError:
+                self.close()
+                return False
+        if sent < len(data):
+            self._outbox += data[sent:]
+            self._loop.watch(sock, selectors.EVENT_READ | selectors.EVENT_WRITE, self._on_ready)
+        return True
+
+    def close(self) -> None:
+        """Close; what the kernel has taken is still delivered."""
+        if self._sock is not None:
+            self._loop.unwatch(self._sock)
+            self._sock.close()
+            self._sock = None
+        self.is_open = self.is_connecting = False
+
+    # --- connecting
+
+    def _look_up(self, host: str, port: int) -> None:
+        """Find the address of a name; in its own thread, touching nothing but the loop's call queue."""
+        try:
+            address = str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
+        except (OSError, UnicodeError, OverflowError):
+            self._loop.call_soon_threadsafe(self.close)
+        else:
+            self._loop.call_soon_threadsafe(lambda: self._connect(address, port))
+
+    def _connect(self, address: str, port: int) -> None:
+        if not self.is_connecting:
+            return  # closed while the name was looked up
+        self._sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._sock.setblocking(False)
+        try:
+            code = self._sock.connect_ex((address, port))
+        except (OSError, OverflowError):
+            code = errno.EINVAL
+        if code in _IN_PROGRESS:
+            self._loop.watch(self._sock, selectors.EVENT_WRITE, self._on_connected)
+        else:
+            self.close()
+
+    def _on_connected(self, events: int) -> None:
+        assert self._sock is not None
+        if self._sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
+            self.close()
+            return
+        self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.is_connecting = False
+        self.is_open = True
+        self._loop.watch(self._sock, selectors.EVENT_READ, self._on_ready)
+
+    # --- bytes
+
+    def _on_ready(self, events: int) -> None:
+        if events & selectors.EVENT_WRITE:
+            self._flush()
+        if events & selectors.EVENT_READ and self._sock is not None:
+            try:
+                data = self._sock.recv(_READ_SIZE)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            if data:
+                self.inbox += data
+            else:
+                self.close()
+
+    def _flush(self) -> None:
+        assert self._sock is not None
+        try:
+            sent = self._sock.send(self._outbox)
+        except BlockingIOError:
+            return
+        except OSError:
+            self.close()
+            return
+        del self._outbox[:sent]
+        if not self._outbox:
+            self._loop.watch(self._sock, selectors.EVENT_READ, self._on_ready)
+
+
+def _is_numeric(host: str) -> bool:
+    try:
+        socket.inet_aton(host)
+    except (OSError, UnicodeError):
+        return False
+    return True
+
+
+class LoopNetwork:
+    """Opens script sockets in a loop."""
+
+    def __init__(self, loop: EventLoop) -> None:
+        self._loop = loop
+
+    def open(self, host: str, port: int) -> LoopSocket:
+        """Begin to connect to `host`:`port`."""
+        return LoopSocket(self._loop, host, port)
