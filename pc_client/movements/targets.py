@@ -18,8 +18,8 @@ from pc_client.movements.geometry import Box
 
 __all__ = ["TargetRules", "random_targets"]
 
-_TRIES_A_POINT = 200
-_TRIES = 500
+_TRIES_A_POINT = 100
+_TRIES = 50
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,183 @@
+"""What the library's movements promise to those who run them: rest, twins, speeds, joints, expected SNR."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from pc_client.errors import MovementError
+from pc_client.movements import Movement, generate_movement, library_names, load_movement
+from pc_client.movements.description import snr_of_delay, speed_rms_frequency
+from pc_client.movements.geometry import UR3_BOX, Box
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.stroke import Stroke
+from pc_client.movements.targets import TargetRules, random_targets
+from pc_client.movements.timing import TwoSidedTiming
+
+NUMBERS = ("4_1", "4_2", "5_1", "5_2", "5_3")
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_twins(number: str) -> None:
+    human, robot = load_movement(f"lognorm_{number}"), load_movement(f"uniform_{number}")
+    assert (human.kind, robot.kind) == ("lognormal", "uniform")
+    assert len(human.target_points) == len(robot.target_points) == int(number[0])
+    np.testing.assert_array_equal(human.target_points, robot.target_points)
+    np.testing.assert_array_equal(human.stroke_durations, robot.stroke_durations)
+    assert human.duration == pytest.approx(robot.duration, abs=1e-12)
+    # the strokes of the human-like one end where its speed is least
+    assert isinstance(human.law, SigmaLognormal)
+    np.testing.assert_allclose(np.cumsum(human.stroke_durations)[:-1], human.law.speed_minima(), atol=5.1e-4)
+    # bent but cut at the corners, the human path is as long as the straight one within a few percent
+    t = np.linspace(0.0, human.duration, 4001)
+    lengths = [m.speed(t).mean() * m.duration for m in (human, robot)]
+    assert lengths[0] == pytest.approx(lengths[1], rel=0.03)
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_begins_and_ends_at_rest_in_the_box_within_the_speed(name: str) -> None:
+    movement = load_movement(name)
+    assert movement.speed([0.0, movement.duration]).max() < 1e-4
+    np.testing.assert_allclose(
+        movement.sample([0.0, movement.duration]).p, movement.target_points[[0, -1]], atol=5e-6
+    )
+    t = np.linspace(0.0, movement.duration, 4001)
+    assert UR3_BOX.contains(movement.sample(t).p)
+    assert 0.1 < movement.speed(t).max() < 0.30
+    assert 5.0 < movement.duration < 10.0
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_joints_stay_far_below_their_limits(name: str) -> None:
+    """With the nominal UR3 of its data sheet, tool at RPY(0, 3/4 pi, 0), by Newton steps along the path."""
+    movement = load_movement(name)
+    t = np.arange(0.0, movement.duration, 0.01)
+    motion = movement.motion(t)
+    q = np.radians([22.6, -101.1, -120.3, -5.9, 74.2, 106.4])
+    centre = UR3_BOX.centre
+    for share in np.linspace(0.0, 1.0, 10):
+        q = solve_position((1.0 - share) * centre + share * motion.p[0], q)
+    qd = np.empty((len(t), 6))
+    for index, (p, v) in enumerate(zip(motion.p, motion.v, strict=True)):
+        q = solve_position(p, q)
+        qd[index] = np.linalg.solve(tool_jacobian(q)[0], np.concatenate((v, np.zeros(3))))
+    assert np.abs(qd).max() < 1.2
+    assert np.abs(np.gradient(qd, t, axis=0)).max() < 4.0
+
+
+def tool_jacobian(q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Jacobian of the flange, linear part first, and its pose (4, 4), from the UR3's DH table."""
+    a = (0.0, -0.24365, -0.21325, 0.0, 0.0, 0.0)
+    d = (0.1519, 0.0, 0.0, 0.11235, 0.08535, 0.0819)
+    sin_alpha, cos_alpha = (1.0, 0.0, 0.0, 1.0, -1.0, 0.0), (0.0, 1.0, 1.0, 0.0, 0.0, 1.0)
+    pose, axes = np.eye(4), []
+    for i in range(6):
+        axes.append((pose[:3, 2].copy(), pose[:3, 3].copy()))
+        c, s, ca, sa = math.cos(q[i]), math.sin(q[i]), cos_alpha[i], sin_alpha[i]
+        pose = pose @ np.array(
+            [
+                [c, -s * ca, s * sa, a[i] * c],
+                [s, c * ca, -c * sa, a[i] * s],
+                [0.0, sa, ca, d[i]],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+        )
+    J = np.column_stack([np.concatenate((np.cross(z, pose[:3, 3] - p), z)) for z, p in axes])
+    return J, pose
+
+
+def solve_position(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
+    h = math.sqrt(0.5)
+    wanted = np.array([[-h, 0.0, h], [0.0, 1.0, 0.0], [-h, 0.0, -h]])
+    for _ in range(12):
+        J, pose = tool_jacobian(q)
+        turn = wanted @ pose[:3, :3].T
+        rotation = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        error = np.concatenate((p - pose[:3, 3], rotation))
+        if np.abs(error).max() < 1e-10:
+            return q
+        q = q + np.linalg.solve(J, error)
+    raise AssertionError(f"no joint angles for {p}")
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_expected_snr_follows_from_the_rms_frequency(name: str) -> None:
+    movement = load_movement(name)
+    w = speed_rms_frequency(movement)
+    for delay in (0.005, 0.022, 0.035):
+        assert snr_of_delay(movement, delay) == pytest.approx(-20.0 * math.log10(delay * w), abs=0.15)
+    with pytest.raises(MovementError):
+        snr_of_delay(movement, 0.0)
+
+
+@pytest.mark.parametrize("window", [0.5, 1.0, 2.0])
+def test_delay_costs_what_the_theory_says(window: float) -> None:
+    """Four separate strokes of one length: 20.0 dB at 16 ms and T = 1 s, the same for the same delay / T."""
+    timings = [TwoSidedTiming(window * j, window, 0.1) for j in range(4)]
+    points = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.0, 0.1, 0.0], [0.0, 0.1, 0.1]])
+    law = SigmaLognormal(points, tuple(Stroke(timing) for timing in timings), 4.0 * window)
+    movement = Movement("four", law, np.full(4, window))
+    assert snr_of_delay(movement, 0.016 * window) == pytest.approx(20.0, abs=0.06)
+    assert snr_of_delay(movement, 0.024 * window) == pytest.approx(16.5, abs=0.06)
+    assert snr_of_delay(movement, 0.048 * window) == pytest.approx(10.5, abs=0.06)
+
+
+def test_sums_of_strokes_reach_the_last_target() -> None:
+    for name in library_names()[5:]:
+        movement = load_movement(name)
+        assert np.linalg.norm(movement.law.evaluate(60.0).p[0] - movement.target_points[-1]) < 1e-14
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32), n=st.integers(2, 7))
+def test_random_targets_follow_their_rules(seed: int, n: int) -> None:
+    rules = TargetRules()
+    points = random_targets(n, UR3_BOX, random.Random(seed), rules)
+    assert points.shape == (n, 3)
+    assert UR3_BOX.contains(points, 1e-12)
+    legs = np.diff(points, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    assert rules.min_leg <= lengths.min()
+    assert lengths.max() <= rules.max_leg
+    cosines = np.einsum("ij,ij->i", legs[:-1], legs[1:]) / (lengths[:-1] * lengths[1:])
+    turns = np.arccos(np.clip(cosines, -1.0, 1.0))
+    assert np.all(turns >= rules.min_turn - 1e-9)
+    assert np.all(turns <= rules.max_turn + 1e-9)
+    apart = [math.dist(a, b) for i, a in enumerate(points) for b in points[:i]]
+    assert min(apart) >= rules.min_apart
+    np.testing.assert_array_equal(points, random_targets(n, UR3_BOX, random.Random(seed), rules))
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10**6), n=st.integers(2, 6))
+def test_generated_twins_share_targets_and_times(seed: int, n: int) -> None:
+    human, robot = generate_movement("lognormal", n, seed), generate_movement("uniform", n, seed)
+    np.testing.assert_array_equal(human.target_points, robot.target_points)
+    np.testing.assert_array_equal(human.stroke_durations, robot.stroke_durations)
+    t = np.linspace(0.0, human.duration, 1001)
+    for movement in (human, robot):
+        assert movement.speed([0.0, movement.duration]).max() < 1e-4
+        assert movement.speed(t).max() < 0.35
+        assert UR3_BOX.contains(movement.sample(t).p, 0.005)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: generate_movement("samples", 4, 1),
+        lambda: generate_movement("lognormal", 1, 1),
+        lambda: generate_movement("lognormal", 4, -1),
+        lambda: random_targets(12, Box((0.0, 0.0, 0.0), (0.08, 0.08, 0.08)), random.Random(1)),
+        lambda: Box((0.0, 0.0, 0.0), (0.1, -0.1, 0.1)),
+        lambda: UR3_BOX.shrunk(0.2),
+    ],
+)
+def test_nonsense_is_refused(make: object) -> None:
+    with pytest.raises(MovementError):
+        make()
