@@ -8,7 +8,7 @@ model without any of that, which takes about two microseconds; the rest is plain
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, isfinite, pi, sin, sqrt
+from math import isfinite, pi, sqrt
 
 import mujoco
 import numpy as np
@@ -19,7 +19,7 @@ from ur_emulator.errors import KinematicsError
 from ur_emulator.kinematics.closed_form import closed_form_inverse
 from ur_emulator.models.calibration import NOMINAL, Calibration, calibrated_dh
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
-from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6
+from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 
 _POSITION_TOLERANCE = 1e-11  # m and rad; the promise to callers is ten times wider
 _MAX_ITERATIONS = 20
@@ -62,14 +62,14 @@ class ArmModel:
         self._tcp_offset: Vector3 = (0.0, 0.0, 0.0)
         self._tcp_rotation: Sequence[float] = rotvec_to_flat(0.0, 0.0, 0.0)
 
-    def fk(self, q: Sequence[float], tcp: Pose | None = None) -> Pose:
+    def fk(self, q: Sequence[float], tcp: Sequence[float] | None = None) -> Pose:
         """Forward kinematics: the pose of the tool centre point at joint angles q (6,) [rad]."""
         self._qpos[:] = q
         mujoco.mj_kinematics(self._model, self._data)
         return self._tcp_pose(tcp)
 
     def state(
-        self, q: Sequence[float], qd: Sequence[float], tcp: Pose | None = None
+        self, q: Sequence[float], qd: Sequence[float], tcp: Sequence[float] | None = None
     ) -> tuple[Pose, Vector6, Vector3, Vector3]:
         """Evaluate everything a frame tells about the arm in space.
 
@@ -101,7 +101,9 @@ class ArmModel:
         elbow_velocity = (vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx)
         return pose, speed, (ex, ey, ez), elbow_velocity
 
-    def jacobian(self, q: Sequence[float], tcp: Pose | None = None) -> NDArray[np.float64]:
+    def jacobian(
+        self, q: Sequence[float] | NDArray[np.float64], tcp: Sequence[float] | None = None
+    ) -> NDArray[np.float64]:
         """Geometric Jacobian (6, 6) at q (6,) [rad]: twist of the tool centre point in base = J @ qd."""
         self._qpos[:] = q
         mujoco.mj_kinematics(self._model, self._data)
@@ -111,7 +113,9 @@ class ArmModel:
         mujoco.mj_jac(self._model, self._data, jacobian[:3], jacobian[3:], point, self._flange_link)
         return jacobian
 
-    def inverse(self, pose: Pose, q_near: Sequence[float], tcp: Pose | None = None) -> Vector6 | None:
+    def inverse(
+        self, pose: Sequence[float], q_near: Sequence[float], tcp: Sequence[float] | None = None
+    ) -> Vector6 | None:
         """Inverse kinematics: the solution next to given joint angles.
 
         Starts from `q_near` itself, which settles it along a path; else from the closed-form branches of the
@@ -131,27 +135,28 @@ class ArmModel:
         """
         if len(pose) != 6 or not all(isfinite(value) for value in pose):
             raise KinematicsError(f"pose {list(pose)} given: six finite numbers are needed")
-        flange = pose if tcp is None else pose_trans(pose, pose_inv(tcp))
+        flange = tuple(pose) if tcp is None else pose_trans(pose, pose_inv(tcp))
         near = [float(angle) for angle in q_near]
-        rotation = rotvec_to_flat(*flange[3:])
-        found = self._refine(near, flange[:3], rotation)
+        position = (flange[0], flange[1], flange[2])
+        rotation = rotvec_to_flat(flange[3], flange[4], flange[5])
+        found = self._refine(near, position, rotation)
         if found is not None and max(map(_distance, found, near)) < _NEAR:
             inside = self._into_range(found, near)
             if inside is not None:
                 return inside
         starts = [
             start
-            for branch in closed_form_inverse(self.robot.dh, rotation, flange[:3], near[5])
+            for branch in closed_form_inverse(self.robot.dh, rotation, position, near[5])
             if (start := self._into_range(branch, near)) is not None
         ]
         starts.sort(key=lambda start: sum((a - b) ** 2 for a, b in zip(start, near, strict=True)))
         for start in starts:
-            found = self._refine(start, flange[:3], rotation)
+            found = self._refine(start, position, rotation)
             if found is not None and (inside := self._into_range(found, near)) is not None:
                 return inside
         return None
 
-    def _tcp_pose(self, tcp: Pose | None) -> Pose:
+    def _tcp_pose(self, tcp: Sequence[float] | None) -> Pose:
         """Pose of the tool centre point for the kinematics evaluated last."""
         x, y, z = self._flange_position.tolist()
         r00, r01, r02, r10, r11, r12, r20, r21, r22 = self._flange_rotation.tolist()
@@ -197,8 +202,7 @@ class ArmModel:
             error[3:] = rotvec_from_flat(*(wanted @ self._flange_rotation.reshape(3, 3).T).ravel().tolist())
             size = sqrt(float(error @ error))
             if size < _POSITION_TOLERANCE:
-                a, b, c, d, e, f = q.tolist()
-                return (a, b, c, d, e, f)
+                return six(q.tolist())
             # A whiff of damping: no effect on convergence away from singularities, finite steps at them.
             step = np.linalg.solve(jacobian.T @ jacobian + 1e-12 * np.eye(6), jacobian.T @ error)
             longest = float(np.abs(step).max())
@@ -217,8 +221,7 @@ class ArmModel:
             if turned > high:
                 return None
             angles.append(turned)
-        a, b, c, d, e, f = angles
-        return (a, b, c, d, e, f)
+        return six(angles)
 
 
 def _distance(a: float, b: float) -> float:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import acos, atan2, cos, hypot, pi, sin
 
-from ur_emulator.models.robot_model import DhRow, Vector3, Vector6
+from ur_emulator.models.robot_model import DhRow, Vector3, Vector6, six
 
 _SLACK = 0.02
 """A cosine may be this far outside [-1, 1] and is then taken as the limit: a calibrated arm reaches a little
@@ -33,7 +33,7 @@ def closed_form_inverse(
         q6_free: value for joint 6 where it is undetermined (wrist singularity) [rad].
 
     Returns:
-        Up to eight solutions, each angle within (-2 pi, 2 pi] but not otherwise unwrapped; none when out of
+        Up to eight solutions, each angle within [-pi, pi); none when out of
         reach. Near the limits of reach a solution may be approximate.
     """
     d1, d4, d5, d6 = dh[0].d, dh[3].d, dh[4].d, dh[5].d
@@ -68,8 +68,7 @@ def closed_form_inverse(
             for q3 in (fold, -fold):
                 q2 = atan2(v, u) - atan2(a3 * sin(q3), a2 + a3 * cos(q3))
                 angles = (q1, q2, q3, q234 - q2 - q3, q5, q6)
-                a, b, c, d, e, f = (wrap(angle) for angle in angles)
-                solutions.append((a, b, c, d, e, f))
+                solutions.append(six([wrap(angle) for angle in angles]))
     return solutions
 
 

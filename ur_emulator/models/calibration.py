@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.random_streams import random_stream
-from ur_emulator.models.robot_model import DhRow, RobotModel, Vector6
+from ur_emulator.models.robot_model import DhRow, RobotModel, Vector6, six
 
 _ZERO: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -47,8 +47,8 @@ def draw_calibration(fidelity: Fidelity, seed: int) -> Calibration:
     rng = random_stream(seed, "calibration")
     angles = rng.standard_normal((2, 6)) * fidelity.calibration_angle
     lengths = rng.standard_normal((2, 6)) * fidelity.calibration_length
-    theta, alpha = (_six(row.tolist()) for row in angles)
-    a, d = (_six(row.tolist()) for row in lengths)
+    theta, alpha = (six(row.tolist()) for row in angles)
+    a, d = (six(row.tolist()) for row in lengths)
     return Calibration(delta_theta=theta, delta_a=a, delta_d=d, delta_alpha=alpha)
 
 
@@ -65,8 +65,3 @@ def calibrated_dh(robot: RobotModel, calibration: Calibration) -> tuple[DhRow, .
             strict=True,
         )
     )
-
-
-def _six(values: list[float]) -> Vector6:
-    a, b, c, d, e, f = values
-    return (a, b, c, d, e, f)

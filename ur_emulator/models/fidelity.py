@@ -8,8 +8,8 @@ Sources, cited by letter below:
  A  Logs of a real UR3e at rest and moving, 500 Hz (kevinhpham/DalESelfEBot): encoder noise, steps, the filter
     of the reported speed, speed ripple at 101 and 202 cycles a joint turn, current noise.
  B  Delays reported for streamed motion: Universal_Robots_ROS_Driver pull 1 (aim of two cycles for speedj),
-    Universal_Robots_ROS2_Driver issue 1311 (UR5 CB3 about 35 ms), ur_modern_driver (a gain of 50 1/s is stable
-    on a UR3, so the whole loop stays below 31 ms there).
+    Universal_Robots_ROS2_Driver issue 1311 (UR5 CB3 about 35 ms), ur_modern_driver (a gain of 50 1/s is
+    stable on a UR3, so the whole loop stays below 31 ms there).
  C  Factory calibrations of three real arms, see `calibration.py`.
  D  UR3/CB3 manual (force precision ±10 N, ±5 Nm) and forum.universal-robots.com threads 229 and 4481.
  E  assumed: no published figure; to be checked on a real arm.
@@ -27,7 +27,8 @@ from ur_emulator.models.robot_model import Vector6
 class Fidelity:
     """One set of imperfections.
 
-    The loop delay that a streaming client sees is dead time + drive lag + feedback age + half a cycle of hold.
+    The loop delay that a streaming client sees is dead time + drive lag + feedback age + half a cycle of
+    hold.
 
     Attributes:
         name: as on the command line.

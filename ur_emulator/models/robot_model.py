@@ -10,10 +10,17 @@ wrist 3. Link frames are the standard (distal) Denavit-Hartenberg frames: link i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
+
+
+def six(values: Sequence[float]) -> Vector6:
+    """Make a Vector6 of six numbers, one a joint; any other count is a ValueError."""
+    a, b, c, d, e, f = values
+    return (a, b, c, d, e, f)
 
 
 @dataclass(frozen=True, slots=True)

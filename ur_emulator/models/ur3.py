@@ -2,14 +2,14 @@
 
 Sources, cited by letter below:
  A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR3 table).
- B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur3/physical_parameters.yaml: cylinder estimates,
-    because the vendor publishes no inertia tensors for the UR3 and calls those of its sisters negligible.
- C  UR3/CB3 user manual 3.13 and "max joint torques" article, as collected in config/ur3/joint_limits.yaml of B.
+ B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur3/physical_parameters.yaml: cylinder
+    estimates, because the vendor publishes no inertia tensors for the UR3 and calls its sisters' negligible.
+ C  UR3/CB3 user manual 3.13 and "max joint torques" article, as collected in joint_limits.yaml beside B.
  D  Least-squares fit of a current model to a logged move of a real UR3e (kevinhpham/DalESelfEBot); R² .995.
     All such figures are good to about 30 %; size 0 joints could not be separated and assume 3 Nm/A.
  E  UR3/CB3 user manual 3.10, stopping times and distances of category 0 (183 deg/s, arm stretched, 3 kg).
  F  UR5 friction set in kejianhong/UR5-External-Force-Estimation: friction falls towards standstill.
- G  Measured off the outline drawing by eye; only collisions depend on it.
+ G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 """
 
 from __future__ import annotations
@@ -30,53 +30,43 @@ UR3 = RobotModel(
         DhRow(a=0.0, d=0.08535, alpha=-pi / 2),
         DhRow(a=0.0, d=0.0819, alpha=0.0),
     ),
-    # A: mass and centre of mass. B: inertia, turned from a cylinder along the link into the DH frame.  G: hull.
+    # A: mass and centre of mass. B: inertia, cylinder axis turned along the link in the DH frame. G: hull.
     links=(
         Link(  # shoulder: the cylinder stands along y of its frame
             mass=2.0,
             com=(0.0, -0.02, 0.0),
             inertia=(0.008093, 0.005625, 0.008093),
-            hull=(
-                Capsule((0.0, -0.045, 0.0), (0.0, 0.0, 0.0), 0.056),
-                Capsule((0, 0, 0), (0, 0, 0.045), 0.053),
-            ),
+            hull=(Capsule((0.0, -0.01, 0.0), (0.0, 0.0, 0.04), 0.055),),
         ),
         Link(  # upper arm: from the elbow (origin) back to the shoulder along +x
             mass=3.42,
             com=(0.13, 0.0, 0.1157),
             inertia=(0.009619, 0.021728, 0.021728),
-            hull=(
-                Capsule((0.24365, 0.0, 0.105), (0.24365, 0.0, 0.13), 0.053),
-                Capsule((0.0, 0.0, 0.12), (0.24365, 0.0, 0.12), 0.042),
-                Capsule((0.0, 0.0, 0.09), (0.0, 0.0, 0.125), 0.045),
-            ),
+            hull=(Capsule((0.0, 0.0, 0.12), (0.24365, 0.0, 0.12), 0.048),),
         ),
         Link(  # forearm: from wrist 1 (origin) back to the elbow along +x
             mass=1.26,
             com=(0.05, 0.0, 0.0238),
             inertia=(0.003544, 0.006547, 0.006547),
-            hull=(
-                Capsule((0.21325, 0.0, 0.02), (0.21325, 0.0, 0.035), 0.045),
-                Capsule((0.0, 0.0, 0.0275), (0.21325, 0.0, 0.0275), 0.034),
-            ),
+            hull=(Capsule((0.0, 0.0, 0.0275), (0.21325, 0.0, 0.0275), 0.038),),
         ),
         Link(  # wrist 1: from the forearm along +y to the axis of wrist 2
             mass=0.8,
             com=(0.0, 0.0, 0.01),
             inertia=(0.001611, 0.00225, 0.001611),
-            hull=(Capsule((0.0, -0.04, 0.0), (0.0, 0.005, 0.0), 0.035),),
+            hull=(Capsule((0.0, -0.04, 0.0), (0.0, 0.005, 0.0), 0.034),),
         ),
         Link(  # wrist 2: from wrist 1 along -y to the axis of wrist 3
             mass=0.8,
             com=(0.0, 0.0, 0.01),
             inertia=(0.001572, 0.00225, 0.001572),
-            hull=(Capsule((0.0, 0.04, 0.0), (0.0, -0.005, 0.0), 0.035),),
+            hull=(Capsule((0.0, 0.04, 0.0), (0.0, -0.005, 0.0), 0.034),),
         ),
         Link(  # wrist 3 with the tool flange at the origin, facing +z
             mass=0.35,
             com=(0.0, 0.0, -0.02),
             inertia=(0.000136, 0.000136, 0.000179),
-            hull=(Capsule((0.0, 0.0, -0.04), (0.0, 0.0, -0.032), 0.032),),
+            hull=(Capsule((0.0, 0.0, -0.036), (0.0, 0.0, -0.032), 0.032),),
         ),
     ),
     base_hull=(Capsule((0.0, 0.0, 0.06), (0.0, 0.0, 0.075), 0.06),),
@@ -96,7 +86,7 @@ UR3 = RobotModel(
         3.0,
         3.0,
         3.0,
-    ),  # D; elbow between the moving fit 6.4 and the static 9-11
+    ),  # D; elbow: moving fit 6.4, static 9-11
     gear_ratio=101.0,  # strain wave gears 1:101 in all sizes; seen as 101 and 202 cycles a joint turn in D
     stop_deceleration=(
         20.0,
@@ -105,7 +95,7 @@ UR3 = RobotModel(
         40.0,
         40.0,
         40.0,
-    ),  # E for the first three; the wrists are not published
+    ),  # E; the wrists are assumed
     servo_frequency=12.0,  # assumed: a position loop of 10-30 Hz fits the delays that drivers report
     servo_damping=0.9,
     # Joint-space inertia diagonal at a work pose by A and B plus the armature.

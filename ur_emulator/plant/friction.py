@@ -1,8 +1,8 @@
 """Joint friction: the physics' own, and the controller's slightly wrong idea of it.
 
-Viscous friction is a joint damping in MuJoCo, Coulomb friction its frictionloss, whose size follows the speed:
-real joints lose two thirds of it towards standstill (see the robot's numbers), which is also why they do
-not stick and slip. The controller compensates friction in its feed-forward with parameters that are off by
+Viscous friction is a joint damping in MuJoCo, Coulomb friction its frictionloss, whose size follows the
+speed: real joints lose two thirds of it towards standstill (see the robot's numbers), which is also why they
+do not stick and slip. The controller compensates friction in its feed-forward with parameters that are off by
 what `Fidelity.friction_error` says.
 """
 

@@ -28,27 +28,28 @@ class GearRipple:
     """
 
     def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
-        self._cycles = np.array([[robot.gear_ratio], [2.0 * robot.gear_ratio]])
-        self._phases = random_stream(seed, "gear").uniform(0.0, 2.0 * np.pi, (2, 6))
+        phases = random_stream(seed, "gear").uniform(0.0, 2.0 * np.pi, (2, 6))
+        first, second = robot.gear_ratio, 2.0 * robot.gear_ratio
         # A speed ripple of rms r has the slope amplitude sqrt(2) r.
-        self._slopes = sqrt(2.0) * np.array([[fidelity.ripple_first], [fidelity.ripple_second]])
-        self._sizes = self._slopes / self._cycles
-        self._angles = np.empty((2, 6))
-        self._waves = np.empty((2, 6))
-        self.error: NDArray[np.float64] = np.zeros(6)
-        self.slope: NDArray[np.float64] = np.zeros(6)
+        slopes = sqrt(2.0) * np.array([fidelity.ripple_first, fidelity.ripple_second])
+        # Four waves: error and slope of the first harmonic, error and slope of the second.
+        self._cycles = np.array([[first], [first], [second], [second]])
+        self._phases = np.array([phases[0], phases[0] + np.pi / 2, phases[1], phases[1] + np.pi / 2])
+        self._sizes = np.array([[slopes[0] / first], [slopes[0]], [slopes[1] / second], [slopes[1]]])
+        self._waves = np.zeros((4, 6))
+        self._first, self._second = self._waves[:2], self._waves[2:]
+        self._sum = np.zeros((2, 6))
+        self.error: NDArray[np.float64] = self._sum[0]
+        self.slope: NDArray[np.float64] = self._sum[1]
 
     def evaluate(self, q_motor: NDArray[np.float64]) -> None:
         """Set `error` e [rad] and `slope` de/dq [1] for motor positions q_motor (6,)."""
-        angles, waves = self._angles, self._waves
-        np.multiply(self._cycles, q_motor, out=angles)
-        np.add(angles, self._phases, out=angles)
-        np.sin(angles, out=waves)
+        waves = self._waves
+        np.multiply(self._cycles, q_motor, out=waves)
+        np.add(waves, self._phases, out=waves)
+        np.sin(waves, out=waves)
         np.multiply(waves, self._sizes, out=waves)
-        np.add(waves[0], waves[1], out=self.error)
-        np.cos(angles, out=waves)
-        np.multiply(waves, self._slopes, out=waves)
-        np.add(waves[0], waves[1], out=self.slope)
+        np.add(self._first, self._second, out=self._sum)
 
     def motor_position(self, q_joint: NDArray[np.float64]) -> NDArray[np.float64]:
         """Invert the gear: motor positions (6,) that put the joints at q_joint (6,) [rad]."""

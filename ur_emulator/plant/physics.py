@@ -1,13 +1,14 @@
 """The plant's MuJoCo model: the mechanism with hull, friction, drives, table and raw sensors.
 
-The joint servo's proportional and speed terms are MuJoCo actuators (force = ctrl - kp q - kv qd), so that they
-act within every sub-step, in C, and implicitly in speed. What goes into `ctrl` is the business of `plant.py`.
+The joint servo's proportional and speed terms are MuJoCo actuators (force = ctrl - kp q - kv qd), so that
+they act within every sub-step, in C, and implicitly in speed. What goes into `ctrl` is the drives' business.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import pi
 
 import mujoco
@@ -18,14 +19,6 @@ from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
 from ur_emulator.models.robot_model import DhRow, RobotModel
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
-
-# Raw sensors, in this order in `sensordata`. MuJoCo evaluates them at the start of a sub-step.
-RAW_Q = slice(0, 6)
-RAW_QD = slice(6, 12)
-RAW_FORCE = slice(12, 18)
-RAW_ACCELERATION = slice(18, 21)
-RAW_VELOCITY = slice(21, 24)
-N_RAW = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +52,10 @@ def build_physics(
     option = spec.option
     option.timestep = substep
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    # A diverged state must reach the caller instead of being reset behind his back; one arm is one island.
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND
+    # A diverged state must reach the caller instead of being reset behind his back. Islands and the midphase
+    # are for scenes with many bodies and only cost time here.
+    off = mujoco.mjtDisableBit
+    option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_ISLAND | off.mjDSBL_MIDPHASE
     _add_joint_physics(spec, robot)
     _add_drives(spec, robot, gains)
     _add_hulls(spec, robot, dh)
@@ -99,9 +94,9 @@ def _add_hulls(spec: mujoco.MjSpec, robot: RobotModel, dh: Sequence[DhRow]) -> N
         body = spec.body(name)
         for piece in link.hull:
             _add_capsule(body, to_body(row, piece.start), to_body(row, piece.end), piece.radius)
-    # Neighbours touch in their common joint by construction.
-    chain = ("world", *LINKS)
-    for one, other in zip(chain, chain[1:], strict=False):
+    # Neighbours touch in their common joint by construction; in the wrist the next but one is out of reach.
+    neighbours = [*pairwise(("world", *LINKS)), (LINKS[2], LINKS[4]), (LINKS[3], LINKS[5])]
+    for one, other in neighbours:
         spec.add_exclude(bodyname1=one, bodyname2=other)
 
 
@@ -112,6 +107,7 @@ def _add_capsule(body: mujoco.MjsBody, start: Sequence[float], end: Sequence[flo
 
 
 def _add_sensors(spec: mujoco.MjSpec) -> None:
+    """Add raw sensors in the order of `sensors.REC_SIMULATED`; they are taken at the start of a sub-step."""
     kinds, objects = mujoco.mjtSensor, mujoco.mjtObj
     for kind, of in (
         (kinds.mjSENS_JOINTPOS, objects.mjOBJ_JOINT),

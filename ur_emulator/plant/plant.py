@@ -1,19 +1,19 @@
 """Plant: one arm with its drives and sensors, advanced a control cycle at a time.
 
-A cycle is: target -> controller's model torque -> command path (delay, interpolation, lag) -> joint servos and
-physics in sub-steps -> a record of true values -> sensors. The plant knows nothing of programs, modes or
-safety; it holds what it is told or raises `PlantError`. It reads no clock, and its only chance comes from the
+A cycle is: target -> controller's model torque -> command path (delay, interpolation, lag) -> joint servos
+and physics in sub-steps -> a record of true values -> sensors. The plant knows nothing of programs, modes or
+safety; it does what it is told or raises `PlantError`. It reads no clock, and its only chance comes from the
 seed: equal seeds and equal targets give bit-identical states.
 
-Angles: the physics' hinge is the motor side of the gear, which the drive holds; the joint itself is there plus
-the gear's transmission error. Links move with the hinge, the error of 0.1 mrad is left out of collisions.
+Angles: the physics' hinge is the motor side of the gear, which the drive holds; the joint is there plus the
+gear's transmission error. Links move with the hinge: collisions leave out that error of 0.1 mrad.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from math import isfinite
+from operator import ge, mul
 
 import mujoco
 import numpy as np
@@ -24,41 +24,29 @@ from ur_emulator.models.calibration import calibrated_dh, draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import FLANGE, GRAVITY, LINKS
 from ur_emulator.models.random_streams import random_stream
-from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6
+from ur_emulator.models.robot_model import RobotModel, Vector3, six
 from ur_emulator.plant.command_path import CommandPath
-from ur_emulator.plant.friction import Friction
+from ur_emulator.plant.contact import contact_wrench
+from ur_emulator.plant.drives import NO_LOAD, Drives
 from ur_emulator.plant.gear import GearRipple
-from ur_emulator.plant.inverse_dynamics import InverseDynamics
 from ur_emulator.plant.payload import check_payload, set_payload_body
-from ur_emulator.plant.physics import (
-    N_RAW,
-    RAW_ACCELERATION,
-    ServoGains,
-    build_physics,
-)
-from ur_emulator.plant.plant_state import JointTarget, PlantState
+from ur_emulator.plant.physics import ServoGains, build_physics
+from ur_emulator.plant.plant_state import PlantState, Target
 from ur_emulator.plant.sensors import (
     N_RECORD,
-    OUT_ACCELERATION,
-    OUT_CURRENT,
-    OUT_Q,
-    OUT_QD,
-    OUT_VOLTAGE,
-    OUT_WRENCH,
+    REC_ACCELERATION,
     REC_Q,
     REC_QD,
+    REC_SIMULATED,
     REC_WRENCH,
     Sensors,
-    Thermometers,
 )
+from ur_emulator.plant.thermometers import Thermometers
 
 SUBSTEP_US = 2000
 """Physics time step [µs]; must divide the control cycle."""
 
-_INTEGRAL_TIME = 0.12  # s; the outer joint loop removes what friction and model errors leave
-_TRIM_MAX = 0.003  # rad; its reach, about 15 Nm at the base
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
-_ZERO: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Plant:
@@ -97,15 +85,13 @@ class Plant:
         spread = fidelity.dead_time_spread * float(random_stream(seed, "delay").uniform())
         dead_substeps = int((fidelity.dead_time + spread) / substep + 1e-9)
         self.dead_time = dead_substeps * substep
-        self._path = CommandPath(self._n_substeps, substep, dead_substeps, fidelity.drive_lag)
-
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
-        self._gains = ServoGains.of(robot)
+        gains = ServoGains.of(robot)
         self._model = build_physics(
-            robot, calibrated_dh(robot, self.calibration), mass_scale.tolist(), self._gains, substep
+            robot, calibrated_dh(robot, self.calibration), mass_scale.tolist(), gains, substep
         )
-        self._data = mujoco.MjData(self._model)
-        data = self._data
+        self._data = data = mujoco.MjData(self._model)
+        # Views into MuJoCo's memory: one attribute lookup each, once.
         self._qpos: NDArray[np.float64] = data.qpos
         self._qvel: NDArray[np.float64] = data.qvel
         self._ctrl: NDArray[np.float64] = data.ctrl
@@ -113,33 +99,32 @@ class Plant:
         self._force: NDArray[np.float64] = data.actuator_force
         self._frictionloss: NDArray[np.float64] = self._model.dof_frictionloss
         self._flange_link: int = self._model.body(LINKS[5]).id
-        self._flange_site: int = self._model.site(FLANGE).id
+        site: int = self._model.site(FLANGE).id
+        self._flange_position: NDArray[np.float64] = data.site_xpos[site]
+        self._flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
 
-        self._dynamics = InverseDynamics(robot, self.calibration)
-        self._friction = Friction(robot, fidelity, seed)
+        self._path = CommandPath(self._n_substeps, substep, dead_substeps, fidelity.drive_lag)
+        self._drives = Drives(robot, self.calibration, fidelity, seed, gains, self._path, self.period_s)
         self._gear = GearRipple(robot, fidelity, seed)
         self._sensors = Sensors(robot, fidelity, seed, self.period_s)
         self._thermometers = Thermometers(self.period_s)
 
-        # The measurement is taken in this sub-step of a cycle and reported this many cycles later.
+        # The measurement is taken in this sub-step of a cycle and reported so many cycles later.
         age_substeps = max(1, round(fidelity.feedback_age / substep))
         self._capture_at = -age_substeps % self._n_substeps
-        self._records: deque[NDArray[np.float64]] = deque(maxlen=1 + (age_substeps - 1) // self._n_substeps)
+        self._cycles_late = (age_substeps - 1) // self._n_substeps
+        self._records: deque[NDArray[np.float64]] = deque(maxlen=1 + self._cycles_late)
 
-        self._tau_limits = robot.tau_max
-        self._per_torque = 1.0 / np.array(robot.torque_constant)
-        self._trim_gain = self.period_s / _INTEGRAL_TIME
-        self._target = np.zeros((3, 6))
-        self._ones = np.ones(18)
-        self._table = np.zeros((self._n_substeps, 6))
-        self._table_work = np.zeros((self._n_substeps, 6))
-        self._captured = np.zeros(N_RAW)
-        self._trim = np.zeros(6)
+        self._amperes_per_torque = [1.0 / constant for constant in robot.torque_constant]
         self._error = np.zeros(6)
-        self._work = np.zeros(6)
-        self._wrench = np.zeros(6)
+        self._ripple = np.zeros(6)
         self._push: NDArray[np.float64] | None = None
-        self._push_point: NDArray[np.float64] | None = None
+        self._push_point = np.zeros(3)
+        self._braked = True
+        self._saturated = self._saturated_now = False
+        self._control_current = NO_LOAD
+        self._rest_record = np.zeros(N_RECORD)
+        self._state: PlantState | None = None
         self.reset(robot.home_q)
 
     # --- state for tests and for the control API ---
@@ -173,12 +158,10 @@ class Plant:
         self.cycle = 0
         mujoco.mj_resetData(self._model, self._data)
         self._qpos[:] = self._gear.motor_position(angles)
-        self._target_current: list[float] = [0.0] * 6
-        self._target_moment: list[float] = [0.0] * 6
         self._sensors.reset()
         self._engage_brakes()
-        self._records.extend([self._rest_record] * (self._records.maxlen or 1))
-        self._state: PlantState | None = None
+        self._records.extend([self._rest_record] * (1 + self._cycles_late))
+        self._state = None
 
     def set_payload(self, mass: float, cog: Vector3) -> None:
         """Hang a payload on the flange and declare it to the controller.
@@ -192,7 +175,7 @@ class Plant:
         """
         check_payload(mass, cog)
         set_payload_body(self._model, mass, cog)
-        self._dynamics.set_payload(mass, cog)
+        self._drives.set_payload(mass, cog)
 
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
         """Push the flange from now on; a zero force ends it.
@@ -212,13 +195,11 @@ class Plant:
             )
         self._push = force_base if force_base.any() else None
         self._push_point = at
-        if self._push is None:
-            self._data.xfrc_applied[self._flange_link] = 0.0
-            self._wrench[:] = 0.0
+        self._data.xfrc_applied[self._flange_link] = 0.0
 
     # --- the cycle ---
 
-    def step(self, target: JointTarget | None) -> None:
+    def step(self, target: Target | None) -> None:
         """Advance one control cycle.
 
         Args:
@@ -226,7 +207,7 @@ class Plant:
                 plus the dead time. None puts or keeps the brakes on: the joints stand still.
 
         Raises:
-            PlantError: when the target is not finite or the simulation diverges; the plant needs a reset then.
+            PlantError: the target is not finite, or the simulation diverged and needs a reset.
         """
         self._state = None
         self.cycle += 1
@@ -237,117 +218,81 @@ class Plant:
             return
         if self._braked:
             self._release_brakes()
-        self._command(target)
-        if self._push is not None:
-            self._apply_push()
-        model, data, table, ctrl, capture_at = (
-            self._model,
-            self._data,
-            self._table,
-            self._ctrl,
-            self._capture_at,
-        )
-        saturated_before = self._saturated_now
-        for i in range(self._n_substeps):
-            ctrl[:] = table[i]
-            mujoco.mj_step(model, data)
-            if i == capture_at:
-                self._captured[:] = self._raw
-        speed_squared = float(np.dot(self._qvel, self._qvel))
-        if not speed_squared < _RUNAWAY**2:
+        if not self._drives.command(target, self._qvel):
             raise PlantError(
-                f"the simulation diverged in cycle {self.cycle}: joint speeds {self._qvel.tolist()} rad/s; "
-                "reset the plant and check the targets",
-                cycle=self.cycle,
+                f"target {target} in cycle {self.cycle}: finite numbers are needed", cycle=self.cycle
             )
-        forces: list[float] = self._force.tolist()
-        self._saturated_now = False
-        for force, limit in zip(forces, self._tau_limits, strict=True):
-            if force >= limit or force <= -limit:
-                self._saturated_now = True
-        self._saturated = saturated_before and self._saturated_now
+        self._frictionloss[:] = self._drives.coulomb
+        if self._push is not None:
+            self._apply_push(self._push)
+        self._run_substeps()
+        self._look_after_saturation()
         self._record_cycle()
 
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
         if self._state is None:
             reading = self._sensors.read(self._records[0])
-            current = reading[OUT_CURRENT]
-            self._thermometers.step(current)
-            np.multiply(self._force, self._per_torque, out=self._work)
+            self._thermometers.step(reading.actual_current)
             self._state = PlantState(
-                tuple(reading[OUT_Q]),
-                tuple(reading[OUT_QD]),
-                tuple(current),
-                tuple(reading[OUT_VOLTAGE]),
-                tuple(reading[OUT_ACCELERATION]),
-                tuple(reading[OUT_WRENCH]),
+                *reading,
                 self._thermometers.reading,
-                tuple(self._target_current),
-                tuple(self._target_moment),
-                tuple(self._work.tolist()),
+                self._drives.target_current,
+                self._drives.target_moment,
+                self._control_current,
                 self._saturated,
-                tuple(self._error.tolist()),
+                six(self._error.tolist()),
             )
         return self._state
 
-    def _command(self, target: JointTarget) -> None:
-        """Turn the target into the control table of this cycle."""
-        path, gains, knot = self._path, self._gains, self._target
-        q, qd, qdd = knot
-        q[:] = target.q
-        qd[:] = target.qd
-        qdd[:] = target.qdd
-        if not isfinite(np.dot(knot.ravel(), self._ones)):
+    def _run_substeps(self) -> None:
+        model, data, ctrl, capture_at = self._model, self._data, self._ctrl, self._capture_at
+        record = np.zeros(N_RECORD)
+        for i, torques in enumerate(self._drives.table):
+            ctrl[:] = torques
+            mujoco.mj_step(model, data)
+            if i == capture_at:
+                record[REC_SIMULATED] = self._raw
+        self._record = record
+        if not np.dot(self._qvel, self._qvel) < _RUNAWAY**2:
             raise PlantError(
-                f"target {target} in cycle {self.cycle}: finite numbers are needed", cycle=self.cycle
+                f"the simulation diverged in cycle {self.cycle}: joint speeds {self._qvel.tolist()} rad/s; "
+                "reset the plant and check the targets",
+                cycle=self.cycle,
             )
-        moment = self._dynamics.evaluate(q, qd, qdd)
-        self._target_moment = moment.tolist()
-        self._friction.evaluate(self._qvel, qd)
-        self._frictionloss[:] = self._friction.coulomb
-        # The third signal of the command path is torque, in place of the acceleration that it came from.
-        np.add(moment, self._friction.compensation, out=qdd)
-        np.multiply(qdd, self._per_torque, out=self._work)
-        self._target_current = self._work.tolist()
-        path.advance(knot)
-        table, work = self._table, self._table_work
-        np.add(path.q, self._trim, out=table)
-        np.multiply(table, gains.kp, out=table)
-        np.multiply(path.qd, gains.kv, out=work)
-        np.add(table, work, out=table)
-        np.add(table, path.tau, out=table)
+
+    def _look_after_saturation(self) -> None:
+        saturated_before = self._saturated_now
+        torques: list[float] = self._force.tolist()
+        a, b, c, d, e, f = map(mul, torques, self._amperes_per_torque)
+        self._control_current = (a, b, c, d, e, f)
+        self._saturated_now = any(map(ge, map(abs, torques), self.robot.tau_max))
+        self._saturated = saturated_before and self._saturated_now
 
     def _record_cycle(self) -> None:
-        """Keep the true values of this cycle for the sensors, and trim the servos by what they left."""
-        gear, captured = self._gear, self._captured
-        gear.evaluate(captured[REC_Q])
-        record = np.empty(N_RECORD)
-        record[:N_RAW] = captured
+        """Finish the record of this cycle for the sensors, and trim the servos by what they left."""
+        gear, record, error, ripple = self._gear, self._record, self._error, self._ripple
+        gear.evaluate(record[REC_Q])
+        np.multiply(gear.slope, record[REC_QD], out=ripple)
         record[REC_Q] += gear.error
-        np.multiply(gear.slope, captured[REC_QD], out=self._work)
-        record[REC_QD] += self._work
-        record[REC_WRENCH] = self._wrench
+        record[REC_QD] += ripple
+        if self._push is not None:
+            record[REC_WRENCH] = self._push_wrench
+        if self._data.ncon:
+            record[REC_WRENCH] += contact_wrench(self._model, self._data, self._flange_position)
         self._records.append(record)
-        error, work = self._error, self._work
         np.subtract(self._path.q_final, self._qpos, out=error)
         np.subtract(error, gear.error, out=error)
         if not self._saturated_now:
-            np.multiply(error, self._trim_gain, out=work)
-            np.add(work, self._trim, out=work)
-            np.maximum(work, -_TRIM_MAX, out=work)
-            np.minimum(work, _TRIM_MAX, out=self._trim)
+            self._drives.integrate(error)
 
-    def _apply_push(self) -> None:
+    def _apply_push(self, force: NDArray[np.float64]) -> None:
         """Bring the push to the body that MuJoCo wants it at, for the pose at the start of this cycle."""
         data = self._data
-        position = data.site_xpos[self._flange_site]
-        arm = data.site_xmat[self._flange_site].reshape(3, 3) @ self._push_point
-        self._wrench[:3] = self._push
-        self._wrench[3:] = np.cross(arm, self._push)
-        from_com = position + arm - data.xipos[self._flange_link]
-        data.xfrc_applied[self._flange_link, :3] = self._push
-        data.xfrc_applied[self._flange_link, 3:] = np.cross(from_com, self._push)
+        lever = self._flange_rotation @ self._push_point
+        self._push_wrench = np.concatenate([force, np.cross(lever, force)])
+        from_com = self._flange_position + lever - data.xipos[self._flange_link]
+        data.xfrc_applied[self._flange_link] = np.concatenate([force, np.cross(from_com, force)])
 
     # --- brakes ---
 
@@ -356,24 +301,16 @@ class Plant:
         self._braked = True
         self._saturated = self._saturated_now = False
         self._qvel[:] = 0.0
-        self._force[:] = 0.0
         self._error[:] = 0.0
-        self._wrench[:] = 0.0
-        self._target_current = [0.0] * 6
-        self._target_moment = [0.0] * 6
+        self._control_current = NO_LOAD
+        self._drives.release()
         mujoco.mj_kinematics(self._model, self._data)
         record = np.zeros(N_RECORD)
-        self._gear.evaluate(self._qpos)
-        record[REC_Q] = self._qpos + self._gear.error
-        up = self._data.site_xmat[self._flange_site].reshape(3, 3)[2]
-        record[RAW_ACCELERATION] = GRAVITY * up
+        record[REC_Q] = self.q_true
+        record[REC_ACCELERATION] = GRAVITY * self._flange_rotation[2]
         self._rest_record = record
 
     def _release_brakes(self) -> None:
-        """Take the load over from the brakes: the drives stand at the present pose with the model's torque."""
+        """Hand the load over to the drives, at the pose in which the brakes hold it."""
         self._braked = False
-        q = self._rest_record[REC_Q]
-        still = np.zeros(6)
-        self._path.reset(q, self._dynamics.evaluate(q, still, still))
-        # The servo holds the motor side; the trim starts as the gear's error of this pose.
-        np.subtract(self._qpos, q, out=self._trim)
+        self._drives.take_over(self._rest_record[REC_Q], self._qpos)

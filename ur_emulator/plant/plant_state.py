@@ -3,9 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from ur_emulator.models.robot_model import Vector3, Vector6
+
+
+class Target(Protocol):
+    """What the plant takes as a target: any record with these three, see `JointTarget`."""
+
+    @property
+    def q(self) -> Sequence[float]: ...
+
+    @property
+    def qd(self) -> Sequence[float]: ...
+
+    @property
+    def qdd(self) -> Sequence[float]: ...
 
 
 class JointTarget(NamedTuple):
@@ -14,7 +27,7 @@ class JointTarget(NamedTuple):
     Attributes:
         q: (6,) [rad].
         qd: (6,) [rad/s].
-        qdd: (6,) [rad/s²].
+        qdd: (6,) [rad/s²], for the torque that the controller's model sends along.
     """
 
     q: Sequence[float]

@@ -1,0 +1,123 @@
+"""Drives: from the controller's target to what the joint servos are told in every sub-step.
+
+The controller sends position, speed and the torque that its model of the arm expects (rigid body plus
+friction compensation) down the command path. A servo adds up
+
+    tau = kp (q_set + trim - q) + kv (qd_set - qd) + tau_set
+
+of which the terms in q and qd live in MuJoCo's actuators. `trim` is the slow outer loop: it integrates the
+error at the joint's own encoder, so that gear error, wrong masses and left-over friction vanish at rest.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_emulator.models.calibration import Calibration
+from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
+from ur_emulator.plant.command_path import CommandPath
+from ur_emulator.plant.friction import Friction
+from ur_emulator.plant.inverse_dynamics import InverseDynamics
+from ur_emulator.plant.physics import ServoGains
+from ur_emulator.plant.plant_state import Target
+
+_INTEGRAL_TIME = 0.12  # s; assumed: rest within a few tenths of a second, as arms of this kind settle
+
+NO_LOAD: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Drives:
+    """The six drives and the controller's torque model that feeds them.
+
+    Args:
+        robot: type of the arm.
+        calibration: of this arm.
+        fidelity: its imperfections.
+        seed: of the box.
+        gains: of the servos, as in the actuators.
+        path: the command path.
+        period: control cycle [s].
+
+    Attributes:
+        table: (n_substeps, 6), what to write to MuJoCo's `ctrl` before each sub-step of this cycle [Nm].
+        target_moment: rigid-body torque for the present target (6,) [Nm].
+        target_current: current for the present target, friction included (6,) [A].
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        calibration: Calibration,
+        fidelity: Fidelity,
+        seed: int,
+        gains: ServoGains,
+        path: CommandPath,
+        period: float,
+    ) -> None:
+        self._dynamics = InverseDynamics(robot, calibration)
+        self._friction = Friction(robot, fidelity, seed)
+        self._path = path
+        self._kp, self._kv = gains.kp, gains.kv
+        self._per_torque = 1.0 / np.array(robot.torque_constant)
+        self._trim_gain = period / _INTEGRAL_TIME
+        self._trim = np.zeros(6)
+        self._knot = np.zeros((3, 6))
+        self._q, self._qd, self._qdd = self._knot
+        self.table = np.zeros(path.q.shape)
+        self._damping = np.zeros(path.q.shape)
+        self._work = np.zeros(6)
+        self.coulomb = self._friction.coulomb
+        """True size of the Coulomb friction at the speeds last given (6,) [Nm]."""
+        self.target_moment = self.target_current = NO_LOAD
+
+    def set_payload(self, mass: float, cog: Vector3) -> None:
+        """Declare the payload to the controller's model: mass [kg], centre in the flange frame [m]."""
+        self._dynamics.set_payload(mass, cog)
+
+    def take_over(self, q: NDArray[np.float64], q_motor: NDArray[np.float64]) -> None:
+        """Hold the arm at rest: joints at q, motors at q_motor, (6,) each [rad]."""
+        still = np.zeros(6)
+        self._path.reset(q, self._dynamics.evaluate(q, still, still))
+        np.subtract(q_motor, q, out=self._trim)
+
+    def release(self) -> None:
+        """Carry nothing: the brakes do."""
+        self.target_moment = self.target_current = NO_LOAD
+
+    def command(self, target: Target, qd_actual: NDArray[np.float64]) -> bool:
+        """Take the target of this cycle and fill `table`; qd_actual (6,) [rad/s] sets the true friction.
+
+        Returns:
+            False when the target is not finite; nothing has been sent to the drives then.
+        """
+        knot, q, qd, qdd = self._knot, self._q, self._qd, self._qdd
+        q[:] = target.q
+        qd[:] = target.qd
+        qdd[:] = target.qdd
+        moment = self._dynamics.evaluate(q, qd, qdd)
+        self.target_moment = six(moment.tolist())
+        self._friction.evaluate(qd_actual, qd)
+        # The third signal of the command path is torque, in place of the acceleration that it came from.
+        np.add(moment, self._friction.compensation, out=qdd)
+        np.multiply(qdd, self._per_torque, out=self._work)
+        self.target_current = six(self._work.tolist())
+        # Anything that is not finite in the target has reached the currents by now.
+        if not isfinite(sum(self.target_current)):
+            return False
+        path, table, damping = self._path, self.table, self._damping
+        path.advance(knot)
+        np.add(path.q, self._trim, out=table)
+        np.multiply(table, self._kp, out=table)
+        np.multiply(path.qd, self._kv, out=damping)
+        np.add(table, damping, out=table)
+        np.add(table, path.tau, out=table)
+        return True
+
+    def integrate(self, error: NDArray[np.float64]) -> None:
+        """Trim the servos by the joints' error (6,) [rad] of this cycle; not to be called in saturation."""
+        np.multiply(error, self._trim_gain, out=self._work)
+        np.add(self._trim, self._work, out=self._trim)

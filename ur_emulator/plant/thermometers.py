@@ -1,0 +1,42 @@
+"""Thermometers: joint temperatures that follow the work of the motors, slowly and without chance.
+
+Source: production log of a UR3 (UCI "UR3 CobotOps"): 28 to 45 °C, wrists hottest. Time constant and heat per
+current are assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp
+
+from ur_emulator.models.robot_model import Vector6
+
+_IDLE: Vector6 = (28.0, 29.0, 31.0, 36.0, 38.0, 39.0)  # °C, powered and still for long
+_RISE: Vector6 = (0.25, 0.25, 0.5, 0.8, 0.8, 0.8)  # °C per A²
+_LARGEST_RISE = 20.0  # °C
+_TIME_CONSTANT = 900.0  # s
+_INTERVAL = 1.0  # s between updates
+_STEPS_PER_DEGREE = 16.0
+
+
+class Thermometers:
+    """Six thermometers; `reading` holds what they show [°C]."""
+
+    def __init__(self, period: float) -> None:
+        self._every = max(1, round(_INTERVAL / period))
+        self._gain = 1.0 - exp(-self._every * period / _TIME_CONSTANT)
+        self._countdown = self._every
+        self._exact = list(_IDLE)
+        self.reading = _IDLE
+
+    def step(self, current: Sequence[float]) -> None:
+        """Go on by one cycle with these motor currents (6,) [A]."""
+        self._countdown -= 1
+        if self._countdown:
+            return
+        self._countdown = self._every
+        for i, amperes in enumerate(current):
+            final = _IDLE[i] + min(_LARGEST_RISE, _RISE[i] * amperes * amperes)
+            self._exact[i] += self._gain * (final - self._exact[i])
+        a, b, c, d, e, f = (round(_STEPS_PER_DEGREE * value) / _STEPS_PER_DEGREE for value in self._exact)
+        self.reading = (a, b, c, d, e, f)
