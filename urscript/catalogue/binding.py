@@ -35,6 +35,15 @@ def _wrong_count(builtin: Builtin, given: int) -> ScriptTypeError:
     return ScriptTypeError(f"{builtin.name} takes {allowed} ({given} given)", hint=f"use {builtin.signature}")
 
 
+def _missing(builtin: Builtin, given: int, name: str) -> ScriptTypeError:
+    """Too few arguments, or enough of them but not this one."""
+    if given < sum(param.is_required for param in builtin.params):
+        return _wrong_count(builtin, given)
+    return ScriptTypeError(
+        f"{builtin.name}() missing required argument '{name}'", hint=f"use {builtin.signature}"
+    )
+
+
 def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str] = ()) -> list[Slot]:
     """Decide for each parameter, in order, where its value comes from.
 
@@ -70,7 +79,7 @@ def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str
         elif param.name in seen:
             slots.append(("kw", param.name))
         elif param.is_required:
-            raise _wrong_count(builtin, given)
+            raise _missing(builtin, given, param.name)
         else:
             slots.append(("default", param.default))
     return slots

@@ -89,9 +89,10 @@ class Catalogue:
 
     def suggest(self, name: str, others: Iterable[str] = ()) -> str | None:
         """The known name that looks most like a misspelt one, among builtins, variables and `others`."""
-        known = {*self._by_name, *self.variables, *self.arrays, *others}
-        matches = get_close_matches(name, sorted(known), n=1, cutoff=0.75)
-        return matches[0] if matches else None
+        names = sorted({*self._by_name, *self.variables, *self.arrays, *others})
+        by_lower_case = {known.lower(): known for known in names}
+        matches = get_close_matches(name.lower(), by_lower_case, n=1, cutoff=0.75)
+        return by_lower_case[matches[0]] if matches else None
 
     def static_bind(self, name: str, n_positional: int, keyword_names: Sequence[str] = ()) -> list[Slot]:
         """Where the value of each parameter comes from in a call of this shape.

@@ -289,7 +289,7 @@ _PATH_OFFSET: tuple[Builtin, ...] = (
         "the offset to superimpose",
         since=NOT_CB3,
     ),
-    _row("path_offset_get", (_OFFSET_TYPE,), "pose m, rad", "the offset in force", since=NOT_CB3),
+    _row("path_offset_get", (_OFFSET_TYPE,), "pose, m and rad", "the offset in force", since=NOT_CB3),
     _row(
         "path_offset_set_alpha_filter",
         (Param("alpha", NUMBER, unit="0 to 1", low=0, high=1),),
@@ -339,7 +339,7 @@ _CONVEYORS: tuple[Builtin, ...] = (
     _row(
         "encoder_get_tick_count",
         (_ENCODER_REQUIRED,),
-        "float ticks",
+        "float, ticks",
         "the filtered count",
         since=releases("3.0", "5.0"),
         until=releases(None, "5.21"),
@@ -347,7 +347,7 @@ _CONVEYORS: tuple[Builtin, ...] = (
     _row(
         "encoder_get_tick_count",
         (_ENCODER_REQUIRED, Param("opt", STRING, "", 'empty or "raw"')),
-        "float ticks, int32 when raw",
+        "int or float, ticks",
         "the filtered or the raw count",
         since=LATE_E_SERIES,
         source=MANUAL_LATE,
@@ -355,7 +355,7 @@ _CONVEYORS: tuple[Builtin, ...] = (
     _row(
         "encoder_unwind_delta_tick_count",
         (_ENCODER_REQUIRED, Param("delta_tick_count", NUMBER, unit="ticks")),
-        "float ticks, None for an encoder that is not enabled",
+        "float or None, ticks",
         "remove the wrap from a difference of counts",
     ),
     _row(
@@ -386,11 +386,11 @@ _CONVEYORS: tuple[Builtin, ...] = (
         "stop tracking and bring the joints to rest",
         time=MOTION,
     ),
-    _row("get_target_tcp_pose_along_path", (), "pose m, rad", "target without conveyor and path offset"),
+    _row("get_target_tcp_pose_along_path", (), "pose, m and rad", "target without conveyor and path offset"),
     _row(
         "get_target_tcp_speed_along_path",
         (),
-        "six-vector m/s, rad/s",
+        "pose, m/s and rad/s",
         "speed without conveyor and path offset",
     ),
     _row(
@@ -400,7 +400,9 @@ _CONVEYORS: tuple[Builtin, ...] = (
         "old form of encoder_enable_pulse_decode",
         deprecated=True,
     ),
-    _row("get_conveyor_tick_count", (), "float ticks", "old form of encoder_get_tick_count", deprecated=True),
+    _row(
+        "get_conveyor_tick_count", (), "float, ticks", "old form of encoder_get_tick_count", deprecated=True
+    ),
     _row(
         "set_conveyor_tick_count",
         (

@@ -121,7 +121,8 @@ class Builtin:
     Args:
         name: URScript name.
         params: in positional order.
-        returns: type and unit of the result, "None" where there is none.
+        returns: type of the result, then after a comma its unit; "None" where there is none. The compiler
+            reads the type, so it must hold for every call ("int or list" where it varies).
         time: what a call costs the thread.
         module: chapter of the script manual.
         since: first release of each generation that knows this form.

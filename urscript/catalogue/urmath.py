@@ -35,9 +35,7 @@ ROWS: tuple[Builtin, ...] = (
     _row("random", (), "float", "pseudo-random number between 0 and 1"),
     _row("length", (Param("v", ParamType.SIZED),), "int", "number of elements or bytes"),
     _row("get_list_length", (Param("v", ParamType.ARRAY),), "int", "number of elements"),
-    _row(
-        "size", (Param("v", ParamType.SHAPED),), "int, or [rows, columns]", "size of a list, string or matrix"
-    ),
+    _row("size", (Param("v", ParamType.SHAPED),), "int or list", "size of a list, string or matrix"),
     _row("transpose", (Param("m", ParamType.LIST_OR_MATRIX),), "matrix or list", "rows become columns"),
     _row("inv", (Param("m", ParamType.POSE_OR_MATRIX),), "matrix or pose", "inverse of a matrix or pose"),
     _row("integer_to_binary_list", (Param("x", INT),), "list of 32 bool", "two's complement, bit 0 first"),

@@ -22,11 +22,16 @@ ROWS: tuple[Builtin, ...] = tuple(
         ("delete_frame", (_NAME,), "None", "remove a frame"),
         ("delete_all_frames", (), "None", "remove all added frames"),
         ("move_frame", (_NAME, _POSE, _REFERENCE), "None", "place a frame anew"),
-        ("get_pose", (_NAME, Param("rel_name", STRING), _REFERENCE), "pose m, rad", "one frame from another"),
+        (
+            "get_pose",
+            (_NAME, Param("rel_name", STRING), _REFERENCE),
+            "pose, m and rad",
+            "one frame from another",
+        ),
         (
             "convert_pose",
             (_POSE, Param("from_frame", STRING), Param("to_frame", STRING)),
-            "pose m, rad",
+            "pose, m and rad",
             "a pose in another frame",
         ),
         ("reset_world_model", (), "None", "remove everything added"),

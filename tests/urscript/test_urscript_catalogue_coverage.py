@@ -1,0 +1,39 @@
+"""The generated page is the one in docs/, and says something about every function."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from urscript.catalogue import ALL_ROWS, CB3_3_15, Support
+from urscript.catalogue.coverage import render
+
+PAGE = Path(__file__).parents[2] / "docs" / "urscript-coverage.md"
+
+
+def test_page_is_up_to_date() -> None:
+    expected = render()
+    assert PAGE.read_text(encoding="utf-8") == expected, (
+        "run: python -m urscript.catalogue.coverage > docs/urscript-coverage.md"
+    )
+
+
+def test_page_shows_every_form_of_every_function() -> None:
+    page = render()
+    assert [row.signature for row in ALL_ROWS if f"`{row.signature}`" not in page] == []
+
+
+def test_totals_add_up() -> None:
+    line = next(line for line in render().splitlines() if line.startswith("| **total**"))
+    cells = [int(cell) for cell in line.split("|")[2:6]]
+    assert cells == [*(sum(row.support is kind for row in CB3_3_15) for kind in Support), len(CB3_3_15)]
+
+
+def test_tables_are_rectangular() -> None:
+    width = 0
+    for line in render().splitlines():
+        if not line.startswith("|"):
+            width = 0
+            continue
+        cells = line.replace("\\|", "").count("|")
+        width = width or cells
+        assert cells == width, line

@@ -1,0 +1,123 @@
+"""The page `docs/urscript-coverage.md`, generated from the tables: which builtin is modelled how well.
+
+Run `python -m urscript.catalogue.coverage > docs/urscript-coverage.md` after changing a table; a test
+compares the two.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Iterable
+
+from .catalogue import ALL_ROWS, CB3_3_15, catalogue_for
+from .types import Builtin, Support
+
+_HEAD = """\
+# URScript coverage
+
+Every builtin function that a controller knows, and how this box models it. The page is generated from the
+tables in `urscript/catalogue/`; do not edit it, run
+`python -m urscript.catalogue.coverage > docs/urscript-coverage.md`.
+
+* **exact**: does what the manual says, as far as the manual says it.
+* **approximate**: works; the note says what differs or is assumed.
+* **declared only**: programs that name it compile, and the call ends the program with the run-time error
+  `<name> is declared only: this box does not model it yet`.
+
+"Undocumented" names are missing in the script manual of that generation, but its controllers know them.
+"""
+
+_LATER_HEAD = """\
+Functions, or forms of functions, that CB3 3.15 does not have. A program compiled for a version that has
+them passes the compiler; the calls are declared only. 5.0 and 10.0 stand for "as far back as the documents
+go": the first release is not known."""
+
+
+def _summary(rows: Iterable[Builtin]) -> list[str]:
+    counts: dict[str, Counter[Support]] = {}
+    for row in rows:
+        counts.setdefault(row.module, Counter())[row.support] += 1
+    lines = ["| module | exact | approximate | declared only | all |", "|---|---|---|---|---|"]
+    total: Counter[Support] = Counter()
+    for module, count in counts.items():
+        lines.append(_count_line(module, count))
+        total += count
+    return [*lines, _count_line("**total**", total)]
+
+
+def _count_line(title: str, count: Counter[Support]) -> str:
+    cells = [str(count[support]) for support in Support]
+    return f"| {title} | {' | '.join(cells)} | {count.total()} |"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def _remarks(row: Builtin, is_documented: bool) -> str:
+    words = ["undocumented"] if not is_documented else []
+    if row.deprecated:
+        words.append("deprecated")
+    if row.note:
+        words.append(row.note)
+    return "; ".join(words)
+
+
+def _table(rows: Iterable[Builtin]) -> list[str]:
+    lines = ["| function | returns | time | model | what it does | remarks |", "|---|---|---|---|---|---|"]
+    for row in rows:
+        is_documented = row.is_documented_in(CB3_3_15.version)
+        cells = (
+            f"`{row.signature}`",
+            row.returns,
+            row.time.name.lower(),
+            row.support.value,
+            row.summary,
+            _remarks(row, is_documented),
+        )
+        lines.append(f"| {' | '.join(_cell(cell) for cell in cells)} |")
+    return lines
+
+
+def _later_table(rows: Iterable[Builtin]) -> list[str]:
+    lines = ["| function | since | until | what it does |", "|---|---|---|---|"]
+    for row in rows:
+        cells = (f"`{row.signature}`", str(row.since), str(row.until), row.summary)
+        lines.append(f"| {' | '.join(_cell(cell) for cell in cells)} |")
+    return lines
+
+
+def render() -> str:
+    """The whole page as Markdown."""
+    lines = [_HEAD, f"## CB3 {CB3_3_15.version}", "", *_summary(CB3_3_15), ""]
+    lines += [
+        "Besides the functions, programs can read the variables "
+        + ", ".join(f"`{item.name}` ({item.value:g} {item.unit})" for item in CB3_3_15.variables.values())
+        + " and use the arrays "
+        + ", ".join(
+            f"`{item.name}[n]` (as `{item.getter}` and `{item.setter}`)" for item in CB3_3_15.arrays.values()
+        )
+        + ".",
+        "",
+    ]
+    for module in dict.fromkeys(row.module for row in CB3_3_15):
+        lines += [f"### {module}", "", *_table(row for row in CB3_3_15 if row.module == module), ""]
+    lines += [
+        "## e-Series 5.11",
+        "",
+        "The same functions unless the next table says otherwise; none is checked against an e-Series arm.",
+        "",
+        *_summary(catalogue_for("5.11")),
+        "",
+        "## What other versions know",
+        "",
+        _LATER_HEAD,
+        "",
+        *_later_table(row for row in ALL_ROWS if not row.is_in(CB3_3_15.version)),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(render())
