@@ -1,1 +1,83 @@
+"""URScript: the language of Universal Robots arms, compiled to Python and run one control cycle at a time.
 
+    program = compile_program(text)
+    running = program.start(host)
+    while running.step() is ProgramStatus.RUNNING: ...
+
+Knows no robot, no socket, no clock: effects come from a `Host`. Names are loaded when first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from urscript.errors import (
+        ScriptCompileError,
+        ScriptError,
+        ScriptNameError,
+        ScriptRuntimeError,
+        ScriptSyntaxError,
+    )
+    from urscript.host import Host, HostFunction
+    from urscript.program import (
+        CompiledProgram,
+        ProgramStatus,
+        RunningProgram,
+        check_program,
+        compile_program,
+    )
+    from urscript.recording_host import RecordingHost
+    from urscript.threads import ScriptThread
+    from urscript.values import Matrix, Pose
+    from urscript.waits import NEXT_CYCLE, Blocked
+
+_HOME: Final = {
+    "ScriptCompileError": "errors",
+    "ScriptError": "errors",
+    "ScriptNameError": "errors",
+    "ScriptRuntimeError": "errors",
+    "ScriptSyntaxError": "errors",
+    "Host": "host",
+    "HostFunction": "host",
+    "CompiledProgram": "program",
+    "ProgramStatus": "program",
+    "RunningProgram": "program",
+    "check_program": "program",
+    "compile_program": "program",
+    "RecordingHost": "recording_host",
+    "ScriptThread": "threads",
+    "Matrix": "values",
+    "Pose": "values",
+    "NEXT_CYCLE": "waits",
+    "Blocked": "waits",
+}
+"""Which module each public name lives in."""
+
+__all__ = [
+    "NEXT_CYCLE",
+    "Blocked",
+    "CompiledProgram",
+    "Host",
+    "HostFunction",
+    "Matrix",
+    "Pose",
+    "ProgramStatus",
+    "RecordingHost",
+    "RunningProgram",
+    "ScriptCompileError",
+    "ScriptError",
+    "ScriptNameError",
+    "ScriptRuntimeError",
+    "ScriptSyntaxError",
+    "ScriptThread",
+    "check_program",
+    "compile_program",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'urscript' has no attribute {name!r}")
+    return getattr(import_module(f"urscript.{_HOME[name]}"), name)

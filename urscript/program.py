@@ -1,0 +1,241 @@
+"""A program, compiled (`CompiledProgram`) and running (`RunningProgram`).
+
+    text -> source -> parser -> nodes -> resolver -> compiler -> CompiledProgram -> start(host) -> step() ...
+
+`compile_program` is the way in; `check_program` reports everything wrong with a text instead of raising.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+from urscript import runtime
+from urscript.catalogue import CB3_3_15, Catalogue
+from urscript.compiler import compile_resolved
+from urscript.dialect import Dialect, dialect_for
+from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError
+from urscript.ops import UNDEFINED
+from urscript.parser import parse
+from urscript.resolver import resolve
+from urscript.scopes import ResolvedProgram
+from urscript.source import Source
+from urscript.threads import ProgramHalted, Scheduler, ScriptThread
+
+if TYPE_CHECKING:
+    from types import CodeType
+
+    from urscript.host import Host
+
+
+def compile_program(
+    text: str,
+    *,
+    catalogue: Catalogue = CB3_3_15,
+    dialect: Dialect | None = None,
+    name: str = "<program>",
+) -> CompiledProgram:
+    """Compile one program.
+
+    Args:
+        text: A `def` or `sec` program, or statements without a definition around them. One character a byte
+            (latin-1); text with other characters is taken as UTF-8 bytes.
+        catalogue: The builtins of the software version the program runs on.
+        dialect: Switches of the language; by default those of the catalogue's version.
+        name: What people know the text by, for error messages.
+
+    Raises:
+        ScriptCompileError: The first error in the text, with line, column, wire_text and render().
+    """
+    source = Source(_as_bytes(text), name)
+    dialect = dialect or dialect_for(catalogue.version)
+    program, errors = _resolve(source, catalogue, dialect)
+    if errors:
+        raise errors[0]
+    assert program is not None
+    file_name = f"<urscript {program.name}>"
+    try:
+        compiled = compile_resolved(program, catalogue, dialect, file_name)
+    except RecursionError:
+        raise _too_deep(source) from None
+    return CompiledProgram(
+        name=program.name,
+        kind=program.kind,
+        warnings=tuple(program.warnings),
+        source=source,
+        dialect=dialect,
+        catalogue=catalogue,
+        code=compiled.code,
+        constants=compiled.constants,
+        builtins=frozenset(program.builtins),
+        globals=frozenset(program.globals),
+        function_names={scope.python_name: scope.name for scope in program.scopes()},
+        file_name=file_name,
+    )
+
+
+def check_program(
+    text: str, *, catalogue: Catalogue = CB3_3_15, dialect: Dialect | None = None, name: str = "<program>"
+) -> tuple[Sequence[ScriptCompileError], Sequence[ScriptCompileError]]:
+    """All errors and all warnings of a text, each in its order. A syntax error hides what comes after it."""
+    source = Source(_as_bytes(text), name)
+    program, errors = _resolve(source, catalogue, dialect or dialect_for(catalogue.version))
+    if errors:
+        return errors, program.warnings if program is not None else ()
+    try:
+        compiled = compile_program(text, catalogue=catalogue, dialect=dialect, name=name)
+    except ScriptCompileError as error:
+        return [error], ()
+    return [], compiled.warnings
+
+
+def _resolve(
+    source: Source, catalogue: Catalogue, dialect: Dialect
+) -> tuple[ResolvedProgram | None, list[ScriptCompileError]]:
+    try:
+        return resolve(parse(source), source, catalogue, dialect)
+    except ScriptSyntaxError as error:
+        return None, [error]
+    except RecursionError:
+        return None, [_too_deep(source)]
+
+
+def _too_deep(source: Source) -> ScriptSyntaxError:
+    return ScriptSyntaxError("the program is nested too deeply", line=1, column=1, source=source)
+
+
+def _as_bytes(text: str) -> str:
+    """Text as a controller sees it, one character a byte."""
+    try:
+        text.encode("latin-1")
+    except UnicodeEncodeError:
+        return text.encode("utf-8", "surrogateescape").decode("latin-1")
+    return text
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledProgram:
+    """A program ready to run, any number of times.
+
+    Attributes:
+        name: The `def` name; of a one-line program the function it calls.
+        kind: "def" (primary), "sec" (secondary), or "statement".
+        warnings: What is allowed but probably not meant.
+        builtins: Builtin functions it uses.
+        globals: Its global variables.
+    """
+
+    name: str
+    kind: str
+    warnings: tuple[ScriptCompileError, ...]
+    source: Source
+    dialect: Dialect
+    catalogue: Catalogue
+    code: CodeType
+    constants: dict[str, Any]
+    builtins: frozenset[str]
+    globals: frozenset[str]
+    function_names: dict[str, str]
+    file_name: str
+
+    def start(self, host: Host) -> RunningProgram:
+        """A new run on `host`; nothing happens before its first `step`."""
+        return RunningProgram(self, host)
+
+
+class ProgramStatus(Enum):
+    """Where a run stands."""
+
+    RUNNING = "running"
+    FINISHED = "finished"
+    FAILED = "failed"
+
+
+class RunningProgram:
+    """One run of a program.
+
+    Attributes:
+        status: RUNNING until the main thread ends, `halt`, an error, or `kill`.
+        error: What ended a FAILED run, with line, column and the calls on the way.
+    """
+
+    def __init__(self, program: CompiledProgram, host: Host) -> None:
+        self.program = program
+        self.status = ProgramStatus.RUNNING
+        self.error: ScriptRuntimeError | None = None
+        self._host = host
+        self._namespace = runtime.base_namespace(program.dialect)
+        self._scheduler = Scheduler(self._namespace, program.dialect.statement_budget, host.thread_ended)
+        self._namespace.update(runtime.flow_namespace(self._scheduler, self._namespace))
+        self._namespace.update(runtime.builtin_namespace(program.builtins, program.catalogue, host))
+        self._namespace.update(program.constants)
+        self._namespace.update(dict.fromkeys((f"g_{name}" for name in program.globals), UNDEFINED))
+        exec(program.code, self._namespace)
+        self._main = self._scheduler.start(self._namespace["main"], program.name, None)
+
+    @property
+    def threads(self) -> Sequence[ScriptThread]:
+        """The unfinished threads in the order they run."""
+        return [thread for thread in self._scheduler.threads if not thread.finished]
+
+    @property
+    def waits_outside(self) -> bool:
+        """Whether a thread waits for something outside the box that has not come yet."""
+        for thread in self._scheduler.threads:
+            wait = thread.wait
+            if wait is not None and wait.outside and not wait.ready():
+                return True
+        return False
+
+    def step(self) -> ProgramStatus:
+        """Run one control cycle; after the end it does nothing."""
+        if self.status is not ProgramStatus.RUNNING:
+            return self.status
+        try:
+            self._scheduler.step()
+        except ProgramHalted:
+            self._finish(ProgramStatus.FINISHED)
+        except Exception as error:
+            self._fail(runtime.script_error(error, self.program.file_name, self.program.function_names))
+        else:
+            if self._main.finished:
+                self._finish(ProgramStatus.FINISHED)
+            elif self.program.kind == "sec":
+                self._fail_secondary()
+        return self.status
+
+    def kill(self) -> None:
+        """End the run: stopped from outside or replaced by another program."""
+        if self.status is ProgramStatus.RUNNING:
+            self._finish(ProgramStatus.FINISHED)
+
+    def read_global(self, name: str) -> Any:
+        """The value of a global variable; `ops.UNDEFINED` before the first assignment.
+
+        Raises:
+            KeyError: The program has no such variable.
+        """
+        return self._namespace[f"g_{name}"]
+
+    def position(self, thread: ScriptThread) -> tuple[int, int]:
+        """Line and column where a suspended thread stands."""
+        return runtime.thread_position(thread, self.program.file_name)
+
+    def _fail_secondary(self) -> None:
+        line, column = self.position(self._main)
+        error = ScriptRuntimeError("a secondary program must end within one control cycle")
+        self._fail(error.locate(self.program.source, line, column))
+
+    def _fail(self, error: ScriptRuntimeError) -> None:
+        if error.stack:
+            place = error.stack[-1]
+            error.locate(self.program.source, place.line, place.column)
+        self.error = error
+        self._finish(ProgramStatus.FAILED)
+
+    def _finish(self, status: ProgramStatus) -> None:
+        self.status = status
+        self._scheduler.kill_all()
+        self._host.program_ended()
