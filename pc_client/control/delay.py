@@ -70,11 +70,8 @@ def estimate_delay(
     way, q = way[:, moved], q[:, moved]
 
     def mean_square(delay: float) -> float:
-        total = 0.0
-        for j in range(q.shape[1]):
-            rest = q[:, j] - np.interp(t - delay, knots, way[:, j])
-            total += float(np.var(rest))
-        return total / q.shape[1]
+        told = [np.interp(t - delay, knots, joint) for joint in way.T]
+        return float(np.var(q.T - told, axis=1).mean())
 
     coarse = np.arange(0.0, LONGEST_DELAY + _COARSE_STEP, _COARSE_STEP)
     best: float = coarse[int(np.argmin([mean_square(delay) for delay in coarse]))]

@@ -104,11 +104,9 @@ class Tracker:
 
 
 def _describe_error(q_ref: Sequence[float], q: Sequence[float], t: float, abort: float) -> str:
-    joint, error = 0, 0.0
-    for j, (wanted, actual) in enumerate(zip(q_ref, q, strict=True)):
-        if not abs(wanted - actual) <= abs(error):
-            joint, error = j, wanted - actual
+    errors = [wanted - actual for wanted, actual in zip(q_ref, q, strict=True)]
+    joint = next(j for j, error in enumerate(errors) if not -abort < error < abort)
     return (
-        f"the {JOINT_NAMES[joint]} joint is {error:+.3f} rad from its reference at t = {t:.3f} s; "
+        f"the {JOINT_NAMES[joint]} joint is {errors[joint]:+.3f} rad from its reference at t = {t:.3f} s; "
         f"allowed is {abort} rad: the run was ended"
     )

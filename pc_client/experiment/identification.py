@@ -71,6 +71,6 @@ def identify_delay(
     if margin < _LEAST_MARGIN:
         raise DriverError(
             f"with a loop delay of {estimate.delay * 1e3:.0f} ms the controller {config.name!r} has a "
-            f"gain margin of {margin:.1f}, needed is {_LEAST_MARGIN}: the connection to the robot is too slow for it"
+            f"gain margin of {margin:.1f}, needed is {_LEAST_MARGIN}: the loop is too slow for it"
         )
     return estimate, report
