@@ -20,7 +20,7 @@ from typing import ClassVar
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.primary_layout import NO_TIME
 from protocol.ur_types import SafetyMode, SoftwareVersion
-from protocol.wire_record import codec_for, since, wire
+from protocol.wire_record import OLDEST, codec_for, since, wire
 
 __all__ = [
     "MESSAGES",
@@ -272,6 +272,7 @@ def decode_message(body: bytes, version: SoftwareVersion) -> RobotMessage:
         return UnknownMessage(timestamp=timestamp, source=source, message_type=message_type, body=data)
     if record is VersionMessage:
         name_end = 1 + data[0] if data else 0
-        version = SoftwareVersion(*data[name_end : name_end + 2].ljust(2, b"\0"))
-    fields = codec_for(record, version).decode_fields(data)
+        if len(data) >= name_end + 2:
+            version = SoftwareVersion(data[name_end], data[name_end + 1])
+    fields = codec_for(record, max(version, OLDEST)).decode_fields(data)
     return record(timestamp=timestamp, source=source, **fields)

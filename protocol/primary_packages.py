@@ -34,7 +34,7 @@ from protocol.primary_messages import (
     encode_message,
 )
 from protocol.ur_types import SoftwareVersion
-from protocol.wire_record import Codec, codec_for, wire_fields
+from protocol.wire_record import OLDEST, Codec, codec_for, wire_fields
 
 __all__ = [
     "MAX_PACKAGE_SIZE",
@@ -192,8 +192,11 @@ def encode_state(records: Iterable[SubPackage], version: SoftwareVersion) -> byt
     sub-packages that belong into a state see `state_types`.
 
     Raises:
-        LocalProtocolError: two records of one type, a record without table, or a value that does not fit.
+        LocalProtocolError: two records of one type, a record without table, a value that does not fit, or
+            software before 3.0.
     """
+    if version < OLDEST:
+        raise LocalProtocolError(f"no table for the robot state of software {version}: use {OLDEST} or later")
     given = {}
     for record in records:
         if type(record) in given or type(record) not in _ORDER:
@@ -212,7 +215,10 @@ def encode_state(records: Iterable[SubPackage], version: SoftwareVersion) -> byt
 
 
 def state_types(version: SoftwareVersion, *, first: bool) -> tuple[type[SubPackage], ...]:
-    """The sub-packages of a state, in order: all in the first of a connection, fewer in the later ones."""
+    """The sub-packages of a state, in order: all in the first of a connection, fewer in the later ones.
+
+    Software before 3.0 has none that we know.
+    """
     return tuple(
         record
         for record in SUB_PACKAGES

@@ -24,7 +24,7 @@ from typing import Any, Generic, TypeVar
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.ur_types import SoftwareVersion
 
-__all__ = ["ALWAYS", "Codec", "Since", "WireField", "codec_for", "since", "wire", "wire_fields"]
+__all__ = ["ALWAYS", "OLDEST", "Codec", "Since", "WireField", "codec_for", "since", "wire", "wire_fields"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +50,11 @@ def since(cb3: tuple[int, int] | None, e_series: tuple[int, int] | None = (5, 0)
     return Since(cb3 and SoftwareVersion(*cb3), e_series and SoftwareVersion(*e_series))
 
 
+OLDEST = SoftwareVersion(3, 0)
+"""First software with the present layouts; those before were others and are not in the tables."""
+
 ALWAYS = since((3, 0))
-"""As old as the present protocol; layouts before 3.0 were others."""
+"""As old as the present layouts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,7 +279,14 @@ def codec_for(record: type[R], version: SoftwareVersion, present: tuple[str, ...
         record: a dataclass with `wire` fields.
         version: software of the controller.
         present: names of the `only_if` conditions that hold.
+
+    Raises:
+        LocalProtocolError: the software is older than `OLDEST`.
     """
+    if version < OLDEST:
+        raise LocalProtocolError(
+            f"software {version} had other layouts on the primary ports: use {OLDEST} or later"
+        )
     key = (record, version, present)
     codec = _codecs.get(key)
     if codec is None:

@@ -1,0 +1,239 @@
+"""Port 29999: table, both ends wired together, and what neither end may do."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from protocol import dashboard_replies as R
+from protocol.dashboard_commands import COMMANDS, find, match_command, unknown_command_reply
+from protocol.dashboard_connection import (
+    MAX_LINE,
+    CommandReceived,
+    DashboardConnection,
+    Greeting,
+    Reply,
+    Role,
+    UnknownCommand,
+)
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
+
+V3_15 = SoftwareVersion(3, 15, 8)
+
+
+def events(connection, data, step=None):
+    found = []
+    for start in range(0, len(data), step or len(data)):
+        connection.receive_data(data[start : start + (step or len(data))])
+        while (event := connection.next_event()) is not None:
+            found.append(event)
+    return found
+
+
+@pytest.mark.parametrize("step", [1, None])
+def test_a_session_with_both_ends(step):
+    robot, pc = DashboardConnection(Role.ROBOT, V3_15), DashboardConnection(Role.PC)
+    assert events(pc, robot.greet(), step) == [Greeting("Connected: Universal Robots Dashboard Server")]
+
+    asked = pc.command("robotmode") + pc.command("load", "my program.urp") + pc.command("quit")
+    received = events(robot, asked, step)
+    assert received == [
+        CommandReceived(find("robotmode"), ""),
+        CommandReceived(find("load"), "my program.urp"),
+        CommandReceived(find("quit"), ""),
+    ]
+    answers = robot.reply(received[0].command.reply(mode="RUNNING"))
+    answers += robot.reply(received[1].command.reply("not_found", name=received[1].argument))
+    assert not robot.is_closed
+    answers += robot.reply(received[2].command.reply())
+    assert robot.is_closed
+    assert events(robot, b"robotmode\n") == []
+    assert answers == b"Robotmode: RUNNING\nFile not found: my program.urp\nDisconnected\n"
+    assert events(pc, answers, step) == [
+        Reply("robotmode", "Robotmode: RUNNING"),
+        Reply("load my program.urp", "File not found: my program.urp"),
+        Reply("quit", "Disconnected"),
+    ]
+    assert pc.is_closed
+    with pytest.raises(LocalProtocolError, match="quit"):
+        pc.command("robotmode")
+
+
+@pytest.mark.parametrize(
+    ("line", "name", "argument"),
+    [
+        ("play", "play", ""),
+        ("  play \r", "play", ""),
+        ("load a.urp", "load", "a.urp"),
+        ("load", "load", ""),
+        ('load "External Control.urp"', "load", '"External Control.urp"'),
+        ("load installation default.installation", "load installation", "default.installation"),
+        ("popup hello  world", "popup", "hello  world"),
+        ("close popup", "close popup", ""),
+        ("get  serial  number", "get serial number", ""),
+        ("generate flight report system", "generate flight report", "system"),
+        ("setUserRole NONE", "setUserRole", "NONE"),
+    ],
+)
+def test_lines_that_are_commands(line, name, argument):
+    (event,) = events(DashboardConnection(Role.ROBOT, V3_15), line.encode() + b"\n")
+    assert event == CommandReceived(find(name), argument)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["brake_release", "PLAY", "play now", "get", "power", "", "is in remote control", "\x00\xff", "loadx"],
+)
+def test_lines_that_are_not(line):
+    robot = DashboardConnection(Role.ROBOT, V3_15)
+    (event,) = events(robot, line.encode("latin-1") + b"\n")
+    assert event == UnknownCommand(line, f"could not understand: '{line}'")
+    assert robot.reply(event.answer) == unknown_command_reply(line).encode("latin-1") + b"\n"
+
+
+def test_older_software_knows_fewer_commands():
+    assert match_command("get serial number", SoftwareVersion(3, 11)) is None
+    assert match_command("get serial number", SoftwareVersion(3, 12)) == (find("get serial number"), "")
+    old = {command.name for command in COMMANDS if match_command(command.name, SoftwareVersion(3, 0))}
+    assert {"play", "power on", "brake release"} <= old
+    assert not {"unlock protective stop", "restart safety", "saveLog"} & old
+    # without the command of 3.2, the line is a program's name
+    assert match_command("load installation x", SoftwareVersion(3, 1)) == (find("load"), "installation x")
+
+
+# What URCL's and ur_rtde's tests compare replies with (whole line).
+EXPECTED = {
+    "load": r"Loading program: .*a\.urp.*",
+    "play": "Starting program",
+    "stop": "Stopped",
+    "pause": "Pausing program",
+    "quit": "Disconnected",
+    "running": "Program running: (true|false)",
+    "robotmode": "Robotmode: [A-Z_]+",
+    "get loaded program": "Loaded program: .*",
+    "popup": "showing popup",
+    "close popup": "closing popup",
+    "addToLog": "Added log message",
+    "isProgramSaved": r"(true|false) .*\.urp",
+    "programState": "(STOPPED|PLAYING|PAUSED) .*",
+    "PolyscopeVersion": r"URSoftware \d+\.\d+\.\d+\.\d+ \(.*\)",
+    "setUserRole": "Setting user role: NONE",
+    "getUserRole": "NONE",
+    "power on": "Powering on",
+    "power off": "Powering off",
+    "brake release": "Brake releasing",
+    "safetymode": "Safetymode: [A-Z_]+",
+    "safetystatus": "Safetystatus: [A-Z_]+",
+    "unlock protective stop": "Protective stop releasing",
+    "close safety popup": "closing safety popup",
+    "load installation": r"Loading installation: .*a\.urp.*",
+    "restart safety": "Restarting safety",
+    "get serial number": "20[0-9]+",
+    "get robot model": "UR3",
+    "generate flight report": "Flight Report generated with id:.*",
+    "generate support file": "Completed successfully:.*",
+    "saveLog": "Log saved to disk",
+    "shutdown": "Shutting down",
+}
+VALUES = {
+    "path": "/programs/a.urp", "running": "true", "mode": "POWER_OFF", "status": "NORMAL", "saved": "true",
+    "program": "a.urp", "state": "STOPPED", "version": "3.15.8.106339", "date": "Nov 10 2021", "role": "NONE",
+    "serial": "20993000007", "model": "UR3", "id": 3, "file": "ur_20993000007.zip",
+}  # fmt: skip
+
+
+def test_replies_are_what_clients_compare_with():
+    assert {command.name for command in COMMANDS} == set(EXPECTED)
+    for command in COMMANDS:
+        assert re.fullmatch(EXPECTED[command.name], command.reply("ok", **VALUES)), command.name
+
+
+def test_a_reply_needs_a_known_key_and_its_values():
+    assert (
+        find("unlock protective stop").reply("too_early").startswith("Cannot unlock protective stop until 5s")
+    )
+    with pytest.raises(LocalProtocolError, match="'play' has no reply 'nope': use ok, failed"):
+        find("play").reply("nope")
+    with pytest.raises(LocalProtocolError, match=r"'Robotmode: \{mode\}' of 'robotmode' needs 'mode'"):
+        find("robotmode").reply()
+
+
+def test_one_reply_a_command_one_line_a_reply():
+    robot = DashboardConnection(Role.ROBOT, V3_15)
+    with pytest.raises(LocalProtocolError, match="answers nothing"):
+        robot.reply("Stopped")
+    robot.receive_data(b"stop\n")
+    robot.next_event()
+    with pytest.raises(LocalProtocolError, match="line break"):
+        robot.reply("Stopped\nreally")
+    assert robot.reply("Stopped") == b"Stopped\n"  # the refused one changed nothing
+    robot.greet()
+    with pytest.raises(LocalProtocolError, match="once"):
+        robot.greet()
+
+
+def test_a_pc_hears_only_answers():
+    pc = DashboardConnection(Role.PC)
+    pc.receive_data(b"Connected: x\nPowering on\n")
+    assert pc.next_event() == Greeting("Connected: x")
+    with pytest.raises(RemoteProtocolError, match="'Powering on' although nothing was asked"):
+        pc.next_event()
+
+
+@pytest.mark.parametrize(
+    ("name", "argument", "problem"),
+    [
+        ("power_on", "", "no dashboard command"),
+        ("play", "x", "no argument"),
+        ("popup", "a\nstop", "line break"),
+    ],
+)
+def test_a_pc_asks_only_for_what_there_is(name, argument, problem):
+    pc = DashboardConnection(Role.PC)
+    with pytest.raises(LocalProtocolError, match=problem):
+        pc.command(name, argument)
+
+
+def test_roles_do_not_mix():
+    with pytest.raises(LocalProtocolError, match="robot's end"):
+        DashboardConnection(Role.PC).greet()
+    with pytest.raises(LocalProtocolError, match="pc's end"):
+        DashboardConnection(Role.ROBOT).command("play")
+
+
+@pytest.mark.parametrize("data", [b"x" * (MAX_LINE + 1), b"x" * (MAX_LINE + 1) + b"\nplay\n"])
+def test_endless_lines_are_refused(data):
+    with pytest.raises(RemoteProtocolError, match="more than"):
+        DashboardConnection(Role.ROBOT, V3_15).receive_data(data)
+    with pytest.raises(LocalProtocolError, match="longer than"):
+        DashboardConnection(Role.PC).command("popup", "x" * MAX_LINE)
+
+
+def test_what_a_pc_reads_out_of_replies():
+    assert R.parse_polyscope_version("URSoftware 3.15.8.106339 (Nov 10 2021)") == (3, 15, 8, 106339)
+    assert R.parse_robot_mode("Robotmode: RUNNING") is RobotMode.RUNNING
+    assert R.parse_safety_mode("Safetymode: PROTECTIVE_STOP") is SafetyMode.PROTECTIVE_STOP
+    assert R.parse_running("Program running: true") is True
+    assert R.parse_running("Robot running: False") is False
+    assert R.parse_program_state("PLAYING my program.urp") == ("PLAYING", "my program.urp")
+    assert R.parse_program_state("STOPPED") == ("STOPPED", "")
+
+
+@pytest.mark.parametrize(
+    "parse",
+    [
+        R.parse_polyscope_version,
+        R.parse_robot_mode,
+        R.parse_safety_mode,
+        R.parse_running,
+        R.parse_program_state,
+    ],
+)
+@pytest.mark.parametrize(
+    "reply", ["could not understand: 'x'", "", "Robotmode: ASLEEP", "Program running: maybe"]
+)
+def test_other_replies_are_refused_with_their_text(parse, reply):
+    with pytest.raises(RemoteProtocolError, match=re.escape(repr(reply))):
+        parse(reply)

@@ -1,0 +1,355 @@
+"""Ports 30001 and 30002: captured bytes, documented totals, and every codec four ways."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import asdict, fields, replace
+from types import SimpleNamespace
+
+import pytest
+
+from protocol import primary_layout as L
+from protocol import primary_messages as M
+from protocol import primary_packages as P
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.frame_buffer import FrameBuffer
+from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import codec_for, wire_fields
+
+V3_15 = SoftwareVersion(3, 15, 8)
+NO_TIME_HEX = "ff" * 8
+
+
+def read(data, version=V3_15, step=None):
+    """All packages in some bytes, fed in pieces; what is left over must be a beginning of a package."""
+    buffer, packages = FrameBuffer(P.MAX_PACKAGE_SIZE, P.MIN_PACKAGE_SIZE), []
+    for start in range(0, len(data), step or len(data)):
+        buffer.feed(data[start : start + (step or len(data))])
+        while (frame := buffer.next_frame()) is not None:
+            packages.append(P.decode_package(frame, version))
+    return packages
+
+
+# (version, record, bytes of the package). The first two and the key and exception messages are captures.
+MESSAGES = [
+    ("3.3.1",
+     M.VersionMessage(major=3, minor=3, bugfix=1, build=60, build_date="Jul 08 2016, 16:07:20"),
+     f"00000038 14 {NO_TIME_HEX} fe 03 09 {b'URControl'.hex()} 03 03 00000001 0000003c "
+     f"{b'Jul 08 2016, 16:07:20'.hex()}"),
+    ("3.10",
+     M.VersionMessage(major=3, minor=10, build_date="03-05-2019, 06:39:00"),
+     f"00000037 14 {NO_TIME_HEX} fe 03 09 {b'URControl'.hex()} 03 0a 00000000 00000000 "
+     f"{b'03-05-2019, 06:39:00'.hex()}"),
+    ("3.15.8",
+     M.KeyMessage(timestamp=0, source=-2, title="PROGRAM_XXX_STARTED", text="textmsg"),
+     f"00000032 14 {'00' * 8} fe 07 00000000 00000000 13 {b'PROGRAM_XXX_STARTED'.hex()} {b'textmsg'.hex()}"),
+    ("3.15.8",
+     M.RuntimeExceptionMessage(timestamp=0, line=3, column=1, text="compile_error_name_not_found:txtmsg:"),
+     f"0000003b 14 {'00' * 8} fd 0a 00000003 00000001 {b'compile_error_name_not_found:txtmsg:'.hex()}"),
+    ("3.10", M.StartupMessage(first=510, second=259),
+     f"00000018 14 {NO_TIME_HEX} fe 0c 000001fe 00000103 01"),
+    ("3.15.8", M.TextMessage(timestamp=16_634_482_000, text="hello\xe9"),
+     f"00000015 14 {16_634_482_000:016x} fd 00 {b'hello'.hex()} e9"),
+    ("3.15.8", M.ErrorCodeMessage(source=20, code=210, report_level=3, data_type=4, data=0xC0FFEE, text="x"),
+     f"00000024 14 {NO_TIME_HEX} 14 06 000000d2 00000000 00000003 00000004 00c0ffee 78"),
+    ("3.15.8", M.SafetyModeMessage(safety_mode=3, code=1, argument=-1, data_type=2, data=5),
+     f"00000020 14 {NO_TIME_HEX} fd 05 00000001 ffffffff 03 00000002 00000005"),
+    ("3.15.8", M.PopupMessage(request_id=1, is_warning=True, is_blocking=True, title="T", text="text"),
+     f"00000020 14 {NO_TIME_HEX} fd 02 00000001 00000008 01 00 01 01 54 {b'text'.hex()}"),
+    # the forms of software up to 3.2
+    ("3.2", M.VersionMessage(major=3, minor=2, bugfix=19171, build_date="May 01 2016, 00:00:00"),
+     f"00000034 14 {NO_TIME_HEX} fe 03 09 {b'URControl'.hex()} 03 02 00004ae3 "
+     f"{b'May 01 2016, 00:00:00'.hex()}"),
+    ("3.2", M.ErrorCodeMessage(code=4, argument=5, text="old"),
+     f"0000001a 14 {NO_TIME_HEX} fd 06 00000004 00000005 {b'old'.hex()}"),
+    ("3.2", M.PopupMessage(is_error=True, title="T", text="x"),
+     f"00000014 14 {NO_TIME_HEX} fd 02 00 01 01 54 78"),
+    ("3.2", M.RuntimeExceptionMessage(text="old"), f"00000012 14 {NO_TIME_HEX} fd 0a {b'old'.hex()}"),
+]  # fmt: skip
+MESSAGE_IDS = [f"{type(message).__name__} {version}" for version, message, _ in MESSAGES]
+
+
+@pytest.mark.parametrize(("version", "message", "data"), MESSAGES, ids=MESSAGE_IDS)
+def test_messages_four_ways(version, message, data):
+    version, data = SoftwareVersion.parse(version), bytes.fromhex(data)
+    assert P.encode_message_package(message, version) == data
+    assert read(data, version) == [message]
+    assert read(data, version, step=1) == [message]
+    assert read(data + data[:7], version) == [message]
+
+
+def test_a_version_message_is_read_without_knowing_the_version():
+    for version, message, data in MESSAGES:
+        if isinstance(message, M.VersionMessage):
+            for believed in (SoftwareVersion(3, 0), V3_15, SoftwareVersion(5, 24)):
+                assert read(bytes.fromhex(data), believed) == [message], version
+
+
+def test_the_version_message_of_3_15_fits_old_clients():
+    message = M.version_message(V3_15)
+    data = P.encode_message_package(message, V3_15)
+    assert len(data) == 55
+    assert data[0:5].hex() == "0000003714"
+    assert len(message.build_date) == 20
+
+
+@pytest.mark.parametrize(("version", "message", "data"), MESSAGES, ids=MESSAGE_IDS)
+def test_messages_cut_anywhere_are_refused_or_shorter_texts(version, message, data):
+    version, data = SoftwareVersion.parse(version), bytes.fromhex(data)
+    codec = codec_for(type(message), version)
+    ends_with_text = codec.fields[-1].code == "s"
+    refused = 0
+    for end in range(5, len(data)):
+        package = P.encode_package(20, data[5:end])
+        try:
+            (short,) = read(package, version)
+        except RemoteProtocolError:
+            refused += 1
+        else:
+            assert ends_with_text
+            assert replace(short, **{codec.fields[-1].name: ""}) == replace(
+                message, **{codec.fields[-1].name: ""}
+            )
+    text = getattr(message, codec.fields[-1].name)
+    assert refused == len(data) - 5 - (len(text) if ends_with_text else 0)
+
+
+def test_unknown_messages_and_packages_come_out_as_they_are():
+    header = f"{NO_TIME_HEX} fd"
+    (message,) = read(P.encode_package(20, bytes.fromhex(f"{header} 0e 00112233")))
+    assert message == M.UnknownMessage(message_type=14, body=b"\x00\x11\x22\x33")
+    with pytest.raises(LocalProtocolError, match="UnknownMessage has no table"):
+        M.encode_message(message, V3_15)
+    # a 5.4 simulator's type 5 and type 25
+    data = bytes.fromhex(f"00000009 05 00000000 00000010 19 {NO_TIME_HEX} 01 0000")
+    assert read(data) == [
+        P.UnknownPackage(5, bytes(4)),
+        P.UnknownPackage(25, bytes.fromhex(f"{NO_TIME_HEX} 01 0000")),
+    ]
+
+
+def test_safety_tolerances_have_the_captured_size():
+    data = P.encode_safety_tolerances()
+    assert len(data) == 181
+    assert data[:13].hex() == "000000b5183fc3333333333333"
+    assert read(data) == [P.SafetyTolerances()] == read(data, step=1) == read(data + data[:9])
+    with pytest.raises(LocalProtocolError, match="22 numbers"):
+        P.encode_safety_tolerances(P.SafetyTolerances((1.0,)))
+
+
+@pytest.mark.parametrize(
+    ("message", "problem"),
+    [
+        (M.TextMessage(timestamp=-1), "timestamp -1"),
+        (M.TextMessage(source=200), "source 200"),
+        (M.KeyMessage(title="x" * 256), "title has 256 characters"),
+        (M.KeyMessage(code=2**31), "KeyMessage cannot be sent: code is 2147483648"),
+        (M.VersionMessage(major=256), "major is 256"),
+    ],
+)
+def test_values_that_do_not_fit_are_named(message, problem):
+    with pytest.raises(LocalProtocolError, match=problem):
+        M.encode_message(message, V3_15)
+
+
+# --- robot state ---
+
+TOTALS = [
+    ("3.0", 1247, 577), ("3.1", 1295, 625), ("3.3", 1306, 636), ("3.4.5", 1306, 636), ("3.5", 1350, 680),
+    ("3.9.1", 1350, 680), ("3.14.3", 1352, 682), ("3.15.8", 1352, 682), ("5.0.5", 1376, 706),
+    ("5.1", 1384, 714), ("5.3", 1384, 714), ("5.8", 1386, 716),
+]  # fmt: skip
+
+
+def distinct(record):
+    """A record whose every number differs from its neighbours; all exact in 32-bit floats."""
+    values, number = {}, 1
+    for field in wire_fields(record):
+        one = []
+        for _ in range(field.count):
+            number = number % 100 + 1
+            one.append(
+                number % 2 == 1 if field.code == "?" else number + 0.5 if field.code in "df" else number
+            )
+        values[field.name] = tuple(one) if field.count > 1 else one[0]
+    if "euromap67_installed" in values:
+        values["euromap67_installed"] = False
+    return record(**values)
+
+
+def as_sent(record, version):
+    """A record with defaults where a version does not send the field."""
+    present = ("euromap67_installed",) if getattr(record, "euromap67_installed", False) else ()
+    sent = {field.name for field in codec_for(type(record), version, present).fields}
+    absent = {field.name for field in fields(record)} - sent
+    defaults = type(record)()
+    return replace(record, **{name: getattr(defaults, name) for name in absent})
+
+
+@pytest.mark.parametrize(("version", "first", "later"), TOTALS)
+def test_state_totals_are_the_documented_ones(version, first, later):
+    version = SoftwareVersion.parse(version)
+    records = [record() for record in L.SUB_PACKAGES]
+    data = P.encode_state(records, version)
+    assert len(data) == first == P.state_size(version, first=True)
+    data = P.encode_state([record for record in records if not record.FIRST_STATE_ONLY], version)
+    assert len(data) == later == P.state_size(version, first=False)
+
+
+@pytest.mark.parametrize("version", [version for version, _, _ in TOTALS])
+def test_states_four_ways(version):
+    version = SoftwareVersion.parse(version)
+    records = [distinct(record) for record in P.state_types(version, first=True)]
+    data = P.encode_state(reversed(records), version)
+    state = P.RobotState(tuple(as_sent(record, version) for record in records))
+    assert read(data, version) == [state]
+    assert read(data, version, step=1) == [state]
+    assert read(data + data[:100], version) == [state]
+    assert [len(data)] == [int.from_bytes(data[:4], "big")]
+
+
+def test_order_and_sizes_on_the_wire_in_3_15():
+    data = P.encode_state([record() for record in L.SUB_PACKAGES], V3_15)
+    seen, position = [], 5
+    while position < len(data):
+        size, sub_type = struct.unpack_from(">iB", data, position)
+        seen.append((sub_type, size))
+        position += size
+    assert seen == [
+        (0, 47), (1, 251), (4, 101), (5, 225), (9, 53), (3, 75), (2, 37), (6, 445), (7, 61), (8, 9), (10, 43),
+    ]  # fmt: skip
+
+
+def test_robot_mode_data_byte_by_byte():
+    record = L.RobotModeData(
+        timestamp=6_242_520_000, is_real_robot_enabled=True, is_robot_power_on=True, is_program_running=True,
+        robot_mode=7, control_mode=0, target_speed_fraction=1.0, speed_scaling=0.5,
+    )  # fmt: skip
+    data = P.encode_sub_package(L.RobotModeData, record, V3_15)
+    assert data.hex(" ") == bytes.fromhex(
+        "0000002f 00 0000000174154bc0 01 01 01 00 00 01 00 07 00"
+        "3ff0000000000000 3fe0000000000000 3ff0000000000000 00"
+    ).hex(" ")
+    assert P.encode_sub_package(L.RobotModeData, replace(record, robot_mode=-1), V3_15)[20] == 0xFF
+    for minor, size in ((1, 38), (2, 46), (4, 46), (5, 47)):
+        assert len(P.encode_sub_package(L.RobotModeData, record, SoftwareVersion(3, minor))) == size
+
+
+# Sub-packages of a 5.8 simulator's first state.
+CAPTURED = [
+    (L.AdditionalInfo(freedrive_button_enabled=True), "00000009 08 00 01 00 01"),
+    (L.ToolCommunicationInfo(), "0000001a 0b 00 0001c200 00000000 00000001 3fc00000 40600000"),
+    (L.ToolModeInfo(), "00000008 0c 00 01 01"),
+    (
+        L.MasterboardData(
+            analog_output0=0.004000000189989805,
+            analog_output1=0.004000000189989805,
+            safety_checksum=0x57F4285B,
+        ),
+        "0000004b 03 00000000 00000000 01 01" + "00" * 18 + "3f70624de0000000" * 2
+        + "41c00000 42400000 00000000 00000000 01 00 00 57f4285b 01 01 01",
+    ),
+    (
+        L.SafetyData(safety_checksum=0x57F4285B, values=(0.0, 0.0, 0.0, 0.13)),
+        "0000002b 0a 57f4285b 01 01" + "00" * 24 + "3fc0a3d70a3d70a4",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("record", "data"), CAPTURED, ids=[type(record).__name__ for record, _ in CAPTURED])
+def test_captured_sub_packages(record, data):
+    data = bytes.fromhex(data)
+    assert P.encode_sub_package(type(record), record, SoftwareVersion(5, 8)) == data
+    assert P.decode_sub_package(data[4], data[5:]) == record
+
+
+def test_joints_stand_together_and_pairs_alternate():
+    joints = distinct(L.JointData)
+    data = P.encode_sub_package(L.JointData, joints, V3_15)
+    for k in range(6):
+        block = struct.unpack_from(">3d4fB", data, 5 + 41 * k)
+        assert block == tuple(getattr(joints, field.name)[k] for field in fields(joints))
+    configuration = distinct(L.ConfigurationData)
+    data = P.encode_sub_package(L.ConfigurationData, configuration, V3_15)
+    assert struct.unpack_from(">2d", data, 5 + 16 * 4) == (
+        configuration.joint_min_limit[4],
+        configuration.joint_max_limit[4],
+    )
+    assert struct.unpack_from(">2d", data, 101 + 16 * 5) == (
+        configuration.joint_max_speed[5],
+        configuration.joint_max_acceleration[5],
+    )
+    assert struct.unpack_from(">4i", data, 429) == (
+        configuration.masterboard_version,
+        configuration.controller_box_type,
+        configuration.robot_type,
+        configuration.robot_sub_type,
+    )
+
+
+@pytest.mark.parametrize(("version", "size"), [("3.1", 88), ("3.5", 90), ("3.15", 91)])
+def test_euromap_fields_are_there_only_with_the_board(version, size):
+    version = SoftwareVersion.parse(version)
+    record = replace(distinct(L.MasterboardData), euromap67_installed=True)
+    data = P.encode_sub_package(L.MasterboardData, record, version)
+    assert len(data) == size
+    assert data[67] == 1
+    assert struct.unpack_from(">II", data, 68) == (record.euromap67_input_bits, record.euromap67_output_bits)
+    assert P.decode_sub_package(3, data[5:]) == as_sent(record, version)
+
+
+def test_records_may_be_mappings_or_any_object():
+    record = distinct(L.CartesianInfo)
+    expected = P.encode_sub_package(L.CartesianInfo, record, V3_15)
+    assert P.encode_sub_package(L.CartesianInfo, asdict(record), V3_15) == expected
+    assert P.encode_sub_package(L.CartesianInfo, SimpleNamespace(**asdict(record)), V3_15) == expected
+    board = asdict(distinct(L.MasterboardData))
+    assert len(P.encode_sub_package(L.MasterboardData, board, V3_15)) == 75
+    with pytest.raises(LocalProtocolError, match=r"CartesianInfo needs the field .*tcp_offset"):
+        P.encode_sub_package(L.CartesianInfo, {"tcp_pose": (0.0,) * 6}, V3_15)
+    with pytest.raises(LocalProtocolError, match="tcp_pose has 5 values instead of 6"):
+        P.encode_sub_package(L.CartesianInfo, replace(record, tcp_pose=(0.0,) * 5), V3_15)
+
+
+def test_a_reader_skips_what_newer_software_appends():
+    record = distinct(L.ConfigurationData)
+    data = P.encode_sub_package(L.ConfigurationData, record, V3_15)
+    assert P.decode_sub_package(6, data[5:] + b"\x00\x01\x00\x02") == record
+    body = P.encode_package(13, b"\x01\x02") + P.encode_sub_package(L.ForceModeData, L.ForceModeData(), V3_15)
+    (state,) = read(P.encode_package(16, body))
+    assert state.sub_packages == (P.UnknownSubPackage(13, b"\x01\x02"), L.ForceModeData())
+    assert state.find(L.ForceModeData) == L.ForceModeData()
+    assert state.find(L.JointData) is None
+
+
+@pytest.mark.parametrize(
+    ("body", "problem"),
+    [
+        ("0000002f 00", "says 47 bytes, 5 are left"),
+        ("00000004 00 00", "says 4 bytes"),
+        ("ffffffff 00 00", "says -1 bytes"),
+        ("00", "1 are left"),
+        ("00000006 0c 00", "ToolModeInfo needs 3 bytes or more, these are 1"),
+    ],
+)
+def test_states_that_do_not_add_up_are_refused(body, problem):
+    with pytest.raises(RemoteProtocolError, match=problem):
+        read(P.encode_package(16, bytes.fromhex(body)))
+
+
+def test_a_state_takes_each_sub_package_once():
+    with pytest.raises(LocalProtocolError, match="ToolData is unknown or repeated"):
+        P.encode_state([L.ToolData(), L.ToolData()], V3_15)
+    with pytest.raises(LocalProtocolError, match="SubPackage is unknown"):
+        P.encode_state([L.SubPackage()], V3_15)
+
+
+def test_software_before_3_0_has_no_table():
+    old = SoftwareVersion(1, 8)
+    assert P.state_types(old, first=True) == ()
+    with pytest.raises(LocalProtocolError, match=r"1\.8\.0: use 3\.0\.0 or later"):
+        P.encode_state([L.ToolData()], old)
+    with pytest.raises(LocalProtocolError, match=r"1\.8\.0 had other layouts"):
+        M.encode_message(M.TextMessage(text="x"), old)
+    data = P.encode_message_package(M.TextMessage(text="x"), V3_15)
+    assert read(data, old) == [M.TextMessage(text="x")]  # a reader makes the best of it

@@ -1,0 +1,226 @@
+"""Where programs end on a script port: the manual's rule, the field's exceptions, garbage, bounds."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocol.controller_words import CONTROLLER_WORDS
+from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptChannel
+
+NESTED = """\
+def outer():
+  # if this counted, end would not close
+  $ 1 "if while" "noBreak"
+  def inner(a, b):
+    if a == "if end def":
+      return b
+    elif a == 2:
+      return 3
+    else:
+      while (True): sync() end
+    end
+  end
+  thread t():
+    textmsg("# no comment, if")   # end
+  end
+  end_teach_mode()
+  if_not = 1 p_end = 2
+end
+"""
+
+# python-urx's blended moves: body in column 1; ur_modern_driver indents with tabs
+URX = """\
+def movexs():
+movel(p[0,0,0,0,0,0], a=0.1, v=0.1, r=0.02)
+movel(p[0,0,0.1,0,0,0], a=0.1, v=0.1, r=0)
+end
+"""
+UMD = "def driverProg():\n\tMSTOP = 0\n\tdef set(q):\n\t\tenter_critical\n\tend\n\tsync()\nend\n"
+
+# ur_rtde splices register offsets in after a newline: a value in column 1, then the next statement
+URRTDE = """\
+def rtde_control():
+global reg_offset_float = # float register offset
+0    global reg_offset_int = # "int" register offset
+
+0    global force_mode_type = 2
+# a comment in column 1: def if while
+  while (True):
+    if (a == 1):  # if
+    elif (b == 2):
+    end
+    sync()
+  end
+end
+"""
+
+CASES = [
+    ("nested blocks", NESTED, [ProgramText(NESTED, "outer", "def")]),
+    ("unindented body", URX, [ProgramText(URX, "movexs", "def")]),
+    ("tabs", UMD, [ProgramText(UMD, "driverProg", "def")]),
+    ("spliced lines", URRTDE, [ProgramText(URRTDE, "rtde_control", "def")]),
+    ("secondary", "sec setOut():\n\tset_flag(1, True)\nend\n",
+     [ProgramText("sec setOut():\n\tset_flag(1, True)\nend\n", "setOut", "sec")]),
+    ("one line", "def a(): sync() end\n", [ProgramText("def a(): sync() end\n", "a", "def")]),
+    ("CRLF", "def a():\r\n  sync()\r\nend\r\n", [ProgramText("def a():\n  sync()\nend\n", "a", "def")]),
+    ("indented as a whole", "  def a():\n    b()\n  end\n",
+     [ProgramText("  def a():\n    b()\n  end\n", "a", "def")]),
+    ("no name", "def :\nend\n", [ProgramText("def :\nend\n", "", "def")]),
+    ("text after the end is the compiler's", "def a(): end end\n",
+     [ProgramText("def a(): end end\n", "a", "def")]),
+    ("unclosed string stays on its line", 'def a():\n  textmsg("if)\nend\n',
+     [ProgramText('def a():\n  textmsg("if)\nend\n', "a", "def")]),
+    ("statements", "movej([0,0,0,0,0,0])\n digital_out[2]=True # f(x)\nhalt\n",
+     [ProgramText("movej([0,0,0,0,0,0])\n", "movej", "statement"),
+      ProgramText(" digital_out[2]=True # f(x)\n", "digital_out", "statement"),
+      ProgramText("halt\n", "halt", "statement")]),
+    ("called function's name", "x = get_actual_tcp_pose ()\n",
+     [ProgramText("x = get_actual_tcp_pose ()\n", "get_actual_tcp_pose", "statement")]),
+    ("names that begin like keywords", "define(1)\nsection = 2\n",
+     [ProgramText("define(1)\n", "define", "statement"),
+      ProgramText("section = 2\n", "section", "statement")]),
+    ("nothing", "\n   \n# comment\n  # if\n$ 3 \"label\"\n\r\n", []),
+    ("garbage is a statement for the compiler", "\x00\xff\xfe)(\n",
+     [ProgramText("\x00\xff\xfe)(\n", "", "statement")]),
+    ("two programs in one", URX + "stopj(2)\n" + UMD,
+     [ProgramText(URX, "movexs", "def"), ProgramText("stopj(2)\n", "stopj", "statement"),
+      ProgramText(UMD, "driverProg", "def")]),
+    ("call after the program", "def a():\n b()\nend\na()\n",
+     [ProgramText("def a():\n b()\nend\n", "a", "def"), ProgramText("a()\n", "a", "statement")]),
+    ("a new def ends a program that never closes", "def a():\n  if x:\n    b()\nend\ndef c():\nend\n",
+     [ProgramText("def a():\n  if x:\n    b()\nend\n", "a", "def"),
+      ProgramText("def c():\nend\n", "c", "def")]),
+    ("so does a controller word", "def a():\n  if x:\nend\nstop program\nsync()\n",
+     [ProgramText("def a():\n  if x:\nend\n", "a", "def"), ControlLine("stop program", "stop program", ""),
+      ProgramText("sync()\n", "sync", "statement")]),
+    ("controller words", "power on\nset  speed\t0.5\r\n power off \nset robotmode run\n",
+     [ControlLine("power on", "power on", ""), ControlLine("set speed 0.5", "set speed", "0.5"),
+      ControlLine("power off", "power off", ""), ControlLine("set robotmode run", "set robotmode run", "")]),
+    ("not quite controller words", "set speed\nset speed fast\npower on 1\nPower on\nset speed 1 2\n",
+     [ProgramText("set speed\n", "set", "statement"), ProgramText("set speed fast\n", "set", "statement"),
+      ProgramText("power on 1\n", "power", "statement"), ProgramText("Power on\n", "Power", "statement"),
+      ProgramText("set speed 1 2\n", "set", "statement")]),
+]  # fmt: skip
+
+
+def split(channel, data, size):
+    items = []
+    for start in range(0, len(data), size):
+        items += channel.feed(data[start : start + size])
+    return items
+
+
+@pytest.mark.parametrize("size", [1, 7, 1 << 20], ids=["bytewise", "by 7", "whole"])
+@pytest.mark.parametrize(("text", "items"), [case[1:] for case in CASES], ids=[case[0] for case in CASES])
+def test_cases(text, items, size):
+    channel = ScriptChannel()
+    assert split(channel, text.encode("latin-1"), size) == items
+    assert channel.pending == 0
+
+
+@pytest.mark.parametrize(("text", "items"), [case[1:] for case in CASES], ids=[case[0] for case in CASES])
+def test_cases_followed_by_half_a_program(text, items):
+    channel = ScriptChannel()
+    rest = b"def late():\n  sync()\nen"
+    assert channel.feed(text.encode("latin-1") + rest) == items
+    assert channel.pending == len(rest)
+    assert channel.feed(b"d\n") == [ProgramText("def late():\n  sync()\nend\n", "late", "def")]
+
+
+def test_without_the_last_newline_nothing_runs():
+    channel = ScriptChannel()
+    assert channel.feed(b"movej([0,0,0,0,0,0])") == []
+    assert channel.feed(b"def a():\n end") == [
+        ProgramText("movej([0,0,0,0,0,0])def a():\n", "movej", "statement")
+    ]
+
+
+def test_every_word_of_the_table_is_recognised():
+    for word in CONTROLLER_WORDS:
+        line = f"{word.text} 0.25" if word.takes_number else word.text
+        (item,) = ScriptChannel().feed(line.encode() + b"\n")
+        assert item == ControlLine(line, word.text, "0.25" if word.takes_number else "")
+
+
+PIECES = st.sampled_from(
+    [b"def a():\n", b"sec b():\n", b"end\n", b" if x: ", b"end", b"\n", b"while y:\n", b"stop program\n",
+     b'"', b"#", b"$", b" ", b"\r\n", b"\xff\x00", b"x" * 30, b"set speed .5\n", b"thread t():\n"]
+)  # fmt: skip
+
+
+@given(
+    st.lists(st.one_of(PIECES, st.binary(max_size=20)), max_size=40), st.lists(st.integers(1, 40), min_size=1)
+)
+def test_the_split_does_not_matter_and_nothing_raises(pieces, cuts):
+    data = b"".join(pieces)
+    whole = ScriptChannel(max_line=50, max_program=120)
+    expected = whole.feed(data)
+    pieced = ScriptChannel(max_line=50, max_program=120)
+    items, position, k = [], 0, 0
+    while position < len(data):
+        step = cuts[k % len(cuts)]
+        items += pieced.feed(data[position : position + step])
+        position, k = position + step, k + 1
+    assert items == expected
+    assert pieced.pending == whole.pending <= 50 + 120
+
+
+@given(st.lists(st.one_of(PIECES, st.binary(max_size=20)), max_size=40))
+def test_whatever_came_before_a_control_word_is_heard_and_the_next_program_runs(pieces):
+    channel = ScriptChannel(max_line=50, max_program=120)
+    channel.feed(b"".join(pieces) + b"\n")
+    assert channel.feed(b"stop program\n")[-1] == ControlLine("stop program", "stop program", "")
+    assert channel.feed(b"def a():\nend\n") == [ProgramText("def a():\nend\n", "a", "def")]
+
+
+@pytest.mark.parametrize("size", [1, 13, 1 << 20])
+def test_a_line_that_is_too_long_is_dropped_and_said_once(size):
+    channel = ScriptChannel(max_line=100)
+    data = b"a" * 1000 + b"\nsync()\n" + b"b" * 100 + b"\n"
+    items = split(channel, data, size)
+    assert items == [
+        Overflow("line", 100),
+        ProgramText("sync()\n", "sync", "statement"),
+        ProgramText("b" * 100 + "\n", "b" * 100, "statement"),
+    ]
+
+
+@pytest.mark.parametrize("size", [1, 13, 1 << 20])
+def test_the_body_of_a_dropped_program_does_not_run_line_by_line(size):
+    channel = ScriptChannel(max_line=100)
+    body = (
+        b"def a():\n  movej(q1)\n  x = [" + b"1," * 100 + b"]\nmovej(q2)\n  if x:\n  end\nend_teach_mode()\n"
+    )
+    assert split(channel, body + b"end\nsync()\n", size) == [
+        Overflow("line", 100),
+        ProgramText("sync()\n", "sync", "statement"),
+    ]
+    # if its end never comes, the next program still does
+    assert split(channel, body + b"def b():\nend\n", size) == [
+        Overflow("line", 100),
+        ProgramText("def b():\nend\n", "b", "def"),
+    ]
+
+
+def test_a_program_that_is_too_long_is_dropped():
+    channel = ScriptChannel(max_program=1000)
+    items = channel.feed(b"def a():\n" + b"  movej(q)\n" * 1000)
+    assert items == [Overflow("program", 1000)]
+    assert channel.pending == 0
+    assert channel.feed(b"end\nsync()\n") == [ProgramText("sync()\n", "sync", "statement")]
+
+
+@pytest.mark.parametrize("unit", [b"a", b"a(", b'"', b"#", b" ", b"if ", b"\x80", b"def ", b"1a"])
+def test_megabytes_without_a_newline_are_bounded_and_cheap(unit):
+    # quadratic scanning would need hours here; pytest's timeout is the judge
+    channel = ScriptChannel()
+    data = unit * (3_000_000 // len(unit))
+    items = split(channel, data, 4096)
+    assert items == [Overflow("line", 1 << 20)]
+    assert channel.pending == 0
+    line = unit * ((1 << 20) // len(unit) - 1)
+    (item,) = ScriptChannel().feed(b"x=" + line[:-2] + b"\n")
+    assert isinstance(item, ProgramText)
+    assert channel.feed(b"\nsync()\n") == [ProgramText("sync()\n", "sync", "statement")]

@@ -1,0 +1,85 @@
+"""Numbers and names that both ends share."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from protocol.errors import LocalProtocolError, ProtocolError, RemoteProtocolError
+from protocol.ur_types import (
+    JOINT_NAMES,
+    JointMode,
+    Ports,
+    ProgramState,
+    RobotMode,
+    RobotType,
+    SafetyMode,
+    SafetyStatus,
+    SoftwareVersion,
+    parse_serial,
+    simulated_serial,
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "version", "again"),
+    [("3.15", (3, 15, 0, 0), "3.15.0"), ("3.15.8", (3, 15, 8, 0), "3.15.8"),
+     (" 5.12.0.1101319\n", (5, 12, 0, 1101319), "5.12.0.1101319")],
+)  # fmt: skip
+def test_versions_are_read_and_written(text, version, again):
+    assert SoftwareVersion.parse(text) == version
+    assert str(SoftwareVersion.parse(text)) == again
+
+
+@pytest.mark.parametrize("text", ["", "3", "3.x", "3.15.8.1.2", "-3.15", "3..15", "³.15", "3. 15"])
+def test_other_texts_are_no_versions(text):
+    with pytest.raises(LocalProtocolError, match=r"3\.15\.8"):
+        SoftwareVersion.parse(text)
+
+
+def test_versions_compare_by_number():
+    assert SoftwareVersion(3, 9) < SoftwareVersion(3, 10) < SoftwareVersion(3, 10, 1) < SoftwareVersion(5, 0)
+
+
+def test_ports_move_together():
+    standard = dataclasses.asdict(Ports())
+    assert standard == dataclasses.asdict(Ports.standard())
+    moved = dataclasses.asdict(Ports.standard(1000))
+    assert {name: port - 1000 for name, port in moved.items()} == standard
+    for offset in (35523, -29999):
+        with pytest.raises(LocalProtocolError, match="-29998 to 35522"):
+            Ports.standard(offset)
+    assert Ports.standard(35522).realtime_ro == 65535
+    assert Ports.standard(-29998).dashboard == 1
+
+
+def test_simulated_serials_say_so_and_carry_the_seed():
+    assert simulated_serial(RobotType.UR3, 7) == "20993000007"
+    assert parse_serial("20993000007\n") == ("20993000007", True, 7)
+    assert parse_serial(simulated_serial(3, 12_345_678)).seed == 345_678
+    assert parse_serial("20175599999") == ("20175599999", False, None)
+    assert not parse_serial("209930000070").simulated
+    with pytest.raises(LocalProtocolError, match="1 to 9"):
+        simulated_serial(10, 0)
+    with pytest.raises(RemoteProtocolError, match="digits"):
+        parse_serial("2017-1")
+
+
+def test_numbers_of_the_documents():
+    assert (RobotMode.NO_CONTROLLER, RobotMode.POWER_OFF, RobotMode.IDLE, RobotMode.RUNNING) == (-1, 3, 5, 7)
+    assert (JointMode.POWER_OFF, JointMode.BOOTING, JointMode.RUNNING, JointMode.IDLE) == (239, 247, 253, 255)
+    assert (SafetyMode.NORMAL, SafetyMode.PROTECTIVE_STOP, SafetyMode.FAULT) == (1, 3, 9)
+    assert (ProgramState.STOPPED, ProgramState.PLAYING, ProgramState.PAUSED) == (1, 2, 4)
+    assert len(JOINT_NAMES) == 6
+
+
+def test_safety_status_begins_as_safety_mode():
+    assert [(mode.name, mode.value) for mode in SafetyMode] == [
+        (status.name, status.value) for status in SafetyStatus
+    ][: len(SafetyMode)]
+
+
+def test_errors_have_one_root():
+    assert issubclass(LocalProtocolError, ProtocolError)
+    assert issubclass(RemoteProtocolError, ProtocolError)

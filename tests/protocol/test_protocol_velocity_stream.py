@@ -1,0 +1,68 @@
+"""The reverse channel: golden bytes, round trip, and refusal of what must never reach an arm."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocol import velocity_stream as V
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+
+
+def test_golden_message():
+    data = V.encode_velocity(V.VelocityMode.VELOCITY, (0.1, -0.1, 0.0, 1e-6, 3.141593, -2.0))
+    assert data.hex(" ", 4) == "00000001 000186a0 fffe7960 00000000 00000001 002fefd9 ffe17b80"
+
+
+@given(st.sampled_from(V.VelocityMode), st.lists(st.floats(-2147.0, 2147.0), min_size=6, max_size=6))
+def test_round_trip_within_half_a_step(mode, qd):
+    data = V.encode_velocity(mode, qd)
+    assert len(data) == V.COMMAND_SIZE == 28
+    command = V.decode_velocity(data)
+    assert command.mode is mode
+    assert command.qd == pytest.approx(qd, abs=0.5000001e-6)
+
+
+def test_arrays_give_the_same_bytes():
+    qd = [0.1, 0.2, 0.3, -0.4, 0.5, 1e-7]
+    assert V.encode_velocity(V.VelocityMode.VELOCITY, np.array(qd)) == V.encode_velocity(
+        V.VelocityMode.VELOCITY, qd
+    )
+
+
+def test_stop_and_hold_need_no_velocities():
+    assert V.encode_velocity(V.VelocityMode.STOP_PROGRAM) == bytes(28)
+    assert V.decode_velocity(V.encode_velocity(V.VelocityMode.HOLD)) == (V.VelocityMode.HOLD, (0.0,) * 6)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 2147.5, -1e300, "x", None])
+@pytest.mark.parametrize("place", [0, 5])
+def test_values_that_do_not_fit_are_refused(bad, place):
+    qd = [0.0] * 6
+    qd[place] = bad
+    with pytest.raises(LocalProtocolError, match="six finite numbers"):
+        V.encode_velocity(V.VelocityMode.VELOCITY, qd)
+
+
+@pytest.mark.parametrize("count", [0, 5, 7])
+def test_other_counts_are_refused(count):
+    with pytest.raises(LocalProtocolError, match="six finite numbers"):
+        V.encode_velocity(V.VelocityMode.VELOCITY, np.zeros(count))
+
+
+@pytest.mark.parametrize("data", [b"", bytes(27), bytes(29), b"\0\0\0\x03" + bytes(24), b"\xff" * 28])
+def test_a_receiver_refuses_other_messages(data):
+    with pytest.raises(RemoteProtocolError, match=r"28 bytes|mode word"):
+        V.decode_velocity(data)
+
+
+def test_hello():
+    assert V.encode_hello() == b"\0\0\0\x01"
+    V.decode_hello(V.encode_hello())
+    for data in (b"", b"\0\0\0\x02", b"GET / HTTP"):
+        with pytest.raises(RemoteProtocolError, match="instead of hello"):
+            V.decode_hello(data)
