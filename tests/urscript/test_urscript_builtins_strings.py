@@ -85,20 +85,20 @@ def test_examples(name: str, args: tuple[Any, ...], result: object) -> None:
         (
             "to_str",
             (None,),
-            "to_str: operand must be a string, bool, int, float or pose, or a list of bools, ints, floats or "
-            "poses, got a none",
+            "to_str: operand must be a string, bool, int, float or pose, or a list of bools, ints, "
+            "floats or poses, got a none",
         ),
         (
             "str_cat",
             ("", ["a"]),
-            "str_cat: operand must be a string, bool, int, float or pose, or a list of bools, ints, floats or "
-            "poses, got a list with a string in it",
+            "str_cat: operand must be a string, bool, int, float or pose, or a list of bools, ints, "
+            "floats or poses, got a list with a string in it",
         ),
         (
             "str_cat",
             (Matrix([[1]]), ""),
-            "str_cat: operand must be a string, bool, int, float or pose, or a list of bools, ints, floats or "
-            "poses, got a matrix",
+            "str_cat: operand must be a string, bool, int, float or pose, or a list of bools, ints, "
+            "floats or poses, got a matrix",
         ),
     ],
 )
