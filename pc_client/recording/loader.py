@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
@@ -37,6 +38,7 @@ from pc_client.recording.provenance import Provenance
 
 _RECORD_HEAD = struct.Struct("<BQ")
 _CHANNEL_ID = struct.Struct("<H")
+_CRC = struct.Struct("<I")
 _CDR_HEAD_BYTES = 4
 
 
@@ -109,7 +111,10 @@ def load_recording(path: Path | str) -> Recording:
     damage = scan.read(data)
     if PROVENANCE_RECORD not in scan.metadata or not scan.topics:
         raise RecordingError(f"{path} holds no recording of this package{': ' + damage if damage else ''}")
-    summary = {key: json.loads(text) for key, text in scan.metadata.get(SUMMARY_RECORD, {}).items()}
+    try:
+        summary = {key: json.loads(text) for key, text in scan.metadata.get(SUMMARY_RECORD, {}).items()}
+    except ValueError as error:
+        summary, damage = {}, damage or f"damaged: the summary cannot be read ({error})"
     return Recording(
         path=path,
         provenance=Provenance.from_metadata(scan.metadata[PROVENANCE_RECORD]),
@@ -128,31 +133,38 @@ class _Scan:
         self.schemas: dict[int, Schema] = {}
         self.topics: dict[int, Topic] = {}
         self.metadata: dict[str, dict[str, str]] = {}
+        self.row_bytes: dict[int, int] = {}
         self.bodies: dict[int, list[bytes]] = {}
 
     def read(self, data: bytes) -> str:
         """Take in all whole records; return what is missing or damaged, "" when nothing is."""
         position = len(MAGIC)
+        in_rows = True  # behind DataEnd there is only the index, which repeats what is known
+        damage = ""
         while position + _RECORD_HEAD.size <= len(data):
             opcode, length = _RECORD_HEAD.unpack_from(data, position)
             start = position + _RECORD_HEAD.size
             end = start + length
-            if end > len(data):
-                if opcode == Opcode.CHUNK:
-                    # Only the rows stand behind a chunk's head, and they are not compressed.
-                    self._take_messages(data[position + CHUNK_HEAD_BYTES :])
-                return f"cut off inside a record at byte {position} of {len(data)}"
             try:
-                self._take(opcode, data[start:end])
+                if end > len(data):
+                    if in_rows and opcode == Opcode.CHUNK:
+                        # Only the rows stand behind a chunk's head, and they are not compressed.
+                        self._take_messages(data[position + CHUNK_HEAD_BYTES :])
+                    return f"cut off inside a record at byte {position} of {len(data)}"
+                if opcode == Opcode.DATA_END:
+                    in_rows = False
+                    if _CRC.unpack_from(data, start)[0] not in (0, crc32(data[:position])):
+                        damage = "damaged: the checksum over all records is wrong"
+                elif in_rows:
+                    self._take(opcode, data[start:end])
             except CRCValidationError:
                 return f"damaged: checksum of the chunk at byte {position} is wrong"
             except (McapError, ValueError, struct.error) as error:
                 return f"damaged: record at byte {position} cannot be read ({error})"
             position = end
             if opcode == Opcode.FOOTER:
-                return (
-                    "" if data[position : position + len(MAGIC)] == MAGIC else "cut off inside the end mark"
-                )
+                whole = not in_rows and data[position : position + len(MAGIC)] == MAGIC
+                return damage if whole else "cut off inside the end mark"
         return f"cut off at byte {len(data)}: the end mark is missing"
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
@@ -173,10 +185,13 @@ class _Scan:
             self.schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
             channel = Channel.read(stream)
+            if channel.schema_id not in self.schemas:
+                raise ValueError(f"topic {channel.topic} names the unknown schema {channel.schema_id}")
             schema = self.schemas[channel.schema_id]
             self.topics[channel.id] = Topic(
                 channel.topic, schema.name, parse_schema_text(schema.data.decode())
             )
+            self.row_bytes[channel.id] = self.topics[channel.id].body_dtype.itemsize
             self.bodies.setdefault(channel.id, [])
         elif opcode == Opcode.METADATA:
             metadata = Metadata.read(stream)
@@ -203,4 +218,7 @@ class _Scan:
         (channel,) = _CHANNEL_ID.unpack_from(body)
         if channel not in self.bodies:
             raise ValueError(f"a message names the unknown channel {channel}")
-        self.bodies[channel].append(body[MESSAGE_HEAD_BYTES + _CDR_HEAD_BYTES :])
+        row = body[MESSAGE_HEAD_BYTES + _CDR_HEAD_BYTES :]
+        if len(row) != self.row_bytes[channel]:
+            raise ValueError(f"a message has {len(row)} bytes, its topic needs {self.row_bytes[channel]}")
+        self.bodies[channel].append(row)

@@ -140,6 +140,7 @@ def encode_chunk(layout: RowLayout, rows: NDArray[np.void], first_row: int) -> C
 def encode_tail(
     layout: RowLayout,
     position: int,
+    crc: int,
     summary: Mapping[str, str],
     provenance_index: MetadataIndex,
     chunks: Sequence[tuple[ChunkIndex, int]],
@@ -149,14 +150,16 @@ def encode_tail(
     Args:
         layout: layout of the rows.
         position: where in the file the tail will stand.
+        crc: CRC-32 of all bytes before it.
         summary: texts of the summary record.
         provenance_index: from `encode_head`.
         chunks: index and number of rows of every chunk in the file.
     """
     builder = RecordBuilder()
     summary_index = _write_metadata(builder, position, SUMMARY_RECORD, summary)
-    DataEnd(data_section_crc=0).write(builder)
-    data_end = builder.end()
+    summary_record = builder.end()
+    DataEnd(data_section_crc=zlib.crc32(summary_record, crc)).write(builder)
+    data_end = summary_record + builder.end()
 
     n_rows = sum(n for _, n in chunks)
     statistics = Statistics(

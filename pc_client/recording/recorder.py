@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
+from zlib import crc32
 
 import numpy as np
 from mcap.records import ChunkIndex
@@ -100,6 +101,7 @@ class Recorder:
 
         head, self._provenance_index = encode_head(self._layout, provenance.to_metadata())
         self._position = 0  # end of the last record that is wholly in the file
+        self._crc = 0  # of everything up to there
         self._partial = 0  # bytes behind it, of a write that failed half-way
         try:
             self._file = opener(self.path)
@@ -168,7 +170,9 @@ class Recorder:
                 del self._held[0]
         if not self._held:
             texts = {key: json.dumps(value) for key, value in (summary or {}).items()}
-            tail = encode_tail(self._layout, self._position, texts, self._provenance_index, self._chunks)
+            tail = encode_tail(
+                self._layout, self._position, self._crc, texts, self._provenance_index, self._chunks
+            )
             self._write(tail)
         try:
             self._file.close()
@@ -242,6 +246,7 @@ class Recorder:
             self._latch(error)
             return False
         self._position += done
+        self._crc = crc32(data, self._crc)
         return True
 
     def _rewind(self) -> bool:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from recording_samples import SIGNALS, append_rows, provenance
 
 from pc_client.errors import RecordingError
@@ -113,6 +115,33 @@ def test_a_flipped_bit_ends_the_reading_there(tmp_path: Path, whole: bytes) -> N
     assert recording.n_rows == ROWS_PER_CHUNK
     assert "checksum" in recording.damage
     assert is_prefix(recording)
+
+
+def test_a_changed_provenance_is_noticed(tmp_path: Path, whole: bytes) -> None:
+    assert whole.count(b"20993000007") == 1
+    recording = load_bytes(tmp_path, whole.replace(b"20993000007", b"20993000008"))
+    assert not recording.complete
+    assert "checksum over all records" in recording.damage
+
+
+@given(st.lists(st.tuples(st.integers(0, 20_000), st.integers(0, 255)), min_size=1, max_size=4))
+@settings(max_examples=150, deadline=None)
+def test_no_damage_makes_the_loader_fail_otherwise(
+    tmp_path_factory: pytest.TempPathFactory, changes: list[tuple[int, int]]
+) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    with Recorder(folder / "small.mcap", provenance(), SIGNALS) as recorder:
+        append_rows(recorder, 30)
+    original = (folder / "small.mcap").read_bytes()
+    data = bytearray(original)
+    for position, value in changes:
+        data[position % len(data)] = value
+    try:
+        recording = load_bytes(folder, bytes(data))
+    except RecordingError:
+        return
+    data_end = original.index(b"\x0f\x04" + bytes(7))  # behind it only the index follows, which is not read
+    assert not recording.complete or data[:data_end] == original[:data_end]
 
 
 @pytest.mark.parametrize("data", [b"", b"hello", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" + bytes(100)])
