@@ -32,6 +32,7 @@ class Errors:
         rms_joint_error_mrad: (6,) its root mean square.
         peak_speed_mm_s: top TCP speed of the reference.
         duration_s: length of the movement phase.
+        noise_floor_mm_s: root mean square of the differenced position at rest, one axis; None without rest.
     """
 
     max_position_error_mm: float
@@ -43,6 +44,7 @@ class Errors:
     rms_joint_error_mrad: tuple[float, ...]
     peak_speed_mm_s: float
     duration_s: float
+    noise_floor_mm_s: float | None
 
 
 def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Errors:
@@ -61,6 +63,7 @@ def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Error
     path_distance = 1e3 * np.linalg.norm(path_error - offset, axis=1)
     joint_error = 1e3 * joint_errors(recording, track)[moving]
     ref_speed = np.linalg.norm(velocity(track.t, track.p_ref), axis=1)[track.movement_steps]
+    noise = rest_noise(recording, track)
     x, y, z = (float(v) for v in 1e3 * offset)
     return Errors(
         max_position_error_mm=float(distance.max()),
@@ -72,6 +75,7 @@ def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Error
         rms_joint_error_mrad=tuple(_rms(column) for column in joint_error.T),
         peak_speed_mm_s=float(1e3 * ref_speed.max()),
         duration_s=track.t_end - track.t_start,
+        noise_floor_mm_s=None if noise is None else float(1e3 * np.sqrt(np.trace(noise) / 3.0)),
     )
 
 

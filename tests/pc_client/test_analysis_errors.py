@@ -49,6 +49,7 @@ def test_noise_at_rest(tmp_path: Path) -> None:
     covariance = rest_noise(run.recording, run.track)
     assert covariance is not None
     expected = 2.0 * sigma**2 / PERIOD**2
+    assert run.errors.noise_floor_mm_s == pytest.approx(1e3 * math.sqrt(expected), rel=0.05)
     assert np.trace(covariance) / 3.0 == pytest.approx(expected, rel=0.1)
 
 
