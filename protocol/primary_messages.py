@@ -20,7 +20,8 @@ from typing import ClassVar
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.primary_layout import NO_TIME
 from protocol.ur_types import SafetyMode, SoftwareVersion
-from protocol.wire_record import OLDEST, codec_for, since, wire
+from protocol.wire_codec import codec_for
+from protocol.wire_record import OLDEST, since, wire
 
 __all__ = [
     "MESSAGES",

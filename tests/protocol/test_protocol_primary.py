@@ -14,7 +14,8 @@ from protocol import primary_packages as P
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
 from protocol.ur_types import SoftwareVersion
-from protocol.wire_record import codec_for, wire_fields
+from protocol.wire_codec import codec_for
+from protocol.wire_record import wire_fields
 
 V3_15 = SoftwareVersion(3, 15, 8)
 NO_TIME_HEX = "ff" * 8

@@ -1,0 +1,189 @@
+"""The robot state (package type 16): sub-packages to bytes and back.
+
+    state body  = sub-package*
+    sub-package = i32 size, itself included | u8 sub-type | fields
+
+A writer goes by the software version. A reader goes by sizes, as the vendor tells clients to: an unknown
+sub-package comes out as it is, surplus bytes at the end of a known one are skipped.
+
+Source: UR "Primary/Secondary Client Interface" (2021); order and sizes from captures of 3.3 to 5.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, TypeVar
+
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.primary_framing import HEADER, PackageType, encode_package
+from protocol.primary_layout import SUB_PACKAGES, SubPackage
+from protocol.ur_types import SoftwareVersion
+from protocol.wire_codec import Codec, codec_for
+from protocol.wire_record import OLDEST, wire_fields
+
+__all__ = [
+    "RobotState",
+    "UnknownSubPackage",
+    "decode_state",
+    "decode_sub_package",
+    "encode_state",
+    "encode_sub_package",
+    "state_size",
+    "state_types",
+]
+
+S = TypeVar("S", bound=SubPackage)
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownSubPackage:
+    """A part of a state that has no table here; `body` follows its five-byte header."""
+
+    sub_type: int
+    body: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """One decoded state; `sub_packages` in the order of the wire."""
+
+    sub_packages: tuple[SubPackage | UnknownSubPackage, ...]
+
+    def find(self, record: type[S]) -> S | None:
+        """The sub-package of a type, or None: `state.find(RobotModeData)`."""
+        for sub_package in self.sub_packages:
+            if isinstance(sub_package, record):
+                return sub_package
+        return None
+
+
+def encode_sub_package(record: type[SubPackage], source: Any, version: SoftwareVersion) -> bytes:
+    """One sub-package, header included, as software `version` sends it.
+
+    Args:
+        record: the sub-package's class, which is its table.
+        source: an instance of it, or any object or mapping with fields of these names.
+        version: software of the controller.
+
+    Raises:
+        LocalProtocolError: a field is missing or its value does not fit its type.
+    """
+    present = tuple(
+        condition
+        for condition in _CONDITIONS[record]
+        if (source[condition] if isinstance(source, Mapping) else getattr(source, condition))
+    )
+    return encode_package(record.SUB_TYPE, codec_for(record, version, present).encode(source))
+
+
+def encode_state(records: Iterable[SubPackage], version: SoftwareVersion) -> bytes:
+    """A whole robot state package.
+
+    Records may come in any order; those that software `version` does not have are left out. For the
+    sub-packages that belong into a state see `state_types`.
+
+    Raises:
+        LocalProtocolError: two records of one type, a record without table, a value that does not fit, or
+            software before 3.0.
+    """
+    if version < OLDEST:
+        raise LocalProtocolError(f"no table for the robot state of software {version}: use {OLDEST} or later")
+    given = {}
+    for record in records:
+        if type(record) in given or type(record) not in _ORDER:
+            raise LocalProtocolError(
+                f"a state takes every known sub-package once: {type(record).__name__} is unknown or repeated"
+            )
+        given[type(record)] = record
+    return encode_package(
+        PackageType.ROBOT_STATE,
+        b"".join(
+            encode_sub_package(record, given[record], version)
+            for record in SUB_PACKAGES
+            if record in given and record.SINCE.covers(version)
+        ),
+    )
+
+
+def state_types(version: SoftwareVersion, *, first: bool) -> tuple[type[SubPackage], ...]:
+    """The sub-packages of a state, in order: all in the first of a connection, fewer in the later ones.
+
+    Software before 3.0 has none that we know.
+    """
+    return tuple(
+        record
+        for record in SUB_PACKAGES
+        if record.SINCE.covers(version) and (first or not record.FIRST_STATE_ONLY)
+    )
+
+
+def state_size(version: SoftwareVersion, *, first: bool) -> int:
+    """Bytes of a state package without Euromap67."""
+    return HEADER.size + sum(
+        HEADER.size + codec_for(record, version).size for record in state_types(version, first=first)
+    )
+
+
+def decode_state(body: bytes) -> RobotState:
+    """Read the body of a state package.
+
+    Raises:
+        RemoteProtocolError: sub-package sizes do not add up, or one is shorter than its oldest form.
+    """
+    return RobotState(tuple(_sub_packages(body)))
+
+
+def _sub_packages(body: bytes) -> Iterable[SubPackage | UnknownSubPackage]:
+    position = 0
+    while position < len(body):
+        left = len(body) - position
+        size, sub_type = HEADER.unpack_from(body, position) if left >= HEADER.size else (0, 0)
+        if not HEADER.size <= size <= left:
+            raise RemoteProtocolError(
+                f"sub-package at byte {position + HEADER.size} of a state says {size} bytes, {left} are left"
+            )
+        yield decode_sub_package(sub_type, body[position + HEADER.size : position + size])
+        position += size
+
+
+def decode_sub_package(sub_type: int, data: bytes) -> SubPackage | UnknownSubPackage:
+    """Read the fields of one sub-package; its size tells which software's form it is.
+
+    Raises:
+        RemoteProtocolError: shorter than the oldest form.
+    """
+    record = _BY_SUB_TYPE.get(sub_type)
+    if record is None:
+        return UnknownSubPackage(sub_type, data)
+    oldest = _forms(sub_type, ())[0]
+    fields = oldest.decode_fields(data)  # conditions stand where every form has them
+    forms = _forms(sub_type, tuple(condition for condition in _CONDITIONS[record] if fields[condition]))
+    best = oldest
+    for form in forms:
+        if form.size <= len(data):
+            best = form
+    return best.decode(data)
+
+
+_ORDER = frozenset(SUB_PACKAGES)
+_BY_SUB_TYPE = {record.SUB_TYPE: record for record in SUB_PACKAGES}
+_CONDITIONS = {
+    record: tuple(dict.fromkeys(field.only_if for field in wire_fields(record) if field.only_if))
+    for record in SUB_PACKAGES
+}
+
+
+@cache
+def _forms(sub_type: int, present: tuple[str, ...]) -> list[Codec[SubPackage]]:
+    """All forms of a sub-package that some software sends under these conditions, shortest first."""
+    record = _BY_SUB_TYPE[sub_type]
+    firsts = {
+        first
+        for field in wire_fields(record)
+        for first in (field.since.cb3, field.since.e_series)
+        if first is not None
+    }
+    by_size = {codec.size: codec for codec in (codec_for(record, first, present) for first in sorted(firsts))}
+    return [by_size[size] for size in sorted(by_size)]
