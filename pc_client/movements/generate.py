@@ -71,9 +71,9 @@ class HumanRules:
 class RobotRules:
     """The profile of robot-like movements: see `RoboticLaw`.
 
-    The ramps together last as long as those that a UR makes by itself: movel's default speed by its default
-    acceleration, .25 m/s / 1.2 m/s^2 = .21 s (Source: URScript manual, movel). Most of it is acceleration, the rest
-    keeps the jerk finite. To stop at the target points is what a UR does on movel without a blend radius.
+    The ramps together last as long as those that a UR makes by itself: movel's default speed over its default
+    acceleration, .25 m/s / 1.2 m/s^2 = .21 s (Source: URScript manual, movel). Most of it bounds the
+    acceleration, the rest the jerk. To stop at the target points is what a UR does on movel without a blend radius.
     """
 
     ramps: tuple[float, ...] = (0.16, 0.05)
