@@ -133,8 +133,7 @@ IDEAL = replace(
 POOR = replace(
     TYPICAL,
     name="poor",
-    dead_time=0.012,
-    dead_time_spread=0.010,
+    dead_time=0.014,
     drive_lag=0.014,
     feedback_age=0.010,
     sample_jitter=5e-5,

@@ -1,9 +1,9 @@
 """Drives: from the controller's target to what the joint servos are told in every sub-step.
 
-The controller sends position, speed and the torque that its model of the arm expects (rigid body plus
-friction compensation) down the command path. A servo adds up
+The controller sends position, speed and the torque of its rigid-body model down the command path. A servo
+adds up
 
-    tau = kp (q_set + trim - q) + kv (qd_set - qd) + tau_set
+    tau = kp (q_set + trim - q) + kv (qd_set - qd) + tau_set + friction compensation at qd_set
 
 of which the terms in q and qd live in MuJoCo's actuators. `trim` is the slow outer loop: it integrates the
 error at the joint's own encoder, so that gear error, wrong masses and left-over friction vanish at rest.
@@ -68,7 +68,7 @@ class Drives:
         self._knot = np.zeros((3, 6))
         self._q, self._qd, self._qdd = self._knot
         self.table = np.zeros(path.q.shape)
-        self._damping = np.zeros(path.q.shape)
+        self._table_work = np.zeros(path.q.shape)
         self._work = np.zeros(6)
         self.coulomb = self._friction.coulomb
         """True size of the Coulomb friction at the speeds last given (6,) [Nm]."""
@@ -92,30 +92,30 @@ class Drives:
         """Take the target of this cycle and fill `table`; qd_actual (6,) [rad/s] sets the true friction.
 
         Returns:
-            False when the target is not finite; nothing has been sent to the drives then.
+            False when the target is not finite; the drives are useless then until they take over again.
         """
         knot, q, qd, qdd = self._knot, self._q, self._qd, self._qdd
         q[:] = target.q
         qd[:] = target.qd
         qdd[:] = target.qdd
         moment = self._dynamics.evaluate(q, qd, qdd)
-        self.target_moment = six(moment.tolist())
-        self._friction.evaluate(qd_actual, qd)
         # The third signal of the command path is torque, in place of the acceleration that it came from.
-        np.add(moment, self._friction.compensation, out=qdd)
-        np.multiply(qdd, self._per_torque, out=self._work)
-        self.target_current = six(self._work.tolist())
-        # Anything that is not finite in the target has reached the currents by now.
-        if not isfinite(sum(self.target_current)):
-            return False
-        path, table, damping = self._path, self.table, self._damping
+        qdd[:] = moment
+        path, friction, table, work = self._path, self._friction, self.table, self._table_work
         path.advance(knot)
+        friction.evaluate(qd_actual, qd, path.qd[-1])
         np.add(path.q, self._trim, out=table)
         np.multiply(table, self._kp, out=table)
-        np.multiply(path.qd, self._kv, out=damping)
-        np.add(table, damping, out=table)
+        np.multiply(path.qd, self._kv, out=work)
+        np.add(table, work, out=table)
         np.add(table, path.tau, out=table)
-        return True
+        np.add(table, friction.compensation, out=table)
+        self.target_moment = six(moment.tolist())
+        np.add(moment, friction.expected, out=self._work)
+        np.multiply(self._work, self._per_torque, out=self._work)
+        self.target_current = six(self._work.tolist())
+        # Anything that is not finite in the target has reached the currents by now.
+        return isfinite(sum(self.target_current))
 
     def integrate(self, error: NDArray[np.float64]) -> None:
         """Trim the servos by the joints' error (6,) [rad] of this cycle; not to be called in saturation."""

@@ -15,42 +15,55 @@ from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_model import RobotModel
 
-_REVERSAL_SPEED = 0.005  # rad/s; the compensation changes sign smoothly over this, as a drive's must
+_REVERSAL_SPEED = 0.012  # rad/s; friction changes sign over about this, see `physics.py`
 
 
 class Friction:
-    """Evaluates true Coulomb friction and the controller's compensation together, once a cycle."""
+    """Evaluates true Coulomb friction and the controller's compensation together, once a cycle.
+
+    Attributes:
+        coulomb: true size of the Coulomb friction (6,) [Nm].
+        expected: friction that the controller expects at its target (6,) [Nm].
+        compensation: torque that the drives add against friction (6,) [Nm].
+    """
 
     def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
         errors = 1.0 + fidelity.friction_error * random_stream(seed, "friction").standard_normal((2, 6))
         # A model worse than that would have been caught at commissioning.
         errors = errors.clip(0.3, 1.7)
         self._believed_viscous = np.array(robot.viscous) * errors[0]
-        # Row 0 is the truth at the actual speed, row 1 the belief at the target speed.
-        self._coulomb = np.array([robot.coulomb, np.array(robot.coulomb) * errors[1]])
+        believed = np.array(robot.coulomb) * errors[1]
+        # One row a use: the truth at the actual speed, beliefs at the target's and at the set-point's speed.
+        self._coulomb = np.array([robot.coulomb, believed, believed])
         self._lost = self._coulomb * (1.0 - robot.coulomb_standstill)
         self._per_speed = -1.0 / robot.coulomb_speed
-        self._speeds = np.zeros((2, 6))
-        self._work = np.zeros((2, 6))
-        self._direction = np.zeros(6)
-        self.coulomb: NDArray[np.float64] = self._work[0]
-        """True size of the Coulomb friction (6,) [Nm]."""
-        self.compensation: NDArray[np.float64] = np.zeros(6)
-        """Torque that the controller adds against friction (6,) [Nm]."""
+        self._speeds = np.zeros((3, 6))
+        self._sizes = np.zeros((3, 6))
+        self._beliefs = np.zeros((2, 6))
+        self._viscous = np.zeros((2, 6))
+        self._believed_speeds = self._speeds[1:]
+        self._believed_sizes = self._sizes[1:]
+        self.coulomb: NDArray[np.float64] = self._sizes[0]
+        self.expected: NDArray[np.float64] = self._beliefs[0]
+        self.compensation: NDArray[np.float64] = self._beliefs[1]
 
-    def evaluate(self, qd_actual: NDArray[np.float64], qd_target: NDArray[np.float64]) -> None:
-        """Set `coulomb` for the actual and `compensation` for the target speeds (6,) [rad/s]."""
-        speeds, work, direction = self._speeds, self._work, self._direction
+    def evaluate(
+        self, qd_actual: NDArray[np.float64], qd_target: NDArray[np.float64], qd_set: NDArray[np.float64]
+    ) -> None:
+        """Set the attributes for the actual, the target and the drives' set-point speeds, (6,) each [rad/s]."""
+        speeds, sizes, beliefs = self._speeds, self._sizes, self._beliefs
         speeds[0] = qd_actual
         speeds[1] = qd_target
+        speeds[2] = qd_set
         # coulomb - lost * exp(-|qd| / coulomb_speed)
-        np.abs(speeds, out=work)
-        np.multiply(work, self._per_speed, out=work)
-        np.exp(work, out=work)
-        np.multiply(work, self._lost, out=work)
-        np.subtract(self._coulomb, work, out=work)
-        np.divide(qd_target, _REVERSAL_SPEED, out=direction)
-        np.tanh(direction, out=direction)
-        np.multiply(direction, work[1], out=direction)
-        np.multiply(qd_target, self._believed_viscous, out=self.compensation)
-        np.add(self.compensation, direction, out=self.compensation)
+        np.abs(speeds, out=sizes)
+        np.multiply(sizes, self._per_speed, out=sizes)
+        np.exp(sizes, out=sizes)
+        np.multiply(sizes, self._lost, out=sizes)
+        np.subtract(self._coulomb, sizes, out=sizes)
+        # size * tanh(qd / reversal speed) + viscous * qd
+        np.multiply(self._believed_speeds, 1.0 / _REVERSAL_SPEED, out=beliefs)
+        np.tanh(beliefs, out=beliefs)
+        np.multiply(beliefs, self._believed_sizes, out=beliefs)
+        np.multiply(self._believed_speeds, self._believed_viscous, out=self._viscous)
+        np.add(beliefs, self._viscous, out=beliefs)

@@ -20,6 +20,12 @@ from ur_emulator.models.robot_model import DhRow, RobotModel
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
 
+# MuJoCo's Coulomb friction is a soft constraint. These numbers make it set in like a steep viscous friction, over
+# .01-.02 rad/s, instead of holding the joint against its servo: measured friction rises from small values at rest,
+# and real arms neither stick nor hunt around a target.
+_FRICTION_SOLREF = (0.02, 1.0)
+_FRICTION_SOLIMP = (0.1, 0.1, 0.001, 0.5, 2.0)
+
 
 @dataclass(frozen=True, slots=True)
 class ServoGains:
@@ -69,6 +75,8 @@ def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:
         joint.armature = robot.armature[i]
         joint.damping = [robot.viscous[i], 0.0, 0.0]
         joint.frictionloss = robot.coulomb[i]
+        joint.solref_friction = _FRICTION_SOLREF
+        joint.solimp_friction = _FRICTION_SOLIMP
 
 
 def _add_drives(spec: mujoco.MjSpec, robot: RobotModel, gains: ServoGains) -> None:

@@ -12,13 +12,16 @@ class Target(Protocol):
     """What the plant takes as a target: any record with these three, see `JointTarget`."""
 
     @property
-    def q(self) -> Sequence[float]: ...
+    def q(self) -> Sequence[float]:
+        """Angles (6,) [rad]."""
 
     @property
-    def qd(self) -> Sequence[float]: ...
+    def qd(self) -> Sequence[float]:
+        """Speeds (6,) [rad/s]."""
 
     @property
-    def qdd(self) -> Sequence[float]: ...
+    def qdd(self) -> Sequence[float]:
+        """Accelerations (6,) [rad/s²]."""
 
 
 class JointTarget(NamedTuple):

@@ -91,7 +91,7 @@ class Sensors:
         self._speeds = [0.0] * 6
 
     def read(self, record: NDArray[np.float64]) -> Reading:
-        """Read all sensors of an arm whose true values are `record` (N_RECORD,); to be called once a cycle."""
+        """Read all sensors of an arm whose true values are `record` (N_RECORD,); for one call a cycle."""
         noise = self._next_noise()
         values, steps, work = self._values, self._steps, self._work
         # Sampled a moment early or late, in the sensors' units, noisy, in whole encoder steps.
