@@ -73,7 +73,8 @@ class RobotRules:
 
     The ramps together last as long as those that a UR makes by itself: movel's default speed over its default
     acceleration, .25 m/s / 1.2 m/s^2 = .21 s (Source: URScript manual, movel). Most of it bounds the
-    acceleration, the rest the jerk. To stop at the target points is what a UR does on movel without a blend radius.
+    acceleration, the rest the jerk. To stop at the target points is what a UR does on movel without a blend
+    radius.
     """
 
     ramps: tuple[float, ...] = (0.16, 0.05)
