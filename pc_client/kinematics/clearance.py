@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 # posture), and its elbow end lies beside the forearm's: from the forearm on, links are watched.
 _FIRST_LINK_ABOVE_FLOOR = 3
 
-# Neighbours touch at their common joint. Of the wrist's links those two joints apart pass each other closely but
-# freely: the full meshes of a UR3 keep 6.7 mm in every posture, while the hull of the forearm, which bridges its
-# hollow side, would not. Numbers are the joints that carry the links (forearm 3, wrist 3 is 6).
+# Neighbours touch at their common joint. Of the wrist's links those two joints apart pass each other closely
+# but freely: the full meshes of a UR3 keep 6.7 mm in every posture, while the forearm's hull, which bridges
+# its hollow side, would not. Numbers are the joints that carry the links (forearm 3, wrist 3 is 6).
 _FREE_BY_DESIGN = {(3, 5), (4, 6)}
 
 
@@ -108,7 +108,7 @@ def clearance_model(robot: RobotModel) -> ClearanceModel:
 @lru_cache(maxsize=4)
 def _load_hulls(urdf: str) -> tuple[Any, Any]:
     """Read the meshes of a URDF: link-against-link and floor-against-link pairs (shared, never changed)."""
-    model, T_base_root = load_pinocchio_model(urdf)
+    model = load_pinocchio_model(urdf)  # its frames place the meshes, so they are in `base` already
     meshes = pin.buildGeomFromUrdf(
         model, str(find_robot_file(urdf)), pin.GeometryType.COLLISION, package_dirs=[str(find_share_folder())]
     )
@@ -122,8 +122,6 @@ def _load_hulls(urdf: str) -> tuple[Any, Any]:
         if not isinstance(mesh.geometry, pin.coal.BVHModelBase):
             continue  # ee_link carries a token box, not a part of the arm
         mesh.geometry.buildConvexHull(True, "Qt")  # Qt: triangles only, as coal needs
-        if mesh.parentJoint == 0:
-            mesh.placement = T_base_root * mesh.placement
         hull = pin.GeometryObject(
             mesh.name, mesh.parentJoint, mesh.parentFrame, mesh.placement, mesh.geometry.convex
         )

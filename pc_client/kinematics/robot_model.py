@@ -142,12 +142,12 @@ def robot_model(name: str = "ur3") -> RobotModel:
     description = ROBOTS.get(name)
     if description is None:
         raise PlanningError(f"no nominal model is called {name!r}; choose one of {', '.join(sorted(ROBOTS))}")
-    model, _ = load_pinocchio_model(description.urdf)
+    model = load_pinocchio_model(description.urdf)
     return RobotModel(description, model, model.createData(), int(model.getFrameId("tool0")))
 
 
 @lru_cache(maxsize=len(ROBOTS))
-def load_pinocchio_model(urdf: str) -> tuple[Any, Any]:
+def load_pinocchio_model(urdf: str) -> Any:
     """Read a URDF of example-robot-data and move its world into UR's `base` frame.
 
     The result is shared between all callers and must not be changed.
@@ -156,7 +156,7 @@ def load_pinocchio_model(urdf: str) -> tuple[Any, Any]:
         urdf: file below `example-robot-data/robots/`.
 
     Returns:
-        The Pinocchio model, and T_base_root: the URDF's own root frame seen from `base` (pin.SE3).
+        The Pinocchio model.
     """
     model = pin.buildModelFromUrdf(str(find_robot_file(urdf)))
     T_base_root = model.frames[model.getFrameId("base")].placement.inverse()
@@ -165,4 +165,4 @@ def load_pinocchio_model(urdf: str) -> tuple[Any, Any]:
     for frame in model.frames:
         if frame.parentJoint == 0:
             frame.placement = T_base_root * frame.placement
-    return model, T_base_root
+    return model

@@ -3,14 +3,16 @@
 A movej of the control box moves all joints on a straight line in joint space, whatever stands there; so the
 line is checked here, posture by posture, before it is asked for. Two rules keep it short and harmless: of the
 start postures that differ by whole turns the nearest is taken (the plan is shifted to match), and when the
-direct line is not clear, one posture with the arm raised is tried on the way.
+direct line is not clear, ways by raised postures are tried: up, turn, and down.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import pairwise
-from math import inf, pi, sqrt
+from itertools import pairwise, product
+from math import pi, sqrt
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,8 +39,9 @@ OWN_MARGIN = 0.01
 
 _CHECK_STEP = 0.02  # rad between checked postures: at most 10 mm at the reach of a UR3
 _TURN = 2.0 * pi
-_RAISED_SHOULDER = -pi / 2
-_RAISED_ELBOW = 0.0
+_FOLDING_JOINTS = (1, 2)
+# UR's home posture (0, -90, 0, -90, 0, 0) deg: far from the plane, and the wrist far from the forearm.
+_RAISED = MappingProxyType({1: -pi / 2, 2: 0.0, 3: -pi / 2, 4: 0.0})
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +87,7 @@ def plan_approach(
         a: acceleration of the leading joint [rad/s²], at most APPROACH_ACCELERATION.
 
     Returns:
-        One waypoint, or two when the direct line is not clear; use `.plan` instead of `plan` from then on.
+        One waypoint, up to three if the direct line is not clear. Use `.plan` instead of `plan` from then on.
 
     Raises:
         PlanningError: the present posture or every tried way is not clear; names posture and joint.
@@ -92,18 +95,18 @@ def plan_approach(
     arm = robot_model(plan.report.robot) if model is None else model
     q_from = np.array(q_now, dtype=np.float64)
     _refuse_arguments(plan, arm, q_from, v, a)
-    shifted = _nearest_turns(plan, arm, q_from)
     hulls = clearance_model(arm)
+    starts = _starts(plan, q_from)
     refusals = []
-    for via in ((), *((raised,) for raised in _raised_postures(q_from, shifted.start_q))):
-        waypoints = (*via, shifted.start_q)
-        clearance = _check_way(plan.name, hulls, (q_from, *waypoints))
-        if isinstance(clearance, PlanningError):
-            refusals.append(clearance)
-            continue
-        legs = pairwise((q_from, *waypoints))
-        duration = sum(movej_duration(begin, end, v, a) for begin, end in legs)
-        return Approach(shifted, q_from, waypoints, v, a, duration, *clearance)
+    for way in _WAYS:
+        for start in starts:
+            waypoints = (*way(q_from, start.start_q), start.start_q)
+            clearance = _check_way(plan.name, hulls, (q_from, *waypoints))
+            if isinstance(clearance, PlanningError):
+                refusals.append(clearance)
+                continue
+            duration = sum(movej_duration(begin, end, v, a) for begin, end in pairwise((q_from, *waypoints)))
+            return Approach(start, q_from, waypoints, v, a, duration, *clearance)
     # The direct way tells best what is wrong.
     raise refusals[0]
 
@@ -144,39 +147,37 @@ def _refuse_arguments(plan: JointPlan, arm: RobotModel, q_from: Array, v: float,
         )
 
 
-def _nearest_turns(plan: JointPlan, arm: RobotModel, q_from: Array) -> JointPlan:
-    """Shift a plan by the whole turns that bring its begin nearest to q_from and keep its range margin."""
-    margin = plan.report.limits.position_margin
-    turns = np.zeros(6)
-    for joint in range(6):
-        low, high = float(plan.report.q_min[joint]), float(plan.report.q_max[joint])
-        best = inf
-        for turn in (0, -1, 1, -2, 2):
-            offset = _TURN * turn
-            distance = abs(float(plan.start_q[joint]) + offset - float(q_from[joint]))
-            fits = (
-                low + offset >= arm.limits.q_min[joint] + margin
-                and high + offset <= arm.limits.q_max[joint] - margin
-            )
-            if fits and distance < best:
-                best, turns[joint] = distance, turn
-    return plan.shifted(turns)
+def _starts(plan: JointPlan, q_from: Array) -> list[JointPlan]:
+    """Return the plan in every sensible turn, the one with the shortest way from q_from first.
 
-
-def _raised_postures(q_from: Array, q_to: Array) -> tuple[Array, ...]:
-    """Return postures with the arm straight up, where it is far from the plane and from itself.
-
-    The first swings the base while the arm is raised, on the second leg; the second on the first leg.
+    Base and wrists take the nearest turn that keeps the range margin of the whole plan. Shoulder and elbow
+    are offered in all their turns: the nearest one may lead through the plane or the folded elbow.
     """
-    raised = []
-    for base in (q_from[0], q_to[0]):
-        posture = q_to.copy()
-        posture[0] = base
-        # Keep the turn in which the shoulder and elbow of the plan are: -90 deg may be 270 deg there.
-        posture[1] = _RAISED_SHOULDER + _TURN * round((q_to[1] - _RAISED_SHOULDER) / _TURN)
-        posture[2] = _RAISED_ELBOW + _TURN * round((q_to[2] - _RAISED_ELBOW) / _TURN)
-        raised.append(posture)
-    return tuple(raised)
+    fitting = [_fitting_turns(plan, q_from, joint) for joint in range(6)]
+    options = (turns if joint in _FOLDING_JOINTS else turns[:1] for joint, turns in enumerate(fitting))
+    starts = [plan.shifted(turns) for turns in product(*options)]
+    return sorted(starts, key=lambda start: float(np.abs(start.start_q - q_from).max()))
+
+
+def _fitting_turns(plan: JointPlan, q_from: Array, joint: int) -> list[int]:
+    """Return the turns of one joint that keep its range margin, nearest to q_from first; 0 always fits."""
+    margin = plan.report.limits.position_margin
+    limits = plan.report.joint_limits
+    low, high = limits.q_min[joint] + margin, limits.q_max[joint] - margin
+    fitting = [
+        turn
+        for turn in (0, -1, 1, -2, 2)
+        if plan.report.q_min[joint] + _TURN * turn >= low and plan.report.q_max[joint] + _TURN * turn <= high
+    ]
+    return sorted(fitting, key=lambda turn: abs(float(plan.start_q[joint] + _TURN * turn - q_from[joint])))
+
+
+def _raised(q: Array) -> Array:
+    """Return q with the arm straight up as in UR's home posture, each joint in the turn that is nearest."""
+    posture = q.copy()
+    for joint, angle in _RAISED.items():
+        posture[joint] = angle + _TURN * round((float(q[joint]) - angle) / _TURN)
+    return posture
 
 
 def _check_way(
@@ -207,3 +208,13 @@ def _check_way(
                 joint=nearest[k].joint,
             )
     return float(clearance.floor.min()), float(clearance.own.min())
+
+
+_WAYS: tuple[Callable[[Array, Array], tuple[Array, ...]], ...] = (
+    lambda q_from, q_to: (),
+    lambda q_from, q_to: (_raised(q_from),),
+    lambda q_from, q_to: (_raised(q_to),),
+    lambda q_from, q_to: (_raised(q_from), _raised(q_to)),
+)
+"""What stands between begin and end of a way, shortest first: nothing; or postures with the arm straight up,
+turning the base while folding down, while rising, or in between."""

@@ -182,13 +182,13 @@ def _judge(names: PathNames, report: PlanReport, *, floor_link: str, own_links: 
         ),
         (
             speed,
-            f"speed {speed.value:.2f} rad/s, at most {speed.value / speed.share:.2f} rad/s is allowed"
+            f"speed {speed.value:.2f} rad/s, at most {speed.limit:.2f} rad/s is allowed"
             f" ({limits.speed_fraction * 100:.0f} % of the arm's limit); give the movement more time",
         ),
         (
             acceleration,
             f"acceleration {acceleration.value:.1f} rad/s², at most"
-            f" {acceleration.value / acceleration.share:.0f} rad/s² is allowed;"
+            f" {acceleration.limit:.0f} rad/s² is allowed;"
             " give the movement more time or smoother corners",
         ),
         (
@@ -205,18 +205,17 @@ def _highest(values: Array, limit: Array | float) -> Extreme:
     """Return where values (n,) or (n, 6) come highest relative to their limit."""
     share = values / limit
     index = np.unravel_index(int(share.argmax()), share.shape)
-    return _extreme(values, index, float(share[index]))
+    joint = int(index[1]) if values.ndim == 2 else None
+    at_joint = limit if isinstance(limit, float) else float(limit[joint])
+    return Extreme(float(values[index]), int(index[0]), joint, at_joint, float(share[index]))
 
 
 def _lowest(values: Array, limit: float) -> Extreme:
     """Return where values (n,) or (n, 6) that must stay above `limit` come lowest."""
     index = np.unravel_index(int(values.argmin()), values.shape)
+    joint = int(index[1]) if values.ndim == 2 else None
     lowest = float(values[index])
-    return _extreme(values, index, limit / lowest if lowest > 0.0 else np.inf)
-
-
-def _extreme(values: Array, index: tuple[np.intp, ...], share: float) -> Extreme:
-    return Extreme(float(values[index]), int(index[0]), int(index[1]) if values.ndim == 2 else None, share)
+    return Extreme(lowest, int(index[0]), joint, limit, limit / lowest if lowest > 0.0 else np.inf)
 
 
 def _first(mask: NDArray[np.bool_]) -> int:

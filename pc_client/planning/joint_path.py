@@ -16,10 +16,9 @@ from pc_client.errors import PlanningError
 from pc_client.kinematics.forward import tcp_jacobian, tcp_pose
 from pc_client.kinematics.inverse import IkSolution, solve_ik_se3
 from pc_client.kinematics.robot_model import RobotModel
-from pc_client.kinematics.singularity import SingularityMeasure, measure_singularity
+from pc_client.kinematics.singularity import SINGULARITIES, SingularityMeasure, measure_singularity
 from pc_client.planning.limits import DEFAULT_LIMITS, PlanLimits
 from pc_client.planning.refusal import PathNames
-from protocol.ur_types import JOINT_NAMES
 
 Array = NDArray[np.float64]
 
@@ -116,7 +115,7 @@ def _lead_in(
                 0,
                 "the start cannot be reached from the preferred posture without passing a singularity or"
                 " leaving the reach; move the movement into the arm's working box or give another q_branch",
-                joint=int(measure.racing_joint[0]),
+                joint=int(measure.critical_joint[0]),
             )
         q = solution.q
     return q
@@ -140,7 +139,7 @@ def _refuse_step(
             and solution.rotation_error <= limits.rotation_error_max
         )
     ):
-        joint = int(measure_singularity(tcp_jacobian(model, solution.q)[None]).racing_joint[0])
+        joint = int(measure_singularity(tcp_jacobian(model, solution.q)[None]).critical_joint[0])
         return names.refuse(
             k,
             f"out of reach: the nearest posture misses by {solution.position_error * 1e3:.2f} mm and"
@@ -164,10 +163,10 @@ def _refuse_singular(names: PathNames, singularity: SingularityMeasure, limits: 
     near = np.flatnonzero(singularity.sigma_min < limits.sigma_min)
     if near.size:
         k = int(near[0])
-        joint = int(singularity.racing_joint[k])
+        joint = int(singularity.critical_joint[k])
         raise names.refuse(
             k,
-            f"too near a singularity, where {JOINT_NAMES[joint]} would race: smallest singular value"
+            f"too near the singularity where {SINGULARITIES[joint]}: smallest singular value"
             f" {singularity.sigma_min[k]:.4f}, at least {limits.sigma_min:g}; move the movement away from it",
             joint=joint,
         )

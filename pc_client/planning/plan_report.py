@@ -22,12 +22,14 @@ class Extreme(NamedTuple):
         value: in the unit of the quantity.
         sample: index of the sample where it occurs (the nearest one, when it occurs between two).
         joint: index 0..5 of the joint it belongs to, or None.
+        limit: what the value is held against, at that joint.
         share: `value` over its limit (of a quantity to keep low) or limit over `value` (of one to keep high).
     """
 
     value: float
     sample: int
     joint: int | None
+    limit: float
     share: float
 
 

@@ -1,7 +1,7 @@
 """An oracle for the client's iterative kinematics: the UR arm in closed form, from its DH table alone.
 
-Uses nothing of the code under test. All eight branches (shoulder, wrist, elbow), after K. Hawkins, "Analytic inverse
-kinematics for the Universal Robots UR-5/UR-10 arms", 2013, written for the standard DH form.
+Uses nothing of the code under test. All eight branches (shoulder, wrist, elbow), after K. Hawkins, "Analytic
+inverse kinematics for the Universal Robots UR-5/UR-10 arms", 2013, written for the standard DH form.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 
 class DhTable(NamedTuple):
-    """Lengths [m] of a UR arm. Source: Universal Robots article "DH parameters for calculations of kinematics"."""
+    """Lengths [m] of a UR arm. Source: Universal Robots article on DH parameters."""
 
     d1: float
     a2: float
@@ -39,7 +39,14 @@ def link(theta, d, a, alpha):
 
 def frames(q, dh=DH["ur3"]):
     """Return T_base_1 .. T_base_6, the DH frames, at joint angles q."""
-    rows = ((dh.d1, 0, pi / 2), (0, dh.a2, 0), (0, dh.a3, 0), (dh.d4, 0, pi / 2), (dh.d5, 0, -pi / 2), (dh.d6, 0, 0))
+    rows = (
+        (dh.d1, 0, pi / 2),
+        (0, dh.a2, 0),
+        (0, dh.a3, 0),
+        (dh.d4, 0, pi / 2),
+        (dh.d5, 0, -pi / 2),
+        (dh.d6, 0, 0),
+    )
     T, chain = np.eye(4), []
     for theta, (d, a, alpha) in zip(q, rows, strict=True):
         T = T @ link(theta, d, a, alpha)
@@ -58,8 +65,8 @@ def wrap(angle):
 
 
 def closed_form_ik(T, dh=DH["ur3"]):
-    """Return every q (6,) in (-pi, pi] with dh_pose(q) = T; an empty list when out of reach."""
-    solutions = []
+    """Return every q (6,) in (-pi, pi] with dh_pose(q) = T by branch (shoulder, wrist, elbow)."""
+    solutions = {}
     p5 = T[:3, 3] - dh.d6 * T[:3, 2]
     r = hypot(p5[0], p5[1])
     if r < dh.d4:
@@ -86,12 +93,16 @@ def closed_form_ik(T, dh=DH["ur3"]):
                 q3 = elbow * acos(c3)
                 q2 = atan2(p3[1], p3[0]) - atan2(dh.a3 * sin(q3), dh.a2 + dh.a3 * cos(q3))
                 T34 = np.linalg.inv(link(q2, 0, dh.a2, 0) @ link(q3, 0, dh.a3, 0)) @ T14
-                solutions.append(wrap([q1, q2, q3, atan2(T34[1, 0], T34[0, 0]), q5, q6]))
+                q4 = atan2(T34[1, 0], T34[0, 0])
+                solutions[shoulder, wrist, elbow] = wrap([q1, q2, q3, q4, q5, q6])
     return solutions
 
 
 def branch_error(q, T, dh=DH["ur3"]):
-    """Return (index, distance [rad]) of the closed-form solution of T nearest to q, up to whole turns."""
-    distances = [float(np.abs(wrap(np.asarray(q) - solution)).max()) for solution in closed_form_ik(T, dh)]
-    nearest = int(np.argmin(distances))
+    """Return (branch, distance [rad]) of the closed-form solution of T nearest to q, up to whole turns."""
+    distances = {
+        branch: float(np.abs(wrap(np.asarray(q) - solution)).max())
+        for branch, solution in closed_form_ik(T, dh).items()
+    }
+    nearest = min(distances, key=distances.get)
     return nearest, distances[nearest]

@@ -1,4 +1,4 @@
-"""Small movements for planning tests: straight and circular min-jerk strokes, exact in position and velocity."""
+"""Small movements for planning tests: straight and circular min-jerk strokes in closed form."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_form_ik import DH, closed_form_ik, dh_pose, wrap
+from closed_form_ik import DH, closed_form_ik, dh_pose, frames, wrap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -25,11 +25,11 @@ def test_the_nominal_model_is_the_published_dh_table_in_the_base_frame(name):
 @given(ANGLES)
 def test_the_oracle_solves_its_own_forward_kinematics(q):
     T = dh_pose(q)
-    for solution in closed_form_ik(T):
+    for solution in closed_form_ik(T).values():
         np.testing.assert_allclose(dh_pose(solution), T, rtol=0, atol=1e-11)
     # The posture itself is one of them, unless it is so near the wrist singularity that q4 and q6 blur.
     if abs(np.sin(q[4])) > 1e-3 and measure_singularity(tcp_jacobian(UR3, q)[None]).sigma_min[0] > 1e-3:
-        assert min(np.abs(wrap(q - solution)).max() for solution in closed_form_ik(T)) < 1e-8
+        assert min(np.abs(wrap(q - solution)).max() for solution in closed_form_ik(T).values()) < 1e-8
 
 
 @settings(deadline=None, max_examples=50)
@@ -62,17 +62,27 @@ def test_results_are_not_overwritten_by_the_next_call():
 
 
 @pytest.mark.parametrize(
-    ("q_deg", "racing"),
+    ("q_deg", "joint"),
     [
-        ((20, -100, 0, -60, 70, 30), {1, 2, 3}),  # elbow stretched: shoulder, elbow, wrist 1 are parallel
-        ((20, -100, -90, -60, 0, 30), {1, 2, 3, 5}),  # wrist 1 and wrist 3 aligned
+        ((20, -100, 0, -60, 70, 30), 2),  # elbow stretched
+        ((20, -100, -90, -60, 0, 30), 4),  # wrist 1 and wrist 3 aligned
     ],
 )
-def test_known_singularities_are_seen_with_the_joints_that_race(q_deg, racing):
+def test_known_singularities_are_seen_and_named(q_deg, joint):
     measure = measure_singularity(tcp_jacobian(UR3, np.radians(q_deg))[None])
     assert measure.sigma_min[0] < 1e-10
     assert measure.condition[0] > 1e9
-    assert measure.racing_joint[0] in racing
+    assert measure.critical_joint[0] == joint
+
+
+def test_the_wrist_above_the_base_axis_is_seen_and_named():
+    # Of all shoulder angles take the one that brings the wrist centre nearest to the base axis.
+    postures = np.radians([(20, q2, -110, -60, 70, 30) for q2 in np.linspace(-180, 0, 2001)])
+    radius = [np.hypot(*frames(q)[4][:2, 3]) for q in postures]
+    nearest = postures[int(np.argmin(radius))]
+    measure = measure_singularity(tcp_jacobian(UR3, nearest)[None])
+    assert measure.sigma_min[0] < 1e-3
+    assert measure.critical_joint[0] == 0
 
 
 def test_manipulability_is_the_jacobian_determinant_and_condition_the_ratio():
@@ -81,4 +91,6 @@ def test_manipulability_is_the_jacobian_determinant_and_condition_the_ratio():
     measure = measure_singularity(J)
     np.testing.assert_allclose(measure.manipulability, np.abs(np.linalg.det(J)), rtol=1e-9)
     np.testing.assert_allclose(measure.condition, np.linalg.cond(J), rtol=1e-9)
-    np.testing.assert_allclose(measure.sigma_min, 1 / np.linalg.norm(np.linalg.inv(J), ord=2, axis=(1, 2)), rtol=1e-9)
+    np.testing.assert_allclose(
+        measure.sigma_min, 1 / np.linalg.norm(np.linalg.inv(J), ord=2, axis=(1, 2)), rtol=1e-9
+    )

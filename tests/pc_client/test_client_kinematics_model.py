@@ -3,6 +3,7 @@ from __future__ import annotations
 from importlib import metadata
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from pc_client.errors import PlanningError
@@ -73,7 +74,7 @@ def test_the_preferred_branch_is_elbow_up_clear_and_points_forward_and_down(name
     np.testing.assert_allclose(tool_z, (np.sqrt(0.5), 0, -np.sqrt(0.5)), atol=2e-3)
     clearance = clearance_model(model).along(q)
     assert clearance.floor[0] > 0.08
-    assert clearance.own[0] > 0.01
+    assert clearance.own[0] > 0.005
 
 
 def test_the_flange_face_tells_the_floor_distance_of_a_tool_that_points_down():
@@ -101,13 +102,46 @@ def test_turning_the_base_changes_no_clearance_from_the_floor():
 def test_a_folded_arm_hits_itself_and_an_upright_one_does_not():
     clearance = HULLS.along(np.radians([(0, -90, 160, -90, -90, 0), (0, -90, 0, -90, 0, 0)]))
     assert clearance.own[0] < 0.0
-    assert clearance.own_nearest[0].name == "shoulder and forearm"
-    assert clearance.own_nearest[0].joint == 2
-    assert clearance.own[1] > 0.05
+    assert clearance.own_nearest[0].name == "upper arm and wrist 1"
+    assert clearance.own_nearest[0].joint == 3
+    assert clearance.own[1] > 0.02
 
 
-def test_a_wrist_that_bends_into_the_base_is_seen_in_the_base_frame():
-    # Reaching backwards down to the own base: base hull and wrist would miss each other if the base were turned.
-    folded = np.radians((0, -150, -100, -60, 90, 0))
-    clearance = HULLS.along(folded)
-    assert clearance.own[0] < HULLS.along(np.array(UR3.description.q_branch)).own[0]
+@pytest.mark.parametrize(
+    "q_deg", [(22, -101, -120, -6, 74, 106), (200, -30, 80, -150, -100, 5), (0, 40, 0, 0, 0, 0)]
+)
+def test_floor_distances_are_those_of_the_lowest_mesh_vertex(q_deg):
+    # Against the meshes themselves, every vertex moved by the DH table's own chain of link frames.
+    q = np.radians(q_deg)
+    urdf = str(robot_data.find_robot_file(UR3.description.urdf))
+    shares = [str(robot_data.find_share_folder())]
+    root = pin.buildModelFromUrdf(urdf)
+    meshes = pin.buildGeomFromUrdf(root, urdf, pin.GeometryType.COLLISION, package_dirs=shares)
+    data = root.createData()
+    pin.forwardKinematics(root, data, q)
+    heights = {}
+    for mesh in meshes.geometryObjects:
+        if mesh.parentJoint >= 3 and hasattr(mesh.geometry, "num_vertices"):
+            vertices = np.array(mesh.geometry.vertices())
+            placement = data.oMi[mesh.parentJoint] * mesh.placement
+            heights[mesh.parentJoint - 1] = (vertices @ placement.rotation.T + placement.translation)[
+                :, 2
+            ].min()
+    clearance = HULLS.along(q)
+    assert clearance.floor[0] == pytest.approx(min(heights.values()), abs=1e-6)
+    assert clearance.floor_nearest[0].joint == min(heights, key=heights.get)
+
+
+def test_the_base_of_the_arm_stands_in_the_base_frame():
+    # The base's hull reaches 99 mm to one side (its plug): turned with base_link, that side is +y of `base`.
+    frames = UR3.pin_model.frames
+    np.testing.assert_allclose(
+        frames[UR3.pin_model.getFrameId("base")].placement.homogeneous, np.eye(4), atol=1e-12
+    )
+    root = frames[UR3.pin_model.getFrameId("base_link")].placement
+    np.testing.assert_allclose(root.rotation, np.diag((-1.0, -1.0, 1.0)), atol=1e-9)
+    hull = next(h for h in HULLS._own_pairs.geometryObjects if h.parentJoint == 0)
+    points = np.array([hull.geometry.point(i) for i in range(hull.geometry.num_points)])
+    y = (points @ hull.placement.rotation.T + hull.placement.translation)[:, 1]
+    assert y.max() == pytest.approx(0.099, abs=1e-3)
+    assert y.min() == pytest.approx(-0.064, abs=1e-3)

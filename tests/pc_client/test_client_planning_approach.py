@@ -1,0 +1,181 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from closed_form_ik import dh_pose, frames
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from planning_paths import INSIDE_THE_BOX, StraightStrokes
+
+from pc_client.errors import PlanningError
+from pc_client.kinematics.clearance import clearance_model
+from pc_client.kinematics.robot_model import robot_model
+from pc_client.planning.approach import (
+    APPROACH_ACCELERATION,
+    APPROACH_SPEED,
+    FLOOR_MARGIN,
+    OWN_MARGIN,
+    movej_duration,
+    plan_approach,
+)
+from pc_client.planning.plan import plan_movement
+from pc_client.planning.plan_text import approach_text
+
+UR3 = robot_model("ur3")
+PLAN = plan_movement(StraightStrokes(INSIDE_THE_BOX, 1.5), model=UR3)
+HOME = np.radians((0, -90, 0, -90, 0, 0))
+
+
+def way(approach, step=0.01):
+    """All postures of an approach, finely."""
+    postures = [approach.q_from, *approach.waypoints]
+    for begin, end in pairwise(postures):
+        n = int(np.abs(end - begin).max() / step) + 2
+        yield from (begin + s * (end - begin) for s in np.linspace(0, 1, n))
+
+
+def assert_above_the_plane(approach):
+    """Joint centres and TCP, by the DH table alone, stay above the plane."""
+    for q in way(approach):
+        heights = [T[2, 3] for T in frames(q)]
+        assert min(heights[1:]) >= FLOOR_MARGIN
+
+
+def test_from_home_the_direct_way_is_taken():
+    approach = plan_approach(PLAN, HOME, model=UR3)
+    assert approach.plan is PLAN
+    assert len(approach.waypoints) == 1
+    np.testing.assert_array_equal(approach.waypoints[-1], PLAN.start_q)
+    assert approach.v <= APPROACH_SPEED
+    assert approach.a <= APPROACH_ACCELERATION
+    assert approach.floor_clearance >= FLOOR_MARGIN
+    assert approach.own_clearance >= OWN_MARGIN
+    assert_above_the_plane(approach)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.lists(st.integers(-1, 1), min_size=6, max_size=6), st.floats(-0.3, 0.3))
+def test_turns_of_the_present_posture_are_kept_not_unwound(turns, offset):
+    q_now = PLAN.start_q + 2 * np.pi * np.array(turns) + offset
+    margin = 2 * np.pi - 0.1
+    q_now = np.where(np.abs(q_now) > margin - 0.5, q_now - 2 * np.pi * np.array(turns), q_now)
+    approach = plan_approach(PLAN, q_now, model=UR3)
+    target = approach.waypoints[-1]
+    np.testing.assert_array_equal(target, approach.plan.start_q)
+    # It is the plan's start up to whole turns, reached with less than half a turn wherever ranges allow it.
+    shift = (target - PLAN.start_q) / (2 * np.pi)
+    np.testing.assert_allclose(shift, np.rint(shift), atol=1e-9)
+    np.testing.assert_allclose(dh_pose(target)[:3, 3], PLAN.p[0], atol=1e-9)
+    allowed = np.abs(np.stack((approach.plan.report.q_min, approach.plan.report.q_max))).max()
+    assert allowed <= margin
+    for joint in range(6):
+        options = [PLAN.start_q[joint] + 2 * np.pi * k for k in (-2, -1, 0, 1, 2)]
+        fitting = [
+            option
+            for option in options
+            if max(
+                abs(PLAN.report.q_min[joint] + option - PLAN.start_q[joint]),
+                abs(PLAN.report.q_max[joint] + option - PLAN.start_q[joint]),
+            )
+            <= margin
+        ]
+        assert (
+            abs(target[joint] - q_now[joint]) <= min(abs(option - q_now[joint]) for option in fitting) + 1e-9
+        )
+
+
+def test_already_there_it_takes_no_time():
+    approach = plan_approach(PLAN, PLAN.start_q, model=UR3)
+    assert approach.duration == pytest.approx(0.0, abs=1e-9)
+    assert len(approach.waypoints) == 1
+
+
+def test_when_the_direct_line_is_not_clear_the_arm_is_raised_on_the_way():
+    # Wrist 2 is bent to the side on which wrist 1 would swing the flange into the forearm.
+    q_now = np.radians((-30, -100, 90, 10, -90, -130))
+    approach = plan_approach(PLAN, q_now, model=UR3)
+    line = q_now + np.linspace(0, 1, 400)[:, None] * (approach.plan.start_q - q_now)
+    hulls = clearance_model(UR3)
+    assert hulls.along(line).own.min() < OWN_MARGIN
+    assert len(approach.waypoints) == 2
+    np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
+    fine = hulls.along(np.array(list(way(approach))))
+    assert fine.own.min() >= OWN_MARGIN - 1e-3
+    assert approach.own_clearance == pytest.approx(fine.own.min(), abs=1e-3)
+    assert approach.floor_clearance == pytest.approx(fine.floor.min(), abs=2e-3)
+    assert_above_the_plane(approach)
+    legs = pairwise((q_now, *approach.waypoints))
+    assert approach.duration == pytest.approx(
+        sum(movej_duration(a, b, approach.v, approach.a) for a, b in legs)
+    )
+
+
+def test_the_elbow_takes_the_long_way_where_the_short_one_is_folded():
+    # 80 deg is nearer to -127 deg by way of 180, where the arm is folded onto itself.
+    q_now = np.radians((-110, -140, 80, -140, -10, 170))
+    approach = plan_approach(PLAN, q_now, model=UR3)
+    np.testing.assert_allclose(approach.plan.start_q[2], PLAN.start_q[2])
+    assert approach.own_clearance >= OWN_MARGIN
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 10**6))
+def test_from_any_clear_posture_the_way_found_is_clear(seed):
+    rng = np.random.default_rng(seed)
+    q_now = np.radians(rng.uniform((-180, -200, -150, -200, -180, -180), (180, 20, 150, 20, 180, 180)))
+    try:
+        approach = plan_approach(PLAN, q_now, model=UR3)
+    except PlanningError as error:
+        assert "not clear" in str(error)  # noqa: PT017 - one of two allowed outcomes
+        return
+    np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
+    assert_above_the_plane(approach)
+    assert approach.floor_clearance >= FLOOR_MARGIN
+    assert approach.own_clearance >= OWN_MARGIN
+
+
+def test_an_arm_that_lies_on_the_table_is_refused_before_anything_moves():
+    with pytest.raises(PlanningError, match="the present posture is not clear") as caught:
+        plan_approach(PLAN, np.radians((0, 12, 0, -90, 0, 0)), model=UR3)
+    assert caught.value.joint is not None
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("q_now", "joint"),
+    [((0, 0, 0, 0, 0, 7.0), 5), ((-6.5, 0, 0, 0, 0, 0), 0), ((0, 0, np.nan, 0, 0, 0), 2)],
+)
+def test_a_present_posture_outside_the_ranges_is_refused_with_its_joint(q_now, joint):
+    with pytest.raises(PlanningError, match="outside its range") as caught:
+        plan_approach(PLAN, q_now, model=UR3)
+    assert caught.value.joint == joint
+
+
+def test_five_joints_are_not_an_arm():
+    with pytest.raises(PlanningError, match="six joint angles"):
+        plan_approach(PLAN, np.zeros(5), model=UR3)
+
+
+@pytest.mark.parametrize(("v", "a"), [(0.6, 0.8), (0.5, 0.9), (0.0, 0.8), (0.5, -1.0), (np.nan, 0.8)])
+def test_a_fast_approach_is_refused(v, a):
+    with pytest.raises(PlanningError, match="allowed are"):
+        plan_approach(PLAN, HOME, model=UR3, v=v, a=a)
+
+
+@given(st.floats(1e-4, 6.0), st.floats(0.05, 0.5), st.floats(0.05, 0.8))
+def test_movej_takes_the_time_of_its_trapezoid(way_rad, v, a):
+    duration = movej_duration(np.zeros(6), (0, -way_rad, way_rad / 2, 0, 0, 0), v, a)
+    # Integrate the speed profile: rises with a, is capped at v, falls with a.
+    t = np.linspace(0, duration, 4001)
+    speed = np.minimum(np.minimum(a * t, v), a * (duration - t))
+    assert np.trapezoid(speed, t) == pytest.approx(way_rad, rel=1e-3)
+
+
+def test_the_way_in_words_tells_from_where_to_where_and_how_slowly():
+    approach = plan_approach(PLAN, HOME, model=UR3)
+    text = approach_text(approach)
+    assert "(0.0, -90.0, 0.0, -90.0, 0.0, 0.0) deg" in text
+    assert "29 deg/s" in text
+    assert f"{approach.duration:.1f} s" in text
