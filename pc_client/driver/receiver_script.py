@@ -14,13 +14,24 @@ from pathlib import Path
 
 from pc_client.errors import DriverError
 
+STOP_DECELERATION = 10.0
+"""Of the program's ramp to rest [rad/s2]; half of what UR's mechanical stopping figures show for a UR3."""
+
+READ_TIMEOUT = 1.0
+"""Silence of ours after which the program ends [s]."""
+
+MISSED_ALLOWED = 6
+"""Cycles in which the last velocity is repeated when we are late: 48 ms, in which an arm at 0.3 m/s goes on for
+14 mm. Source: half of ur_modern_driver's watchdog of 12 cycles; a PC without real-time kernel needs it."""
+
 _FILE = Path("programs") / "velocity_receiver.script"
-_MARK = re.compile(r"\{\{\s*(\w+)\s*\}\}")
+_MARKED_LINE = re.compile(r"^(?P<begin>\s+(?P<name>\w+) = )\S+(?P<end>\s+# <- client)$", re.MULTILINE)
+_ADDRESS = re.compile(r"[0-9A-Za-z.:-]+")
 
 
 @cache
 def receiver_template() -> str:
-    """The program text with its marks, `{{NAME}}`.
+    """The program text, whose lines to fill in end in `# <- client`.
 
     Raises:
         DriverError: the file is not installed.
@@ -34,19 +45,18 @@ def receiver_template() -> str:
 
 
 def fill_template(template: str, values: Mapping[str, str | int | float]) -> str:
-    """Replace every mark by its value.
+    """Replace the value in every marked line.
 
     Raises:
-        DriverError: a mark has no value, or a value has no mark: program and client do not fit.
+        DriverError: a marked line has no value, or a value no line: program and client do not fit.
     """
-    marks = set(_MARK.findall(template))
-    if marks != set(values):
+    marked = [match["name"] for match in _MARKED_LINE.finditer(template)]
+    if sorted(marked) != sorted(values):
         raise DriverError(
-            f"the robot's program has the marks {sorted(marks)}, this client fills in {sorted(values)}: "
-            "they are of different versions, install ur-hil again"
+            f"the robot's program wants {', '.join(sorted(marked)) or 'nothing'} filled in, this client has "
+            f"{', '.join(sorted(values))}: they are of different versions, install ur-hil again"
         )
-    text = _MARK.sub(lambda match: str(values[match[1]]), template)
-    return text if text.endswith("\n") else text + "\n"
+    return _MARKED_LINE.sub(lambda line: f"{line['begin']}{values[line['name']]}{line['end']}", template)
 
 
 def receiver_script(host: str, port: int, *, acceleration: float) -> str:
@@ -58,6 +68,16 @@ def receiver_script(host: str, port: int, *, acceleration: float) -> str:
         acceleration: of `speedj`, leading axis [rad/s2].
 
     Raises:
-        DriverError: the program is not installed or does not fit this client.
+        DriverError: the program is not installed or does not fit this client, or that is no address.
     """
-    return fill_template(receiver_template(), {"HOST": host, "PORT": port, "ACCELERATION": acceleration})
+    if not _ADDRESS.fullmatch(host):  # it goes into a program: no quotes, no line breaks
+        raise DriverError(f"{host!r} is no address that a robot could dial")
+    values: dict[str, str | int | float] = {
+        "pc_address": f'"{host}"',
+        "pc_port": port,
+        "acceleration": float(acceleration),
+        "stop_deceleration": STOP_DECELERATION,
+        "read_timeout": READ_TIMEOUT,
+        "missed_allowed": MISSED_ALLOWED,
+    }
+    return fill_template(receiver_template(), values)

@@ -144,6 +144,7 @@ class UrDriver:
         reached = self.actual_q()
         error = float(np.abs(reached - np.asarray(q, dtype=np.float64)).max())
         if not error <= _ARRIVAL_TOLERANCE:
+            self._raise_robot_errors()
             raise DriverError(
                 f"the arm is {error:.4f} rad away from the posture it was sent to, allowed is "
                 f"{_ARRIVAL_TOLERANCE} rad: is it blocked?"
@@ -280,11 +281,11 @@ class UrDriver:
         deadline = self._network.now() + timeout
         while True:
             arrival = self._frames.receive()
-            if any(condition(frame) for frame in arrival.new) or condition(arrival.latest):
-                return
-            if checked:
+            if checked:  # first: a safety stop or a script error ends the program too
                 check_safety(arrival.latest)
                 self._raise_robot_errors()
+            if any(condition(frame) for frame in arrival.new) or condition(arrival.latest):
+                return
             if self._network.now() > deadline:
                 raise DriverError(complaint)
 

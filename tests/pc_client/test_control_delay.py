@@ -1,4 +1,4 @@
-"""Identification of the loop delay: the excitation is harmless, the estimate is sub-sample, nonsense is refused."""
+"""Identification of the loop delay: harmless excitation, sub-sample estimate, nonsense is refused."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_excitation_is_small_smooth_and_ends_where_it_began():
     assert np.degrees(np.abs(q - Q0).max()) > 0.8
     np.testing.assert_allclose(q[-1], Q0)
     np.testing.assert_allclose(np.gradient(q, t, axis=0)[2:-2], qd[2:-2], atol=2e-3)
-    t_cmd, qd_cmd = commands()
+    _, qd_cmd = commands()
     np.testing.assert_allclose(qd_cmd.sum(axis=0) * PERIOD, 0.0, atol=1e-12)
 
 

@@ -92,7 +92,7 @@ def test_integral_part_costs_margin_and_can_cost_all():
 
 
 def _last_error(factor):
-    """Closed loop on a pure delay of 4 cycles plus half a cycle of hold; error after 12 s of a 1 mrad step."""
+    """Closed loop on 4 cycles of delay plus half a cycle of hold: error 12 s after a step of 1 mrad."""
     delay = 4 * 0.008 + 0.004
     config = replace(PLAIN, gain_p=factor * largest_gain(delay), gain_i=0.0)
     arm, state = DelayedArm([0.0] * 6, cycles=4), PiState()

@@ -1,0 +1,259 @@
+"""A control box in memory for the driver's tests: ports, programs and an arm that integrates, no sockets, no time.
+
+It is a `Network` to the driver. Whenever the driver reads a frame, the robot lives on: in lockstep it
+advances only while nothing is missing (else it repeats its last frame), otherwise with every frame.
+Tests spoil it through `on_tick`, or by setting its attributes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from types import SimpleNamespace
+
+from pc_client.errors import DriverError
+from protocol.primary_messages import (
+    ErrorCodeMessage,
+    RuntimeExceptionMessage,
+    encode_message,
+    version_message,
+)
+from protocol.realtime_layout import SNAPSHOT_FIELDS, layout_for_version
+from protocol.ur_types import Ports, SoftwareVersion
+from protocol.velocity_stream import VelocityMode, decode_velocity, encode_hello
+
+VERSION = SoftwareVersion(3, 15, 8)
+PERIOD = 0.008
+LAYOUT = layout_for_version(VERSION)
+_ENCODE = LAYOUT.encoder()
+_COUNTS = {column.attribute: column.count for column in LAYOUT.columns}
+STOPPED, PLAYING = 1, 2
+
+
+class Pipe:
+    """The driver's end of one connection; the robot's end are the two queues."""
+
+    def __init__(self, robot, kind, peer="10.0.0.2"):
+        self.robot, self.kind, self.peer_address = robot, kind, peer
+        self.local_address = "10.0.0.1"
+        self.incoming = deque()
+        self.outgoing = deque()
+        self.closed = self.broken = False
+
+    def send(self, data):
+        if self.closed or self.broken:
+            raise DriverError(f"{self.kind}: the other end closed the connection")
+        self.outgoing.append(data)
+        self.robot.took(self, data)
+
+    def receive(self, timeout):
+        assert not self.closed, "read after close"
+        if not self.incoming and not self.broken and self.kind == "realtime" and timeout > 0:
+            self.robot.live()
+        if self.incoming:
+            # all that is there comes at once, as from a socket
+            data = b"".join(self.incoming)
+            self.incoming.clear()
+            return data
+        if self.broken:
+            return b""
+        self.robot.clock += timeout
+        return None
+
+    def close(self):
+        if not self.closed:
+            self.closed = True
+            self.robot.closed.append(self.kind)
+
+
+class Listener:
+    port = 50123
+
+    def __init__(self, robot):
+        self.robot = robot
+        self.callers = deque()
+        self.closed = False
+
+    def accept(self, timeout):
+        if self.callers:
+            return self.callers.popleft()
+        self.robot.clock += timeout
+        return None
+
+    def close(self):
+        self.closed = True
+
+
+class FakeRobot:
+    def __init__(
+        self, *, lockstep=True, delay=3, on_tick=None, hello=None, dials=True, answers_dashboard=True
+    ):
+        self.lockstep, self.delay, self.on_tick = lockstep, delay, on_tick
+        self.hello = encode_hello() if hello is None else hello
+        self.dials, self.answers_dashboard = dials, answers_dashboard
+        self.clock = 0.0
+        self.tick = 1000
+        self.q = [0.0] * 6
+        self.qd = [0.0] * 6
+        self.robot_mode, self.safety_mode = 7, 1
+        self.program = None  # None, "approach", "receiver", "stop"
+        self.programs = []
+        self.listener = None
+        self.reverse = None
+        self.commands = deque()
+        self.received = []  # every velocity message
+        self.closed = []
+        self.pipes = {}
+        self.hold = 0  # frames to hold back, so that they come together
+        self.skip = 0  # frames to lose
+        self.silent = False
+        self.refuses = False
+        self.deaf_to_stop = False
+        self.error_in = None
+
+    # ---- Network
+    def now(self):
+        return self.clock
+
+    def connect(self, host, port, timeout):
+        kind = {v: k for k, v in vars_of(Ports.standard()).items()}[port]
+        if kind == "dashboard" and not self.answers_dashboard:
+            raise DriverError(f"{host}:{port} refuses the connection")
+        pipe = self.pipes[kind] = Pipe(self, kind)
+        if kind in ("primary", "secondary"):
+            pipe.incoming.append(package(encode_message(version_message(VERSION), VERSION)))
+        elif kind == "realtime":
+            pipe.incoming.append(self.frame())
+        elif kind == "dashboard":
+            pipe.incoming.append(b"Connected: Universal Robots Dashboard Server\n")
+        return pipe
+
+    def listen(self, address):
+        self.listener = Listener(self)
+        return self.listener
+
+    # ---- what the driver sends
+    def took(self, pipe, data):
+        if pipe.kind == "secondary":
+            self.load(data.decode())
+        elif pipe.kind == "reverse":
+            self.commands.append(decode_velocity(data))
+            self.received.append(self.commands[-1])
+        elif pipe.kind == "dashboard":
+            answer = {"get serial number": "20993000007", "get robot model": "UR3"}.get(data.decode().strip())
+            if answer:
+                pipe.incoming.append(answer.encode() + b"\n")
+
+    def load(self, text):
+        assert text.endswith("end\n"), text
+        self.programs.append(text)
+        if self.refuses:
+            return
+        if self.error_in and self.error_in in text:
+            self.report(RuntimeExceptionMessage(line=2, column=3, text="compile_error_name_not_found:foo:"))
+            return
+        if self.reverse is not None:
+            self.reverse.broken = True
+        self.commands.clear()
+        if "movej(" in text:
+            goal = re.search(r"movej\(\[(.*?)\]", text)[1]
+            self.goal, self.program = [float(x) for x in goal.split(",")], "approach"
+            self.remaining = 5
+        elif "socket_open" in text:
+            self.program = "receiver"
+            self.pipeline = deque([[0.0] * 6] * self.delay)
+            if self.dials:
+                self.reverse = Pipe(self, "reverse")
+                self.reverse.incoming.append(self.hello)
+                self.listener.callers.append(self.reverse)
+        elif "stopj" in text:
+            self.program = "stop"
+
+    def report(self, message):
+        self.pipes["primary"].incoming.append(package(encode_message(message, VERSION)))
+
+    # ---- life
+    def live(self):
+        """One read of a frame by the driver."""
+        if self.silent:
+            return
+        frames = self.pipes["realtime"].incoming
+        while True:
+            waits = self.program is None or (
+                self.program == "receiver" and not self.commands and self.safety_mode == 1
+            )
+            if self.lockstep and waits:
+                self.clock += PERIOD
+                frames.append(self.frame())
+                return
+            self.advance()
+            if self.skip:
+                self.skip -= 1
+                continue
+            if self.silent:
+                return
+            frames.append(self.frame())
+            if not self.hold:
+                return
+            self.hold -= 1
+
+    def advance(self):
+        self.tick += 1
+        self.clock += PERIOD
+        if self.on_tick is not None:
+            self.on_tick(self)
+        if self.safety_mode != 1:
+            self.qd, self.program = [0.0] * 6, None
+        elif self.program == "approach":
+            self.remaining -= 1
+            if not self.remaining:
+                self.q, self.program = list(self.goal), None
+        elif self.program == "receiver":
+            self.follow()
+        elif self.program == "stop":
+            self.qd = [0.0] * 6
+            self.program = None
+        if self.program != "receiver":
+            self.qd = [0.0] * 6
+
+    def follow(self):
+        if self.commands:
+            command = self.commands.popleft()
+            if command.mode is VelocityMode.STOP_PROGRAM and not self.deaf_to_stop:
+                self.program, self.qd = None, [0.0] * 6
+                return
+            self.pipeline.append(list(command.qd))
+        else:
+            self.pipeline.append(list(self.pipeline[-1]) if self.pipeline else self.qd)
+        self.qd = self.pipeline.popleft()
+        self.q = [q + qd * PERIOD for q, qd in zip(self.q, self.qd, strict=True)]
+
+    def frame(self):
+        values = {
+            name: 0.0 if _COUNTS.get(name, 1) == 1 else (0.0,) * _COUNTS[name] for name in SNAPSHOT_FIELDS
+        }
+        values.update(
+            timestamp=self.tick * PERIOD,
+            actual_q=tuple(self.q),
+            actual_qd=tuple(self.qd),
+            robot_mode=self.robot_mode,
+            safety_mode=self.safety_mode,
+            runtime_state=STOPPED if self.program is None else PLAYING,
+        )
+        return _ENCODE(SimpleNamespace(**values))
+
+    # ---- what tests look at
+    @property
+    def at_rest(self):
+        return self.program is None and not any(self.qd)
+
+    def report_error(self, level=3):
+        self.report(ErrorCodeMessage(code=153, argument=2, report_level=level, text="position deviates"))
+
+
+def vars_of(ports):
+    return {name: getattr(ports, name) for name in type(ports).__dataclass_fields__}
+
+
+def package(body):
+    return (len(body) + 5).to_bytes(4, "big") + b"\x14" + body

@@ -1,0 +1,233 @@
+"""Opening a session, moving to a posture, and the small programs and questions around it, on a robot in memory."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import pytest
+from fake_robot import LAYOUT, FakeRobot, Pipe
+
+from pc_client.driver.approach_script import approach_script, stop_script
+from pc_client.driver.dashboard_query import ask_dashboard
+from pc_client.driver.package_stream import PackageStream
+from pc_client.driver.receiver_script import fill_template, receiver_script
+from pc_client.driver.reverse_server import ReverseServer
+from pc_client.driver.ur_driver import UrDriver
+from pc_client.errors import DriverError, RobotStoppedError
+from protocol.primary_messages import TextMessage
+from protocol.ur_types import SoftwareVersion
+
+GOAL = [0.1, -1.5, -2.0, 0.2, 1.3, 1.8]
+
+
+def move(robot, q=GOAL):
+    with UrDriver("robot", network=robot) as driver:
+        driver.move_to(q, speed=0.5, acceleration=0.8, expected=3.0)
+
+
+def test_session_says_who_answered():
+    robot = FakeRobot()
+    with UrDriver("robot", network=robot) as driver:
+        assert driver.info.version == SoftwareVersion(3, 15, 8)
+        assert driver.info.model == "UR3"
+        assert (driver.info.serial.simulated, driver.info.serial.seed) == (True, 7)
+        assert driver.info.period == 0.008
+        assert driver.layout is LAYOUT
+        assert driver.actual_q().tolist() == [0.0] * 6
+    assert robot.programs == []
+    assert set(robot.closed) == {"dashboard", "primary", "secondary", "realtime"}
+
+
+def test_session_without_dashboard_server():
+    with UrDriver("robot", network=FakeRobot(answers_dashboard=False)) as driver:
+        assert driver.info.model == "unknown"
+        assert driver.info.serial.text == "unknown"
+        assert not driver.info.serial.simulated
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_move_to_arrives(lockstep):
+    robot = FakeRobot(lockstep=lockstep)
+    move(robot)
+    assert robot.q == pytest.approx(GOAL)
+    assert len(robot.programs) == 1
+    assert robot.programs[0].startswith("def ur_client_approach():\n  movej([0.1")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "error", "words"),
+    [
+        (dict(safety_mode=3), RobotStoppedError, "unlock the protective stop"),
+        (dict(safety_mode=5), RobotStoppedError, "SAFEGUARD_STOP"),
+        (dict(safety_mode=99), RobotStoppedError, "99"),
+        (dict(robot_mode=5), RobotStoppedError, "IDLE, motion needs RUNNING"),
+        (dict(robot_mode=3), RobotStoppedError, "POWER_OFF"),
+        (dict(program="other"), DriverError, "a program is PLAYING"),
+    ],
+)
+def test_nothing_is_sent_to_a_robot_that_is_not_ready(spoil, error, words):
+    robot = FakeRobot()
+    for name, value in spoil.items():
+        setattr(robot, name, value)
+    with pytest.raises(error, match=words):
+        move(robot)
+    assert robot.programs == []
+
+
+def test_a_reduced_robot_may_move():
+    robot = FakeRobot(lockstep=False)
+    with UrDriver("robot", network=robot) as driver:
+        robot.safety_mode = 2
+        driver.check_ready()
+
+
+def test_protective_stop_on_the_way_is_reported_and_nothing_left_moving():
+    def spoil(robot):
+        if robot.program == "approach" and robot.remaining == 3:
+            robot.safety_mode = 3
+
+    robot = FakeRobot(on_tick=spoil)
+    with pytest.raises(RobotStoppedError, match="PROTECTIVE_STOP"):
+        move(robot)
+    assert robot.at_rest
+
+
+def test_program_that_does_not_start_is_reported_and_replaced():
+    robot = FakeRobot()
+    robot.refuses = True
+    with pytest.raises(DriverError, match="local control"):
+        move(robot)
+    assert "stopj" in robot.programs[-1]
+
+
+def test_script_error_is_reported_with_its_line():
+    robot = FakeRobot()
+    robot.error_in = "movej"
+    with pytest.raises(
+        RobotStoppedError, match=r"line 2, column 3: compile_error_name_not_found:foo: \(movej"
+    ):
+        move(robot)
+
+
+def test_arm_that_stops_elsewhere_is_reported():
+    def spoil(robot):
+        if robot.program == "approach":
+            robot.goal = [0.0] * 6
+
+    with pytest.raises(DriverError, match="is it blocked"):
+        move(FakeRobot(on_tick=spoil))
+
+
+def test_ctrl_c_on_the_way_stops_the_arm():
+    def spoil(robot):
+        if robot.program == "approach":
+            raise KeyboardInterrupt
+
+    robot = FakeRobot(on_tick=spoil)
+    with pytest.raises(KeyboardInterrupt):
+        move(robot)
+    assert robot.programs[-1] == stop_script()
+    robot.on_tick = None
+    assert robot.at_rest
+
+
+def test_program_that_cannot_dial_back():
+    robot = FakeRobot(dials=False)
+    with UrDriver("robot", network=robot) as driver, pytest.raises(DriverError, match="firewall"):
+        driver.stream(None, None, acceleration=1.0)
+    assert robot.programs[-1] == stop_script()
+    assert robot.listener.closed
+
+
+@pytest.mark.parametrize("hello", [b"GET ", b"\0\0\0\2", b"\0\0\0\1\0\0\0\1"])
+def test_only_our_program_may_dial_back(hello):
+    robot = FakeRobot(hello=hello)
+    with (
+        UrDriver("robot", network=robot) as driver,
+        pytest.raises(DriverError, match="not our velocity receiver"),
+    ):
+        driver.stream(None, None, acceleration=1.0)
+    assert robot.received[-1:] == [] or not any(robot.received[-1].qd)
+
+
+def test_callers_from_elsewhere_are_turned_away():
+    robot = FakeRobot()
+    server = ReverseServer(robot, "10.0.0.1", "10.0.0.2")
+    stranger = Pipe(robot, "stranger", peer="10.0.0.66")
+    program = Pipe(robot, "reverse")
+    program.incoming.append(robot.hello[:1])
+    program.incoming.append(robot.hello[1:])
+    robot.listener.callers.extend([stranger, program])
+    assert server.accept_program(lambda: None) is program
+    assert stranger.closed
+
+
+def test_a_port_that_is_no_control_box():
+    robot = FakeRobot()
+    pipe = Pipe(robot, "primary")
+    with pytest.raises(DriverError, match="is this a control box"):
+        PackageStream(pipe, robot, "primary").wait_for_version()
+    pipe.incoming.append(b"SSH-2.0-OpenSSH_9.2\r\n")
+    with pytest.raises(DriverError, match="does not speak its protocol"):
+        PackageStream(pipe, robot, "primary").wait_for_version()
+
+
+def test_messages_before_the_question_for_the_version_are_kept():
+    robot = FakeRobot()
+    with UrDriver("robot", network=robot) as driver:
+        robot.report(TextMessage(text="hello"))
+        messages = driver._primary.poll()
+    assert [m.text for m in messages if isinstance(m, TextMessage)] == ["hello"]
+
+
+def test_dashboard_answers_only_what_it_knows():
+    robot = FakeRobot()
+    answers = ask_dashboard(robot, "robot", 29999, ("get robot model", "make coffee", "get serial number"))
+    assert answers == {"get robot model": "UR3"}
+    assert robot.closed == ["dashboard"]
+
+
+def test_approach_script_holds_nine_digits_and_slow_speeds():
+    text = approach_script(GOAL, 0.5, 0.8)
+    assert "a=0.8000, v=0.5000" in text
+    assert text.endswith("\nend\n")
+    for q, v, a in [
+        ([0.0] * 5, 0.5, 0.8),
+        ([float("nan")] * 6, 0.5, 0.8),
+        ([7.0] * 6, 0.5, 0.8),
+        (GOAL, 3.0, 0.8),
+        (GOAL, 0.5, 50.0),
+        (GOAL, 0.0, 0.8),
+    ]:
+        with pytest.raises(DriverError):
+            approach_script(q, v, a)
+
+
+def test_receiver_program_is_filled_in():
+    text = receiver_script("192.168.0.5", 50123, acceleration=40.0)
+    assert re.search(r'^  pc_address = "192.168.0.5"\s+# <- client$', text, re.MULTILINE)
+    assert re.search(r"^  pc_port = 50123\s+# <- client$", text, re.MULTILINE)
+    assert re.search(r"^  acceleration = 40.0\s+# <- client$", text, re.MULTILINE)
+    assert text.startswith("def velocity_receiver():\n")
+    assert text.endswith("\nend\n")
+
+
+def test_the_client_does_not_import_the_language():
+    code = "import sys; from pc_client.driver.receiver_script import receiver_template; receiver_template();"
+    code += "sys.exit(any(name.split('.')[0] in ('urscript', 'ur_emulator') for name in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_no_program_text_gets_in_through_the_address():
+    with pytest.raises(DriverError, match="no address"):
+        receiver_script('1.2.3.4"\n  powerdown()\n', 1, acceleration=1.0)
+
+
+def test_template_and_client_must_fit():
+    template = "def f():\n  a = 1  # <- client\n  b = 2\nend\n"
+    assert fill_template(template, {"a": 1.5}) == "def f():\n  a = 1.5  # <- client\n  b = 2\nend\n"
+    for values in ({}, {"a": 1, "b": 2}, {"b": 2}):
+        with pytest.raises(DriverError, match="different versions"):
+            fill_template(template, values)

@@ -1,0 +1,280 @@
+"""The control loop on a robot in memory: one command a frame, heartbeats, late and lost frames, every way to fail."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from control_loop import Ramp
+from fake_robot import PERIOD, FakeRobot
+
+from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.reference import ReferenceTable
+from pc_client.control.tracker import Tracker, TrackerStep
+from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.velocity_stream import check_command
+from pc_client.errors import ClientError, DriverError, RobotStoppedError
+from pc_client.recording.layout import Phase
+from protocol.velocity_stream import VelocityMode
+
+QD_MAX = (3.14, 3.14, 3.14, 6.28, 6.28, 6.28)
+CONFIG = CONTROLLERS["preview"]
+
+
+def tracker(duration=0.4, qd=0.1):
+    reference = ReferenceTable(
+        Ramp([qd] * 6, duration), period=PERIOD, lead=0.2, settle=0.3, lookahead=3 * PERIOD
+    )
+    return Tracker(reference, CONFIG, QD_MAX)
+
+
+class Rows(list):
+    def __call__(self, frame, step):
+        self.append((frame.timestamp, step))
+
+
+def stream(robot, run=None, rows=None):
+    rows = Rows() if rows is None else rows
+    with UrDriver("robot", network=robot) as driver:
+        report = driver.stream(run or tracker(), rows, acceleration=40.0)
+    return report, rows
+
+
+def velocities(robot):
+    return [c for c in robot.received if c.mode is VelocityMode.VELOCITY]
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_one_command_for_every_new_stamp_and_a_stop_word_at_the_end(lockstep):
+    robot = FakeRobot(lockstep=lockstep)
+    report, rows = stream(robot)
+    stamps = np.array([stamp for stamp, _ in rows])
+    np.testing.assert_allclose(np.diff(stamps), PERIOD)
+    assert len(velocities(robot)) == len(rows) == report.n_commands
+    assert robot.received[-1].mode is VelocityMode.STOP_PROGRAM
+    assert report.late_frames == report.lost_frames == 0
+    assert [step.phase for _, step in rows].count(Phase.MOVEMENT) == 51
+    assert report.robot_time == pytest.approx(0.904)
+    assert robot.at_rest
+    assert robot.q[0] == pytest.approx(0.04, abs=1e-3)
+    assert robot.listener.closed
+    assert set(robot.closed) >= {"reverse", "primary", "secondary", "realtime"}
+
+
+def test_in_lockstep_the_first_command_answers_the_frame_at_which_time_stands_still():
+    robot = FakeRobot()
+    hello_at = {}
+
+    def note(r):
+        if r.program == "receiver":
+            hello_at.setdefault("tick", r.tick)
+
+    robot.on_tick = note
+    _, rows = stream(robot)
+    assert rows[0][0] == pytest.approx((hello_at["tick"] - 1) * PERIOD)
+
+
+def test_lockstep_runs_are_equal_to_the_bit():
+    runs = []
+    for _ in range(2):
+        robot = FakeRobot()
+        stream(robot)
+        runs.append([tuple(c.qd) for c in robot.received])
+    assert runs[0] == runs[1]
+
+
+def test_heartbeats_are_neither_answered_nor_logged():
+    robot = FakeRobot()
+    original = robot.live
+    robot.live = lambda: (robot.pipes["realtime"].incoming.append(robot.frame()), original())
+    report, rows = stream(robot)
+    stamps = [stamp for stamp, _ in rows]
+    assert len(set(stamps)) == len(stamps) == len(velocities(robot))
+    assert report.heartbeats >= len(rows)
+    assert report.lost_frames == 0
+
+
+def test_waiting_frames_are_logged_and_the_newest_is_answered():
+    def spoil(robot):
+        if robot.tick == 1050:
+            robot.hold = 3
+
+    robot = FakeRobot(lockstep=False, on_tick=spoil)
+    report, rows = stream(robot)
+    assert report.late_frames == 3
+    assert report.lost_frames == 0
+    assert len(velocities(robot)) == len(rows) - 3
+    held = [step for stamp, step in rows if 1050 <= round(stamp / PERIOD) < 1053]
+    before = next(step for stamp, step in rows if round(stamp / PERIOD) == 1049)
+    # the rows of late frames carry the command that was in force, and their own reference
+    assert all(step.qd_cmd == before.qd_cmd for step in held)
+    assert len({step.point.q for step in held}) == 3
+
+
+def test_missing_stamps_are_counted():
+    def spoil(robot):
+        if robot.tick == 1050:
+            robot.skip = 4
+
+    report, rows = stream(FakeRobot(lockstep=False, on_tick=spoil))
+    assert report.lost_frames == 4
+    assert np.diff([stamp for stamp, _ in rows]).max() == pytest.approx(5 * PERIOD)
+
+
+def spoil_at(tick, action):
+    def on_tick(robot):
+        if robot.tick == tick:
+            action(robot)
+
+    return on_tick
+
+
+def protective_stop(robot):
+    robot.safety_mode = 3
+
+
+def emergency_stop(robot):
+    robot.safety_mode, robot.robot_mode = 7, 3
+
+
+def program_ends(robot):
+    robot.program = None
+
+
+def script_fails(robot):
+    robot.report_error()
+
+
+def robot_gone(robot):
+    robot.silent = True
+
+
+def frames_socket_closes(robot):
+    robot.pipes["realtime"].broken = True
+
+
+def reverse_socket_closes(robot):
+    robot.reverse.broken = True
+
+
+def long_gap(robot):
+    robot.skip = 50
+
+
+@pytest.mark.parametrize(
+    ("action", "error", "words"),
+    [
+        (protective_stop, RobotStoppedError, "PROTECTIVE_STOP"),
+        (emergency_stop, RobotStoppedError, "emergency stop"),
+        (program_ends, RobotStoppedError, "ended before the movement"),
+        (script_fails, RobotStoppedError, "C153A2"),
+        (robot_gone, DriverError, "no realtime frame"),
+        (frames_socket_closes, DriverError, "closed the realtime"),
+        (reverse_socket_closes, DriverError, "closed the connection"),
+        (long_gap, DriverError, "jump"),
+    ],
+)
+def test_what_goes_wrong_ends_the_run_with_one_line_and_a_stopped_arm(action, error, words):
+    robot = FakeRobot(lockstep=False, on_tick=spoil_at(1040, action))
+    with pytest.raises(error, match=words) as caught:
+        stream(robot)
+    assert "\n" not in str(caught.value)
+    if action in (robot_gone, frames_socket_closes):
+        # nothing more can be seen; both ways to stop were tried, and the user is told
+        assert robot.programs[-1].startswith("def ur_client_stop")
+        assert "EMERGENCY STOP" in caught.value.__notes__[0]
+    else:
+        assert robot.at_rest
+        assert not getattr(caught.value, "__notes__", [])
+    assert robot.listener.closed
+    assert "reverse" in robot.closed
+
+
+class Spoilt:
+    """A tracker whose answer goes wrong after some steps."""
+
+    qd_max = QD_MAX
+
+    def __init__(self, act, after=60):
+        self.inner, self.act, self.left = tracker(), act, after
+
+    def step(self, stamp, q):
+        self.left -= 1
+        step = self.inner.step(stamp, q)
+        return self.act(step) if self.left == 0 else step
+
+
+def with_command(value):
+    def act(step):
+        return TrackerStep(step.t, step.phase, step.point, [0.0, value, 0.0, 0.0, 0.0, 0.0], False)
+
+    return act
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 3.2, -50.0])
+def test_a_command_that_is_not_safe_is_never_sent(value):
+    robot = FakeRobot()
+    with pytest.raises(DriverError, match="not safe to send"):
+        stream(robot, Spoilt(with_command(value)))
+    assert all(abs(v) <= 3.14 for c in robot.received for v in c.qd)
+    assert robot.received[-1].mode is VelocityMode.STOP_PROGRAM
+    assert robot.at_rest
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError, MemoryError])
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_any_exception_leaves_the_arm_stopped(error, lockstep):
+    def fail(step):
+        raise error
+
+    robot = FakeRobot(lockstep=lockstep)
+    with pytest.raises(error):
+        stream(robot, Spoilt(fail))
+    assert robot.received[-1].mode is VelocityMode.STOP_PROGRAM
+    assert robot.at_rest
+    assert any(robot.received[-2].qd)
+
+
+def test_when_the_stop_word_does_not_help_a_stop_program_is_sent():
+    def fail(step):
+        raise RuntimeError("spoilt")
+
+    robot = FakeRobot(lockstep=False)
+    robot.deaf_to_stop = True
+    with pytest.raises(RuntimeError, match="spoilt"):
+        stream(robot, Spoilt(fail))
+    assert robot.programs[-1] == "def ur_client_stop():\n  stopj(2.0)\nend\n"
+    assert robot.at_rest
+
+
+def test_a_row_sink_that_fails_ends_the_run():
+    def sink(frame, step):
+        if step.t > 0.1:
+            raise ClientError("disk full")
+
+    robot = FakeRobot()
+    with pytest.raises(ClientError, match="disk full"):
+        stream(robot, rows=sink)
+    assert robot.at_rest
+
+
+def test_time_that_stands_still_for_ever_is_an_error():
+    robot = FakeRobot()
+    take = robot.took
+
+    def lose_commands(pipe, data):
+        if pipe.kind != "reverse" or robot.tick < 1030:
+            take(pipe, data)
+
+    robot.took = lose_commands
+    with pytest.raises(DriverError, match="stood still"):
+        stream(robot)
+    assert robot.programs[-1].startswith("def ur_client_stop")
+    assert robot.at_rest
+
+
+def test_check_command_accepts_the_limits_themselves():
+    check_command([3.14, -3.14, 0.0, 6.28, -6.28, 0.0], QD_MAX)
+    with pytest.raises(DriverError, match="allowed is"):
+        check_command([3.141, 0, 0, 0, 0, 0], QD_MAX)
