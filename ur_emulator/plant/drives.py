@@ -11,7 +11,7 @@ error at the joint's own encoder, so that gear error, wrong masses and left-over
 
 from __future__ import annotations
 
-from math import isfinite
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from ur_emulator.plant.physics import ServoGains
 from ur_emulator.plant.plant_state import Target
 
 _INTEGRAL_TIME = 0.12  # s; assumed: rest within a few tenths of a second, as arms of this kind settle
+TARGET_MAX = 1e6  # rad, rad/s, rad/s²; far beyond sense, small enough for arithmetic
 
 NO_LOAD: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -92,8 +93,10 @@ class Drives:
         """Take the target of this cycle and fill `table`; qd_actual (6,) [rad/s] sets the true friction.
 
         Returns:
-            False when the target is not finite; the drives are useless then until they take over again.
+            False when the target is not finite or absurd; nothing has changed then.
         """
+        if not hypot(*target.q, *target.qd, *target.qdd) < TARGET_MAX:
+            return False
         knot, q, qd, qdd = self._knot, self._q, self._qd, self._qdd
         q[:] = target.q
         qd[:] = target.qd
@@ -114,8 +117,7 @@ class Drives:
         np.add(moment, friction.expected, out=self._work)
         np.multiply(self._work, self._per_torque, out=self._work)
         self.target_current = six(self._work.tolist())
-        # Anything that is not finite in the target has reached the currents by now.
-        return isfinite(sum(self.target_current))
+        return True
 
     def integrate(self, error: NDArray[np.float64]) -> None:
         """Trim the servos by the joints' error (6,) [rad] of this cycle; not to be called in saturation."""

@@ -50,7 +50,7 @@ class Friction:
     def evaluate(
         self, qd_actual: NDArray[np.float64], qd_target: NDArray[np.float64], qd_set: NDArray[np.float64]
     ) -> None:
-        """Set the attributes for the actual, the target and the drives' set-point speeds, (6,) each [rad/s]."""
+        """Set the attributes for actual, target and set-point speeds, (6,) each [rad/s]."""
         speeds, sizes, beliefs = self._speeds, self._sizes, self._beliefs
         speeds[0] = qd_actual
         speeds[1] = qd_target

@@ -20,9 +20,9 @@ from ur_emulator.models.robot_model import DhRow, RobotModel
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
 
-# MuJoCo's Coulomb friction is a soft constraint. These numbers make it set in like a steep viscous friction, over
-# .01-.02 rad/s, instead of holding the joint against its servo: measured friction rises from small values at rest,
-# and real arms neither stick nor hunt around a target.
+# MuJoCo's Coulomb friction is a soft constraint. These numbers make it set in like a steep viscous friction,
+# over .01-.02 rad/s, instead of holding the joint against its servo: measured friction rises from small
+# values at rest, and real arms neither stick nor hunt around a target.
 _FRICTION_SOLREF = (0.02, 1.0)
 _FRICTION_SOLIMP = (0.1, 0.1, 0.001, 0.5, 2.0)
 

@@ -27,7 +27,7 @@ from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_model import RobotModel, Vector3, six
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.contact import contact_wrench
-from ur_emulator.plant.drives import NO_LOAD, Drives
+from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX, Drives
 from ur_emulator.plant.gear import GearRipple
 from ur_emulator.plant.payload import check_payload, set_payload_body
 from ur_emulator.plant.physics import ServoGains, build_physics
@@ -220,7 +220,8 @@ class Plant:
             self._release_brakes()
         if not self._drives.command(target, self._qvel):
             raise PlantError(
-                f"target {target} in cycle {self.cycle}: finite numbers are needed", cycle=self.cycle
+                f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
+                cycle=self.cycle,
             )
         self._frictionloss[:] = self._drives.coulomb
         if self._push is not None:
