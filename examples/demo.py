@@ -65,7 +65,7 @@ def main() -> int:
     options = parser.parse_args()
     base = free_port_base()
     with serving_box(base, options.seed, options.pace, options.fidelity):
-        client = [sys.executable, "-m", "pc_client.cli", "experiment", "--robot", "127.0.0.1", "--port-base", str(base)]
+        client = [sys.executable, "-m", "pc_client", "experiment", "--robot", "127.0.0.1", "--port-base", str(base)]
         client += ["--out", str(options.out), "--repeat", "3", "--controller", options.controller]
         return subprocess.run(client, check=False).returncode
 

@@ -3,7 +3,8 @@
 EmulatorError
 ├── ModelError        an unknown robot or fidelity name, or numbers that make no arm
 ├── KinematicsError   arguments of the controller's own kinematics make no sense
-└── PlantError        the physics cannot go on: a target that is no number, or a diverged simulation
+├── PlantError        the physics cannot go on: a target that is no number, or a diverged simulation
+└── PortError         a TCP port of the box cannot be opened
 
 Every message is one line: what was given, what is allowed, what to do. Errors of URScript programs are
 not here: they belong to the program (`urscript.errors`), not to the box.
@@ -34,3 +35,7 @@ class PlantError(EmulatorError):
     def __init__(self, message: str, *, cycle: int | None = None) -> None:
         super().__init__(message)
         self.cycle = cycle
+
+
+class PortError(EmulatorError):
+    """A TCP port of the box cannot be opened."""

@@ -76,6 +76,7 @@ class Controller:
             robot=robot,
             arm=arm,
             period_s=self.period_s,
+            seed=seed,
             motion=ArmMotion(q),
             mode=RobotModeMachine(mode, self.period_s),
             tick=BOOT_TICK,
@@ -190,6 +191,7 @@ class Controller:
             tcp_offset=state.tcp_offset,
             program_name=self.programs.name,
         )
+        state.q_history.appendleft(sensed.actual_q)
         return state.snapshot
 
     # --- commands

@@ -61,7 +61,8 @@ def find_violation(
             return _stop(
                 204,
                 i,
-                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {speed:.3f} rad/s, limit {limit:.3f}",
+                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {speed:.3f} rad/s, "
+                f"limit {limit:.3f}",
             )
     for i, (q, low, high) in enumerate(zip(target.q, robot.q_min, robot.q_max, strict=True)):
         if not low <= q <= high:

@@ -5,6 +5,7 @@ The controller owns the one instance; the script functions of a running program 
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 
 from ur_emulator.controller.events import Event
@@ -17,6 +18,10 @@ from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.target import ZERO6, Vector6
+
+
+# How many cycles back a script may ask for joint positions; the real buffer's length is not known.
+HISTORY_CYCLES = 125
 
 
 @dataclass(slots=True)
@@ -35,6 +40,7 @@ class ControllerState:
         robot: numbers of the arm.
         arm: the controller's (calibrated) kinematics.
         period_s: duration of a control cycle [s].
+        seed: of everything random in the box.
         motion: where the joints are asked to go, and by whom.
         mode: robot mode and its way.
         safety: safety mode.
@@ -42,12 +48,14 @@ class ControllerState:
         events: what was said since the last cycle ended, in order.
         speed_slider: 0..1.
         stop_requested: a script or a client asked for a protective stop in this cycle.
+        q_history: measured joint positions of the last cycles, the newest first.
         steady_cycles: for how many cycles the target has stood still.
     """
 
     robot: RobotModel
     arm: ArmModel
     period_s: float
+    seed: int
     motion: ArmMotion
     mode: RobotModeMachine
     snapshot: Snapshot = field(init=False)
@@ -61,4 +69,5 @@ class ControllerState:
     steady_cycles: int = 0
     tick: int = 0
     stop_requested: bool = False
+    q_history: deque[Vector6] = field(default_factory=lambda: deque(maxlen=HISTORY_CYCLES))
     events: list[Event] = field(default_factory=list)

@@ -15,7 +15,7 @@ Must not know scripts or physics: an owner is any object, compared by identity.
 
 from __future__ import annotations
 
-from ur_emulator.motion.generators import Generator, Hold, SpeedJ, StopJ
+from ur_emulator.motion.generators import Generator, Hold, MoveJ, SpeedJ, StopJ
 from ur_emulator.motion.target import JointTarget, Vector6
 
 # Deceleration of the leading axis when a program ends, is replaced or killed while the arm moves. Users
@@ -48,6 +48,12 @@ class ArmMotion:
     def owner(self) -> object | None:
         """The object that controls the arm at present, or None."""
         return self._owner
+
+    @property
+    def goal(self) -> Vector6:
+        """Joint positions that the present move leads to; the target's own if no move has a goal [rad]."""
+        generator = self._generator
+        return generator.goal if isinstance(generator, MoveJ) else self.target.q
 
     def command(self, owner: object, generator: Generator) -> None:
         """Let `owner` move the arm with `generator` from the next cycle on.

@@ -97,8 +97,8 @@ class MoveJ:
             t: duration [s]; above 0 it has priority over `a` and `v`.
         """
         self._start = vector6(start)
-        self._goal = vector6(goal)
-        self._way = vector6([b - a for a, b in zip(self._start, self._goal, strict=True)])
+        self.goal = vector6(goal)
+        self._way = vector6([b - a for a, b in zip(self._start, self.goal, strict=True)])
         distance = max(map(abs, self._way))
         self._profile = Trapezoid.from_limits(distance, v, a)
         if t > 0.0:
@@ -117,7 +117,7 @@ class MoveJ:
         self._time += scale * dt
         if self._time >= self._profile.duration:
             self.done = True
-            return JointTarget(self._goal)
+            return JointTarget(self.goal)
         s, sd, sdd = self._profile.at(self._time)
         return JointTarget(
             vector6([p + s * u for p, u in zip(self._start, self._share, strict=True)]),

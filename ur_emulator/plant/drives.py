@@ -62,9 +62,11 @@ class Drives:
         self._dynamics = InverseDynamics(robot, calibration)
         self._friction = Friction(robot, fidelity, seed)
         self._path = path
-        self._kp, self._kv = gains.kp, gains.kv
+        # One row a sub-step: broadcasting costs twice the arithmetic at this size.
+        self._kp, self._kv = np.tile(gains.kp, (len(path.q), 1)), np.tile(gains.kv, (len(path.q), 1))
+        self._torque_per_trim = gains.kp
         self._per_torque = 1.0 / np.array(robot.torque_constant)
-        self._trim_gain = period / _INTEGRAL_TIME
+        self._trim_gain = np.full(6, period / _INTEGRAL_TIME)
         self._trim = np.zeros(6)
         self._knot = np.zeros((3, 6))
         self._q, self._qd, self._qdd = self._knot
@@ -83,7 +85,7 @@ class Drives:
         """Hold the arm at rest: joints at q, motors at q_motor, (6,) each [rad]."""
         still = np.zeros(6)
         self._path.reset(q, self._dynamics.evaluate(q, still, still))
-        np.subtract(q_motor, q, out=self._trim)
+        np.subtract(q_motor, q, self._trim)
 
     def release(self) -> None:
         """Carry nothing: the brakes do."""
@@ -107,19 +109,20 @@ class Drives:
         path, friction, table, work = self._path, self._friction, self.table, self._table_work
         path.advance(knot)
         friction.evaluate(qd_actual, qd, path.qd[-1])
-        np.add(path.q, self._trim, out=table)
-        np.multiply(table, self._kp, out=table)
-        np.multiply(path.qd, self._kv, out=work)
-        np.add(table, work, out=table)
-        np.add(table, path.tau, out=table)
-        np.add(table, friction.compensation, out=table)
+        np.multiply(path.q, self._kp, table)
+        np.multiply(path.qd, self._kv, work)
+        np.add(table, work, table)
+        np.add(table, path.tau, table)
+        np.multiply(self._trim, self._torque_per_trim, self._work)
+        np.add(self._work, friction.compensation, self._work)
+        np.add(table, self._work, table)
         self.target_moment = six(moment.tolist())
-        np.add(moment, friction.expected, out=self._work)
-        np.multiply(self._work, self._per_torque, out=self._work)
+        np.add(moment, friction.expected, self._work)
+        np.multiply(self._work, self._per_torque, self._work)
         self.target_current = six(self._work.tolist())
         return True
 
     def integrate(self, error: NDArray[np.float64]) -> None:
         """Trim the servos by the joints' error (6,) [rad] of this cycle; not to be called in saturation."""
-        np.multiply(error, self._trim_gain, out=self._work)
-        np.add(self._trim, self._work, out=self._trim)
+        np.multiply(error, self._trim_gain, self._work)
+        np.add(self._trim, self._work, self._trim)

@@ -31,12 +31,15 @@ class Friction:
         errors = 1.0 + fidelity.friction_error * random_stream(seed, "friction").standard_normal((2, 6))
         # A model worse than that would have been caught at commissioning.
         errors = errors.clip(0.3, 1.7)
-        self._believed_viscous = np.array(robot.viscous) * errors[0]
+        viscous = np.array(robot.viscous) * errors[0]
         believed = np.array(robot.coulomb) * errors[1]
         # One row a use: the truth at the actual speed, beliefs at the target's and at the set-point's speed.
         self._coulomb = np.array([robot.coulomb, believed, believed])
         self._lost = self._coulomb * (1.0 - robot.coulomb_standstill)
-        self._per_speed = -1.0 / robot.coulomb_speed
+        # Constants have the full shape: broadcasting costs twice the arithmetic at this size.
+        self._believed_viscous = np.array([viscous, viscous])
+        self._per_speed = np.full((3, 6), -1.0 / robot.coulomb_speed)
+        self._per_reversal = np.full((2, 6), 1.0 / _REVERSAL_SPEED)
         self._speeds = np.zeros((3, 6))
         self._sizes = np.zeros((3, 6))
         self._beliefs = np.zeros((2, 6))
@@ -56,14 +59,14 @@ class Friction:
         speeds[1] = qd_target
         speeds[2] = qd_set
         # coulomb - lost * exp(-|qd| / coulomb_speed)
-        np.abs(speeds, out=sizes)
-        np.multiply(sizes, self._per_speed, out=sizes)
-        np.exp(sizes, out=sizes)
-        np.multiply(sizes, self._lost, out=sizes)
-        np.subtract(self._coulomb, sizes, out=sizes)
+        np.abs(speeds, sizes)
+        np.multiply(sizes, self._per_speed, sizes)
+        np.exp(sizes, sizes)
+        np.multiply(sizes, self._lost, sizes)
+        np.subtract(self._coulomb, sizes, sizes)
         # size * tanh(qd / reversal speed) + viscous * qd
-        np.multiply(self._believed_speeds, 1.0 / _REVERSAL_SPEED, out=beliefs)
-        np.tanh(beliefs, out=beliefs)
-        np.multiply(beliefs, self._believed_sizes, out=beliefs)
-        np.multiply(self._believed_speeds, self._believed_viscous, out=self._viscous)
-        np.add(beliefs, self._viscous, out=beliefs)
+        np.multiply(self._believed_speeds, self._per_reversal, beliefs)
+        np.tanh(beliefs, beliefs)
+        np.multiply(beliefs, self._believed_sizes, beliefs)
+        np.multiply(self._believed_speeds, self._believed_viscous, self._viscous)
+        np.add(beliefs, self._viscous, beliefs)

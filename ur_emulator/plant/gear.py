@@ -33,9 +33,10 @@ class GearRipple:
         # A speed ripple of rms r has the slope amplitude sqrt(2) r.
         slopes = sqrt(2.0) * np.array([fidelity.ripple_first, fidelity.ripple_second])
         # Four waves: error and slope of the first harmonic, error and slope of the second.
-        self._cycles = np.array([[first], [first], [second], [second]])
+        # Constants have the full shape: broadcasting costs twice the arithmetic at this size.
+        self._cycles = _rows(first, first, second, second)
         self._phases = np.array([phases[0], phases[0] + np.pi / 2, phases[1], phases[1] + np.pi / 2])
-        self._sizes = np.array([[slopes[0] / first], [slopes[0]], [slopes[1] / second], [slopes[1]]])
+        self._sizes = _rows(slopes[0] / first, slopes[0], slopes[1] / second, slopes[1])
         self._waves = np.zeros((4, 6))
         self._first, self._second = self._waves[:2], self._waves[2:]
         self._sum = np.zeros((2, 6))
@@ -45,11 +46,12 @@ class GearRipple:
     def evaluate(self, q_motor: NDArray[np.float64]) -> None:
         """Set `error` e [rad] and `slope` de/dq [1] for motor positions q_motor (6,)."""
         waves = self._waves
-        np.multiply(self._cycles, q_motor, out=waves)
-        np.add(waves, self._phases, out=waves)
-        np.sin(waves, out=waves)
-        np.multiply(waves, self._sizes, out=waves)
-        np.add(self._first, self._second, out=self._sum)
+        waves[:] = q_motor
+        np.multiply(waves, self._cycles, waves)
+        np.add(waves, self._phases, waves)
+        np.sin(waves, waves)
+        np.multiply(waves, self._sizes, waves)
+        np.add(self._first, self._second, self._sum)
 
     def motor_position(self, q_joint: NDArray[np.float64]) -> NDArray[np.float64]:
         """Invert the gear: motor positions (6,) that put the joints at q_joint (6,) [rad]."""
@@ -59,3 +61,8 @@ class GearRipple:
             self.evaluate(q_motor)
             q_motor = q_joint - self.error
         return q_motor
+
+
+def _rows(*values: float) -> NDArray[np.float64]:
+    """Return one row of six equal entries for each value."""
+    return np.repeat(np.array(values)[:, None], 6, axis=1)

@@ -46,6 +46,6 @@ class InverseDynamics:
         mujoco.mj_comPos(model, data)
         mujoco.mj_comVel(model, data)
         mujoco.mj_rne(model, data, 1, self.torque)
-        np.multiply(self._armature, qdd, out=self._rotor)
-        np.add(self.torque, self._rotor, out=self.torque)
+        np.multiply(self._armature, qdd, self._rotor)
+        np.add(self.torque, self._rotor, self.torque)
         return self.torque

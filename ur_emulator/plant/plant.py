@@ -274,7 +274,7 @@ class Plant:
         """Finish the record of this cycle for the sensors, and trim the servos by what they left."""
         gear, record, error, ripple = self._gear, self._record, self._error, self._ripple
         gear.evaluate(record[REC_Q])
-        np.multiply(gear.slope, record[REC_QD], out=ripple)
+        np.multiply(gear.slope, record[REC_QD], ripple)
         record[REC_Q] += gear.error
         record[REC_QD] += ripple
         if self._push is not None:
@@ -282,8 +282,8 @@ class Plant:
         if self._data.ncon:
             record[REC_WRENCH] += contact_wrench(self._model, self._data, self._flange_position)
         self._records.append(record)
-        np.subtract(self._path.q_final, self._qpos, out=error)
-        np.subtract(error, gear.error, out=error)
+        np.subtract(self._path.q_final, self._qpos, error)
+        np.subtract(error, gear.error, error)
         if not self._saturated_now:
             self._drives.integrate(error)
 

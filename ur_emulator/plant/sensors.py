@@ -62,9 +62,10 @@ class Sensors:
     def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int, period: float) -> None:
         self._rng = random_stream(seed, "sensors")
         self._drift = ForceDrift(fidelity, seed, _BLOCK * period)
-        self._step = fidelity.encoder_step
+        step = fidelity.encoder_step
+        self._step = np.full(6, step)
         sigmas = np.zeros(_N_NOISE)
-        sigmas[REC_Q] = np.array(fidelity.encoder_sigma) / self._step
+        sigmas[REC_Q] = np.array(fidelity.encoder_sigma) / step
         sigmas[REC_QD] = fidelity.speed_sigma
         sigmas[REC_TORQUE] = fidelity.current_sigma
         sigmas[REC_ACCELERATION] = fidelity.accelerometer_sigma
@@ -74,7 +75,7 @@ class Sensors:
         self._sigmas = sigmas
         # From the record's units to those of the sensors: encoder steps and amperes.
         self._scale = np.ones(N_RECORD)
-        self._scale[REC_Q] = 1.0 / self._step
+        self._scale[REC_Q] = 1.0 / step
         self._scale[REC_TORQUE] = 1.0 / np.array(robot.torque_constant)
         self._keep = [exp(-2.0 * pi * pole * period) for pole in fidelity.speed_filter_hz]
         self._dead_band = fidelity.speed_dead_band
@@ -95,13 +96,13 @@ class Sensors:
         noise = self._next_noise()
         values, steps, work = self._values, self._steps, self._work
         # Sampled a moment early or late, in the sensors' units, noisy, in whole encoder steps.
-        np.multiply(record[REC_QD], noise[_NOISE_MOMENT], out=work)
-        np.add(work, record[REC_Q], out=work)
-        np.multiply(record, self._scale, out=values)
-        np.divide(work, self._step, out=steps)
-        np.add(values, noise[:N_RECORD], out=values)
-        np.rint(steps, out=steps)
-        np.multiply(steps, self._step, out=steps)
+        np.multiply(record[REC_QD], noise[_NOISE_MOMENT], work)
+        np.add(work, record[REC_Q], work)
+        np.multiply(record, self._scale, values)
+        np.divide(work, self._step, steps)
+        np.add(values, noise[:N_RECORD], values)
+        np.rint(steps, steps)
+        np.multiply(steps, self._step, steps)
         reading: list[float] = values.tolist()
         # Speeds: a one-pole filter y = u + keep (y - u) whose input u is gated to zero at rest.
         dead_band = self._dead_band

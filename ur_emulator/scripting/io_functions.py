@@ -28,10 +28,11 @@ _DIGITAL_GROUPS = (
 _DEPRECATED_BITS = (*range(N_STANDARD), TOOL_SHIFT, TOOL_SHIFT + 1)
 
 
-def _pick(what: str, index: int, size: int) -> int:
+def _pick(what: str, index: float, size: int) -> int:
+    """Return the index of a line or register; the language lets a float without fraction through."""
     if not 0 <= index < size:
-        raise ScriptRuntimeError(f"{what} {index} does not exist, allowed are 0 to {size - 1}")
-    return index
+        raise ScriptRuntimeError(f"{what} {index:g} does not exist, allowed are 0 to {size - 1}")
+    return int(index)
 
 
 def io_functions(state: ControllerState) -> Mapping[str, Function]:
@@ -72,7 +73,7 @@ def _analog(state: ControllerState) -> dict[str, Function]:
     def set_tool_voltage(thread: object, voltage: int) -> None:
         if voltage not in (0, 12, 24):
             raise ScriptRuntimeError(f"set_tool_voltage: {voltage} V is not one of 0, 12, 24")
-        io.tool_voltage = voltage
+        io.tool_voltage = int(voltage)
 
     return {
         "get_standard_analog_in": reader(io.analog_in, "standard analog input"),

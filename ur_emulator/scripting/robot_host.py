@@ -13,12 +13,20 @@ from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.settings_functions import settings_functions
 from ur_emulator.scripting.socket_functions import ProgramSockets
 from ur_emulator.scripting.state_functions import state_functions
+from urscript.builtins import pure_builtins
 
 
 class RobotHost:
     """The host of one running program (see urscript.host.Host)."""
 
     def __init__(self, state: ControllerState, network: Network) -> None:
+        """Bind the builtins.
+
+        Args:
+            state: what they read and change.
+            network: opens the program's sockets.
+        """
+        random = pure_builtins(state.seed)["random"]
         self.step_time = state.period_s
         self._state = state
         self._sockets = ProgramSockets(state, network)
@@ -29,6 +37,7 @@ class RobotHost:
             **io_functions(state),
             **register_functions(state),
             **self._sockets.functions(),
+            "random": lambda thread: random(),
         }
 
     def builtins(self) -> Mapping[str, Callable[..., Any]]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
 from ur_emulator.controller.events import PopupShown
 from ur_emulator.controller.state import ControllerState, Payload
 from ur_emulator.motion.target import vector6
+from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
+from urscript.waits import Blocked
 
 
 def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
@@ -24,7 +26,7 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
     def mass_of(mass: float) -> float:
         if not 0.0 <= mass <= state.robot.payload_max:
             raise ScriptRuntimeError(
-                f"payload of {mass:g} kg is outside 0 to {state.robot.payload_max:g} kg of a {state.robot.title}"
+                f"payload of {mass:g} kg given: a {state.robot.title} takes 0 to {state.robot.payload_max:g} kg"
             )
         return float(mass)
 
@@ -44,10 +46,13 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
     def protective_stop(thread: object) -> None:
         state.stop_requested = True
 
-    def popup(thread: object, s: Any, title: str, warning: bool, error: bool, blocking: bool) -> None:
+    def popup(
+        thread: object, s: Any, title: str, warning: bool, error: bool, blocking: bool
+    ) -> Generator[Blocked, None, None]:
         if blocking:
             raise ScriptRuntimeError("popup(blocking=True) is declared only: no operator can answer it yet")
-        state.events.append(PopupShown(title, str(s), warning, error, blocking))
+        state.events.append(PopupShown(title, wire_text(s), warning, error, blocking))
+        yield from ()
 
     return {
         "set_tcp": set_tcp,

@@ -116,7 +116,7 @@ class ProgramSockets:
     def _take(
         self, name: str, timeout: float, find: Callable[[bytearray], int]
     ) -> Generator[Blocked, None, bytes | None]:
-        """Wait until `find` sees a whole message in the inbox (its length, or 0); take it, None on failure."""
+        """Wait until `find` sees a message in the inbox (its length, or 0) and take it; None on failure."""
         socket = self._sockets.get(name)
         if socket is None:
             return None

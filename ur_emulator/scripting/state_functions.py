@@ -64,10 +64,18 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
             low <= x <= high for x, low, high in zip(q, state.robot.q_min, state.robot.q_max, strict=True)
         )
 
-    def get_joint_temp(thread: object, j: int) -> float:
+    def get_joint_temp(thread: object, j: float) -> float:
         if not 0 <= j <= 5:
-            raise ScriptRuntimeError(f"get_joint_temp: joint {j} does not exist, allowed are 0 to 5")
-        return state.snapshot.joint_temperatures[j]
+            raise ScriptRuntimeError(f"get_joint_temp: joint {j:g} does not exist, allowed are 0 to 5")
+        return state.snapshot.joint_temperatures[int(j)]
+
+    def get_actual_joint_positions_history(thread: object, steps: float) -> list[float]:
+        if not 0 <= steps < len(state.q_history):
+            raise ScriptRuntimeError(
+                f"get_actual_joint_positions_history: {steps:g} steps back, "
+                f"allowed are 0 to {len(state.q_history) - 1}"
+            )
+        return list(state.q_history[int(steps)])
 
     def get_joint_torques(thread: object) -> list[float]:
         snap = state.snapshot
@@ -84,6 +92,8 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
         "get_joint_positions": lambda thread: list(state.motion.target.q),
         "get_actual_joint_speeds": lambda thread: list(state.snapshot.actual_qd),
         "get_target_joint_speeds": lambda thread: list(state.motion.target.qd),
+        "get_actual_joint_positions_history": get_actual_joint_positions_history,
+        "get_target_waypoint": lambda thread: Pose.of(arm.fk(state.motion.goal, state.tcp_offset)),
         "get_joint_torques": get_joint_torques,
         "get_joint_temp": get_joint_temp,
         "get_controller_temp": lambda thread: 30.0,

@@ -85,6 +85,7 @@ _INPUTS_OUTPUTS: tuple[Builtin, ...] = (
         (Param("voltage", INT, unit="V", choices=(0, 12, 24)),),
         "None",
         "supply voltage of the tool",
+        support=EXACT,
     ),
     _row(
         "set_tool_communication",

@@ -166,6 +166,7 @@ _STATE: tuple[Builtin, ...] = (
         ),
         "bool",
         "whether a pose or joint position is reachable inside the safety limits",
+        support=APPROXIMATE,
     ),
     _row(
         "tool_contact",
