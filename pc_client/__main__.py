@@ -1,0 +1,5 @@
+"""`python -m pc_client` is the command `ur-client`."""
+
+from pc_client.cli import main
+
+main()

@@ -1,0 +1,154 @@
+"""What the tests of the box share: a controller without ports, a network without sockets, a client without a library."""
+
+import socket
+import struct
+from contextlib import contextmanager
+
+from protocol.frame_buffer import FrameBuffer
+from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
+from protocol.realtime_layout import layout_for_size
+from protocol.ur_types import SoftwareVersion
+from ur_emulator.controller.commands import StartProgram
+from ur_emulator.controller.controller import Controller
+from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robots import robot_by_name
+from urscript import compile_program
+
+VERSION = SoftwareVersion(3, 15, 8)
+TIMEOUT = 20.0  # s; a limit for hangs, no test waits for it
+
+
+class FakeSocket:
+    """A script socket whose other end is the test."""
+
+    def __init__(self):
+        self.inbox = bytearray()
+        self.sent = bytearray()
+        self.is_connecting = False
+        self.is_open = True
+
+    def send(self, data):
+        if self.is_open:
+            self.sent += data
+        return self.is_open
+
+    def close(self):
+        self.is_open = False
+
+
+class FakeNetwork:
+    """Connects every script at once, or never if `refuse` is set."""
+
+    def __init__(self, *, refuse=False):
+        self.refuse = refuse
+        self.sockets = []
+
+    def open(self, host, port):
+        sock = FakeSocket()
+        sock.is_open = not self.refuse
+        self.sockets.append(sock)
+        return sock
+
+
+class Bench:
+    """A controller on the bench: ticks when the test says so, remembers what was said."""
+
+    def __init__(self, *, seed=7, fidelity="typical", **kwargs):
+        self.network = FakeNetwork()
+        self.controller = Controller(
+            robot_by_name("ur3"), fidelity_by_name(fidelity), seed, self.network, **kwargs
+        )
+        self.events = []
+        self.snapshots = []
+
+    @property
+    def now(self):
+        return self.controller.snapshot
+
+    def tick(self, n=1, *commands):
+        for _ in range(n):
+            self.snapshots.append(self.controller.tick(commands))
+            commands = ()
+            self.events += self.controller.take_events()
+        return self.now
+
+    def start(self, text):
+        return self.tick(1, StartProgram(compile_program(text)))
+
+    def run(self, text, limit=5000):
+        """Run a program to its end and the arm to rest; return the texts it printed."""
+        first = len(self.events)
+        self.start(text)
+        for _ in range(limit):
+            if not self.controller.is_active:
+                break
+            self.tick()
+        else:
+            raise AssertionError("the program did not end")
+        return [event.text for event in self.events[first:] if type(event).__name__ == "TextPrinted"]
+
+
+def connect(box, port):
+    sock = socket.create_connection((box.host, getattr(box.ports, port)), timeout=TIMEOUT)
+    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return sock
+
+
+class FrameReader:
+    """Reads realtime frames from a socket."""
+
+    def __init__(self, sock):
+        self.sock = sock
+        self._rest = b""
+
+    def next(self):
+        while len(self._rest) < 4 or len(self._rest) < struct.unpack_from(">i", self._rest)[0]:
+            data = self.sock.recv(65536)
+            if not data:
+                raise EOFError
+            self._rest += data
+        size = struct.unpack_from(">i", self._rest)[0]
+        frame, self._rest = self._rest[:size], self._rest[size:]
+        return layout_for_size(size).decode(frame)
+
+    def until(self, condition, limit=20_000):
+        for _ in range(limit):
+            frame = self.next()
+            if condition(frame):
+                return frame
+        raise AssertionError("the frame that was waited for did not come")
+
+
+class MessageReader:
+    """Reads packages of the primary port."""
+
+    def __init__(self, sock):
+        self.sock = sock
+        self._buffer = FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
+
+    def next(self):
+        while (frame := self._buffer.next_frame()) is None:
+            data = self.sock.recv(65536)
+            if not data:
+                raise EOFError
+            self._buffer.feed(data)
+        return decode_package(frame, VERSION)
+
+    def message(self, kind, limit=2000):
+        """Return the next message of a class, skipping everything else."""
+        for _ in range(limit):
+            package = self.next()
+            if isinstance(package, kind):
+                return package
+        raise AssertionError(f"no {kind.__name__} came")
+
+    def state(self):
+        return self.message(RobotState)
+
+
+@contextmanager
+def listening_socket():
+    """A server socket of the test, for scripts to connect to."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(TIMEOUT)
+        yield server

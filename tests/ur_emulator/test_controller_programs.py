@@ -1,0 +1,236 @@
+"""What programs do to the arm, cycle by cycle, without sockets."""
+
+import struct
+
+import numpy as np
+import pytest
+from box_support import Bench
+
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
+from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION
+
+SPIN = "def spin():\n  while True:\n    speedj([0.2,0,0,0,0,0], 2.0, get_steptime())\n  end\nend\n"
+
+
+@pytest.fixture
+def bench():
+    return Bench(fidelity="ideal")
+
+
+def texts(events):
+    return [event.text for event in events if isinstance(event, ScriptFailed | ErrorReported)]
+
+
+def test_a_program_moves_the_arm_and_ends(bench):
+    assert bench.run("def m():\n  movej([0.5,-1.5,-1.8,0,1.2,1.5])\n  textmsg(\"there\")\nend\n") == ["there"]
+    assert bench.now.target_q == pytest.approx([0.5, -1.5, -1.8, 0, 1.2, 1.5])
+    assert bench.now.runtime_state == ProgramState.STOPPED
+    kinds = [type(event) for event in bench.events]
+    assert kinds[0] is ProgramStarted
+    assert kinds[-1] is ProgramStopped
+
+
+def test_speedj_with_the_step_time_takes_exactly_one_cycle_a_call(bench):
+    bench.start(
+        "def s():\n  i = 0\n  while i < 50:\n    speedj([0.1,0,0,0,0,0], 5, get_steptime())\n    i = i + 1\n  end\n"
+        "  textmsg(i)\nend\n"
+    )
+    bench.tick(49)
+    assert not [e for e in bench.events if type(e).__name__ == "TextPrinted"]
+    bench.tick(1)
+    assert [e.text for e in bench.events if type(e).__name__ == "TextPrinted"] == ["50"]
+
+
+def test_speedj_with_t_returns_after_t_whether_or_not_the_speed_is_reached(bench):
+    bench.start("def s():\n  speedj([1.0,0,0,0,0,0], 0.5, 0.4)\n  textmsg(get_target_joint_speeds())\nend\n")
+    bench.tick(60)
+    (said,) = [e.text for e in bench.events if type(e).__name__ == "TextPrinted"]
+    assert said.startswith("[0.2")
+
+
+def test_a_stream_that_pauses_makes_the_arm_stutter(bench):
+    bench.start(
+        "def s():\n  i = 0\n  while i < 60:\n    speedj([0.2,0,0,0,0,0], 2.0, get_steptime())\n    i = i + 1\n  end\n"
+        "  sync()\n  sync()\n  sync()\n"
+        "  while True:\n    speedj([0.2,0,0,0,0,0], 2.0, get_steptime())\n  end\nend\n"
+    )
+    bench.tick(59)
+    assert bench.now.target_qd[0] == pytest.approx(0.2)
+    dip = min(bench.tick().target_qd[0] for _ in range(8))
+    assert dip == pytest.approx(0.2 - 3 * 2.0 * 0.008)
+    bench.tick(10)
+    assert bench.now.target_qd[0] == pytest.approx(0.2)
+
+
+def test_when_a_program_is_stopped_the_arm_ramps_to_rest(bench):
+    bench.start(SPIN)
+    bench.tick(60)
+    assert bench.now.target_qd[0] == pytest.approx(0.2)
+    before = bench.now.target_qd[0]
+    states = []
+    bench.tick(1, cmd.StopProgram())
+    while bench.now.target_qd[0] > 0:
+        assert before - bench.now.target_qd[0] <= PROGRAM_END_DECELERATION * 0.008 * (1 + 1e-9)
+        before = bench.now.target_qd[0]
+        states.append(bench.now.runtime_state)
+        bench.tick()
+    bench.tick()
+    assert set(states) == {ProgramState.STOPPING}
+    assert bench.now.runtime_state == ProgramState.STOPPED
+    assert bench.now.target_qdd == (0.0,) * 6
+
+
+def test_a_stream_of_one_line_programs_moves_without_braking(bench):
+    for _ in range(60):
+        bench.start("speedj([0.3,0,0,0,0,0], 5.0, 0.008)\n")
+    speeds = [s.target_qd[0] for s in bench.snapshots[-20:]]
+    assert speeds == pytest.approx([0.3] * 20)
+
+
+def test_a_second_thread_cannot_take_the_arm(bench):
+    bench.run(
+        "def two():\n  thread mover():\n    while True:\n      speedj([0.1,0,0,0,0,0], 1.0, get_steptime())\n    end\n  end\n"
+        "  h = run mover()\n  sleep(0.1)\n  stopj(1.0)\nend\n"
+    )
+    assert "Another thread is already controlling the robot" in texts(bench.events)[0]
+
+
+def test_killing_the_mover_frees_the_arm(bench):
+    said = bench.run(
+        "def two():\n  thread mover():\n    while True:\n      speedj([0.1,0,0,0,0,0], 1.0, get_steptime())\n    end\n  end\n"
+        "  h = run mover()\n  sleep(0.1)\n  kill h\n  stopj(1.0)\n  textmsg(\"free\")\nend\n"
+    )
+    assert said == ["free"]
+    assert bench.now.target_qd == (0.0,) * 6
+
+
+def test_a_script_that_loops_without_sync_ends_with_the_controllers_error(bench):
+    bench.run("def loop():\n  while True:\n  end\nend\n")
+    assert "used too much time without instructing the robot" in texts(bench.events)[0]
+    assert bench.now.runtime_state == ProgramState.STOPPED
+
+
+def test_numbers_that_are_none_do_not_move_the_arm(bench):
+    q = bench.now.target_q
+    network = bench.network
+    bench.start(
+        "def f():\n  socket_open(\"10.0.0.1\", 1234)\n  v = socket_read_ascii_float(1)\n"
+        "  speedj([v[1],0,0,0,0,0], 1.0, 0.008)\nend\n"
+    )
+    network.sockets[0].inbox += b"(nan)"
+    bench.tick(5)
+    assert texts(bench.events)
+    assert bench.now.target_q == q
+
+
+def test_a_velocity_beyond_the_joint_limit_is_a_protective_stop(bench):
+    bench.start("def f():\n  while True:\n    speedj([50,0,0,0,0,0], 40.0, get_steptime())\n  end\nend\n")
+    bench.tick(60)
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert bench.now.runtime_state == ProgramState.STOPPED
+    assert max(abs(s.target_qd[0]) for s in bench.snapshots) < 3.6
+    assert bench.now.target_qd == (0.0,) * 6
+    assert any(isinstance(e, ErrorReported) and e.code == 204 for e in bench.events)
+
+
+def test_nothing_runs_in_a_protective_stop_until_it_is_unlocked(bench):
+    bench.tick(1, cmd.TriggerProtectiveStop())
+    bench.tick(2)
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    bench.start(SPIN)
+    bench.tick(20)
+    assert bench.now.target_qd == (0.0,) * 6
+    bench.tick(1, cmd.UnlockProtectiveStop())
+    bench.start(SPIN)
+    bench.tick(20)
+    assert bench.now.target_qd[0] > 0
+
+
+def test_a_blocked_arm_stops_itself_and_drops_its_target(bench):
+    bench.controller.plant.push((0.0, 0.0, -400.0))
+    bench.tick(200)
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert any(isinstance(e, ErrorReported) and e.code in (153, 157) for e in bench.events)
+
+
+def test_power_cycle_passes_through_the_modes():
+    bench = Bench(mode=RobotMode.POWER_OFF)
+    bench.tick(1, cmd.ReleaseBrakes())
+    modes = [bench.tick().robot_mode for _ in range(300)]
+    order = list(dict.fromkeys(modes))
+    assert order[-3:] == [RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING]
+    q = bench.now.actual_q
+    bench.tick(1, cmd.PowerOff())
+    bench.tick(50)
+    assert bench.now.robot_mode == RobotMode.POWER_OFF
+    assert np.abs(np.subtract(bench.now.actual_q, q)).max() < 1e-3
+
+
+def test_a_program_is_refused_while_the_brakes_are_on():
+    bench = Bench(mode=RobotMode.IDLE)
+    bench.start(SPIN)
+    assert "it must be RUNNING" in texts(bench.events)[0]
+
+
+def test_reads_return_their_failure_shapes_when_the_peer_is_gone(bench):
+    bench.network.refuse = True
+    said = bench.run(
+        "def f():\n  textmsg(socket_open(\"10.0.0.1\", 1))\n  textmsg(socket_read_binary_integer(2))\n"
+        "  textmsg(socket_read_byte_list(2))\n  textmsg(socket_send_int(5))\nend\n"
+    )
+    assert said == ["False", "[0,-1,-1]", "[0,-1,-1]", "False"]
+
+
+def test_a_read_times_out_in_robot_time(bench):
+    bench.start("def f():\n  socket_open(\"10.0.0.1\", 1)\n  textmsg(socket_read_binary_integer(1, timeout=0.1))\nend\n")
+    assert bench.controller.waits_outside
+    bench.tick(20)
+    assert [e.text for e in bench.events if type(e).__name__ == "TextPrinted"] == ["[0,-1]"]
+
+
+def test_a_read_hands_over_what_came_and_keeps_the_rest(bench):
+    bench.start(
+        "def f():\n  socket_open(\"10.0.0.1\", 1)\n  textmsg(socket_read_binary_integer(2))\n"
+        "  textmsg(socket_read_string(suffix=\"!\"))\n  textmsg(socket_read_line())\nend\n"
+    )
+    sock = bench.network.sockets[0]
+    sock.inbox += struct.pack(">2i", 7, -9)[:5]
+    bench.tick()
+    assert bench.controller.waits_outside
+    sock.inbox += struct.pack(">2i", 7, -9)[5:] + b"hi!line\r\n"
+    bench.tick(2)
+    assert [e.text for e in bench.events if type(e).__name__ == "TextPrinted"] == ["[2,7,-9]", "hi", "line"]
+    assert not sock.is_open
+
+
+def test_a_secondary_program_runs_beside_the_primary_one(bench):
+    bench.start(SPIN)
+    bench.tick(10)
+    bench.start("sec out():\n  set_standard_digital_out(3, True)\nend\n")
+    bench.tick(10)
+    assert bench.now.actual_digital_output_bits == 0b1000
+    assert bench.now.runtime_state == ProgramState.PLAYING
+    bench.start("sec bad():\n  x = 1 / 0\nend\n")
+    bench.tick(10)
+    assert [e for e in bench.events if isinstance(e, ScriptFailed)][0].secondary
+    assert bench.now.runtime_state == ProgramState.PLAYING
+
+
+def test_registers_outlive_programs(bench):
+    bench.run("def w():\n  write_output_integer_register(3, 42)\n  write_output_float_register(1, 1.5)\nend\n")
+    said = bench.run("def r():\n  textmsg(read_output_integer_register(3), read_output_float_register(1))\nend\n")
+    assert said == ["421.5"]
+
+
+def test_speed_slider_slows_a_move(bench):
+    bench.tick(1, cmd.SetSpeedSlider(0.5))
+    bench.run("def m():\n  movej([0.5,-1.5,-1.8,0,1.2,1.5], a=1.4, v=0.4)\nend\n")
+    assert max(abs(x) for s in bench.snapshots for x in s.target_qd) == pytest.approx(0.2)
+    assert bench.now.speed_scaling == 0.5
+
+
+def test_a_name_that_is_only_declared_says_so_when_it_is_called(bench):
+    bench.run("def f():\n  freedrive_mode()\nend\n")
+    assert "declared only" in texts(bench.events)[0]

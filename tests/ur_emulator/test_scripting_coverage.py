@@ -1,0 +1,29 @@
+"""The catalogue's promise and the box must agree: what is called modelled is there, what is there is called modelled."""
+
+from box_support import Bench
+
+from ur_emulator.scripting.robot_host import RobotHost
+from urscript.builtins import PURE
+from urscript.catalogue import CB3_3_15
+from urscript.catalogue.types import Support
+
+# Run by the interpreter itself.
+FLOW = {"sync", "sleep", "textmsg"}
+
+
+def offered():
+    bench = Bench()
+    host = RobotHost(bench.controller.state, bench.network)
+    return set(host.builtins()) | set(PURE) | FLOW
+
+
+def test_every_modelled_builtin_is_offered_and_every_offered_one_is_modelled():
+    modelled = {row.name for row in CB3_3_15 if row.support is not Support.DECLARED_ONLY}
+    missing = modelled - offered()
+    undeclared = {name for name in offered() if name in CB3_3_15} - modelled
+    assert not missing
+    assert not undeclared
+
+
+def test_the_box_offers_nothing_that_the_language_does_not_know():
+    assert {name for name in offered() if name not in CB3_3_15} == set()
