@@ -141,8 +141,7 @@ def _refuse_arguments(plan: JointPlan, arm: RobotModel, q_from: Array, v: float,
         raise PlanningError(
             f"{plan.name}: {JOINT_NAMES[joint]} stands at {np.degrees(q_from[joint]):.1f} deg, outside its"
             f" range of {np.degrees(arm.limits.q_min[joint]):.0f} to"
-            f" {np.degrees(arm.limits.q_max[joint]):.0f}"
-            " deg; move it back by hand first",
+            f" {np.degrees(arm.limits.q_max[joint]):.0f} deg; move it back by hand first",
             joint=joint,
         )
 
@@ -173,10 +172,13 @@ def _fitting_turns(plan: JointPlan, q_from: Array, joint: int) -> list[int]:
 
 
 def _raised(q: Array) -> Array:
-    """Return q with the arm straight up as in UR's home posture, each joint in the turn that is nearest."""
+    """Return q with the arm straight up as in UR's home posture, each joint in its nearest possible turn."""
     posture = q.copy()
     for joint, angle in _RAISED.items():
-        posture[joint] = angle + _TURN * round((float(q[joint]) - angle) / _TURN)
+        options = np.array(
+            [option for option in (angle - _TURN, angle, angle + _TURN) if abs(option) < _TURN]
+        )
+        posture[joint] = options[np.abs(options - q[joint]).argmin()]
     return posture
 
 

@@ -102,7 +102,7 @@ def check_motion(
         The figures, all within limits.
 
     Raises:
-        PlanningError: naming sample and joint of the first limit that is broken.
+        PlanningError: a limit is broken; names the sample where it is broken most, and the joint.
     """
     q, t = path.q, samples.t
     # The speed is highest at a knot or inside an interval; the half-way point is within 1e-3 of the latter.

@@ -17,6 +17,7 @@ from pc_client.planning.approach import (
     APPROACH_SPEED,
     FLOOR_MARGIN,
     OWN_MARGIN,
+    _raised,
     movej_duration,
     plan_approach,
 )
@@ -120,17 +121,31 @@ def test_the_elbow_takes_the_long_way_where_the_short_one_is_folded():
     assert approach.own_clearance >= OWN_MARGIN
 
 
+@pytest.mark.parametrize("turns", [(-6.2, -6.2), (6.2, 6.2), (-6.2, 6.2), (0.1, -0.1)])
+def test_raised_postures_stay_within_the_joint_ranges(turns):
+    q = np.array((0.4, turns[0], turns[1], turns[0], turns[1], 0.5))
+    raised = _raised(q)
+    assert np.abs(raised).max() < 2 * np.pi
+    np.testing.assert_array_equal(raised[[0, 5]], q[[0, 5]])
+    # Straight up, by the DH table alone: both links above the shoulder.
+    chain = frames(raised)
+    assert chain[2][2, 3] == pytest.approx(0.1519 + 0.24365 + 0.21325, abs=1e-9)
+
+
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6))
 def test_from_any_clear_posture_the_way_found_is_clear(seed):
     rng = np.random.default_rng(seed)
     q_now = np.radians(rng.uniform((-180, -200, -150, -200, -180, -180), (180, 20, 150, 20, 180, 180)))
+    turned = q_now + 2 * np.pi * rng.integers(-1, 2, 6)
+    q_now = np.where(np.abs(turned) < 2 * np.pi, turned, q_now)
     try:
         approach = plan_approach(PLAN, q_now, model=UR3)
     except PlanningError as error:
         assert "not clear" in str(error)  # noqa: PT017 - one of two allowed outcomes
         return
     np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
+    assert np.abs(approach.waypoints).max() <= 2 * np.pi
     assert_above_the_plane(approach)
     assert approach.floor_clearance >= FLOOR_MARGIN
     assert approach.own_clearance >= OWN_MARGIN
