@@ -81,7 +81,7 @@ class RecordingHost:
         self.q: list[float] = list(_HOME)
         self.tcp_pose = _ZERO_POSE
         self._catalogue = catalogue
-        self._stored: dict[tuple[str, Any], Any] = {}
+        self._stored: dict[tuple[str, str], Any] = {}
         self._random = Random(seed)
         self._on_message = on_message
         self._on_call = on_call
@@ -148,13 +148,14 @@ class RecordingHost:
         if builtin.returns == "None" or name.startswith("socket_"):
             self._record(thread, name, arguments)
             if arguments:
-                self._stored[_memory(name), arguments[0]] = arguments[-1]
+                self._stored[_memory(name), str(arguments[0])] = arguments[-1]
             return True if name.startswith("socket_send") else None
         if name.startswith("get_") and "joint_positions" in name:
             return self.q
         if name.startswith("get_") and "tcp_pose" in name:
             return self.tcp_pose
-        return self._stored.get((_memory(name), arguments[0] if arguments else None), _default(builtin))
+        key = str(arguments[0]) if arguments else ""
+        return self._stored.get((_memory(name), key), _default(builtin))
 
     def _answer_later(
         self, builtin: Builtin, thread: ScriptThread, *arguments: Any

@@ -147,11 +147,13 @@ class Scheduler:
                         continue
                     thread.wait = None
                 self._resume(thread)
+                if thread.finished and thread is self.main:
+                    return
                 progress = True
                 wait = thread.wait
                 if wait is not None and not wait.outside:
                     waits_inside = True
-            if not (progress and waits_inside) or (self.main is not None and self.main.finished):
+            if not (progress and waits_inside):
                 break
             first_pass = False
         if self._some_finished:

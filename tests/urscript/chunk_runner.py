@@ -1,0 +1,124 @@
+"""Conformance tests written in URScript: files of programs ("chunks") with what is expected beside them.
+
+Chunks stand apart by a line `---`. Expectations are comments, so a chunk is a program as it is:
+
+    #> text            the next text that textmsg shows (all texts, in order)
+    #! 3:5 pattern     an error at line 3 of the chunk, column 5, whose message matches the pattern;
+                       several lines: all compile errors in order; at run time there is only one
+    #~ wire text       what the first error puts into the runtime-exception message
+    #@ name name       the builtins with an effect that were called, in order
+    #< 1 2 3           a frame of integers that the peer of socket "s" sends (also makes it accept)
+    #software 5.11     the software version, 3.15 if not given
+
+A chunk without `#!` must compile and end by itself. Every chunk that parses must also print to a text that
+parses to the same tree.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from urscript.catalogue import catalogue_for
+from urscript.parser import parse
+from urscript.printer import print_program
+from urscript.program import ProgramStatus, check_program, compile_program
+from urscript.recording_host import FakeSocket, RecordingHost
+from urscript.source import Source
+
+MAX_CYCLES = 2_000
+
+
+@dataclass
+class Chunk:
+    """One program and what is expected of it."""
+
+    file: str
+    first_line: int
+    text: str
+    messages: list[str] = field(default_factory=list)
+    errors: list[tuple[int, int, str]] = field(default_factory=list)
+    wire_text: str | None = None
+    calls: list[str] | None = None
+    frames: list[list[int]] | None = None
+    software: str = "3.15"
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.first_line}"
+
+
+def load_chunks(*files: Path) -> list[Chunk]:
+    """All chunks of the given files."""
+    return [chunk for file in files for chunk in _split(file)]
+
+
+def _split(file: Path) -> list[Chunk]:
+    chunks = []
+    lines: list[str] = []
+    first = 1
+    text = file.read_bytes().decode("latin-1")
+    for number, line in enumerate([*text.split("\n"), "---"], start=1):
+        if line.rstrip() != "---":
+            lines.append(line)
+            continue
+        if any(part.strip() for part in lines):
+            chunks.append(_expectations(Chunk(file.name, first, "\n".join(lines))))
+        lines, first = [], number + 1
+    return chunks
+
+
+def _expectations(chunk: Chunk) -> Chunk:
+    for line in chunk.text.split("\n"):
+        mark = re.search(r"#(>|!|~|@|<|software)(?: (.*))?$", line)
+        if mark is None:
+            continue
+        kind, rest = mark[1], mark[2] or ""
+        if kind == ">":
+            chunk.messages.append(rest)
+        elif kind == "!":
+            place = re.match(r"(\d+):(\d+) (.+)", rest)
+            assert place, f"{chunk}: write '#! line:column pattern', not {line!r}"
+            chunk.errors.append((int(place[1]), int(place[2]), place[3]))
+        elif kind == "~":
+            chunk.wire_text = rest
+        elif kind == "@":
+            chunk.calls = rest.split()
+        elif kind == "<":
+            chunk.frames = [*(chunk.frames or []), [int(word) for word in rest.split()]]
+        else:
+            chunk.software = rest
+    return chunk
+
+
+def run_chunk(chunk: Chunk) -> None:
+    """Compile and run a chunk; asserts everything it expects."""
+    catalogue = catalogue_for(chunk.software)
+    sockets = {} if chunk.frames is None else {"s": FakeSocket(chunk.frames, closed=True)}
+    host = RecordingHost(catalogue=catalogue, sockets=sockets)
+    errors = list(check_program(chunk.text, catalogue=catalogue)[0])
+    if not errors:
+        program = compile_program(chunk.text, catalogue=catalogue)
+        running = host.run(program, MAX_CYCLES)
+        assert running.status is not ProgramStatus.RUNNING, f"{chunk}: still running"
+        assert not running.threads, f"{chunk}: left a thread behind"
+        assert host.ended_programs == 1, f"{chunk}: program_ended called {host.ended_programs} times"
+        errors = [running.error] if running.error is not None else []
+        _assert_prints(chunk)
+    found = [(error.line, error.column, error.message) for error in errors]
+    assert len(found) == len(chunk.errors), f"{chunk}: expected {chunk.errors}, got {found}"
+    for (line, column, message), (want_line, want_column, pattern) in zip(found, chunk.errors, strict=True):
+        assert (line, column) == (want_line, want_column), f"{chunk}: {message} at {line}:{column}"
+        assert re.search(pattern, message), f"{chunk}: {message!r} does not match {pattern!r}"
+    if chunk.wire_text is not None:
+        assert errors[0].wire_text == chunk.wire_text
+    assert host.messages == chunk.messages, f"{chunk}: {host.messages}"
+    if chunk.calls is not None:
+        assert host.names_called() == chunk.calls
+
+
+def _assert_prints(chunk: Chunk) -> None:
+    tree = parse(Source(chunk.text))
+    printed = print_program(tree)
+    assert parse(Source(printed)) == tree, f"{chunk}: printed as\n{printed}"
+    assert print_program(parse(Source(printed))) == printed
