@@ -33,6 +33,8 @@ app.command()(doctor.doctor)
 # typer >= 0.16 carries its own copy of click, older ones import it: the class is found where it is used.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
+_INTERRUPTED = 130
+
 _EXTRAS = {
     "pinocchio": "client",
     "scipy": "client",
@@ -61,8 +63,8 @@ def run(arguments: list[str] | None = None) -> int:
         return _complain(f"{text} (see ur-client --help)", 2)
     except typer.Abort:
         return _complain("aborted", 1)
-    except KeyboardInterrupt as error:
-        return _complain(f"interrupted{_notes(error)}; finished recordings are complete", 1)
+    except KeyboardInterrupt:
+        return _complain("interrupted", 1)
     except (ClientError, ProtocolError) as error:
         return _complain(f"{error}{_notes(error)}", 1)
     except ModuleNotFoundError as error:
@@ -72,6 +74,8 @@ def run(arguments: list[str] | None = None) -> int:
         return _complain(f"this needs {error.name}: run `pip install 'ur-hil[{extra}]'`", 1)
     except BrokenPipeError:  # the reader of our output went away
         return 1
+    if code == _INTERRUPTED:  # newer typer turns Ctrl-C into the shell's exit code
+        return _complain("interrupted", 1)
     return code if isinstance(code, int) else 0
 
 

@@ -19,6 +19,7 @@ from pc_client.commands.options import (
     ports_of,
     show_report,
 )
+from pc_client.errors import ClientError
 
 if TYPE_CHECKING:
     from pc_client.experiment.prepare import Experiment
@@ -72,8 +73,12 @@ def _run(
         planned = prepare_experiment(movements, repeat=repeat, out=out)
     if not yes and not is_loopback(robot):
         _ask(planned, robot, ports)
-    with Progress(console, planned.n_runs) as progress, UrDriver(robot, ports) as driver:
-        report = ExperimentRunner(driver, planned, config, progress).run()
+    try:
+        with Progress(console, planned.n_runs) as progress, UrDriver(robot, ports) as driver:
+            report = ExperimentRunner(driver, planned, config, progress).run()
+    except KeyboardInterrupt as interrupt:
+        doubts = "; ".join(getattr(interrupt, "__notes__", ())) or "the arm rests"
+        raise ClientError(f"interrupted; {doubts}; recordings finished so far are in {out}") from interrupt
     robot_time = sum(stream.robot_time for stream in report.streams)
     wall_time = sum(stream.wall_time for stream in report.streams)
     late = sum(stream.late_frames for stream in report.streams)

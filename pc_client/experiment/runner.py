@@ -67,7 +67,7 @@ class ExperimentRunner:
         self._driver = driver
         self._experiment = experiment
         self._config = config
-        self._observer = observer or Silent()
+        self._observer = Silent() if observer is None else observer
         self._qd_max = experiment.model.limits.qd_max
         self._signals = [(column.name, column.count) for column in driver.layout.columns]
 

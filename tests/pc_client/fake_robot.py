@@ -1,4 +1,4 @@
-"""A control box in memory for the driver's tests: ports, programs and an arm that integrates, no sockets, no time.
+"""A control box in memory for the driver's tests: ports, programs, an arm; no sockets, no time.
 
 It is a `Network` to the driver. Whenever the driver reads a frame, the robot lives on: in lockstep it
 advances only while nothing is missing (else it repeats its last frame), otherwise with every frame.
@@ -27,6 +27,7 @@ PERIOD = 0.008
 LAYOUT = layout_for_version(VERSION)
 _ENCODE = LAYOUT.encoder()
 _COUNTS = {column.attribute: column.count for column in LAYOUT.columns}
+_ALL_ZERO = {name: 0.0 if _COUNTS.get(name, 1) == 1 else (0.0,) * _COUNTS[name] for name in SNAPSHOT_FIELDS}
 STOPPED, PLAYING = 1, 2
 
 
@@ -85,12 +86,10 @@ class Listener:
 
 
 class FakeRobot:
-    def __init__(
-        self, *, lockstep=True, delay=3, on_tick=None, hello=None, dials=True, answers_dashboard=True
-    ):
+    def __init__(self, *, lockstep=True, delay=3, on_tick=None, hello=None, dials=True, has_dashboard=True):
         self.lockstep, self.delay, self.on_tick = lockstep, delay, on_tick
         self.hello = encode_hello() if hello is None else hello
-        self.dials, self.answers_dashboard = dials, answers_dashboard
+        self.dials, self.has_dashboard = dials, has_dashboard
         self.clock = 0.0
         self.tick = 1000
         self.q = [0.0] * 6
@@ -117,7 +116,7 @@ class FakeRobot:
 
     def connect(self, host, port, timeout):
         kind = {v: k for k, v in vars_of(Ports.standard()).items()}[port]
-        if kind == "dashboard" and not self.answers_dashboard:
+        if kind == "dashboard" and not self.has_dashboard:
             raise DriverError(f"{host}:{port} refuses the connection")
         pipe = self.pipes[kind] = Pipe(self, kind)
         if kind in ("primary", "secondary"):
@@ -229,9 +228,7 @@ class FakeRobot:
         self.q = [q + qd * PERIOD for q, qd in zip(self.q, self.qd, strict=True)]
 
     def frame(self):
-        values = {
-            name: 0.0 if _COUNTS.get(name, 1) == 1 else (0.0,) * _COUNTS[name] for name in SNAPSHOT_FIELDS
-        }
+        values = dict(_ALL_ZERO)
         values.update(
             timestamp=self.tick * PERIOD,
             actual_q=tuple(self.q),

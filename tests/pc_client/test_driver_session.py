@@ -1,4 +1,4 @@
-"""Opening a session, moving to a posture, and the small programs and questions around it, on a robot in memory."""
+"""Opening a session, moving to a posture, the small programs and questions around it: a robot in memory."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_session_says_who_answered():
 
 
 def test_session_without_dashboard_server():
-    with UrDriver("robot", network=FakeRobot(answers_dashboard=False)) as driver:
+    with UrDriver("robot", network=FakeRobot(has_dashboard=False)) as driver:
         assert driver.info.model == "unknown"
         assert driver.info.serial.text == "unknown"
         assert not driver.info.serial.simulated
@@ -59,12 +59,12 @@ def test_move_to_arrives(lockstep):
 @pytest.mark.parametrize(
     ("spoil", "error", "words"),
     [
-        (dict(safety_mode=3), RobotStoppedError, "unlock the protective stop"),
-        (dict(safety_mode=5), RobotStoppedError, "SAFEGUARD_STOP"),
-        (dict(safety_mode=99), RobotStoppedError, "99"),
-        (dict(robot_mode=5), RobotStoppedError, "IDLE, motion needs RUNNING"),
-        (dict(robot_mode=3), RobotStoppedError, "POWER_OFF"),
-        (dict(program="other"), DriverError, "a program is PLAYING"),
+        ({"safety_mode": 3}, RobotStoppedError, "unlock the protective stop"),
+        ({"safety_mode": 5}, RobotStoppedError, "SAFEGUARD_STOP"),
+        ({"safety_mode": 99}, RobotStoppedError, "99"),
+        ({"robot_mode": 5}, RobotStoppedError, "IDLE, motion needs RUNNING"),
+        ({"robot_mode": 3}, RobotStoppedError, "POWER_OFF"),
+        ({"program": "other"}, DriverError, "a program is PLAYING"),
     ],
 )
 def test_nothing_is_sent_to_a_robot_that_is_not_ready(spoil, error, words):

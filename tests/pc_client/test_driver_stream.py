@@ -1,4 +1,4 @@
-"""The control loop on a robot in memory: one command a frame, heartbeats, late and lost frames, every way to fail."""
+"""The control loop on a robot in memory: one command a frame, heartbeats, late and lost frames, failures."""
 
 from __future__ import annotations
 

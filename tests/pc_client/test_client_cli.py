@@ -1,0 +1,212 @@
+"""The command line: exit codes, one-line errors, questions before a real arm moves."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+
+import pytest
+from fake_robot import FakeRobot
+
+import pc_client.driver.transport as transport
+import pc_client.driver.ur_driver as ur_driver_module
+from pc_client import cli
+
+COMMANDS = (["experiment"], ["run"], ["movements"], ["movements", "list"], ["report"], ["doctor"], ["export"])
+
+
+@pytest.fixture
+def robot(monkeypatch):
+    """A robot in memory instead of the network."""
+    fake = FakeRobot()
+    fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
+    for module in (transport, ur_driver_module):
+        monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
+    return fake
+
+
+def one_line(capsys):
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1, err
+    assert "Traceback" not in err
+    return err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command, capsys):
+    assert cli.run([*command, "--help"]) == 0
+    assert "Usage" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["experiment"], "--robot"),
+        (["experiment", "--robot", "127.0.0.1"], "--out"),
+        (["experiment", "--robot", "x", "--out", "y", "--repeat", "0"], "repeat"),
+        (["experiment", "--robot", "127.0.0.1", "--out", "y", "--port-base", "70000"], "port offset"),
+        (["fly"], "fly"),
+        (["doctor", "--robot", "x", "--quickly"], "quickly"),
+        (["export", "x.mcap", "--to", "xlsx"], "csv or parquet"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_2(arguments, words, capsys):
+    assert cli.run(arguments) == 2
+    assert words in one_line(capsys)
+
+
+def free_offset():
+    """A port offset at which nothing listens."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return listener.getsockname()[1] - 30001
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "lognorm_9_9", "--robot", "127.0.0.1", "--out", "o"], "no movement"),
+        (["run", "nowhere.toml", "--robot", "127.0.0.1", "--out", "o"], "nowhere.toml"),
+        (["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o", "--controller", "pid"], "preview"),
+        (["report", "empty"], "no recordings"),
+        (["export", "missing.mcap"], "missing.mcap"),
+        (["movements", "show", "lognorm_9_9"], "no movement"),
+        (["run", "uniform_4_1", "--robot", "127.0.0.1", "--port-base", "FREE", "--out", "o"], "refuses"),
+        (["run", "uniform_4_1", "--robot", "no.such.invalid", "--yes", "--out", "o"], "cannot be looked up"),
+    ],
+)
+def test_what_does_not_work_is_one_line_and_exit_1(arguments, words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = [str(free_offset()) if a == "FREE" else a for a in arguments]
+    assert cli.run(arguments) == 1
+    assert words in one_line(capsys)
+    assert not (tmp_path / "o").exists()
+
+
+def test_run_records_and_reports(robot, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", str(out)]) == 0
+    assert {p.name for p in out.iterdir()} >= {
+        "uniform_4_1_r1.mcap",
+        "table1.json",
+        "table1.md",
+        "report.html",
+    }
+    text = capsys.readouterr().out
+    assert "loop delay" in text
+    assert "19.02" in text  # the paper's figure stands beside ours
+    assert robot.at_rest
+
+    assert cli.run(["report", str(out)]) == 0
+    assert "uniform_4_1" in capsys.readouterr().out
+    recording = out / "uniform_4_1_r1.mcap"
+    assert cli.run(["export", str(recording), "--to", "csv"]) == 0
+    header, *rows = recording.with_suffix(".csv").read_text().splitlines()
+    assert header.startswith("timestamp,")
+    assert len(rows) > 500
+
+
+def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, monkeypatch):
+    asked = []
+
+    def answer(question, abort):
+        asked.append(question)
+        assert robot.programs == []
+        assert {"primary", "secondary", "realtime"} <= set(robot.closed)
+        raise cli.typer.Abort
+
+    monkeypatch.setattr(cli.typer, "confirm", answer)
+    code = cli.run(["run", "uniform_4_1", "--robot", "192.0.2.7", "--out", str(tmp_path / "out")])
+    assert code == 1
+    assert len(asked) == 1
+    assert robot.programs == []
+    assert not (tmp_path / "out").exists()
+    out = capsys.readouterr().out
+    for words in ("UR3, software 3.15.8", "box of motion", "top TCP speed", "top joint speed", "duration"):
+        assert words in out
+
+
+def test_yes_skips_the_question(robot, tmp_path, monkeypatch):
+    def answer(question, abort):
+        raise AssertionError("asked")
+
+    monkeypatch.setattr(cli.typer, "confirm", answer)
+    arguments = ["run", "uniform_4_1", "--robot", "192.0.2.7", "--yes", "--out", str(tmp_path / "out")]
+    assert cli.run(arguments) == 0
+
+
+def test_ctrl_c_is_one_line_and_leaves_the_arm_stopped(robot, tmp_path, capsys):
+    def interrupt(r):
+        if r.program == "receiver" and len(r.received) == 300:
+            robot.on_tick = None
+            raise KeyboardInterrupt
+
+    robot.on_tick = interrupt
+    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", str(tmp_path)]) == 1
+    err = [line for line in capsys.readouterr().err.splitlines() if line]
+    assert err[-1].startswith("ur-client: interrupted")
+    assert robot.at_rest
+
+
+def test_protective_stop_is_one_line(robot, tmp_path, capsys):
+    def stop(r):
+        if len(r.received) == 300:
+            r.safety_mode = 3
+
+    robot.on_tick = stop
+    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", str(tmp_path)]) == 1
+    assert "PROTECTIVE_STOP" in one_line(capsys)
+
+
+def test_doctor_says_ready(robot, capsys):
+    assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.5"]) == 0
+    out = capsys.readouterr().out
+    assert "30003  realtime      open" in out
+    assert "UR3, software 3.15.8, simulated 20993000007" in out
+    assert "1140 bytes" in out
+    assert "streaming   ready" in out
+
+
+def test_doctor_names_the_obstacle(robot, capsys):
+    robot.lockstep = False
+    robot.safety_mode = 3
+    assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.5"]) == 1
+    out = capsys.readouterr().out
+    assert "cycle       8.000 ms, 0 cycles lost" in out
+    assert "NOT NOW: the robot's safety mode is PROTECTIVE_STOP" in out
+
+
+def test_doctor_where_nothing_answers(capsys):
+    assert cli.run(["doctor", "--robot", "127.0.0.1", "--port-base", str(free_offset())]) == 1
+    out = capsys.readouterr().out
+    assert out.count("closed") >= 8
+    assert "refuses the connection" in out
+
+
+def test_movements_list_show_and_generate(tmp_path, capsys):
+    assert cli.run(["movements", "list"]) == 0
+    assert "lognorm_5_3" in capsys.readouterr().out
+    assert cli.run(["movements", "show", "uniform_5_1", "--json"]) == 0
+    assert '"duration_s"' in capsys.readouterr().out
+    assert cli.run(["movements", "show", "uniform_5_1"]) == 0
+    assert "box of motion" in capsys.readouterr().out
+    file = tmp_path / "mine.toml"
+    assert cli.run(["movements", "generate", "--targets", "4", "--seed", "5", "--out", str(file)]) == 0
+    assert 'name = "mine"' in file.read_text()
+
+
+def test_missing_extras_name_the_command_to_install(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    monkeypatch.delitem(sys.modules, "pc_client.kinematics.robot_model", raising=False)
+    for name in [n for n in sys.modules if n.startswith(("pc_client.experiment", "pc_client.planning"))]:
+        monkeypatch.delitem(sys.modules, name)
+    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o"]) == 1
+    assert "pip install 'ur-hil[client]'" in one_line(capsys)
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys; from pc_client.cli import run; run(['--help']); "
+        "sys.exit(any(n in sys.modules for n in ('pinocchio', 'scipy', 'mcap', 'matplotlib', 'numpy')))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 0

@@ -1,0 +1,135 @@
+"""The TCP transport on real sockets of this machine: what users meet as one-line errors."""
+
+from __future__ import annotations
+
+import socket
+import struct
+
+import pytest
+from fake_robot import LAYOUT, FakeRobot
+
+from pc_client.driver.realtime_client import RealtimeClient
+from pc_client.driver.transport import TcpNetwork, TcpTransport
+from pc_client.errors import DriverError
+
+
+@pytest.fixture
+def pair():
+    listener = socket.create_server(("127.0.0.1", 0))
+    ours = TcpNetwork().connect("127.0.0.1", listener.getsockname()[1], 2.0)
+    theirs, _ = listener.accept()
+    listener.close()
+    yield ours, theirs
+    ours.close()
+    theirs.close()
+
+
+def test_bytes_go_both_ways_without_delay(pair):
+    ours, theirs = pair
+    ours.send(b"abc")
+    assert theirs.recv(10) == b"abc"
+    theirs.sendall(b"defg")
+    assert ours.receive(1.0) == b"defg"
+    assert ours.receive(0.0) is None
+    assert ours.receive(0.001) is None
+    assert ours.local_address == ours.peer_address == "127.0.0.1"
+    assert ours._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+
+def test_end_of_stream_and_broken_connection(pair):
+    ours, theirs = pair
+    # an abrupt close: reset instead of end
+    theirs.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    theirs.close()
+    with pytest.raises(DriverError, match="closed the connection"):
+        ours.receive(1.0)
+    with pytest.raises(DriverError, match="cannot send"):
+        for _ in range(10):
+            ours.send(b"x")
+
+
+def test_clean_end_of_stream(pair):
+    ours, theirs = pair
+    theirs.close()
+    assert ours.receive(1.0) == b""
+
+
+def test_connection_refused_names_address_and_cure():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+    with pytest.raises(DriverError, match=rf"127\.0\.0\.1:{port} refuses the connection.*--port-base"):
+        TcpNetwork().connect("127.0.0.1", port, 1.0)
+
+
+def test_unknown_name():
+    with pytest.raises(DriverError, match="cannot be looked up"):
+        TcpNetwork().connect("no-such-robot.invalid", 30003, 1.0)
+
+
+def test_listening_on_a_foreign_address_is_refused():
+    with pytest.raises(DriverError, match="cannot listen on 192.0.2.1"):
+        TcpNetwork().listen("192.0.2.1")
+
+
+def test_listener_accepts_and_times_out():
+    listener = TcpNetwork().listen("127.0.0.1")
+    assert listener.accept(0.0) is None
+    with socket.create_connection(("127.0.0.1", listener.port)) as caller:
+        accepted = listener.accept(1.0)
+        assert isinstance(accepted, TcpTransport)
+        caller.sendall(b"hi")
+        assert accepted.receive(1.0) == b"hi"
+        accepted.close()
+    listener.close()
+
+
+def frames(n):
+    robot = FakeRobot()
+    out = []
+    for _ in range(n):
+        robot.tick += 1
+        out.append(robot.frame())
+    return out
+
+
+def test_frames_split_and_merged_anyhow(pair):
+    ours, theirs = pair
+    client = RealtimeClient(ours, TcpNetwork())
+    a, b, c = frames(3)
+    theirs.sendall(a[:500])
+    assert client.drain() is None
+    theirs.sendall(a[500:])
+    first = client.receive()
+    assert [f.timestamp for f in first.new] == [pytest.approx(1001 * 0.008)]
+    assert client.layout is LAYOUT
+    theirs.sendall(a + b + b + c)
+    second = client.receive()
+    assert len(second.new) == 2
+    assert second.n_heartbeats == 2
+    assert second.latest is second.new[-1]
+    theirs.sendall(c)
+    third = client.receive()
+    assert third.new == []
+    assert third.n_heartbeats == 1
+    assert client.drain() is None
+
+
+def test_drain_takes_everything(pair):
+    ours, theirs = pair
+    client = RealtimeClient(ours, TcpNetwork())
+    theirs.sendall(b"".join(frames(100)))
+    total = 0
+    while (arrival := client.drain()) is not None:
+        total += len(arrival.new)
+    assert total == 100
+    assert client.last_stamp == pytest.approx(1100 * 0.008)
+
+
+def test_no_frames_and_no_realtime_port(pair):
+    ours, theirs = pair
+    client = RealtimeClient(ours, TcpNetwork())
+    with pytest.raises(DriverError, match=r"no realtime frame for 0\.01 s"):
+        client.receive(0.01)
+    theirs.sendall(b"HTTP/1.0 400 Bad Request\r\n\r\n")
+    with pytest.raises(DriverError, match="no realtime frames"):
+        client.receive(1.0)

@@ -1,0 +1,206 @@
+"""A whole experiment on a robot in memory: order, files, provenance, refusal before motion, interruption."""
+
+from __future__ import annotations
+
+import pytest
+from fake_robot import PERIOD, FakeRobot
+
+from pc_client.control.controller_config import CONTROLLERS
+from pc_client.driver.ur_driver import UrDriver
+from pc_client.errors import ClientError, DriverError, MovementError, RecordingError, RobotStoppedError
+from pc_client.experiment.preflight import experiment_text, is_loopback
+from pc_client.experiment.prepare import clear_folder, prepare_experiment
+from pc_client.experiment.runner import ExperimentRunner
+from pc_client.recording.layout import Phase
+from pc_client.recording.loader import load_recording
+
+POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
+
+
+class Notes(list):
+    def connected(self, info):
+        self.append("connected")
+
+    def approaching(self, approach):
+        self.append("approaching")
+
+    def identified(self, estimate):
+        self.append("identified")
+        self.delay = estimate.delay
+
+    def running(self, name, repetition):
+        self.append(f"running {name} {repetition}")
+
+    def finished(self, name, repetition, path, report):
+        self.append(f"finished {path.name}")
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    return prepare_experiment(["uniform_4_1", "lognorm_4_1"], repeat=2, out=tmp_path_factory.mktemp("unused"))
+
+
+def with_folder(experiment, out):
+    return type(experiment)(experiment.model, experiment.planned, experiment.repeat, out)
+
+
+def run(robot, experiment, controller="preview", notes=None):
+    robot.q = list(POSTURE)
+    with UrDriver("robot", network=robot) as driver:
+        return ExperimentRunner(driver, experiment, CONTROLLERS[controller], notes).run()
+
+
+def test_two_movements_twice(two, tmp_path):
+    notes = Notes()
+    robot = FakeRobot(delay=4)
+    report = run(robot, with_folder(two, tmp_path), notes=notes)
+    assert notes == [
+        "connected",
+        "approaching",
+        "identified",
+        "running uniform_4_1 1",
+        "finished uniform_4_1_r1.mcap",
+        "approaching",
+        "running uniform_4_1 2",
+        "finished uniform_4_1_r2.mcap",
+        "approaching",
+        "running lognorm_4_1 1",
+        "finished lognorm_4_1_r1.mcap",
+        "approaching",
+        "running lognorm_4_1 2",
+        "finished lognorm_4_1_r2.mcap",
+    ]
+    assert report.delay.delay == pytest.approx(4 * PERIOD, abs=1e-3)
+    assert robot.at_rest
+    assert sorted(tmp_path.iterdir()) == sorted(report.paths)
+
+    recording = load_recording(report.paths[2])
+    assert recording.complete
+    p = recording.provenance
+    assert (p.movement, p.kind, p.repetition, p.controller) == ("lognorm_4_1", "lognormal", 1, "preview")
+    assert (p.robot_model, p.firmware, p.serial, p.simulated, p.seed) == (
+        "UR3",
+        "3.15.8",
+        "20993000007",
+        True,
+        7,
+    )
+    assert p.pace == "lockstep"
+    assert p.identified_delay_s == report.delay.delay
+    assert p.controller_config["gain_p"] == CONTROLLERS["preview"].gain_p
+    moving = recording.rows_of(Phase.MOVEMENT)
+    duration = two.planned[1].movement.duration
+    assert moving.sum() == pytest.approx(duration / PERIOD, abs=2)
+    # a perfect arm with a known delay follows to a hair
+    error = recording.column("ref_q")[moving] - recording.column("actual_q")[moving]
+    assert abs(error).max() < 2e-3
+    speed = recording.column("ref_tcp_velocity")
+    assert abs(speed[recording.rows_of(Phase.SETTLE_BEFORE)]).max() == 0.0
+    assert recording.summary["late_frames"] == 0
+
+
+def test_the_same_experiment_gives_the_same_bytes(two, tmp_path):
+    one = type(two)(two.model, two.planned[:1], 1, tmp_path / "a")
+    again = with_folder(one, tmp_path / "b")
+    first, second = run(FakeRobot(), one), run(FakeRobot(), again)
+    assert first.paths[0].read_bytes() == second.paths[0].read_bytes()
+
+
+def test_paper_controller_trails_by_the_delay_that_preview_takes_out(two, tmp_path):
+    short = type(two)(two.model, two.planned[1:], 1, tmp_path)
+    errors = {}
+    for name in CONTROLLERS:
+        recording = load_recording(run(FakeRobot(), short, name).paths[0])
+        errors[name] = abs(recording.column("ref_q") - recording.column("actual_q")).max()
+    assert errors["paper"] > 5 * errors["preview"]
+
+
+def test_realtime_is_recognised(two, tmp_path):
+    short = type(two)(two.model, two.planned[:1], 1, tmp_path)
+    report = run(FakeRobot(lockstep=False), short)
+    assert load_recording(report.paths[0]).provenance.pace == "realtime"
+
+
+def test_what_is_recorded_before_a_protective_stop_stays(two, tmp_path):
+    robot = FakeRobot()
+    receivers = []
+
+    def spoil(r):
+        receivers.extend(text for text in r.programs[len(receivers) :])
+        if sum("velocity_receiver" in text for text in receivers) == 3 and r.received and r.tick % 200 == 0:
+            r.safety_mode = 3
+
+    robot.on_tick = spoil
+    with pytest.raises(RobotStoppedError, match="PROTECTIVE_STOP"):
+        run(robot, with_folder(two, tmp_path))
+    assert load_recording(tmp_path / "uniform_4_1_r1.mcap").complete
+    cut = load_recording(tmp_path / "uniform_4_1_r2.mcap")
+    assert cut.summary == {"aborted": "RobotStoppedError"}
+    assert not (tmp_path / "lognorm_4_1_r1.mcap").exists()
+
+
+def test_an_arm_that_does_not_follow_is_found_before_the_first_movement(two, tmp_path):
+    robot = FakeRobot()
+    robot.follow = lambda: (robot.commands and robot.commands.popleft().mode) or None
+    robot.on_tick = lambda r: None
+    with pytest.raises(DriverError):
+        run(robot, with_folder(two, tmp_path))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_too_slow_a_loop_is_refused(two, tmp_path):
+    with pytest.raises(DriverError, match="gain margin"):
+        run(FakeRobot(delay=20), with_folder(two, tmp_path))
+
+
+def test_nothing_moves_when_a_movement_is_unknown(tmp_path):
+    with pytest.raises(MovementError, match="did you mean"):
+        prepare_experiment(["uniform_4_1", "lognorm_4_11"], repeat=1, out=tmp_path)
+
+
+@pytest.mark.parametrize(("movements", "repeat"), [([], 1), (["uniform_4_1"], 0), (["uniform_4_1"] * 2, 1)])
+def test_experiments_that_make_no_sense(movements, repeat, tmp_path):
+    with pytest.raises(ClientError):
+        prepare_experiment(movements, repeat=repeat, out=tmp_path)
+
+
+def test_folder_of_another_experiment_is_left_alone(two, tmp_path):
+    experiment = with_folder(two, tmp_path)
+    ours, foreign = tmp_path / "uniform_4_1_r2.mcap", tmp_path / "other_r1.mcap"
+    ours.write_bytes(b"old")
+    clear_folder(experiment)
+    assert not ours.exists()
+    ours.write_bytes(b"old")
+    foreign.write_bytes(b"precious")
+    with pytest.raises(RecordingError, match="another experiment"):
+        clear_folder(experiment)
+    assert ours.exists()
+    assert foreign.exists()
+
+
+def test_folder_that_cannot_be_made(two, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RecordingError, match="cannot use the folder"):
+        clear_folder(with_folder(two, tmp_path / "file"))
+
+
+def test_plan_for_bystanders_names_what_matters(two):
+    text = experiment_text(two)
+    for words in ("box of motion", "duration", "top TCP speed", "top joint speed", "joint range", "2 times"):
+        assert words in text
+
+
+@pytest.mark.parametrize(
+    ("host", "loopback"),
+    [
+        ("127.0.0.1", True),
+        ("localhost", True),
+        ("::1", True),
+        ("127.8.9.1", True),
+        ("192.168.0.5", False),
+        ("robot.local", False),
+        ("0.0.0.0", False),
+    ],
+)
+def test_loopback(host, loopback):
+    assert is_loopback(host) is loopback
