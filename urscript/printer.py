@@ -114,11 +114,11 @@ def _bare(expression: Expression) -> tuple[str, int]:
         case nodes.Call(function=function, arguments=arguments):
             return f"{function}({_arguments(arguments)})", _POSTFIX
         case nodes.MethodCall(target=target, method=method, arguments=arguments):
-            return f"{_expression(target, _POSTFIX)}.{method}({_arguments(arguments)})", _POSTFIX
+            return f"{_target(target)}.{method}({_arguments(arguments)})", _POSTFIX
         case nodes.Index(target=target, indices=indices):
-            return f"{_expression(target, _POSTFIX)}[{_list(indices)}]", _POSTFIX
+            return f"{_target(target)}[{_list(indices)}]", _POSTFIX
         case nodes.Member(target=target, name=name):
-            return f"{_expression(target, _POSTFIX)}.{name}", _POSTFIX
+            return f"{_target(target)}.{name}", _POSTFIX
         case nodes.Run(thread=thread):
             return f"run {thread}()", _POSTFIX
         case nodes.Prefix(operator="not", operand=operand):
@@ -131,6 +131,12 @@ def _bare(expression: Expression) -> tuple[str, int]:
             left_level = level + 1 if level == _LEVEL["compare"] else level
             return f"{_expression(left, left_level)} {operator} {_expression(right, level + 1)}", level
     raise TypeError(f"not an expression: {expression!r}")
+
+
+def _target(expression: Expression) -> str:
+    """What stands before a dot or an index; a bare number there would run into the dot."""
+    text = _expression(expression, _POSTFIX)
+    return f"({text})" if isinstance(expression, (nodes.IntLiteral, nodes.FloatLiteral)) else text
 
 
 def _list(items: Iterable[Expression]) -> str:
