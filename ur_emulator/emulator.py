@@ -81,7 +81,7 @@ class ControlBox:
         self.ports = Ports.standard(port_base or 0)
         self.serial_number = simulated_serial(model.robot_type, seed)
         self._free_ports = port_base is None
-        self._loop = EventLoop()
+        self._loop = EventLoop(precise=_parse_pace(pace) is Pace.REALTIME)
         controller = Controller(
             model, fidelity_by_name(fidelity), seed, LoopNetwork(self._loop), mode=RobotMode.RUNNING
         )
@@ -112,7 +112,7 @@ class ControlBox:
         try:
             for name, port in self._port_objects.items():
                 number = 0 if self._free_ports else getattr(self.ports, name)
-                self._listeners[name] = Listener(self._loop, self.host, number, port)
+                self._listeners[name] = Listener(self._loop, self.host, number, port, self._box.backlog)
         except EmulatorError:
             for listener in self._listeners.values():
                 listener.close()

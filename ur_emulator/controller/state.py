@@ -19,7 +19,6 @@ from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.target import ZERO6, Vector6
 
-
 # How many cycles back a script may ask for joint positions; the real buffer's length is not known.
 HISTORY_CYCLES = 125
 

@@ -35,7 +35,12 @@ class Service(Protocol):
 class EventLoop:
     """A selector, deadlines, and calls from other threads."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, precise: bool = True) -> None:
+        """Make the loop.
+
+        Args:
+            precise: deadlines matter to the microsecond; False saves a system call per wait.
+        """
         self._selector = selectors.DefaultSelector()
         self._services: list[Service] = []
         self._calls: deque[Callable[[], None]] = deque()
@@ -47,7 +52,7 @@ class EventLoop:
         # Sub-millisecond waits need the selector's own descriptor to be selectable; that is so for epoll
         # and kqueue.
         descriptor = getattr(self._selector, "fileno", None)
-        self._descriptor: int | None = descriptor() if descriptor is not None else None
+        self._descriptor: int | None = descriptor() if precise and descriptor is not None else None
 
     # --- sockets
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Protocol
 
 from ur_emulator.controller.commands import Command
@@ -21,11 +20,6 @@ HEARTBEAT = 0.008  # s
 class Publisher(Protocol):
     """A port that wants snapshots and events."""
 
-    @property
-    def clients(self) -> Iterable[Connection]:
-        """Connected clients that read a stream."""
-        ...
-
     def publish(self, snapshot: Snapshot) -> None:
         """Send what is due for this cycle."""
         ...
@@ -36,7 +30,12 @@ class Publisher(Protocol):
 
 
 class ServedBox:
-    """Advances a controller in an event loop and publishes what it does."""
+    """Advances a controller in an event loop and publishes what it does.
+
+    Attributes:
+        controller: the box without its ports.
+        backlog: the connections that have not read all they were sent; they keep themselves up to date in it.
+    """
 
     def __init__(self, controller: Controller, pacer: Pacer) -> None:
         self.controller = controller
@@ -44,6 +43,7 @@ class ServedBox:
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._publishers: list[Publisher] = []
         self._commands: list[Command] = []
+        self.backlog: set[Connection] = set()
         self._given_up: set[Connection] = set()
         self._last_frame = -math.inf
 
@@ -75,18 +75,15 @@ class ServedBox:
     @property
     def readers_full(self) -> bool:
         """True while a client has frames waiting that it has not read, unless it was given up."""
-        full = False
-        for publisher in self._publishers:
-            for connection in publisher.clients:
-                if not connection.is_behind:
-                    self._given_up.discard(connection)
-                elif connection not in self._given_up:
-                    full = True
-        return full
+        if not self.backlog:
+            self._given_up.clear()
+            return False
+        self._given_up &= self.backlog
+        return len(self._given_up) < len(self.backlog)
 
     def give_up_readers(self) -> None:
         """Wait no longer for clients that are behind, until they have caught up."""
-        self._given_up = {c for publisher in self._publishers for c in publisher.clients if c.is_behind}
+        self._given_up = set(self.backlog)
 
     # --- the loop
 
@@ -95,8 +92,9 @@ class ServedBox:
         if self._pacer.may_tick(now, self):
             commands, self._commands = self._commands, []
             self._publish(self.controller.tick(commands), now)
-            # Sockets get their turn between any two cycles.
-            return now if self._repeats else self._pacer.next_call(now)
+            if self._repeats and self.is_active and not self.waits_outside:
+                return now  # the next cycle may follow at once, after the sockets have had their turn
+            return self._pacer.next_call(now)
         if self._repeats and now - self._last_frame >= HEARTBEAT:
             self._publish(self.controller.snapshot, now)
         return self._pacer.next_call(now)

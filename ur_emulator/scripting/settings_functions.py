@@ -26,7 +26,7 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
     def mass_of(mass: float) -> float:
         if not 0.0 <= mass <= state.robot.payload_max:
             raise ScriptRuntimeError(
-                f"payload of {mass:g} kg given: a {state.robot.title} takes 0 to {state.robot.payload_max:g} kg"
+                f"a payload of {mass:g} kg was given, allowed are 0 to {state.robot.payload_max:g} kg"
             )
         return float(mass)
 

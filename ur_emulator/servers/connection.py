@@ -31,6 +31,7 @@ class Connection:
         sock: socket.socket,
         on_data: Callable[[Connection, bytes], None],
         on_close: Callable[[Connection], None],
+        backlog: set[Connection],
     ) -> None:
         """Take over a connected socket.
 
@@ -39,11 +40,13 @@ class Connection:
             sock: connected; becomes non-blocking and belongs to this object.
             on_data: called with what has come.
             on_close: called once when the connection is gone, for whatever reason.
+            backlog: the connection is in this set while something waits in its outbox.
         """
         self._loop = loop
         self._sock = sock
         self._on_data = on_data
         self._on_close = on_close
+        self._backlog = backlog
         self._outbox: deque[memoryview] = deque()
         self._pending = 0
         self._closing = False
@@ -62,11 +65,6 @@ class Connection:
     def is_open(self) -> bool:
         """True until the connection is closed by either side."""
         return self._open
-
-    @property
-    def is_behind(self) -> bool:
-        """True while something waits in the outbox because the client has not read."""
-        return self._pending > 0
 
     def send(self, package: bytes) -> bool:
         """Send a package, whole or not at all.
@@ -108,11 +106,13 @@ class Connection:
             self._sock.close()
             self._outbox.clear()
             self._pending = 0
+            self._backlog.discard(self)
             self._on_close(self)
 
     def _queue(self, data: memoryview) -> None:
         self._outbox.append(data)
         self._pending += len(data)
+        self._backlog.add(self)
 
     def _on_ready(self, events: int) -> None:
         if events & selectors.EVENT_WRITE:
@@ -147,6 +147,7 @@ class Connection:
         except OSError:
             self.close()
             return
+        self._backlog.discard(self)
         if self._closing:
             self.close()
         else:

@@ -32,7 +32,7 @@ class Port(Protocol):
 class Listener:
     """Accepts the clients of one port."""
 
-    def __init__(self, loop: EventLoop, host: str, number: int, port: Port) -> None:
+    def __init__(self, loop: EventLoop, host: str, number: int, port: Port, backlog: set[Connection]) -> None:
         """Listen.
 
         Args:
@@ -40,12 +40,14 @@ class Listener:
             host: address to bind to.
             number: TCP port; 0 takes a free one.
             port: gets the clients.
+            backlog: shared by all connections of a box, see Connection.
 
         Raises:
             PortError: the address cannot be bound.
         """
         self._loop = loop
         self._port = port
+        self._backlog = backlog
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self._sock = socket.socket(family, socket.SOCK_STREAM)
         try:
@@ -72,5 +74,5 @@ class Listener:
             client, _ = self._sock.accept()
         except OSError:
             return  # the client has gone again, or descriptors are out: the next one may have more luck
-        connection = Connection(self._loop, client, self._port.received, self._port.closed)
+        connection = Connection(self._loop, client, self._port.received, self._port.closed, self._backlog)
         self._port.opened(connection)
