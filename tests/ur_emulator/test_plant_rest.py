@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from plant_support import HOME, SpeedRamp, column, hold
 
+from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
 from ur_emulator.models.ur3 import UR3
 from ur_emulator.plant.plant import Plant
@@ -134,6 +135,16 @@ def test_brakes_stop_a_moving_arm_where_it_is():
     # And the drives take over there, even when the target has not moved on.
     hold(plant, stopped, 60)
     assert np.abs(plant.q_true - stopped).max() < 5e-5
+
+
+def test_the_physical_flange_is_where_the_controller_computes_it():
+    plant = Plant(UR3, TYPICAL, 9)
+    arm = ArmModel(UR3, plant.calibration)
+    for q in np.random.default_rng(1).uniform(-2.0, 2.0, (10, 6)):
+        plant.reset(q)
+        # The gear's error of .1 mrad is in the encoders, not in the links.
+        assert plant._flange_position == pytest.approx(arm.fk(q)[:3], abs=2e-4)
+        assert np.abs(plant._flange_position - ArmModel(UR3).fk(q)[:3]).max() > 1e-5
 
 
 # --- loads ---

@@ -1,0 +1,187 @@
+"""The plant's parts by themselves: inverse dynamics, friction, gear, force drift, temperatures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
+from ur_emulator.models.fidelity import IDEAL, TYPICAL
+from ur_emulator.models.mjcf import GRAVITY
+from ur_emulator.models.ur3 import UR3
+from ur_emulator.plant.force_estimate import ForceDrift
+from ur_emulator.plant.friction import Friction
+from ur_emulator.plant.gear import GearRipple
+from ur_emulator.plant.inverse_dynamics import InverseDynamics
+from ur_emulator.plant.physics import ServoGains
+from ur_emulator.plant.thermometers import Thermometers
+
+Q = np.array([0.4, -1.3, 1.1, -0.6, 0.9, 2.0])
+STILL = np.zeros(6)
+
+
+def link_frames(rows, q):
+    """DH frames of all links, (6, 4, 4), by plain matrix products."""
+    frame, frames = np.eye(4), []
+    for row, angle in zip(rows, q, strict=True):
+        c, s = np.cos(angle + row.theta), np.sin(angle + row.theta)
+        ca, sa = np.cos(row.alpha), np.sin(row.alpha)
+        frame = frame @ np.array(
+            [
+                [c, -s * ca, s * sa, row.a * c],
+                [s, c * ca, -c * sa, row.a * s],
+                [0, sa, ca, row.d],
+                [0, 0, 0, 1],
+            ]
+        )
+        frames.append(frame)
+    return np.array(frames)
+
+
+def potential_energy(rows, q):
+    frames = link_frames(rows, q)
+    heights = [(frame @ (*link.com, 1.0))[2] for frame, link in zip(frames, UR3.links, strict=True)]
+    return GRAVITY * sum(link.mass * z for link, z in zip(UR3.links, heights, strict=True))
+
+
+def kinetic_energy(rows, q, qd, h=1e-5):
+    """From differences of the frames: masses, tensors and rotors."""
+    before, after = link_frames(rows, q - h * qd), link_frames(rows, q + h * qd)
+    energy = 0.5 * np.dot(UR3.armature, qd**2)
+    for one, two, link in zip(before, after, UR3.links, strict=True):
+        com = np.array([*link.com, 1.0])
+        velocity = ((two - one) @ com)[:3] / (2 * h)
+        spin = two[:3, :3].T @ (two - one)[:3, :3] / (2 * h)  # skew matrix of the spin in link axes
+        omega = np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2
+        energy += 0.5 * link.mass * velocity @ velocity + 0.5 * np.dot(link.inertia, omega**2)
+    return energy
+
+
+@pytest.mark.parametrize(
+    "calibration", [NOMINAL, draw_calibration(TYPICAL, 3)], ids=["nominal", "calibrated"]
+)
+def test_gravity_torque_is_the_slope_of_potential_energy(calibration):
+    rows = calibrated_dh(UR3, calibration)
+    torque = InverseDynamics(UR3, calibration).evaluate(Q, STILL, STILL)
+    h = 1e-6
+    slope = [
+        (potential_energy(rows, Q + h * e) - potential_energy(rows, Q - h * e)) / (2 * h) for e in np.eye(6)
+    ]
+    assert torque == pytest.approx(slope, abs=1e-6)
+
+
+def test_power_of_the_torque_is_the_change_of_energy():
+    dynamics = InverseDynamics(UR3, NOMINAL)
+    rng = np.random.default_rng(0)
+    h = 1e-5
+    for _ in range(10):
+        q, qd, qdd = rng.uniform(-2, 2, (3, 6))
+
+        def energy(t, q=q, qd=qd, qdd=qdd):
+            where, speed = q + qd * t + 0.5 * qdd * t * t, qd + qdd * t
+            return kinetic_energy(UR3.dh, where, speed) + potential_energy(UR3.dh, where)
+
+        power = np.dot(dynamics.evaluate(q, qd, qdd), qd)
+        assert power == pytest.approx((energy(h) - energy(-h)) / (2 * h), abs=2e-4)
+
+
+def test_a_declared_payload_is_in_the_model():
+    dynamics = InverseDynamics(UR3, NOMINAL)
+    alone = dynamics.evaluate(Q, STILL, STILL).copy()
+    dynamics.set_payload(2.0, (0.0, 0.0, 0.1))
+    loaded = dynamics.evaluate(Q, STILL, STILL).copy()
+    h = 1e-6
+
+    def height(q):
+        return (link_frames(UR3.dh, q)[5] @ (0.0, 0.0, 0.1, 1.0))[2]
+
+    slope = [2.0 * GRAVITY * (height(Q + h * e) - height(Q - h * e)) / (2 * h) for e in np.eye(6)]
+    assert loaded - alone == pytest.approx(slope, abs=1e-6)
+    dynamics.set_payload(0.0, (0.0, 0.0, 0.0))
+    assert dynamics.evaluate(Q, STILL, STILL) == pytest.approx(alone, abs=1e-12)
+
+
+def test_friction_falls_towards_standstill_to_the_robots_share():
+    friction = Friction(UR3, IDEAL, 0)
+    friction.evaluate(STILL, STILL, STILL)
+    assert friction.coulomb == pytest.approx(np.array(UR3.coulomb) * UR3.coulomb_standstill)
+    assert friction.compensation == pytest.approx(STILL)
+    friction.evaluate(np.ones(6), np.ones(6), -np.ones(6))
+    assert friction.coulomb == pytest.approx(UR3.coulomb, rel=1e-4)
+    # An ideal controller knows its friction exactly, in both directions.
+    full = np.array(UR3.coulomb) + UR3.viscous
+    assert friction.expected == pytest.approx(full, rel=1e-4)
+    assert friction.compensation == pytest.approx(-full, rel=1e-4)
+
+
+def test_a_typical_controller_is_wrong_about_friction_as_much_as_stated():
+    errors = []
+    for seed in range(60):
+        friction = Friction(UR3, TYPICAL, seed)
+        friction.evaluate(STILL, np.full(6, 10.0), STILL)
+        errors.append(friction.expected / (np.array(UR3.coulomb) + 10.0 * np.array(UR3.viscous)) - 1)
+    assert abs(np.mean(errors)) < 0.03
+    assert 0.10 < np.std(errors) < 0.17
+
+
+def test_gear_slope_is_the_derivative_of_its_error():
+    gear = GearRipple(UR3, TYPICAL, 9)
+    h = 1e-7
+    gear.evaluate(Q)
+    slope = gear.slope.copy()
+    gear.evaluate(Q + h)
+    after = gear.error.copy()
+    gear.evaluate(Q - h)
+    assert slope == pytest.approx((after - gear.error) / (2 * h), abs=1e-6)
+
+
+def test_gear_inverts_exactly():
+    gear = GearRipple(UR3, TYPICAL, 9)
+    motor = gear.motor_position(Q)
+    gear.evaluate(motor)
+    assert motor + gear.error == pytest.approx(Q, abs=1e-15)
+    assert np.abs(motor - Q).max() > 1e-6
+
+
+def test_gear_phases_come_from_the_seed_and_sizes_do_not():
+    q = np.linspace(0, 2 * np.pi, 5000)
+    tables = []
+    for seed in (1, 2):
+        gear = GearRipple(UR3, TYPICAL, seed)
+        rows = []
+        for angle in q:
+            gear.evaluate(np.full(6, angle))
+            rows.append(gear.slope.copy())
+        tables.append(np.array(rows))
+    expected = np.hypot(TYPICAL.ripple_first, TYPICAL.ripple_second)
+    for table in tables:
+        assert table.std(axis=0) == pytest.approx([expected] * 6, rel=0.01)
+    assert np.abs(tables[0] - tables[1]).max() > expected
+
+
+def test_force_drift_stays_in_its_bounds_without_jumps():
+    drift = ForceDrift(TYPICAL, 4, 2.0)
+    blocks = np.concatenate([drift.next_block(256) for _ in range(400)])
+    assert np.all(np.abs(blocks[:, :3]) <= TYPICAL.force_bias)
+    assert np.all(np.abs(blocks[:, 3:]) <= TYPICAL.force_bias / 10)
+    assert np.abs(np.diff(blocks, axis=0)).max() < 0.02
+    assert blocks[:, :3].std() > 1.0
+
+
+def test_motors_warm_up_with_work_and_slowly():
+    idle, working = Thermometers(0.008), Thermometers(0.008)
+    start = np.array(idle.reading)
+    for _ in range(125 * 600):
+        idle.step((0.0,) * 6)
+        working.step((4.0, 4.0, 4.0, 3.0, 3.0, 3.0))
+    assert np.array_equal(idle.reading, start)
+    rise = np.array(working.reading) - start
+    assert np.all((rise > 1.0) & (rise < 20.0))
+    assert max(working.reading) < 46.0
+
+
+def test_servo_gains_have_the_stated_frequency_and_damping():
+    gains = ServoGains.of(UR3)
+    inertia = np.array(UR3.servo_inertia)
+    assert np.sqrt(gains.kp / inertia) / (2 * np.pi) == pytest.approx([12.0] * 6)
+    assert gains.kv / (2 * np.sqrt(gains.kp * inertia)) == pytest.approx([0.9] * 6)
