@@ -42,13 +42,14 @@ class ControllerConfig:
 
 CONTROLLERS = MappingProxyType(
     {
-        # As published (Fig. 3): PI and feed-forward of the current time. The paper gives no numbers. The gain
-        # is moderate for a loop of 30-45 ms (bound pi/2T = 35-52 1/s); the acceleration is one that UR's
-        # documentation and forum scripts write for speedj (1.4 is movej's default, 5 what users raise it to).
+        # As published (Fig. 3): PI and feed-forward of the current time. The paper gives no numbers. Gains as a
+        # cautious user sets them: a tenth of the bound pi/2T of a 30-45 ms loop, gain_i = gain_p^2 / 8 so that
+        # the integral does not overshoot. One acceleration for all joints and movements, between movej's
+        # default of 1.4 that UR's manual shows in its speedj examples and the 5 that users raise it to.
         "paper": ControllerConfig(
             name="paper",
-            gain_p=10.0,
-            gain_i=5.0,
+            gain_p=4.0,
+            gain_i=2.0,
             looks_ahead=False,
             speedj_acceleration=3.0,
             slew_limit=15.0,
@@ -60,8 +61,8 @@ CONTROLLERS = MappingProxyType(
         # streams with a = 40), so that the delay is the only thing between command and motion.
         "preview": ControllerConfig(
             name="preview",
-            gain_p=8.0,
-            gain_i=8.0,
+            gain_p=5.0,
+            gain_i=3.0,
             looks_ahead=True,
             speedj_acceleration=40.0,
             slew_limit=30.0,

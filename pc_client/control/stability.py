@@ -5,7 +5,7 @@ Open loop of one joint: L(s) = (gain_p + gain_i / s) / s * exp(-s T), T from com
 
 from __future__ import annotations
 
-from math import atan, hypot, pi, sqrt
+from math import atan, hypot, inf, pi, sqrt
 
 
 def largest_gain(loop_delay: float) -> float:
@@ -26,13 +26,15 @@ def gain_margin(gain_p: float, gain_i: float, loop_delay: float) -> float:
     """By which factor both gains may grow before the loop oscillates; below 1 it is unstable.
 
     Args:
-        gain_p: proportional gain [1/s], > 0.
+        gain_p: proportional gain [1/s], >= 0.
         gain_i: integral gain [1/s2], >= 0.
         loop_delay: delay from command to reported position [s], > 0.
 
     Returns:
-        The gain margin, 0 when no frequency with -180 deg exists (the integral part alone is too strong).
+        The gain margin; infinite without feedback, 0 when no frequency with -180 deg exists (the integral part alone is too strong).
     """
+    if gain_p == 0.0:
+        return inf if gain_i == 0.0 else 0.0
     corner = gain_i / gain_p
 
     def phase_margin(w: float) -> float:

@@ -22,7 +22,8 @@ READ_TIMEOUT = 1.0
 
 MISSED_ALLOWED = 6
 """Cycles in which the last velocity is repeated when we are late: 48 ms, in which an arm at 0.3 m/s goes on
-for 14 mm. Source: half of ur_modern_driver's watchdog of 12 cycles; a PC without real-time kernel needs it."""
+for 14 mm. Source: half of ur_modern_driver's watchdog of 12 cycles; a PC without real-time kernel needs
+it."""
 
 _FILE = Path("programs") / "velocity_receiver.script"
 _MARKED_LINE = re.compile(r"^(?P<begin>\s+(?P<name>\w+) = )\S+(?P<end>\s+# <- client)$", re.MULTILINE)

@@ -41,6 +41,9 @@ _REST_TIME = 0.5
 _ARRIVAL_TOLERANCE = 5e-3
 """Largest distance of a joint from the posture after an approach [rad]; a blocked arm is far off."""
 
+_NO_MOVE = 1e-4
+"""A way shorter than this [rad] is no way: its program would be over before a frame shows it running."""
+
 _APPROACH_RESERVE = 10.0
 """An approach may take this many seconds longer than computed."""
 
@@ -136,6 +139,8 @@ class UrDriver:
         """
         text = approach_script(q, speed, acceleration)
         self.check_ready()
+        if np.abs(self.read_frame().target_q - np.asarray(q)).max() < _NO_MOVE:
+            return
         with _AlwaysStopped(self, None):
             self._start(text)
             limit = expected + _APPROACH_RESERVE

@@ -231,6 +231,7 @@ class FakeRobot:
         values = dict(_ALL_ZERO)
         values.update(
             timestamp=self.tick * PERIOD,
+            target_q=tuple(self.q),
             actual_q=tuple(self.q),
             actual_qd=tuple(self.qd),
             robot_mode=self.robot_mode,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from math import isclose, pi
 
@@ -89,6 +90,8 @@ def test_margin_without_integral_is_the_known_bound():
 def test_integral_part_costs_margin_and_can_cost_all():
     assert gain_margin(10.0, 20.0, 0.03) < gain_margin(10.0, 0.0, 0.03)
     assert gain_margin(1.0, 50.0, 0.03) == 0.0
+    assert gain_margin(0.0, 1.0, 0.03) == 0.0
+    assert gain_margin(0.0, 0.0, 0.03) == math.inf
 
 
 def _last_error(factor):

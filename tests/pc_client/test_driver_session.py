@@ -56,6 +56,13 @@ def test_move_to_arrives(lockstep):
     assert robot.programs[0].startswith("def ur_client_approach():\n  movej([0.1")
 
 
+def test_an_arm_that_is_there_already_is_not_sent():
+    robot = FakeRobot()
+    robot.q = list(GOAL)
+    move(robot)
+    assert robot.programs == []
+
+
 @pytest.mark.parametrize(
     ("spoil", "error", "words"),
     [

@@ -44,8 +44,7 @@ def test_end_of_stream_and_broken_connection(pair):
     with pytest.raises(DriverError, match="closed the connection"):
         ours.receive(1.0)
     with pytest.raises(DriverError, match="cannot send"):
-        for _ in range(10):
-            ours.send(b"x")
+        ours.send(b"x")
 
 
 def test_clean_end_of_stream(pair):
@@ -67,7 +66,7 @@ def test_unknown_name():
 
 
 def test_listening_on_a_foreign_address_is_refused():
-    with pytest.raises(DriverError, match="cannot listen on 192.0.2.1"):
+    with pytest.raises(DriverError, match=r"cannot listen on 192\.0\.2\.1"):
         TcpNetwork().listen("192.0.2.1")
 
 
