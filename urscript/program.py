@@ -166,6 +166,8 @@ class RunningProgram:
         self.status = ProgramStatus.RUNNING
         self.error: ScriptRuntimeError | None = None
         self._host = host
+        self._in_step = False
+        self._kill_wanted = False
         self._namespace = runtime.base_namespace(program.dialect)
         self._scheduler = Scheduler(self._namespace, program.dialect.statement_budget, host.thread_ended)
         self._namespace.update(runtime.flow_namespace(self._scheduler, self._namespace))
@@ -193,6 +195,7 @@ class RunningProgram:
         """Run one control cycle; after the end it does nothing."""
         if self.status is not ProgramStatus.RUNNING:
             return self.status
+        self._in_step = True
         try:
             self._scheduler.step()
         except ProgramHalted:
@@ -200,15 +203,22 @@ class RunningProgram:
         except Exception as error:
             self._fail(runtime.script_error(error, self.program.file_name, self.program.function_names))
         else:
-            if self._main.finished:
+            if self._main.finished or self._kill_wanted:
                 self._finish(ProgramStatus.FINISHED)
             elif self.program.kind == "sec":
                 self._fail_secondary()
+        finally:
+            self._in_step = False
         return self.status
 
     def kill(self) -> None:
-        """End the run: stopped from outside or replaced by another program."""
-        if self.status is ProgramStatus.RUNNING:
+        """End the run: stopped from outside or replaced by another program.
+
+        Called by a host function, within a cycle, it takes effect at the end of that cycle.
+        """
+        if self._in_step:
+            self._kill_wanted = True
+        elif self.status is ProgramStatus.RUNNING:
             self._finish(ProgramStatus.FINISHED)
 
     def read_global(self, name: str) -> Any:
@@ -232,10 +242,15 @@ class RunningProgram:
         if error.stack:
             place = error.stack[-1]
             error.locate(self.program.source, place.line, place.column)
-        self.error = error
+        # The traceback would keep every frame of the run alive for as long as somebody keeps the error.
+        self.error = error.with_traceback(None)
         self._finish(ProgramStatus.FAILED)
 
     def _finish(self, status: ProgramStatus) -> None:
         self.status = status
         self._scheduler.kill_all()
+        # Functions and their globals refer to each other; a box that runs with its garbage collector frozen
+        # would keep every program it ever ran. The variables stay readable.
+        for name in [name for name in self._namespace if not name.startswith("g_")]:
+            del self._namespace[name]
         self._host.program_ended()

@@ -184,6 +184,13 @@ class Scheduler:
         thread.finished = True
         thread.slice_used = True
         thread.wait = None
+        # Threads it left running belong to its parent now: killing that stops them too.
+        if thread.parent is not None:
+            thread.parent.children.remove(thread)
+            thread.parent.children.extend(thread.children)
+        for child in thread.children:
+            child.parent = thread.parent
+        thread.children = []
         self._some_finished = True
         self._thread_ended(thread)
 

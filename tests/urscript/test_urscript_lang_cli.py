@@ -1,0 +1,80 @@
+import pytest
+from typer.testing import CliRunner
+
+from urscript.cli import app
+
+GOOD = 'def good():\n  movej([0,0,0,0,0,0])\n  textmsg("gr\u00fc\u00dfe")\nend\n'
+BAD = "def bad():\n  txtmsg(1)\n  y = nothing\nend\n"
+
+
+@pytest.fixture
+def call(tmp_path):
+    def run(*words, **files):
+        paths = []
+        for name, text in files.items():
+            path = tmp_path / f"{name}.script"
+            path.write_text(text, encoding="utf-8")
+            paths.append(str(path))
+        return CliRunner().invoke(app, [*words, *paths])
+
+    return run
+
+
+def test_check_is_silent_about_good_programs(call):
+    result = call("check", good=GOOD, crlf=GOOD.replace("\n", "\r\n"), bom="\ufeff" + GOOD)
+    assert (result.exit_code, result.output) == (0, "")
+
+
+def test_check_shows_all_errors_of_all_files(call):
+    result = call("check", bad=BAD, good=GOOD, broken="def f(:\nend")
+    assert result.exit_code == 1
+    assert (
+        "bad.script:2:3: Compile error: name 'txtmsg' is not defined (did you mean 'textmsg'?)"
+        in result.output
+    )
+    assert "bad.script:3:7: Compile error: name 'nothing' is not defined" in result.output
+    assert "broken.script:1:7: Syntax error" in result.output
+    assert "      txtmsg(1)\n      ^^^^^^\n" in result.output
+
+
+def test_check_shows_warnings_without_failing(call):
+    result = call("check", warn="def p():\n  def f():\n  end\n  run f()\nend\n")
+    assert result.exit_code == 0
+    assert "4:3: Warning: 'f' is run as a thread" in result.output
+
+
+def test_run_prints_texts_and_calls(call):
+    result = call("run", good=GOOD)
+    assert result.exit_code == 0
+    assert "    0.000 s  good: movej([0, 0, 0, 0, 0, 0], 1.4, 1.05, 0, 0)\n" in result.output
+    assert "gr\u00fc\u00dfe\n" in result.output
+
+
+def test_run_quiet_prints_texts_only(call):
+    assert call("run", "--quiet", good=GOOD).stdout == "gr\u00fc\u00dfe\n"
+
+
+def test_run_reports_a_failing_program(call):
+    result = call("run", bad="def p():\n  x = [1]\n  y = x[3]\nend\n")
+    assert result.exit_code == 1
+    assert "bad.script:3:7: Runtime error: index is out of range" in result.output
+
+
+def test_run_stops_an_endless_program_at_the_limit(call):
+    result = call("run", "--limit", "0.8", loop="while True:\n  sync()\nend\n")
+    assert result.exit_code == 0
+    assert "still running after 0.8 s" in result.output
+
+
+@pytest.mark.parametrize(
+    "words", [("check", "/nowhere.script"), ("run", "/nowhere.script"), ("run",), ("check",)]
+)
+def test_wrong_use_exits_with_2(call, words):
+    assert call(*words).exit_code == 2
+
+
+def test_the_software_version_decides_which_names_exist(call):
+    late = "set_target_payload(1, [0,0,0])\n"
+    assert call("check", late=late).exit_code == 1
+    assert call("check", "--software", "5.11", late=late).exit_code == 0
+    assert call("check", "--software", "9.9", late=late).exit_code == 2
