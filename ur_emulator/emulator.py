@@ -28,6 +28,7 @@ from ur_emulator.servers.listener import Listener, Port
 from ur_emulator.servers.primary_port import PrimaryPort
 from ur_emulator.servers.program_intake import ProgramIntake
 from ur_emulator.servers.realtime_port import RealtimePort
+from ur_emulator.servers.robot_state import StateEncoder
 from ur_emulator.servers.script_sockets import LoopNetwork
 
 DEFAULT_VERSION = "3.15.8"
@@ -42,6 +43,7 @@ class ControlBox:
     Attributes:
         host: address that it listens on.
         ports: numbers of its ports.
+        port_base: what was added to the standard ones.
         serial_number: as the dashboard gives it; simulated boxes are recognisable by it.
     """
 
@@ -78,7 +80,8 @@ class ControlBox:
         if seed < 0:
             raise EmulatorError(f"seed {seed} given: it must be 0 or above")
         self.host = host
-        self.ports = Ports.standard(port_base or 0)
+        self.port_base = port_base or 0
+        self.ports = Ports.standard(self.port_base)
         self.serial_number = simulated_serial(model.robot_type, seed)
         self._free_ports = port_base is None
         self._loop = EventLoop(precise=_parse_pace(pace) is Pace.REALTIME)
@@ -88,13 +91,14 @@ class ControlBox:
         self._box = ServedBox(controller, make_pacer(_parse_pace(pace), controller.period_s, speed))
         self._intake = ProgramIntake(self._loop, software, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)
+        states = StateEncoder(software)
         self._port_objects: dict[str, Port] = {
             "dashboard": DashboardPort(identity, controller, self._box.submit),
-            "primary": PrimaryPort(software, controller, self._intake, all_messages=True),
-            "secondary": PrimaryPort(software, controller, self._intake, all_messages=False),
+            "primary": PrimaryPort(software, controller, self._intake, states, all_messages=True),
+            "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
             "realtime": RealtimePort(software, self._intake),
-            "primary_ro": PrimaryPort(software, controller, None, all_messages=True),
-            "secondary_ro": PrimaryPort(software, controller, None, all_messages=False),
+            "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
+            "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),
             "realtime_ro": RealtimePort(software, None),
         }
         self._listeners: dict[str, Listener] = {}
@@ -104,18 +108,19 @@ class ControlBox:
     # --- life
 
     def listen(self) -> None:
-        """Open all ports.
+        """Open all ports; once they are open, nothing happens.
 
         Raises:
-            PortError: one of them is taken; none stays open then.
+            PortError: one of them is taken; none stays open then and the box cannot be used any more.
         """
+        if self._listeners:
+            return
         try:
             for name, port in self._port_objects.items():
                 number = 0 if self._free_ports else getattr(self.ports, name)
                 self._listeners[name] = Listener(self._loop, self.host, number, port, self._box.backlog)
         except EmulatorError:
-            for listener in self._listeners.values():
-                listener.close()
+            self._close()
             raise
         self.ports = dataclasses.replace(
             self.ports, **{name: item.number for name, item in self._listeners.items()}

@@ -15,7 +15,7 @@ from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.servers.connection import Connection
 from ur_emulator.servers.event_messages import message_for
 from ur_emulator.servers.program_intake import ProgramIntake
-from ur_emulator.servers.robot_state import setup_records, state_records
+from ur_emulator.servers.robot_state import StateEncoder, setup_records, state_records
 
 STATE_RATE = 10  # states per second
 _CYCLE_RATE = 1_000_000 // PERIOD_US
@@ -31,6 +31,7 @@ class PrimaryPort:
         version: SoftwareVersion,
         controller: Controller,
         intake: ProgramIntake | None,
+        states: StateEncoder,
         *,
         all_messages: bool,
     ) -> None:
@@ -40,11 +41,13 @@ class PrimaryPort:
             version: decides sizes and contents.
             controller: its snapshot greets new clients.
             intake: takes script text; None makes the port read-only.
+            states: encodes the states, shared by the ports of a box.
             all_messages: True on the primary port; the secondary one only sends the greeting.
         """
         self._version = version
         self._controller = controller
         self._intake = intake
+        self._states = states
         self._all_messages = all_messages
         self._channels: dict[Connection, ScriptChannel] = {}
         self._phase = 0
@@ -85,7 +88,7 @@ class PrimaryPort:
             return
         self._phase -= _CYCLE_RATE
         if self._channels:
-            package = encode_state(state_records(snapshot), self._version)
+            package = self._states.encode(snapshot)
             for connection in tuple(self._channels):
                 connection.send(package)
 

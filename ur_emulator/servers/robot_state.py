@@ -16,7 +16,8 @@ from protocol.primary_layout import (
     SubPackage,
     ToolData,
 )
-from protocol.ur_types import ProgramState, RobotMode, SafetyMode
+from protocol.primary_packages import encode_state
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.controller.controller import PERIOD_US
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.snapshot import Snapshot
@@ -65,6 +66,22 @@ def state_records(snapshot: Snapshot) -> tuple[SubPackage, ...]:
         AdditionalInfo(),
         SafetyData(),
     )
+
+
+class StateEncoder:
+    """Encodes states for all ports of a box: each snapshot once, however many ports ask for it."""
+
+    def __init__(self, version: SoftwareVersion) -> None:
+        self._version = version
+        self._snapshot: Snapshot | None = None
+        self._package = b""
+
+    def encode(self, snapshot: Snapshot) -> bytes:
+        """Return the state package of a snapshot."""
+        if snapshot is not self._snapshot:
+            self._package = encode_state(state_records(snapshot), self._version)
+            self._snapshot = snapshot
+        return self._package
 
 
 def setup_records(

@@ -1,0 +1,1 @@
+"""Measurements of the whole thing, over real sockets between processes: `make bench`."""

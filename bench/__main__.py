@@ -1,0 +1,40 @@
+"""`make bench`: measure, print, write bench/results.json. BENCH_MINUTES shortens the realtime part."""
+
+import json
+import os
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from bench.lockstep import measure_lockstep
+from bench.realtime import measure_realtime
+
+RESULTS = Path(__file__).with_name("results.json")
+# What the project asks of itself, by figure: (sign, bound).
+ASKED = {
+    "lockstep_x_realtime": (">=", 40.0),
+    "stream_late_p999_us": ("<=", 1000.0),
+    "stream_lost_cycles": ("<=", 0.0),
+    "cpu_percent": ("<=", 15.0),
+    "rss_mb": ("<=", 150.0),
+    "startup_s": ("<=", 1.0),
+}
+
+
+def main() -> None:
+    """Run all measurements."""
+    minutes = float(os.environ.get("BENCH_MINUTES", "10"))
+    results = {**measure_lockstep(), **measure_realtime(minutes)}
+    RESULTS.write_text(
+        json.dumps({name: round(value, 3) for name, value in results.items()}, indent=2) + "\n"
+    )
+    table = Table("figure", "measured", "asked")
+    for name, value in results.items():
+        sign, bound = ASKED.get(name, ("", None))
+        table.add_row(name, f"{value:.4g}", f"{sign} {bound:g}" if bound is not None else "")
+    Console().print(table)
+    print(f"written to {RESULTS}")
+
+
+main()

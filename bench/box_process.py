@@ -1,0 +1,59 @@
+"""A box in a process of its own, and what the operating system says of that process."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from protocol.ur_types import Ports
+
+START_LIMIT = 30.0  # s
+# Away from the standard ports, so that a box or a simulator that runs there is not disturbed.
+PORT_BASE = 5000
+
+
+@dataclass(frozen=True, slots=True)
+class BoxProcess:
+    """A running box.
+
+    Attributes:
+        process: for its memory and processor time.
+        ports: where it listens on 127.0.0.1.
+        startup_s: from the start of the process until all ports accepted.
+    """
+
+    process: psutil.Process
+    ports: Ports
+    startup_s: float
+
+
+@contextmanager
+def box_process(*arguments: str) -> Iterator[BoxProcess]:
+    """Run `ur-emulator serve` with these arguments as long as the block lasts."""
+    with tempfile.TemporaryDirectory() as folder:
+        ready = Path(folder) / "ready.json"
+        command = [sys.executable, "-m", "ur_emulator", "serve", "--port-base", str(PORT_BASE)]
+        began = time.monotonic()
+        child = subprocess.Popen(
+            [*command, "--ready-file", str(ready), *arguments], stdout=subprocess.DEVNULL
+        )
+        try:
+            while not ready.exists():
+                if child.poll() is not None or time.monotonic() - began > START_LIMIT:
+                    sys.exit("bench: the box did not start")
+                time.sleep(0.001)
+            startup = time.monotonic() - began
+            ports = Ports(**json.loads(ready.read_text())["ports"])
+            yield BoxProcess(psutil.Process(child.pid), ports, startup)
+        finally:
+            child.terminate()
+            child.wait(10)

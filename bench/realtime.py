@@ -1,0 +1,48 @@
+"""How punctual the box is in real time: frames on port 30003 as one client sees them come."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+import numpy as np
+from rich.progress import track
+
+from bench.box_process import box_process
+from protocol.frame_buffer import FrameBuffer
+from protocol.realtime_layout import MAX_FRAME_SIZE, layout_for_size
+
+PERIOD = 0.008  # s
+
+
+def measure_realtime(minutes: float) -> dict[str, float]:
+    """Attach one client for so many minutes; compare arrivals with the grid that the earliest of them lie on."""
+    with box_process("--seed", "7") as box:
+        stamps, arrivals = [], []
+        n_frames = round(minutes * 60.0 / PERIOD)
+        with socket.create_connection(("127.0.0.1", box.ports.realtime), timeout=5.0) as sock:
+            buffer = FrameBuffer(MAX_FRAME_SIZE)
+            box.process.cpu_percent()
+            for _ in track(range(n_frames), description=f"125 Hz for {minutes:g} min"):
+                while (frame := buffer.next_frame()) is None:
+                    buffer.feed(sock.recv(65536))
+                    now = time.monotonic()
+                arrivals.append(now)
+                stamps.append(layout_for_size(len(frame)).decode(frame).timestamp)
+            cpu = box.process.cpu_percent()
+            rss = box.process.memory_info().rss
+        startup = box.startup_s
+    ticks = np.round(np.array(stamps) / PERIOD).astype(int)
+    phase = np.array(arrivals) - ticks * PERIOD
+    lateness_us = 1e6 * (phase - phase.min())
+    return {
+        "stream_minutes": minutes,
+        "stream_lost_cycles": float(ticks[-1] - ticks[0] + 1 - len(ticks)),
+        "stream_late_p50_us": float(np.percentile(lateness_us, 50.0)),
+        "stream_late_p99_us": float(np.percentile(lateness_us, 99.0)),
+        "stream_late_p999_us": float(np.percentile(lateness_us, 99.9)),
+        "stream_late_max_us": float(lateness_us.max()),
+        "cpu_percent": cpu,
+        "rss_mb": rss / 2**20,
+        "startup_s": startup,
+    }
