@@ -29,10 +29,16 @@ from urscript.source import Span
 
 @dataclass(frozen=True, slots=True)
 class Compiled:
-    """A code object that defines the functions of a program, and the constants it refers to."""
+    """A code object that defines the functions of a program.
+
+    Attributes:
+        constants: Values the code refers to by name.
+        function_names: Python function -> function of the script.
+    """
 
     code: CodeType
     constants: dict[str, Any]
+    function_names: dict[str, str]
 
 
 def compile_resolved(
@@ -45,10 +51,13 @@ def compile_resolved(
     """
     types = StaticTypes(program, catalogue)
     expressions = ExpressionCompiler(program, types, catalogue, dialect)
-    body: list[ast.stmt] = []
+    body: list[ast.FunctionDef] = []
+    function_names: dict[str, str] = {}
     for scope in program.scopes():
-        body.extend(_FunctionCompiler(program, types, expressions, scope).compile())
-    module = ast.Module(body, [])
+        made = _FunctionCompiler(program, types, expressions, scope).compile()
+        function_names.update((function.name, scope.name) for function in made)
+        body.extend(made)
+    module = ast.Module([*body], [])
     try:
         code = compile(module, file_name, "exec", dont_inherit=True)
     except SyntaxError as error:
@@ -58,7 +67,7 @@ def compile_resolved(
             column=(error.offset or 0) + 1,
             source=program.source,
         ) from None
-    return Compiled(code, expressions.constants)
+    return Compiled(code, expressions.constants, function_names)
 
 
 def _cost(block: Block) -> int:
@@ -89,11 +98,11 @@ class _FunctionCompiler:
         self._scope = scope
         self._globals_stored: set[str] = {"_b"}
 
-    def compile(self) -> list[ast.stmt]:
+    def compile(self) -> list[ast.FunctionDef]:
         """The Python function, after those that compute its defaults."""
         scope = self._scope
         parameters: list[str] = []
-        defaults: list[ast.stmt] = []
+        defaults: list[ast.FunctionDef] = []
         prologue: list[ast.stmt] = []
         types = self._types
         span = scope.node.span if scope.node is not None else _first_span(scope.body)

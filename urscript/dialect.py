@@ -62,10 +62,6 @@ class Dialect:
     recursion_limit: int = RECURSION_LIMIT
 
 
-CB3 = Dialect()
-"""CB3 3.14 and 3.15."""
-
-
 def dialect_for(version: Sequence[int]) -> Dialect:
     """The dialect of a software version, e.g. (3, 15)."""
     major, minor = version[0], version[1]

@@ -1,4 +1,4 @@
-"""What the operators do at run time: arithmetic, comparison, conditions, elements, assignment.
+"""What the operators do at run time: arithmetic, comparison, conditions.
 
 The compiler calls these where it cannot tell the types; with evident floats or booleans it emits the
 Python operator itself. The common case, two numbers, comes first in each function. Choices that no
@@ -10,29 +10,12 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable
 from math import fmod
-from typing import Any, Final
+from typing import Any
 
 from urscript import dialect
 from urscript.errors import ScriptRuntimeError
-from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, is_number, type_name, wrap_int
-
-
-class _Undefined:
-    """The content of a variable that nothing was assigned to yet."""
-
-    script_type = "undefined"
-
-    def __repr__(self) -> str:
-        return "UNDEFINED"
-
-
-UNDEFINED: Final = _Undefined()
-
-
-def undefined(name: str) -> Any:
-    """A variable was read before anything was assigned to it (U: what a controller says)."""
-    raise ScriptRuntimeError(f"variable '{name}' is used before a value is assigned to it")
-
+from urscript.values import INT_MAX, INT_MIN, Matrix, is_number, type_name, wrap_int
+from urscript.variables import same_kind
 
 # --- arithmetic ----------------------------------------------------------------------------------------
 
@@ -188,7 +171,7 @@ def equal(a: Any, b: Any) -> bool:
         return bool(a == b)
     if is_number(a) and is_number(b):
         return bool(a == b)
-    if dialect.MIXED_TYPES_COMPARE or a is None or b is None or _same_kind(ta, b):
+    if dialect.MIXED_TYPES_COMPARE or a is None or b is None or same_kind(ta, b):
         return False
     raise ScriptRuntimeError(f"cannot compare a {type_name(a)} with a {type_name(b)}")
 
@@ -225,135 +208,3 @@ def truth(value: Any) -> bool:
     if dialect.INT_AS_CONDITION and type(value) is int:
         return value != 0
     raise ScriptRuntimeError(f"a condition must be True or False, got a {type_name(value)}")
-
-
-# --- lists, poses, matrices ----------------------------------------------------------------------------
-
-
-def make_list(items: list[Any]) -> Any:
-    """The value of a list literal: a list of one kind of values, or a matrix when it holds lists."""
-    if not items:
-        return items
-    if all(map(is_number, items)):
-        return items
-    first = type(items[0])
-    if first is list:
-        if all(type(item) is list for item in items):
-            return Matrix(items)
-        raise ScriptRuntimeError("a matrix needs a list in every row")
-    if first is Matrix:
-        raise ScriptRuntimeError("a matrix has two dimensions, not three")
-    for item in items:
-        if type(item) is not first:
-            raise ScriptRuntimeError(
-                f"all elements of a list have one type, got {type_name(items[0])} and {type_name(item)}"
-            )
-    return items
-
-
-def make_pose(*items: Any) -> Pose:
-    """The value of a pose literal."""
-    for item in items:
-        if not is_number(item):
-            raise ScriptRuntimeError(f"a pose holds numbers only, got a {type_name(item)}")
-    return Pose(*items)
-
-
-def _position(index: Any, length: int) -> int:
-    """`index` as a position in something of `length` elements."""
-    if dialect.INDEX_TAKES_WHOLE_FLOATS and type(index) is float and index.is_integer():
-        index = int(index)
-    if type(index) is not int:
-        raise ScriptRuntimeError(f"an index must be an integer, got a {type_name(index)}")
-    if not 0 <= index < length:
-        raise ScriptRuntimeError(f"index {index} is out of range, the valid ones are 0 to {length - 1}")
-    return index
-
-
-def item(target: Any, index: Any) -> Any:
-    """`target[index]` of a list or pose."""
-    kind = type(target)
-    if kind is list or kind is Pose:
-        if type(index) is int and 0 <= index < len(target):
-            return target[index]
-        return target[_position(index, len(target))]
-    if kind is Matrix:
-        raise ScriptRuntimeError("a matrix needs a row and a column: m[row, column]")
-    raise ScriptRuntimeError(f"a {type_name(target)} has no elements")
-
-
-def cell(target: Any, row: Any, column: Any) -> Any:
-    """`target[row, column]` of a matrix."""
-    if type(target) is not Matrix:
-        raise ScriptRuntimeError(f"[row, column] needs a matrix, got a {type_name(target)}")
-    rows, columns = target.shape
-    return target.rows[_position(row, rows)][_position(column, columns)]
-
-
-def store_item(value: Any, index: Any, target: Any) -> Any:
-    """What `target` becomes by `target[index] = value`; the old value stays as it is."""
-    kind = type(target)
-    if kind is list:
-        place = _position(index, len(target))
-        if not _same_kind(type(target[place]), value):
-            raise ScriptRuntimeError(
-                f"cannot store a {type_name(value)} in a list of {type_name(target[place])}"
-            )
-        changed = target.copy()
-        changed[place] = value
-        return changed
-    if kind is Pose:
-        place = _position(index, 6)
-        if not is_number(value):
-            raise ScriptRuntimeError(f"a pose holds numbers only, got a {type_name(value)}")
-        return target.with_item(place, value)
-    if kind is Matrix:
-        raise ScriptRuntimeError("a matrix needs a row and a column: m[row, column] = value")
-    raise ScriptRuntimeError(f"a {type_name(target)} has no elements to assign to")
-
-
-def store_cell(value: Any, row: Any, column: Any, target: Any) -> Any:
-    """What `target` becomes by `target[row, column] = value`."""
-    if type(target) is not Matrix:
-        raise ScriptRuntimeError(f"[row, column] needs a matrix, got a {type_name(target)}")
-    rows, columns = target.shape
-    return target.with_item(_position(row, rows), _position(column, columns), value)
-
-
-# --- variables -----------------------------------------------------------------------------------------
-
-
-def _same_kind(old: type, value: Any) -> bool:
-    """Whether a place that held type `old` may receive `value`; int and float are one kind, number."""
-    new = type(value)
-    if new is old or (dialect.NONE_FITS_EVERY_VARIABLE and (value is None or old is type(None))):
-        return True
-    if old is int or old is float:
-        # A thread handle and the integer 0 stand for each other. Source: driver scripts.
-        return (new is not bool and isinstance(value, (int, float))) or hasattr(value, "thread_id")
-    return hasattr(old, "thread_id") and new is int
-
-
-def assign(value: Any, old: Any, name: str) -> Any:
-    """What variable `name`, which holds `old`, becomes by `name = value`.
-
-    The first value fixes the type (D), and that of a list its length (see Dialect.list_resize).
-    """
-    if type(value) is list and type(old) is list:
-        if len(value) != len(old):
-            raise ScriptRuntimeError("Resizing of 'List' is not supported")
-        if old and not _same_kind(type(old[0]), value[0]):
-            raise _other_type(name, f"list of {type_name(old[0])}", f"list of {type_name(value[0])}")
-        return value
-    return assign_resizing(value, old, name)
-
-
-def assign_resizing(value: Any, old: Any, name: str) -> Any:
-    """`assign` where a list may change its length."""
-    if old is UNDEFINED or _same_kind(type(old), value):
-        return value
-    raise _other_type(name, type_name(old), type_name(value))
-
-
-def _other_type(name: str, old: str, new: str) -> ScriptRuntimeError:
-    return ScriptRuntimeError(f"variable '{name}' is a {old}, cannot assign a {new}")

@@ -17,12 +17,12 @@ from urscript.catalogue import CB3_3_15, Catalogue
 from urscript.compiler import compile_resolved
 from urscript.dialect import Dialect, dialect_for
 from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError
-from urscript.ops import UNDEFINED
 from urscript.parser import parse
 from urscript.resolver import resolve
 from urscript.scopes import ResolvedProgram
 from urscript.source import Source
 from urscript.threads import ProgramHalted, Scheduler, ScriptThread
+from urscript.variables import UNDEFINED
 
 if TYPE_CHECKING:
     from types import CodeType
@@ -49,46 +49,26 @@ def compile_program(
     Raises:
         ScriptCompileError: The first error in the text, with line, column, wire_text and render().
     """
-    source = Source(_as_bytes(text), name)
     dialect = dialect or dialect_for(catalogue.version)
-    program, errors = _resolve(source, catalogue, dialect)
+    program, errors = _resolve(Source(_as_bytes(text), name), catalogue, dialect)
     if errors:
         raise errors[0]
     assert program is not None
-    file_name = f"<urscript {program.name}>"
-    try:
-        compiled = compile_resolved(program, catalogue, dialect, file_name)
-    except RecursionError:
-        raise _too_deep(source) from None
-    return CompiledProgram(
-        name=program.name,
-        kind=program.kind,
-        warnings=tuple(program.warnings),
-        source=source,
-        dialect=dialect,
-        catalogue=catalogue,
-        code=compiled.code,
-        constants=compiled.constants,
-        builtins=frozenset(program.builtins),
-        globals=frozenset(program.globals),
-        function_names={scope.python_name: scope.name for scope in program.scopes()},
-        file_name=file_name,
-    )
+    return _compile(program, catalogue, dialect)
 
 
 def check_program(
     text: str, *, catalogue: Catalogue = CB3_3_15, dialect: Dialect | None = None, name: str = "<program>"
 ) -> tuple[Sequence[ScriptCompileError], Sequence[ScriptCompileError]]:
     """All errors and all warnings of a text, each in its order. A syntax error hides what comes after it."""
-    source = Source(_as_bytes(text), name)
-    program, errors = _resolve(source, catalogue, dialect or dialect_for(catalogue.version))
-    if errors:
-        return errors, program.warnings if program is not None else ()
-    try:
-        compiled = compile_program(text, catalogue=catalogue, dialect=dialect, name=name)
-    except ScriptCompileError as error:
-        return [error], ()
-    return [], compiled.warnings
+    dialect = dialect or dialect_for(catalogue.version)
+    program, errors = _resolve(Source(_as_bytes(text), name), catalogue, dialect)
+    if program is not None and not errors:
+        try:
+            _compile(program, catalogue, dialect)
+        except ScriptCompileError as error:
+            errors = [error]
+    return errors, program.warnings if program is not None else ()
 
 
 def _resolve(
@@ -100,6 +80,28 @@ def _resolve(
         return None, [error]
     except RecursionError:
         return None, [_too_deep(source)]
+
+
+def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -> CompiledProgram:
+    file_name = f"<urscript {program.name}>"
+    try:
+        compiled = compile_resolved(program, catalogue, dialect, file_name)
+    except RecursionError:
+        raise _too_deep(program.source) from None
+    return CompiledProgram(
+        name=program.name,
+        kind=program.kind,
+        warnings=tuple(program.warnings),
+        source=program.source,
+        dialect=dialect,
+        catalogue=catalogue,
+        code=compiled.code,
+        constants=compiled.constants,
+        builtins=frozenset(program.builtins),
+        globals=frozenset(program.globals),
+        function_names=compiled.function_names,
+        file_name=file_name,
+    )
 
 
 def _too_deep(source: Source) -> ScriptSyntaxError:
@@ -222,7 +224,7 @@ class RunningProgram:
             self._finish(ProgramStatus.FINISHED)
 
     def read_global(self, name: str) -> Any:
-        """The value of a global variable; `ops.UNDEFINED` before the first assignment.
+        """The value of a global variable; `variables.UNDEFINED` before the first assignment.
 
         Raises:
             KeyError: The program has no such variable.
@@ -248,7 +250,10 @@ class RunningProgram:
 
     def _finish(self, status: ProgramStatus) -> None:
         self.status = status
-        self._scheduler.kill_all()
+        fault = self._scheduler.kill_all()
+        if fault is not None and self.error is None:
+            self.status = ProgramStatus.FAILED
+            self.error = runtime.script_error(fault, self.program.file_name, self.program.function_names)
         # Functions and their globals refer to each other; a box that runs with its garbage collector frozen
         # would keep every program it ever ran. The variables stay readable.
         for name in [name for name in self._namespace if not name.startswith("g_")]:

@@ -4,7 +4,7 @@
 |---|---|
 | `_T` | the running thread, set by the scheduler |
 | `_b` | statements left in this cycle, set by the scheduler |
-| `_add` ... | the operators of `ops` |
+| `_add` ... | the operators of `ops`, `elements` and `variables` |
 | `_run`, `_kill`, `_join`, `_halt`, `_over`, `_enter`, `_leave` | flow |
 | `b_name` | a builtin, called with the thread first |
 """
@@ -17,7 +17,7 @@ from math import ceil
 from types import CodeType, TracebackType
 from typing import Any, Final
 
-from urscript import ops
+from urscript import elements, ops, variables
 from urscript.builtins import PURE
 from urscript.catalogue import Catalogue
 from urscript.dialect import Dialect
@@ -55,15 +55,15 @@ def _store_member(value: Any, name: str, target: Any) -> Any:
 _COMMON: Final[dict[str, Any]] = {
     "_MISSING": object(),
     "_NEXT_CYCLE": NEXT_CYCLE,
-    "_UNDEFINED": ops.UNDEFINED,
-    "_undefined": ops.undefined,
+    "_UNDEFINED": variables.UNDEFINED,
+    "_undefined": variables.undefined,
     "_Pose": Pose,
-    "_pose": ops.make_pose,
-    "_list": ops.make_list,
-    "_item": ops.item,
-    "_cell": ops.cell,
-    "_store_item": ops.store_item,
-    "_store_cell": ops.store_cell,
+    "_pose": elements.make_pose,
+    "_list": elements.make_list,
+    "_item": elements.item,
+    "_cell": elements.cell,
+    "_store_item": elements.store_item,
+    "_store_cell": elements.store_cell,
     "_member": _member,
     "_store_member": _store_member,
     "_method": _method,
@@ -100,7 +100,7 @@ def base_namespace(dialect: Dialect) -> dict[str, Any]:
     def leave(thread: ScriptThread) -> None:
         thread.depth -= 1
 
-    assign = ops.assign if dialect.list_resize == "error" else ops.assign_resizing
+    assign = variables.assign if dialect.list_resize == "error" else variables.assign_resizing
     return {**_COMMON, "_assign": assign, "_enter": enter, "_leave": leave}
 
 

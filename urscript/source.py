@@ -19,10 +19,6 @@ class Span(NamedTuple):
     end_line: int
     end_column: int
 
-    def to(self, other: Span) -> Span:
-        """The stretch from the start of this one to the end of `other`."""
-        return Span(self.line, self.column, other.end_line, other.end_column)
-
 
 NOWHERE = Span(1, 1, 1, 1)
 

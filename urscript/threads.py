@@ -214,13 +214,19 @@ class Scheduler:
         if kills_itself:
             raise ThreadKilled
 
-    def kill_all(self) -> None:
-        """Stop every thread, children first."""
+    def kill_all(self) -> Exception | None:
+        """Stop every thread, children first; returns the first error of a builtin cleaning up, if any."""
+        fault: Exception | None = None
         for thread in reversed(self.threads):
-            if not thread.finished:
+            if thread.finished:
+                continue
+            try:
                 thread.body.close()
-                self._end(thread)
+            except Exception as error:
+                fault = fault or error
+            self._end(thread)
         self.threads = []
+        return fault
 
 
 def join(by: ScriptThread, handle: Any) -> ThreadBody:

@@ -21,6 +21,8 @@ settings.load_profile("urscript")
 VARIABLES = ["a", "b", "c", "d", "e", "p"]
 FUNCTIONS = ["f", "g", "sync", "sleep", "norm", "length", "to_str", "str_cat", "movej", "textmsg", "size"]
 
+OPERATORS = ["+", "-", "*", "/", "%", "==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"]
+
 names = st.sampled_from(VARIABLES).map(nodes.Name)
 literals = st.one_of(
     st.integers(0, 2**31 - 1).map(nodes.IntLiteral),
@@ -46,7 +48,7 @@ def _compound(values):
         st.builds(nodes.Prefix, st.sampled_from(["-", "+", "not"]), values),
         st.builds(
             nodes.Binary,
-            st.sampled_from(["+", "-", "*", "/", "%", "==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"]),
+            st.sampled_from(OPERATORS),
             values,
             values,
         ),

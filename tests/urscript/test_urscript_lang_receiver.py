@@ -1,4 +1,4 @@
-"""The velocity receiver: which speeds reach the arm in which cycle, with a perfect stream, a late one, none."""
+"""The velocity receiver: which speeds reach the arm in which cycle, with a good stream, a late one, none."""
 
 import pytest
 

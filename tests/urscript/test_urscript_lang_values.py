@@ -59,16 +59,8 @@ def test_text_forms(value, as_text, in_log):
 
 def test_types_have_the_names_of_the_language():
     values = [None, True, 1, 1.0, "", [], Matrix([[1]]), Pose(0, 0, 0, 0, 0, 0)]
-    assert [type_name(value) for value in values] == [
-        "none",
-        "bool",
-        "int",
-        "float",
-        "string",
-        "list",
-        "matrix",
-        "pose",
-    ]
+    names = ["none", "bool", "int", "float", "string", "list", "matrix", "pose"]
+    assert [type_name(value) for value in values] == names
 
 
 @given(st.integers(-(2**70), 2**70))

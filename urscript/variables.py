@@ -1,0 +1,65 @@
+"""What a variable holds before its first value, and which values it takes after.
+
+The first value fixes the type; `dialect` names what no document settles.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from urscript import dialect
+from urscript.errors import ScriptRuntimeError
+from urscript.values import type_name
+
+
+class _Undefined:
+    """The content of a variable that nothing was assigned to yet."""
+
+    script_type = "undefined"
+
+    def __repr__(self) -> str:
+        return "UNDEFINED"
+
+
+UNDEFINED: Final = _Undefined()
+
+
+def undefined(name: str) -> Any:
+    """A variable was read before anything was assigned to it (U: what a controller says)."""
+    raise ScriptRuntimeError(f"variable '{name}' is used before a value is assigned to it")
+
+
+def same_kind(old: type, value: Any) -> bool:
+    """Whether a place that held type `old` may receive `value`; int and float are one kind, number."""
+    new = type(value)
+    if new is old or (dialect.NONE_FITS_EVERY_VARIABLE and (value is None or old is type(None))):
+        return True
+    if old is int or old is float:
+        # A thread handle and the integer 0 stand for each other. Source: driver scripts.
+        return (new is not bool and isinstance(value, (int, float))) or hasattr(value, "thread_id")
+    return hasattr(old, "thread_id") and new is int
+
+
+def assign(value: Any, old: Any, name: str) -> Any:
+    """What variable `name`, which holds `old`, becomes by `name = value`.
+
+    The first value fixes the type (D), and that of a list its length (see Dialect.list_resize).
+    """
+    if type(value) is list and type(old) is list:
+        if len(value) != len(old):
+            raise ScriptRuntimeError("Resizing of 'List' is not supported")
+        if old and not same_kind(type(old[0]), value[0]):
+            raise _other_type(name, f"list of {type_name(old[0])}", f"list of {type_name(value[0])}")
+        return value
+    return assign_resizing(value, old, name)
+
+
+def assign_resizing(value: Any, old: Any, name: str) -> Any:
+    """`assign` where a list may change its length."""
+    if old is UNDEFINED or same_kind(type(old), value):
+        return value
+    raise _other_type(name, type_name(old), type_name(value))
+
+
+def _other_type(name: str, old: str, new: str) -> ScriptRuntimeError:
+    return ScriptRuntimeError(f"variable '{name}' is a {old}, cannot assign a {new}")
