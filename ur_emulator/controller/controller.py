@@ -16,6 +16,7 @@ from ur_emulator.controller.safety import (
     PROTECTIVE_STOP_DECELERATION,
     UNLOCK_DELAY,
     Violation,
+    find_invalid_setpoint,
     find_violation,
 )
 from ur_emulator.controller.snapshot import Snapshot
@@ -25,7 +26,7 @@ from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, ArmMotion
-from ur_emulator.motion.target import ZERO6, Vector6, vector6
+from ur_emulator.motion.target import ZERO6, JointTarget, Vector6, vector6
 from ur_emulator.plant.plant import Plant
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.program_slot import ProgramSlot
@@ -128,12 +129,12 @@ class Controller:
         if self.programs.has_work:
             self.programs.step()
         was_active = self.programs.has_work or state.motion.is_moving or state.mode.is_changing
-        target = state.motion.step(self.period_s, state.speed_slider)
+        target = self._next_target() if running else state.motion.step(self.period_s, state.speed_slider)
         self.plant.step(target if running else None)
         sensed = self.plant.sense()
         self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
         if running and not state.safety.is_stopped:
-            violation = find_violation(state.robot, target, sensed.position_error, self._saturated_s)
+            violation = find_violation(sensed.position_error, self._saturated_s)
             if violation is None and state.stop_requested:
                 violation = _REQUESTED_STOP
             if violation is not None:
@@ -234,6 +235,19 @@ class Controller:
         self.programs.start(program)
 
     # --- stops
+
+    def _next_target(self) -> JointTarget:
+        """Advance the motion; an invalid set-point never reaches the joints: they brake before it."""
+        state, before = self.state, self.state.motion.target
+        target = state.motion.step(self.period_s, state.speed_slider)
+        if target is before or state.safety.is_stopped:
+            return target
+        violation = find_invalid_setpoint(state.robot, before, target, self.period_s)
+        if violation is None:
+            return target
+        state.motion.target = before
+        self._stop_for(violation, state.snapshot.actual_q)
+        return state.motion.step(self.period_s, state.speed_slider)
 
     def _stop_for(self, violation: Violation, actual_q: Vector6) -> None:
         state = self.state

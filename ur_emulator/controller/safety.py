@@ -1,6 +1,7 @@
 """What stops the arm by itself: limit checks, and the protective stop they lead to.
 
-Pure: `find_violation` looks at one cycle and says what is wrong; `SafetyState` remembers the stop.
+Pure: `find_invalid_setpoint` looks at what the joints are asked next, `find_violation` at what they did;
+`SafetyState` remembers the stop.
 Sources: joint limits and torque limits of the robot model; C153 "position deviates from path" and C204
 "invalid setpoints" from user reports. The thresholds of the deviation are not published; those here are the
 proposal of the arm's notes.
@@ -45,33 +46,50 @@ def _stop(code: int, argument: int, text: str, *, blocked: bool = False) -> Viol
     return Violation(ErrorReported(code, argument, ReportLevel.WARNING, text), blocked)
 
 
-def find_violation(
-    robot: RobotModel, target: JointTarget, position_error: tuple[float, ...], saturated_s: float
+def find_invalid_setpoint(
+    robot: RobotModel, before: JointTarget, target: JointTarget, period_s: float
 ) -> Violation | None:
-    """Return what is wrong in this cycle, or None.
+    """Return what is wrong with the next set-point, or None; asked before the joints get it.
+
+    Joint ranges are kept with the way that a protective stop needs, so that the arm comes to rest within
+    them. A joint that is outside already, because something pushed it, may move back.
 
     Args:
         robot: limits of the arm.
-        target: set-point at the end of the cycle.
-        position_error: delayed target minus true position [rad], (6,).
-        saturated_s: for how long a drive has been at its torque limit without a break [s].
+        before: set-point at the end of the last cycle.
+        target: set-point at the end of this one.
+        period_s: control cycle [s].
     """
-    for i, (speed, limit) in enumerate(zip(target.qd, robot.qd_max, strict=True)):
-        if abs(speed) > limit * SPEED_TOLERANCE:
+    braking_time = max(map(abs, target.qd)) / (2.0 * PROTECTIVE_STOP_DECELERATION)
+    for i, (q_before, q, qd, limit, low, high) in enumerate(
+        zip(before.q, target.q, target.qd, robot.qd_max, robot.q_min, robot.q_max, strict=True)
+    ):
+        speed = max(abs(qd), abs(q - q_before) / period_s)
+        if not speed <= limit * SPEED_TOLERANCE:
             return _stop(
                 204,
                 i,
-                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {speed:.3f} rad/s, "
+                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {speed:.4g} rad/s, "
                 f"limit {limit:.3f}",
             )
-    for i, (q, low, high) in enumerate(zip(target.q, robot.q_min, robot.q_max, strict=True)):
-        if not low <= q <= high:
+        reach = q + qd * braking_time
+        if (reach > high and q > q_before) or (reach < low and q < q_before):
             return _stop(
                 204,
                 i,
                 f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {q:.3f} rad, "
                 f"limits {low:.3f} to {high:.3f}",
             )
+    return None
+
+
+def find_violation(position_error: tuple[float, ...], saturated_s: float) -> Violation | None:
+    """Return what the arm has done wrong in this cycle, or None.
+
+    Args:
+        position_error: delayed target minus true position [rad], (6,).
+        saturated_s: for how long a drive has been at its torque limit without a break [s].
+    """
     for i, error in enumerate(position_error):
         if abs(error) > MAX_POSITION_DEVIATION:
             return _stop(

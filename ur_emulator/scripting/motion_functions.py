@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.motion.arm_motion import OwnershipError
+from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, OwnershipError
 from ur_emulator.motion.generators import Generator as MotionGenerator
 from ur_emulator.motion.generators import MoveJ, SpeedJ, StopJ
 from ur_emulator.motion.target import vector6
@@ -36,6 +36,8 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
 
     def movej(thread: object, q: Any, a: float, v: float, t: float, r: float) -> Cycles:
         positive("movej", a=a, v=v)
+        if any(motion.target.qd):  # a move begins at rest, also after a program that was replaced in motion
+            yield from stopj(thread, PROGRAM_END_DECELERATION)
         start = motion.target.q
         if isinstance(q, Pose):
             solution = state.arm.inverse(tuple(q), start, state.tcp_offset)

@@ -12,12 +12,20 @@ from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
 from urscript.waits import Blocked
 
+# No tool is longer than this [m], no rotation vector either [rad]; beyond, poses would lose all their digits.
+MAX_TCP_OFFSET = 100.0
+
 
 def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
     """Return the setting builtins bound to one controller."""
 
     def set_tcp(thread: object, pose: Any) -> None:
-        state.tcp_offset = vector6(pose)
+        offset = vector6(pose)
+        if max(map(abs, offset)) > MAX_TCP_OFFSET:
+            raise ScriptRuntimeError(
+                f"set_tcp: {wire_text(pose)} is no tool, allowed are numbers up to {MAX_TCP_OFFSET:g}"
+            )
+        state.tcp_offset = offset
 
     def cog_of(value: Any) -> tuple[float, float, float]:
         x, y, z = value if value is not None else state.tcp_offset[:3]
