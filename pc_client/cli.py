@@ -6,6 +6,7 @@ need them.
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Sequence
 
@@ -51,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Args:
         arguments: instead of those of the process.
     """
+    # A request to end is answered like Ctrl-C: the arm is stopped first.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     sys.exit(run(list(arguments) if arguments is not None else None))
 
 

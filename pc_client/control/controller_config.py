@@ -42,9 +42,9 @@ class ControllerConfig:
 
 CONTROLLERS = MappingProxyType(
     {
-        # As published (Fig. 3): PI and feed-forward of the current time. The paper gives no numbers. Gains as a
-        # cautious user sets them: a tenth of the bound pi/2T of a 30-45 ms loop, gain_i = gain_p^2 / 8 so that
-        # the integral does not overshoot. One acceleration for all joints and movements, between movej's
+        # As published (Fig. 3): PI and feed-forward of the current time. The paper gives no numbers. Gains as
+        # a cautious user sets them: a tenth of the bound pi/2T of a 30-45 ms loop, gain_i = gain_p^2 / 8 so
+        # that the integral does not overshoot. One acceleration for all joints and movements, between movej's
         # default of 1.4 that UR's manual shows in its speedj examples and the 5 that users raise it to.
         "paper": ControllerConfig(
             name="paper",

@@ -75,6 +75,10 @@ def estimate_delay(
 
     coarse = np.arange(0.0, LONGEST_DELAY + _COARSE_STEP, _COARSE_STEP)
     best: float = coarse[int(np.argmin([mean_square(delay) for delay in coarse]))]
+    if best > LONGEST_DELAY - 2.0 * _COARSE_STEP:
+        raise DriverError(
+            f"the loop delay is {LONGEST_DELAY * 1e3:.0f} ms or more: the network to the robot is too slow to stream"
+        )
     fine = np.arange(max(best - _COARSE_STEP, 0.0), best + _COARSE_STEP + _FINE_STEP / 2, _FINE_STEP)
     errors = np.array([mean_square(delay) for delay in fine])
     # The mean square is a parabola near its minimum; fitting one averages what noise does to single values.

@@ -31,7 +31,7 @@ def gain_margin(gain_p: float, gain_i: float, loop_delay: float) -> float:
         loop_delay: delay from command to reported position [s], > 0.
 
     Returns:
-        The gain margin; infinite without feedback, 0 when no frequency with -180 deg exists (the integral part alone is too strong).
+        The gain margin; infinite without feedback, 0 when the integral part alone is too strong.
     """
     if gain_p == 0.0:
         return inf if gain_i == 0.0 else 0.0

@@ -6,7 +6,9 @@ Works by the real protocol only. Every way out of a motion (done, refused, Ctrl-
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import gc
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Self
 
@@ -111,8 +113,8 @@ class UrDriver:
         q: NDArray[np.float64] = self.read_frame().actual_q
         return q.copy()
 
-    def check_ready(self) -> None:
-        """Refuse a robot that may not move now.
+    def check_ready(self) -> RealtimeFrame:
+        """Refuse a robot that may not move now; returns its state.
 
         Raises:
             RobotStoppedError: safety mode or robot mode forbids it.
@@ -121,6 +123,7 @@ class UrDriver:
         frame = self.read_frame()
         check_safety(frame)
         check_idle(frame)
+        return frame
 
     def move_to(self, q: Sequence[float], *, speed: float, acceleration: float, expected: float) -> None:
         """Move the joints straight to a posture and wait until the arm rests there.
@@ -138,16 +141,15 @@ class UrDriver:
             DriverError: the arm did not arrive, or the connection broke.
         """
         text = approach_script(q, speed, acceleration)
-        self.check_ready()
-        if np.abs(self.read_frame().target_q - np.asarray(q)).max() < _NO_MOVE:
+        goal = np.asarray(q, dtype=np.float64)
+        if np.abs(self.check_ready().target_q - goal).max() < _NO_MOVE:
             return
         with _AlwaysStopped(self, None):
             self._start(text)
             limit = expected + _APPROACH_RESERVE
             self._wait(is_stopped, limit, f"the approach did not end within {limit:.0f} s")
-            self._wait_for_rest()
-        reached = self.actual_q()
-        error = float(np.abs(reached - np.asarray(q, dtype=np.float64)).max())
+            at_rest = self._wait_for_rest()
+        error = float(np.abs(at_rest.actual_q - goal).max())
         if not error <= _ARRIVAL_TOLERANCE:
             self._raise_robot_errors()
             raise DriverError(
@@ -181,7 +183,8 @@ class UrDriver:
                 stream = VelocityStream(
                     self._frames, reverse, self._network, self.info.period, self._raise_robot_errors
                 )
-                report = stream.run(tracker, on_row)
+                with _collector_paused():
+                    report = stream.run(tracker, on_row)
                 self._wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
                 self._wait_for_rest()
         finally:
@@ -294,8 +297,12 @@ class UrDriver:
             if self._network.now() > deadline:
                 raise DriverError(complaint)
 
-    def _wait_for_rest(self) -> None:
-        """Wait until the arm has been at rest for a while, or rests while time itself stands still."""
+    def _wait_for_rest(self) -> RealtimeFrame:
+        """Wait until the arm has been at rest for a while, or rests while time itself stands still.
+
+        Returns:
+            The state at rest.
+        """
         at_rest_since: float | None = None
 
         def rests(frame: RealtimeFrame) -> bool:
@@ -314,9 +321,21 @@ class UrDriver:
             settled = [rests(frame) for frame in arrival.new]
             stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
             if any(settled) or (stands_still and is_at_rest(arrival.latest)):
-                return
+                return arrival.latest
             if self._network.now() > deadline:
                 raise DriverError(f"the arm did not come to rest within {REST_TIMEOUT:g} s")
+
+
+@contextmanager
+def _collector_paused() -> Iterator[None]:
+    """Keep the garbage collector out of the control loop, where one pass may cost more than a cycle."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 class _AlwaysStopped:

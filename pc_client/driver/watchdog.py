@@ -10,8 +10,8 @@ RUNNING = float(RobotMode.RUNNING)
 PLAYING = float(ProgramState.PLAYING)
 SAFE_MODES = (float(SafetyMode.NORMAL), float(SafetyMode.REDUCED))
 
-REST_SPEED = 2e-3
-"""Below this joint speed [rad/s] the arm rests: 0.1 deg/s, above the noise of a filtered encoder."""
+REST_SPEED = 0.01
+"""Below this joint speed [rad/s] the arm rests: 0.6 deg/s, above the noise of a standing joint."""
 
 _HOW_TO_GO_ON = {
     SafetyMode.PROTECTIVE_STOP: "find the cause, then unlock the protective stop on the pendant",

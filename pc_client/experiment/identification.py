@@ -22,8 +22,8 @@ _LEAD, _SETTLE = 0.1, 0.3
 _RETURN_TOLERANCE = 2e-3
 """How far from where it began the excitation may leave a joint [rad]."""
 
-_LEAST_MARGIN = 1.5
-"""A controller needs at least this gain margin with the identified delay."""
+_LEAST_MARGIN = 2.0
+"""A controller needs at least this gain margin with the identified delay: 6 dB, the usual one."""
 
 
 def identify_delay(

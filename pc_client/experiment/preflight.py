@@ -6,6 +6,8 @@ from ipaddress import ip_address
 
 import numpy as np
 
+from pc_client.driver.robot_info import RobotInfo
+from pc_client.errors import DriverError
 from pc_client.experiment.prepare import Experiment
 from protocol.ur_types import JOINT_NAMES
 
@@ -18,6 +20,21 @@ def is_loopback(host: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:  # a name; who knows what answers there
         return False
+
+
+def check_model(experiment: Experiment, info: RobotInfo) -> None:
+    """Refuse to run a plan on another type of arm than it was made for.
+
+    A robot that does not tell its type passes: software before 3.12 cannot.
+
+    Raises:
+        DriverError: the robot says that it is another type.
+    """
+    wanted = experiment.model.name.upper()
+    if info.model not in ("unknown", wanted):
+        raise DriverError(
+            f"the robot is a {info.model}, the movements were planned for a {wanted}: not started"
+        )
 
 
 def experiment_text(experiment: Experiment) -> str:

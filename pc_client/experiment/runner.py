@@ -18,6 +18,7 @@ from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.experiment.identification import identify_delay
 from pc_client.experiment.observer import Observer, Silent
+from pc_client.experiment.preflight import check_model
 from pc_client.experiment.prepare import Experiment, PlannedMovement, clear_folder
 from pc_client.planning.approach import Approach, plan_approach
 from pc_client.planning.plan import JointPlan
@@ -78,6 +79,7 @@ class ExperimentRunner:
             ClientError: a check failed or the robot stopped; the arm rests, earlier recordings are complete.
         """
         experiment, driver = self._experiment, self._driver
+        check_model(experiment, driver.info)
         driver.check_ready()
         clear_folder(experiment)
         self._observer.connected(driver.info)

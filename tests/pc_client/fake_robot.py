@@ -86,10 +86,13 @@ class Listener:
 
 
 class FakeRobot:
-    def __init__(self, *, lockstep=True, delay=3, on_tick=None, hello=None, dials=True, has_dashboard=True):
+    def __init__(
+        self, *, lockstep=True, delay=3, on_tick=None, hello=None, dials=True, has_dashboard=True, model="UR3"
+    ):
         self.lockstep, self.delay, self.on_tick = lockstep, delay, on_tick
         self.hello = encode_hello() if hello is None else hello
         self.dials, self.has_dashboard = dials, has_dashboard
+        self.model = model
         self.clock = 0.0
         self.tick = 1000
         self.q = [0.0] * 6
@@ -139,7 +142,9 @@ class FakeRobot:
             self.commands.append(decode_velocity(data))
             self.received.append(self.commands[-1])
         elif pipe.kind == "dashboard":
-            answer = {"get serial number": "20993000007", "get robot model": "UR3"}.get(data.decode().strip())
+            answer = {"get serial number": "20993000007", "get robot model": self.model}.get(
+                data.decode().strip()
+            )
             if answer:
                 pipe.incoming.append(answer.encode() + b"\n")
 

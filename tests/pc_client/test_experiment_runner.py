@@ -148,9 +148,17 @@ def test_an_arm_that_does_not_follow_is_found_before_the_first_movement(two, tmp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_too_slow_a_loop_is_refused(two, tmp_path):
-    with pytest.raises(DriverError, match="gain margin"):
-        run(FakeRobot(delay=20), with_folder(two, tmp_path))
+@pytest.mark.parametrize(("cycles", "words"), [(21, "gain margin"), (30, "200 ms or more")])
+def test_too_slow_a_loop_is_refused(cycles, words, two, tmp_path):
+    with pytest.raises(DriverError, match=words):
+        run(FakeRobot(delay=cycles), with_folder(two, tmp_path))
+
+
+def test_plans_for_a_ur3_do_not_run_on_another_arm(two, tmp_path):
+    robot = FakeRobot(model="UR10")
+    with pytest.raises(DriverError, match=r"is a UR10.*planned for a UR3"):
+        run(robot, with_folder(two, tmp_path))
+    assert robot.programs == []
 
 
 def test_nothing_moves_when_a_movement_is_unknown(tmp_path):
