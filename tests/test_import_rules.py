@@ -1,0 +1,79 @@
+"""The layer table of docs/architecture.md, held by reading every import."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+OURS = {"protocol", "urscript", "ur_emulator", "pc_client"}
+MAY_IMPORT = {
+    "protocol": {"numpy"},
+    "urscript": {"protocol", "lark", "numpy", "typer", "rich"},
+    "ur_emulator": {"urscript", "protocol", "mujoco", "numpy", "typer", "rich"},
+    "pc_client": {
+        "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "pyarrow", "mpl_toolkits",
+    },
+}  # fmt: skip
+# Modules of the standard library that a layer must not touch, and the folders in which it may.
+EFFECTS = {"socket", "threading", "time", "selectors", "select", "subprocess", "asyncio"}
+MAY_HAVE_EFFECTS = {
+    "ur_emulator": {"realtime", "servers", "emulator.py", "cli.py"},
+    "pc_client": {"driver", "experiment", "commands", "cli.py"},
+}
+
+
+def imports(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            yield node.module.split(".")[0]
+
+
+def modules(package):
+    return sorted((ROOT / package).rglob("*.py"))
+
+
+@pytest.mark.parametrize("package", sorted(OURS))
+def test_packages_import_only_what_their_row_allows(package):
+    allowed = MAY_IMPORT[package] | {package} | set(sys.stdlib_module_names)
+    wrong = {
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in modules(package)
+        for name in imports(path)
+        if name not in allowed
+    }
+    assert not wrong
+
+
+@pytest.mark.parametrize("package", sorted(OURS))
+def test_effects_stay_at_the_rim(package):
+    rim = MAY_HAVE_EFFECTS.get(package, set())
+    wrong = {
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in modules(package)
+        if path.relative_to(ROOT / package).parts[0] not in rim
+        for name in imports(path)
+        if name in EFFECTS
+    }
+    assert not wrong
+
+
+@pytest.mark.parametrize(
+    ("package", "absent"),
+    [
+        ("protocol", {"urscript", "ur_emulator", "pc_client", "mujoco", "scipy", "lark"}),
+        ("urscript", {"ur_emulator", "pc_client", "mujoco", "scipy"}),
+        ("ur_emulator.emulator", {"pc_client", "scipy", "pinocchio", "matplotlib", "mcap"}),
+        ("pc_client.experiment.runner", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),
+    ],
+)
+def test_a_fresh_interpreter_loads_nothing_of_the_other_side(package, absent):
+    code = f"import sys, {package}; print(*sorted({absent!r} & set(sys.modules)))"
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert result.stdout.strip() == ""
