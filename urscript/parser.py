@@ -7,7 +7,7 @@ The parser is built on first use, once per process (about 0.05 s), then parses 1
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from urscript import nodes
 from urscript.errors import ScriptLexerError, ScriptSyntaxError
@@ -38,6 +38,62 @@ def parse(source: Source) -> nodes.Block:
     except ScriptSyntaxError as error:
         error.source = source
         raise
+
+
+def find_syntax_errors(source: Source, limit: int = 20) -> list[ScriptSyntaxError]:
+    """The first syntax errors of `source`: after each the parser goes on with the next statement."""
+    from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
+
+    errors: list[ScriptSyntaxError] = []
+    lost_openers = 0
+
+    def note(error: ScriptSyntaxError) -> None:
+        # More on the same line is most often the echo of the first.
+        if all(error.line != earlier.line for earlier in errors):
+            errors.append(error)
+
+    def recover(error: UnexpectedInput) -> bool:
+        nonlocal lost_openers
+        if isinstance(error, UnexpectedCharacters):
+            note(_unexpected_character(error, source))
+        elif isinstance(error, UnexpectedToken):
+            if error.token.type == "END" and lost_openers:
+                lost_openers -= 1
+                return True
+            note(_unexpected_token(error, source))
+            if error.token.type == "$END":
+                return False
+            lost_openers += _drop_statement(error)
+        return len(errors) < limit
+
+    try:
+        _lark().parse(source.text, on_error=recover)
+    except UnexpectedInput:
+        pass
+    except ScriptSyntaxError as error:
+        error.source = source
+        errors.append(error)
+    return errors
+
+
+def _drop_statement(error: UnexpectedToken) -> int:
+    """Take back what was read of the broken statement; keep the token if another can start or end with it.
+
+    Returns:
+        How many block openers were taken back: as many `end`s will be left over.
+    """
+    parser: Any = error.interactive_parser
+    state = parser.parser_state
+    lost = 0
+    while state.value_stack and not _STATEMENT_ENDS & parser.accepts():
+        state.state_stack.pop()
+        lost += getattr(state.value_stack.pop(), "type", "") in _BLOCK_OPENERS
+    if error.token.type in parser.accepts():
+        parser.feed_token(error.token)
+    return lost
+
+
+_STATEMENT_ENDS = frozenset({"END", "$END"})
 
 
 def prepare() -> None:
@@ -80,12 +136,15 @@ def _unexpected_token(error: UnexpectedToken, source: Source) -> ScriptSyntaxErr
     if token.type == "$END":
         return _unexpected_end(source)
     accepted = error.accepts or error.expected
-    wanted = sorted(_SPELLING[name] for name in accepted if name in _SPELLING)
+    wanted = {_SPELLING[name] for name in accepted if name in _SPELLING}
+    if "RUN" in accepted:
+        wanted -= {"'('", "'['", "a name"}
+        wanted.add("a value")
     if "WHILE" in accepted:
         # A new statement could start here, so the list of what may follow is too long to help.
         message = f"unexpected '{token}'"
     else:
-        message = f"unexpected '{token}', expected {' or '.join(wanted) or 'a value'}"
+        message = f"unexpected '{token}', expected {' or '.join(sorted(wanted))}"
     return ScriptSyntaxError(
         message, line=token.line or 1, column=token.column or 1, width=len(token), source=source
     )

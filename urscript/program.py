@@ -17,7 +17,7 @@ from urscript.catalogue import CB3_3_15, Catalogue
 from urscript.compiler import compile_resolved
 from urscript.dialect import Dialect, dialect_for
 from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError
-from urscript.parser import parse
+from urscript.parser import find_syntax_errors, parse
 from urscript.resolver import resolve
 from urscript.scopes import ResolvedProgram
 from urscript.source import Source
@@ -60,15 +60,18 @@ def compile_program(
 def check_program(
     text: str, *, catalogue: Catalogue = CB3_3_15, dialect: Dialect | None = None, name: str = "<program>"
 ) -> tuple[Sequence[ScriptCompileError], Sequence[ScriptCompileError]]:
-    """All errors and all warnings of a text, each in its order. A syntax error hides what comes after it."""
+    """All errors and warnings of a text, each in order; names are looked up once the syntax is right."""
+    source = Source(_as_bytes(text), name)
     dialect = dialect or dialect_for(catalogue.version)
-    program, errors = _resolve(Source(_as_bytes(text), name), catalogue, dialect)
-    if program is not None and not errors:
+    program, errors = _resolve(source, catalogue, dialect)
+    if program is None:
+        return find_syntax_errors(source) or errors, ()
+    if not errors:
         try:
             _compile(program, catalogue, dialect)
         except ScriptCompileError as error:
             errors = [error]
-    return errors, program.warnings if program is not None else ()
+    return errors, program.warnings
 
 
 def _resolve(

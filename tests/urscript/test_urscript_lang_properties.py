@@ -231,6 +231,8 @@ def _assert_has_a_place(error, text):
     assert error.column >= 1
     assert error.wire_text
     assert error.render()
+    all_errors, _ = check_program(text)
+    assert (all_errors[0].line, all_errors[0].column) == (error.line, error.column)
 
 
 @given(st.text(st.characters(max_codepoint=255), max_size=60))
@@ -280,6 +282,13 @@ def test_a_chain_of_many_arms_needs_no_nesting():
     host = RecordingHost()
     host.run(compile_program(f"x = 299\nif x == 0:\n{arms}end"))
     assert host.messages == ["299"]
+
+
+def test_all_syntax_errors_are_found_in_one_pass():
+    text = 'def f():\n  textmsg("a"\n  x = 3 +\n  while x\n    y = 1\n  end\n  a += 1\n  z = 2 @\nend\n'
+    errors, _ = check_program(text)
+    found = [(error.line, error.column) for error in errors]
+    assert found == [(3, 3), (4, 3), (5, 5), (7, 6), (8, 9)]
 
 
 def test_a_syntax_error_in_the_middle_of_garbage_names_its_line():
