@@ -49,7 +49,6 @@ class Dialect:
         list_resize: What storing a list of another length into a list variable does. "error" since 3.14 /
             5.9.4 (O for 5.9.4-5.14.6, I for 3.14-3.15), "free" before (O).
         has_pause: `pause` is a statement (e-Series 5.x, D); elsewhere it is an ordinary name.
-        has_methods: Lists, structs and matrices have methods and members (5.15 on, D).
         statement_budget: Statements a thread may run in one cycle.
         recursion_limit: Depth of calls of a recursive function.
     """
@@ -57,7 +56,6 @@ class Dialect:
     short_circuit: bool = True
     list_resize: Literal["free", "error"] = "error"
     has_pause: bool = False
-    has_methods: bool = False
     statement_budget: int = STATEMENT_BUDGET
     recursion_limit: int = RECURSION_LIMIT
 
@@ -70,4 +68,4 @@ def dialect_for(version: Sequence[int]) -> Dialect:
     modern = major > 5 or minor >= 15
     # From 5.15 on a list has a capacity; until that is modelled, storing a longer list is allowed there.
     resize: Literal["free", "error"] = "error" if not modern and minor >= 9 else "free"
-    return Dialect(list_resize=resize, has_pause=True, has_methods=modern)
+    return Dialect(list_resize=resize, has_pause=True)
