@@ -1,0 +1,240 @@
+"""Bytes of RTDE's packages, see `rtde_messages`, in both protocol versions and both directions.
+
+    u16 size, header included | u8 type | payload        big-endian
+
+The same type byte means another payload in the other direction, so decoding needs to know the sender.
+
+Source: UR RTDE guide. Data packages of the robot carry no recipe id in version 1: so the public client
+library and the Robotics Library read them, against the guide's table.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import TypeAlias
+
+from protocol.dashboard_connection import Role
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.rtde_messages import (
+    DataPackage,
+    GetControllerVersion,
+    GetControllerVersionReply,
+    Message,
+    PackageType,
+    Pause,
+    PauseReply,
+    RequestProtocolVersion,
+    RequestProtocolVersionReply,
+    SetupInputs,
+    SetupInputsReply,
+    SetupOutputs,
+    SetupOutputsReply,
+    Start,
+    StartReply,
+    TextMessage,
+)
+from protocol.ur_types import SoftwareVersion
+
+__all__ = ["HEADER_SIZE", "MAX_NAMES_SIZE", "data_header", "decode_message", "encode_message"]
+
+_HEADER = struct.Struct(">HB")
+HEADER_SIZE = _HEADER.size
+
+MAX_NAMES_SIZE = 2048
+"""Longest list of names in bytes. Source: UR RTDE guide."""
+
+
+# --- encoding
+
+
+def encode_message(message: Message, sender: Role, version: int) -> bytes:
+    """Bytes of a package.
+
+    Args:
+        message: what to send.
+        sender: who sends it; only text messages differ.
+        version: protocol version spoken.
+
+    Raises:
+        LocalProtocolError: a name, text or number has no place on the wire.
+    """
+    try:
+        kind, payload = _encode_payload(message, sender, version)
+        return _HEADER.pack(HEADER_SIZE + len(payload), kind) + payload
+    except (struct.error, UnicodeEncodeError, OverflowError) as problem:
+        raise LocalProtocolError(f"{message!r} cannot be sent: {problem}") from None
+
+
+def data_header(size: int, recipe_id: int | None) -> bytes:
+    """What stands before `size` bytes of values in a data package."""
+    tail = b"" if recipe_id is None else bytes((recipe_id,))
+    return _HEADER.pack(HEADER_SIZE + len(tail) + size, PackageType.DATA_PACKAGE) + tail
+
+
+def _encode_payload(message: Message, sender: Role, version: int) -> tuple[PackageType, bytes]:
+    match message:
+        case RequestProtocolVersion(wanted):
+            return PackageType.REQUEST_PROTOCOL_VERSION, struct.pack(">H", wanted)
+        case RequestProtocolVersionReply(accepted):
+            return PackageType.REQUEST_PROTOCOL_VERSION, bytes((accepted,))
+        case GetControllerVersion():
+            return PackageType.GET_CONTROLLER_VERSION, b""
+        case GetControllerVersionReply(software):
+            return PackageType.GET_CONTROLLER_VERSION, struct.pack(">4I", *software)
+        case SetupOutputs(names, frequency):
+            if (frequency is None) is not (version == 1):
+                raise LocalProtocolError(
+                    f"frequency {frequency} given: version 1 takes none, version 2 needs one"
+                )
+            head = b"" if frequency is None else struct.pack(">d", frequency)
+            return PackageType.SETUP_OUTPUTS, head + _encode_names(names)
+        case SetupOutputsReply(types, recipe_id):
+            if (recipe_id is None) is not (version == 1):
+                raise LocalProtocolError(
+                    f"recipe id {recipe_id} given: version 1 takes none, version 2 needs one"
+                )
+            head = b"" if recipe_id is None else struct.pack(">B", recipe_id)
+            return PackageType.SETUP_OUTPUTS, head + _encode_words(types)
+        case SetupInputs(names):
+            return PackageType.SETUP_INPUTS, _encode_names(names)
+        case SetupInputsReply(types, recipe_id):
+            return PackageType.SETUP_INPUTS, struct.pack(">B", recipe_id) + _encode_words(types)
+        case Start():
+            return PackageType.START, b""
+        case StartReply(accepted):
+            return PackageType.START, bytes((accepted,))
+        case Pause():
+            return PackageType.PAUSE, b""
+        case PauseReply(accepted):
+            return PackageType.PAUSE, bytes((accepted,))
+        case DataPackage(values, recipe_id):
+            head = b"" if recipe_id is None else struct.pack(">B", recipe_id)
+            return PackageType.DATA_PACKAGE, head + values
+        case TextMessage():
+            return PackageType.TEXT_MESSAGE, _encode_text(message, sender, version)
+
+
+def _encode_text(message: TextMessage, sender: Role, version: int) -> bytes:
+    text = message.message.encode("latin-1", "replace")
+    level = struct.pack(">B", message.level)
+    if version == 1:
+        return level + text if sender is Role.ROBOT else text
+    # Lengths are one byte: the end of a long text is cut off rather than the text refused.
+    text, source = text[:255], message.source.encode("latin-1", "replace")[:255]
+    return bytes((len(text),)) + text + bytes((len(source),)) + source + level
+
+
+def _encode_words(words: tuple[str, ...]) -> bytes:
+    return ",".join(words).encode("ascii")
+
+
+def _encode_names(names: tuple[str, ...]) -> bytes:
+    for name in names:
+        if not name or "," in name:
+            raise LocalProtocolError(f"{name!r} is no name of a variable")
+    data = _encode_words(names)
+    if len(data) > MAX_NAMES_SIZE:
+        raise LocalProtocolError(
+            f"{len(names)} names take {len(data)} bytes, a recipe takes {MAX_NAMES_SIZE}: ask for fewer"
+        )
+    return data
+
+
+# --- decoding
+
+
+def decode_message(kind: int, payload: bytes, sender: Role, version: int) -> Message | None:
+    """Package from bytes; surplus bytes after a fixed payload are skipped.
+
+    Args:
+        kind: type byte.
+        payload: what follows it.
+        sender: who has sent it.
+        version: protocol version spoken.
+
+    Returns:
+        The package, or None if nobody knows its type.
+
+    Raises:
+        RemoteProtocolError: the payload is too short for its type.
+    """
+    decode = (_FROM_PC if sender is Role.PC else _FROM_ROBOT).get(kind)
+    if decode is None:
+        return None
+    try:
+        return decode(payload, version)
+    except (struct.error, IndexError):
+        raise RemoteProtocolError(
+            f"an RTDE package of type {chr(kind)!r} cannot have only {len(payload)} bytes of payload"
+        ) from None
+
+
+def _decode_words(data: bytes) -> tuple[str, ...]:
+    words = data.decode("latin-1").split(",")
+    if not words[-1]:
+        words.pop()  # ur_rtde ends every list with a comma
+    return tuple(words)
+
+
+def _decode_setup_outputs(payload: bytes, version: int) -> SetupOutputs:
+    if version == 1:
+        return SetupOutputs(_decode_words(payload))
+    (frequency,) = struct.unpack_from(">d", payload)
+    return SetupOutputs(_decode_words(payload[8:]), frequency)
+
+
+def _decode_setup_outputs_reply(payload: bytes, version: int) -> SetupOutputsReply:
+    if version == 1:
+        return SetupOutputsReply(_decode_words(payload))
+    return SetupOutputsReply(_decode_words(payload[1:]), payload[0])
+
+
+def _decode_robot_data(payload: bytes, version: int) -> DataPackage:
+    return DataPackage(payload) if version == 1 else DataPackage(payload[1:], payload[0])
+
+
+def _decode_pc_text(payload: bytes, version: int) -> TextMessage:
+    return TextMessage(payload.decode("latin-1")) if version == 1 else _decode_text(payload)
+
+
+def _decode_robot_text(payload: bytes, version: int) -> TextMessage:
+    if version == 1:
+        return TextMessage(payload[1:].decode("latin-1"), level=payload[0])
+    return _decode_text(payload)
+
+
+def _decode_text(payload: bytes) -> TextMessage:
+    end = 1 + payload[0]
+    source_end = end + 1 + payload[end]
+    return TextMessage(
+        payload[1:end].decode("latin-1"), payload[end + 1 : source_end].decode("latin-1"), payload[source_end]
+    )
+
+
+_Decoder: TypeAlias = Callable[[bytes, int], Message]
+
+_FROM_PC: dict[int, _Decoder] = {
+    PackageType.REQUEST_PROTOCOL_VERSION: lambda data, _: RequestProtocolVersion(
+        *struct.unpack_from(">H", data)
+    ),
+    PackageType.GET_CONTROLLER_VERSION: lambda data, _: GetControllerVersion(),
+    PackageType.SETUP_OUTPUTS: _decode_setup_outputs,
+    PackageType.SETUP_INPUTS: lambda data, _: SetupInputs(_decode_words(data)),
+    PackageType.START: lambda data, _: Start(),
+    PackageType.PAUSE: lambda data, _: Pause(),
+    PackageType.TEXT_MESSAGE: _decode_pc_text,
+    PackageType.DATA_PACKAGE: lambda data, _: DataPackage(data[1:], data[0]),
+}
+_FROM_ROBOT: dict[int, _Decoder] = {
+    PackageType.REQUEST_PROTOCOL_VERSION: lambda data, _: RequestProtocolVersionReply(data[0] != 0),
+    PackageType.GET_CONTROLLER_VERSION: lambda data, _: GetControllerVersionReply(
+        SoftwareVersion(*struct.unpack_from(">4I", data))
+    ),
+    PackageType.SETUP_OUTPUTS: _decode_setup_outputs_reply,
+    PackageType.SETUP_INPUTS: lambda data, _: SetupInputsReply(_decode_words(data[1:]), data[0]),
+    PackageType.START: lambda data, _: StartReply(data[0] != 0),
+    PackageType.PAUSE: lambda data, _: PauseReply(data[0] != 0),
+    PackageType.TEXT_MESSAGE: _decode_robot_text,
+    PackageType.DATA_PACKAGE: _decode_robot_data,
+}
