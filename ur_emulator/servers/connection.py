@@ -50,6 +50,7 @@ class Connection:
         self._outbox: deque[memoryview] = deque()
         self._pending = 0
         self._closing = False
+        self._deaf = False
         self._open = True
         self.dropped = 0
         sock.setblocking(False)
@@ -72,7 +73,7 @@ class Connection:
         Returns:
             False if the package was dropped: the outbox is full or the connection is closed.
         """
-        if not self._open:
+        if not self._open or self._deaf:
             return False
         if self._pending:
             if self._pending + len(package) > OUTBOX_LIMIT:
@@ -85,7 +86,7 @@ class Connection:
         except BlockingIOError:
             sent = 0
         except OSError:
-            self.close()
+            self._stop_sending()
             return False
         if sent < len(package):
             self._queue(memoryview(package)[sent:])
@@ -108,6 +109,17 @@ class Connection:
             self._pending = 0
             self._backlog.discard(self)
             self._on_close(self)
+
+    def _stop_sending(self) -> None:
+        """The peer takes nothing any more. What it sent before it went is still read; then it is closed.
+
+        Without this, a script is lost when its sender closes the socket at once, as many do.
+        """
+        self._deaf = True
+        self._outbox.clear()
+        self._pending = 0
+        self._backlog.discard(self)
+        self._loop.watch(self._sock, selectors.EVENT_READ, self._on_ready)
 
     def _queue(self, data: memoryview) -> None:
         self._outbox.append(data)
@@ -145,7 +157,7 @@ class Connection:
         except BlockingIOError:
             return
         except OSError:
-            self.close()
+            self._stop_sending()
             return
         self._backlog.discard(self)
         if self._closing:
