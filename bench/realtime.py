@@ -16,7 +16,7 @@ PERIOD = 0.008  # s
 
 
 def measure_realtime(minutes: float) -> dict[str, float]:
-    """Attach one client for so many minutes; compare arrivals with the grid that the earliest of them lie on."""
+    """Attach one client for so many minutes; compare arrivals with the grid on which the earliest lie."""
     with box_process("--seed", "7") as box:
         stamps, arrivals = [], []
         n_frames = round(minutes * 60.0 / PERIOD)

@@ -15,7 +15,7 @@ from ur_emulator.errors import PortError
 
 
 def open_box(**settings) -> ControlBox:
-    """Return a listening box: on the standard ports, or moved up if another robot is being simulated there."""
+    """Return a listening box: on the standard ports, or moved up if they are taken."""
     for base in range(0, 20_000, 1000):
         box = ControlBox(port_base=base, **settings)
         try:

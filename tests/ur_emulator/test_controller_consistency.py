@@ -64,7 +64,9 @@ def test_tcp_speed_is_the_derivative_of_the_tcp_pose(moved):
     dt = moved.controller.period_s
     targets = moved.snapshots
     for k in range(40, 120, 10):
-        difference = np.subtract(targets[k + 1].target_tcp_pose[:3], targets[k - 1].target_tcp_pose[:3]) / (2 * dt)
+        difference = np.subtract(targets[k + 1].target_tcp_pose[:3], targets[k - 1].target_tcp_pose[:3]) / (
+            2 * dt
+        )
         assert np.allclose(difference, targets[k].target_tcp_speed[:3], atol=2e-3)
 
 

@@ -24,7 +24,7 @@ def texts(events):
 
 
 def test_a_program_moves_the_arm_and_ends(bench):
-    assert bench.run("def m():\n  movej([0.5,-1.5,-1.8,0,1.2,1.5])\n  textmsg(\"there\")\nend\n") == ["there"]
+    assert bench.run('def m():\n  movej([0.5,-1.5,-1.8,0,1.2,1.5])\n  textmsg("there")\nend\n') == ["there"]
     assert bench.now.target_q == pytest.approx([0.5, -1.5, -1.8, 0, 1.2, 1.5])
     assert bench.now.runtime_state == ProgramState.STOPPED
     kinds = [type(event) for event in bench.events]
@@ -100,7 +100,7 @@ def test_a_second_thread_cannot_take_the_arm(bench):
 def test_killing_the_mover_frees_the_arm(bench):
     said = bench.run(
         "def two():\n  thread mover():\n    while True:\n      speedj([0.1,0,0,0,0,0], 1.0, get_steptime())\n    end\n  end\n"
-        "  h = run mover()\n  sleep(0.1)\n  kill h\n  stopj(1.0)\n  textmsg(\"free\")\nend\n"
+        '  h = run mover()\n  sleep(0.1)\n  kill h\n  stopj(1.0)\n  textmsg("free")\nend\n'
     )
     assert said == ["free"]
     assert bench.now.target_qd == (0.0,) * 6
@@ -116,7 +116,7 @@ def test_numbers_that_are_none_do_not_move_the_arm(bench):
     q = bench.now.target_q
     network = bench.network
     bench.start(
-        "def f():\n  socket_open(\"10.0.0.1\", 1234)\n  v = socket_read_ascii_float(1)\n"
+        'def f():\n  socket_open("10.0.0.1", 1234)\n  v = socket_read_ascii_float(1)\n'
         "  speedj([v[1],0,0,0,0,0], 1.0, 0.008)\nend\n"
     )
     network.sockets[0].inbox += b"(nan)"
@@ -177,14 +177,16 @@ def test_a_program_is_refused_while_the_brakes_are_on():
 def test_reads_return_their_failure_shapes_when_the_peer_is_gone(bench):
     bench.network.refuse = True
     said = bench.run(
-        "def f():\n  textmsg(socket_open(\"10.0.0.1\", 1))\n  textmsg(socket_read_binary_integer(2))\n"
+        'def f():\n  textmsg(socket_open("10.0.0.1", 1))\n  textmsg(socket_read_binary_integer(2))\n'
         "  textmsg(socket_read_byte_list(2))\n  textmsg(socket_send_int(5))\nend\n"
     )
     assert said == ["False", "[0,-1,-1]", "[0,-1,-1]", "False"]
 
 
 def test_a_read_times_out_in_robot_time(bench):
-    bench.start("def f():\n  socket_open(\"10.0.0.1\", 1)\n  textmsg(socket_read_binary_integer(1, timeout=0.1))\nend\n")
+    bench.start(
+        'def f():\n  socket_open("10.0.0.1", 1)\n  textmsg(socket_read_binary_integer(1, timeout=0.1))\nend\n'
+    )
     assert bench.controller.waits_outside
     bench.tick(20)
     assert [e.text for e in bench.events if type(e).__name__ == "TextPrinted"] == ["[0,-1]"]
@@ -192,8 +194,8 @@ def test_a_read_times_out_in_robot_time(bench):
 
 def test_a_read_hands_over_what_came_and_keeps_the_rest(bench):
     bench.start(
-        "def f():\n  socket_open(\"10.0.0.1\", 1)\n  textmsg(socket_read_binary_integer(2))\n"
-        "  textmsg(socket_read_string(suffix=\"!\"))\n  textmsg(socket_read_line())\nend\n"
+        'def f():\n  socket_open("10.0.0.1", 1)\n  textmsg(socket_read_binary_integer(2))\n'
+        '  textmsg(socket_read_string(suffix="!"))\n  textmsg(socket_read_line())\nend\n'
     )
     sock = bench.network.sockets[0]
     sock.inbox += struct.pack(">2i", 7, -9)[:5]
@@ -214,13 +216,17 @@ def test_a_secondary_program_runs_beside_the_primary_one(bench):
     assert bench.now.runtime_state == ProgramState.PLAYING
     bench.start("sec bad():\n  x = 1 / 0\nend\n")
     bench.tick(10)
-    assert [e for e in bench.events if isinstance(e, ScriptFailed)][0].secondary
+    assert next(e for e in bench.events if isinstance(e, ScriptFailed)).secondary
     assert bench.now.runtime_state == ProgramState.PLAYING
 
 
 def test_registers_outlive_programs(bench):
-    bench.run("def w():\n  write_output_integer_register(3, 42)\n  write_output_float_register(1, 1.5)\nend\n")
-    said = bench.run("def r():\n  textmsg(read_output_integer_register(3), read_output_float_register(1))\nend\n")
+    bench.run(
+        "def w():\n  write_output_integer_register(3, 42)\n  write_output_float_register(1, 1.5)\nend\n"
+    )
+    said = bench.run(
+        "def r():\n  textmsg(read_output_integer_register(3), read_output_float_register(1))\nend\n"
+    )
     assert said == ["421.5"]
 
 

@@ -49,7 +49,9 @@ def test_velocity_is_the_derivative_of_the_travel():
         assert slope == pytest.approx(profile.at(t)[1], abs=1e-4)
 
 
-@pytest.mark.parametrize(("speed", "acceleration"), [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (float("nan"), 1.0)])
+@pytest.mark.parametrize(
+    ("speed", "acceleration"), [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (float("nan"), 1.0)]
+)
 def test_limits_must_be_positive(speed, acceleration):
     with pytest.raises(ValueError, match="above 0"):
         Trapezoid.from_limits(1.0, speed, acceleration)

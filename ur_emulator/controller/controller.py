@@ -24,9 +24,9 @@ from ur_emulator.controller.state import ControllerState
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, ArmMotion
-from ur_emulator.motion.target import ZERO6, JointTarget, Vector6, vector6
+from ur_emulator.motion.target import ZERO6, JointTarget
 from ur_emulator.plant.plant import Plant
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.program_slot import ProgramSlot
@@ -69,7 +69,7 @@ class Controller:
         self.period_s = PERIOD_US * 1e-6
         self.plant = Plant(robot, fidelity, seed, self.period_s)
         arm = ArmModel(robot, draw_calibration(fidelity, seed))
-        q = vector6(robot.home_q)
+        q = six(robot.home_q)
         self.plant.reset(q)
         self._saturated_s = 0.0
         self._settle = 0

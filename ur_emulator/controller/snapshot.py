@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ur_emulator.motion.target import Vector6
-
-Vector3 = tuple[float, float, float]
+from ur_emulator.models.robot_model import Vector3, Vector6
 
 
 class Snapshot(NamedTuple):

@@ -13,11 +13,11 @@ from ur_emulator.controller.io import InputOutput
 from ur_emulator.controller.registers import Registers
 from ur_emulator.controller.robot_mode import RobotModeMachine
 from ur_emulator.controller.safety import SafetyState
-from ur_emulator.controller.snapshot import Snapshot, Vector3
+from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.target import ZERO6, Vector6
+from ur_emulator.motion.target import ZERO6
 
 # How many cycles back a script may ask for joint positions; the real buffer's length is not known.
 HISTORY_CYCLES = 125

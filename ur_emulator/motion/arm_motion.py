@@ -15,8 +15,9 @@ Must not know scripts or physics: an owner is any object, compared by identity.
 
 from __future__ import annotations
 
+from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.generators import Generator, Hold, MoveJ, SpeedJ, StopJ
-from ur_emulator.motion.target import JointTarget, Vector6
+from ur_emulator.motion.target import JointTarget
 
 # Deceleration of the leading axis when a program ends, is replaced or killed while the arm moves. Users
 # call the real one "abrupt"; the number is not published. Chosen: the mean of UR's stop category 0 tests on

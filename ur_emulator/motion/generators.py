@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.profile import Trapezoid
-from ur_emulator.motion.target import ZERO6, JointTarget, Vector6, vector6
+from ur_emulator.motion.target import ZERO6, JointTarget
 
 # A joint speed below this counts as standstill: one cycle of it moves a joint by less than an encoder step.
 REST_SPEED = 1e-6  # rad/s
@@ -54,17 +55,17 @@ def ramp_towards(
     largest = max(map(abs, change))
     reach = acceleration * dt
     if largest <= reach:
-        qd_next = vector6(qd_goal)
+        qd_next = six(qd_goal)
         share = 1.0
     else:
         share = reach / largest
-        qd_next = vector6([now + share * delta for now, delta in zip(qd, change, strict=True)])
+        qd_next = six([now + share * delta for now, delta in zip(qd, change, strict=True)])
     half = 0.5 * dt
     per_dt = share / dt
     return JointTarget(
-        vector6([p + half * (a + b) for p, a, b in zip(target.q, qd, qd_next, strict=True)]),
+        six([p + half * (a + b) for p, a, b in zip(target.q, qd, qd_next, strict=True)]),
         qd_next,
-        vector6([per_dt * delta for delta in change]),
+        six([per_dt * delta for delta in change]),
     )
 
 
@@ -96,14 +97,14 @@ class MoveJ:
             v: speed of the leading axis [rad/s].
             t: duration [s]; above 0 it has priority over `a` and `v`.
         """
-        self._start = vector6(start)
-        self.goal = vector6(goal)
-        self._way = vector6([b - a for a, b in zip(self._start, self.goal, strict=True)])
+        self._start = six(start)
+        self.goal = six(goal)
+        self._way = six([b - a for a, b in zip(self._start, self.goal, strict=True)])
         distance = max(map(abs, self._way))
         self._profile = Trapezoid.from_limits(distance, v, a)
         if t > 0.0:
             self._profile = Trapezoid.from_duration(distance, t, self._profile)
-        self._share = vector6([d / distance if distance > 0.0 else 0.0 for d in self._way])
+        self._share = six([d / distance if distance > 0.0 else 0.0 for d in self._way])
         self._time = 0.0
         self.done = self._profile.duration == 0.0
 
@@ -120,9 +121,9 @@ class MoveJ:
             return JointTarget(self.goal)
         s, sd, sdd = self._profile.at(self._time)
         return JointTarget(
-            vector6([p + s * u for p, u in zip(self._start, self._share, strict=True)]),
-            vector6([scale * sd * u for u in self._share]),
-            vector6([scale * scale * sdd * u for u in self._share]),
+            six([p + s * u for p, u in zip(self._start, self._share, strict=True)]),
+            six([scale * sd * u for u in self._share]),
+            six([scale * scale * sdd * u for u in self._share]),
         )
 
 
@@ -141,7 +142,7 @@ class SpeedJ:
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Move the target velocity towards the goal, scaled by the speed slider."""
-        goal = self.qd if scale == 1.0 else vector6([scale * x for x in self.qd])
+        goal = self.qd if scale == 1.0 else six([scale * x for x in self.qd])
         after = ramp_towards(target, goal, self.a, dt)
         self.done = after.qd == goal
         return after

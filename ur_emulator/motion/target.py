@@ -2,22 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
-Vector6 = tuple[float, float, float, float, float, float]
+from ur_emulator.models.robot_model import Vector6
 
 ZERO6: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-def vector6(values: Sequence[float]) -> Vector6:
-    """Return six floats as a tuple of Python floats.
-
-    Raises:
-        ValueError: not exactly six values.
-    """
-    a, b, c, d, e, f = values
-    return (float(a), float(b), float(c), float(d), float(e), float(f))
 
 
 class JointTarget(NamedTuple):

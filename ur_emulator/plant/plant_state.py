@@ -9,7 +9,7 @@ from ur_emulator.models.robot_model import Vector3, Vector6
 
 
 class Target(Protocol):
-    """What the plant takes as a target: any record with these three, see `JointTarget`."""
+    """The set-point at the end of a cycle: any record with these three, as `motion.JointTarget`."""
 
     @property
     def q(self) -> Sequence[float]:
@@ -21,21 +21,7 @@ class Target(Protocol):
 
     @property
     def qdd(self) -> Sequence[float]:
-        """Accelerations (6,) [rad/s²]."""
-
-
-class JointTarget(NamedTuple):
-    """The controller's set-point at the end of a control cycle.
-
-    Attributes:
-        q: (6,) [rad].
-        qd: (6,) [rad/s].
-        qdd: (6,) [rad/s²], for the torque that the controller's model sends along.
-    """
-
-    q: Sequence[float]
-    qd: Sequence[float]
-    qdd: Sequence[float]
+        """Accelerations (6,) [rad/s²], for the torque that the controller's model sends along."""
 
 
 class PlantState(NamedTuple):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any
 
 from ur_emulator.controller.state import ControllerState
+from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, OwnershipError
 from ur_emulator.motion.generators import Generator as MotionGenerator
 from ur_emulator.motion.generators import MoveJ, SpeedJ, StopJ
-from ur_emulator.motion.target import vector6
 from urscript.errors import ScriptRuntimeError
 from urscript.values import Pose
 from urscript.waits import NEXT_CYCLE
@@ -46,9 +46,9 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
                     "The robot cannot reach the requested pose. "
                     "Script function movej is unable to find an inverse kinematics solution."
                 )
-            goal = vector6(solution)
+            goal = solution
         else:
-            goal = vector6(q)
+            goal = _floats(q)
         generator = MoveJ(start, goal, a=a, v=v, t=t)
         take(thread, generator)
         while not generator.done:
@@ -56,7 +56,7 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
 
     def speedj(thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
         positive("speedj", a=a)
-        generator = SpeedJ(vector6(qd), a)
+        generator = SpeedJ(_floats(qd), a)
         take(thread, generator)
         if t is not None and t > 0.0:
             # Exactly one cycle for t = step time, whatever the rounding of the division.
@@ -76,3 +76,8 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
             yield NEXT_CYCLE
 
     return {"movej": movej, "speedj": speedj, "stopj": stopj}
+
+
+def _floats(values: Sequence[float]) -> Vector6:
+    """Return joint values as floats; a script may write whole numbers."""
+    return six([float(value) for value in values])

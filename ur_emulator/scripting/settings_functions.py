@@ -7,7 +7,7 @@ from typing import Any
 
 from ur_emulator.controller.events import PopupShown
 from ur_emulator.controller.state import ControllerState, Payload
-from ur_emulator.motion.target import vector6
+from ur_emulator.models.robot_model import six
 from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
 from urscript.waits import Blocked
@@ -20,7 +20,7 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
     """Return the setting builtins bound to one controller."""
 
     def set_tcp(thread: object, pose: Any) -> None:
-        offset = vector6(pose)
+        offset = six([float(x) for x in pose])
         if max(map(abs, offset)) > MAX_TCP_OFFSET:
             raise ScriptRuntimeError(
                 f"set_tcp: {wire_text(pose)} is no tool, allowed are numbers up to {MAX_TCP_OFFSET:g}"

@@ -11,7 +11,7 @@ from typing import Any
 
 from protocol.pose import pose_inv, pose_trans
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.motion.target import vector6
+from ur_emulator.models.robot_model import six
 from urscript.errors import ScriptRuntimeError
 from urscript.values import Pose
 
@@ -24,7 +24,7 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
     arm = state.arm
 
     def joints(value: Any) -> tuple[float, ...]:
-        return state.snapshot.actual_q if value is None else vector6(value)
+        return state.snapshot.actual_q if value is None else six([float(x) for x in value])
 
     def tool(value: Any) -> tuple[float, ...]:
         return state.tcp_offset if value is None else tuple(value)
