@@ -19,7 +19,6 @@ from protocol.errors import ProtocolError
 app = typer.Typer(
     name="ur-client",
     help="Moves a Universal Robots arm, real or emulated, by streaming joint velocities.",
-    no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -60,7 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     try:
-        code = app(arguments, standalone_mode=False)
+        words = sys.argv[1:] if arguments is None else arguments
+        code = app(words or ["--help"], prog_name="ur-client", standalone_mode=False)
     except _UsageError as error:
         text = error.format_message() if hasattr(error, "format_message") else str(error)
         return _complain(f"{text} (see ur-client --help)", 2)
@@ -69,7 +69,7 @@ def run(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _complain("interrupted", 1)
     except (ClientError, ProtocolError) as error:
-        return _complain(f"{error}{_notes(error)}", 1)
+        return _complain(_with_notes(error), 1)
     except ModuleNotFoundError as error:
         extra = _EXTRAS.get((error.name or "").partition(".")[0])
         if extra is None:
@@ -82,8 +82,12 @@ def run(arguments: list[str] | None = None) -> int:
     return code if isinstance(code, int) else 0
 
 
-def _notes(error: BaseException) -> str:
-    return "".join(f"; {note}" for note in getattr(error, "__notes__", ()))
+def _with_notes(error: BaseException) -> str:
+    """The message of an error and what was added to it on its way; a note that says it again replaces it."""
+    text = str(error)
+    for note in getattr(error, "__notes__", ()):
+        text = note if note.startswith(text) else f"{text}; {note}"
+    return text
 
 
 def _complain(text: str, code: int) -> int:

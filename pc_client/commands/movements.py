@@ -11,7 +11,7 @@ from rich.table import Table
 
 from pc_client.commands.options import console
 
-app = typer.Typer(help="The movement library.", no_args_is_help=True, rich_markup_mode=None)
+app = typer.Typer(help="The movement library.", rich_markup_mode=None)
 
 
 @app.command("list")

@@ -77,7 +77,7 @@ def estimate_delay(
     best: float = coarse[int(np.argmin([mean_square(delay) for delay in coarse]))]
     if best > LONGEST_DELAY - 2.0 * _COARSE_STEP:
         raise DriverError(
-            f"the loop delay is {LONGEST_DELAY * 1e3:.0f} ms or more: the network to the robot is too slow to stream"
+            f"the loop delay is {LONGEST_DELAY * 1e3:.0f} ms or more: the network to the robot is too slow"
         )
     fine = np.arange(max(best - _COARSE_STEP, 0.0), best + _COARSE_STEP + _FINE_STEP / 2, _FINE_STEP)
     errors = np.array([mean_square(delay) for delay in fine])

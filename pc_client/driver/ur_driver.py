@@ -50,6 +50,17 @@ _APPROACH_RESERVE = 10.0
 """An approach may take this many seconds longer than computed."""
 
 
+_NEEDED_COLUMNS = (
+    "timestamp",
+    "target_q",
+    "actual_q",
+    "actual_qd",
+    "robot_mode",
+    "safety_mode",
+    "runtime_state",
+)
+
+
 class UrDriver:
     """A session with one robot.
 
@@ -238,6 +249,10 @@ class UrDriver:
         self._open.append(frames)
         self._frames = frames
         self.layout = frames.layout
+        if missing := [name for name in _NEEDED_COLUMNS if name not in self.layout.slices]:
+            raise DriverError(
+                f"software {version} does not report {', '.join(missing)}: streaming needs 3.2 or later"
+            )
 
     def _send(self, text: str) -> None:
         """Send a program; what was reported before it is of no interest any more."""

@@ -26,6 +26,11 @@ def robot(monkeypatch):
     return fake
 
 
+def test_no_words_at_all_show_the_help(capsys):
+    assert cli.run([]) == 0
+    assert "experiment" in capsys.readouterr().out
+
+
 def one_line(capsys):
     err = capsys.readouterr().err
     assert err.count("\n") == 1, err
@@ -47,6 +52,7 @@ def test_every_command_has_help(command, capsys):
         (["experiment", "--robot", "x", "--out", "y", "--repeat", "0"], "repeat"),
         (["experiment", "--robot", "127.0.0.1", "--out", "y", "--port-base", "70000"], "port offset"),
         (["fly"], "fly"),
+        (["movements"], "command"),
         (["doctor", "--robot", "x", "--quickly"], "quickly"),
         (["export", "x.mcap", "--to", "xlsx"], "csv or parquet"),
     ],

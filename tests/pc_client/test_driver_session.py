@@ -47,6 +47,14 @@ def test_session_without_dashboard_server():
         assert not driver.info.serial.simulated
 
 
+def test_software_that_does_not_tell_whether_a_program_runs_is_refused():
+    robot = FakeRobot()
+    robot.frame = lambda: (1044).to_bytes(4, "big") + bytes(1040)
+    with pytest.raises(DriverError, match=r"runtime_state.*3\.2 or later"):
+        UrDriver("robot", network=robot)
+    assert set(robot.closed) == {"dashboard", "primary", "secondary", "realtime"}
+
+
 @pytest.mark.parametrize("lockstep", [True, False])
 def test_move_to_arrives(lockstep):
     robot = FakeRobot(lockstep=lockstep)
