@@ -9,7 +9,7 @@ from typing import Any
 
 from urscript import dialect
 from urscript.errors import ScriptRuntimeError
-from urscript.values import Matrix, Pose, is_number, type_name
+from urscript.values import Matrix, Pose, a_type, is_number, type_name
 from urscript.variables import same_kind
 
 
@@ -38,7 +38,7 @@ def make_pose(*items: Any) -> Pose:
     """The value of a pose literal."""
     for item in items:
         if not is_number(item):
-            raise ScriptRuntimeError(f"a pose holds numbers only, got a {type_name(item)}")
+            raise ScriptRuntimeError(f"a pose holds numbers only, got {a_type(item)}")
     return Pose(*items)
 
 
@@ -47,7 +47,7 @@ def _position(index: Any, length: int) -> int:
     if dialect.INDEX_TAKES_WHOLE_FLOATS and type(index) is float and index.is_integer():
         index = int(index)
     if type(index) is not int:
-        raise ScriptRuntimeError(f"an index must be an integer, got a {type_name(index)}")
+        raise ScriptRuntimeError(f"an index must be an integer, got {a_type(index)}")
     if not 0 <= index < length:
         raise ScriptRuntimeError(f"index {index} is out of range, the valid ones are 0 to {length - 1}")
     return index
@@ -62,13 +62,13 @@ def item(target: Any, index: Any) -> Any:
         return target[_position(index, len(target))]
     if kind is Matrix:
         raise ScriptRuntimeError("a matrix needs a row and a column: m[row, column]")
-    raise ScriptRuntimeError(f"a {type_name(target)} has no elements")
+    raise ScriptRuntimeError(f"{a_type(target)} has no elements")
 
 
 def cell(target: Any, row: Any, column: Any) -> Any:
     """`target[row, column]` of a matrix."""
     if type(target) is not Matrix:
-        raise ScriptRuntimeError(f"[row, column] needs a matrix, got a {type_name(target)}")
+        raise ScriptRuntimeError(f"[row, column] needs a matrix, got {a_type(target)}")
     rows, columns = target.shape
     return target.rows[_position(row, rows)][_position(column, columns)]
 
@@ -79,25 +79,23 @@ def store_item(value: Any, index: Any, target: Any) -> Any:
     if kind is list:
         place = _position(index, len(target))
         if not same_kind(type(target[place]), value):
-            raise ScriptRuntimeError(
-                f"cannot store a {type_name(value)} in a list of {type_name(target[place])}"
-            )
+            raise ScriptRuntimeError(f"cannot store {a_type(value)} in a list of {type_name(target[place])}")
         changed = target.copy()
         changed[place] = value
         return changed
     if kind is Pose:
         place = _position(index, 6)
         if not is_number(value):
-            raise ScriptRuntimeError(f"a pose holds numbers only, got a {type_name(value)}")
+            raise ScriptRuntimeError(f"a pose holds numbers only, got {a_type(value)}")
         return target.with_item(place, value)
     if kind is Matrix:
         raise ScriptRuntimeError("a matrix needs a row and a column: m[row, column] = value")
-    raise ScriptRuntimeError(f"a {type_name(target)} has no elements to assign to")
+    raise ScriptRuntimeError(f"{a_type(target)} has no elements to assign to")
 
 
 def store_cell(value: Any, row: Any, column: Any, target: Any) -> Any:
     """What `target` becomes by `target[row, column] = value`."""
     if type(target) is not Matrix:
-        raise ScriptRuntimeError(f"[row, column] needs a matrix, got a {type_name(target)}")
+        raise ScriptRuntimeError(f"[row, column] needs a matrix, got {a_type(target)}")
     rows, columns = target.shape
     return target.with_item(_position(row, rows), _position(column, columns), value)

@@ -14,7 +14,7 @@ from typing import Any
 
 from urscript import dialect
 from urscript.errors import ScriptRuntimeError
-from urscript.values import INT_MAX, INT_MIN, Matrix, is_number, type_name, wrap_int
+from urscript.values import INT_MAX, INT_MIN, Matrix, a_type, is_number, type_name, wrap_int
 from urscript.variables import same_kind
 
 # --- arithmetic ----------------------------------------------------------------------------------------
@@ -100,7 +100,7 @@ def neg(a: Any) -> Any:
         return Matrix([neg(item) for item in row] for row in a.rows)
     if is_number(a):
         return neg(_plain(a))
-    raise ScriptRuntimeError(f"cannot negate a {type_name(a)}")
+    raise ScriptRuntimeError(f"cannot negate {a_type(a)}")
 
 
 def pos(a: Any) -> Any:
@@ -173,7 +173,7 @@ def equal(a: Any, b: Any) -> bool:
         return bool(a == b)
     if dialect.MIXED_TYPES_COMPARE or a is None or b is None or same_kind(ta, b):
         return False
-    raise ScriptRuntimeError(f"cannot compare a {type_name(a)} with a {type_name(b)}")
+    raise ScriptRuntimeError(f"cannot compare {a_type(a)} with {a_type(b)}")
 
 
 def unequal(a: Any, b: Any) -> bool:
@@ -207,4 +207,4 @@ def truth(value: Any) -> bool:
         return value != ""
     if dialect.INT_AS_CONDITION and type(value) is int:
         return value != 0
-    raise ScriptRuntimeError(f"a condition must be True or False, got a {type_name(value)}")
+    raise ScriptRuntimeError(f"a condition must be True or False, got {a_type(value)}")

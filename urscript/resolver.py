@@ -197,7 +197,11 @@ class _Resolver:
     def _variable(self, name: str, span: Span, scope: FunctionScope) -> None:
         if name in scope.locals or name in self.program.globals or name in self.catalogue.variables:
             return
-        self._unknown(name, span, [*scope.locals, *self.program.globals, *self.catalogue.variables])
+        if name in self.catalogue or scope.find_function(name) is not None:
+            hint = f"'{name}' is a function, call it as {name}(...)"
+            self._error(ScriptNameError(name, hint=hint), span)
+        else:
+            self._unknown(name, span, [*scope.locals, *self.program.globals, *self.catalogue.variables])
 
     def _call(self, call: nodes.Call, scope: FunctionScope, runs_in: FunctionScope) -> None:
         if not self._argument_order(call.arguments):
@@ -275,9 +279,8 @@ class _Resolver:
     def _unknown(self, name: str, span: Span, known: list[str]) -> None:
         alike = self.catalogue.suggest(name, known)
         hint = f"did you mean '{alike}'?" if alike else None
-        error = ScriptNameError(name, hint=hint)
-        error.locate(self.source, span.line, span.column, len(name))
-        self.errors.append(error)
+        name_only = Span(span.line, span.column, span.line, span.column + len(name))
+        self._error(ScriptNameError(name, hint=hint), name_only)
 
     def _error(self, error: ScriptCompileError, span: Span) -> None:
         width = span.end_column - span.column if span.line == span.end_line else 1

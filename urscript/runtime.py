@@ -24,7 +24,7 @@ from urscript.dialect import Dialect
 from urscript.errors import ScriptBudgetError, ScriptRuntimeError, StackEntry
 from urscript.host import Handle, Host
 from urscript.threads import ProgramHalted, Scheduler, ScriptThread, join
-from urscript.values import Pose, log_form, type_name, wrap_int
+from urscript.values import Pose, a_type, log_form, wrap_int
 from urscript.waits import NEXT_CYCLE, Wait
 
 
@@ -41,15 +41,15 @@ def _method(
 ) -> Generator[Wait, None, Any]:
     if isinstance(target, Handle):
         return (yield from target.call_method(thread, method, arguments, named))
-    raise ScriptRuntimeError(f"a {type_name(target)} has no method '{method}'")
+    raise ScriptRuntimeError(f"{a_type(target)} has no method '{method}'")
 
 
 def _member(target: Any, name: str) -> Any:
-    raise ScriptRuntimeError(f"a {type_name(target)} has no member '{name}'")
+    raise ScriptRuntimeError(f"{a_type(target)} has no member '{name}'")
 
 
 def _store_member(value: Any, name: str, target: Any) -> Any:
-    raise ScriptRuntimeError(f"a {type_name(target)} has no member '{name}' to assign to")
+    raise ScriptRuntimeError(f"{a_type(target)} has no member '{name}' to assign to")
 
 
 _COMMON: Final[dict[str, Any]] = {

@@ -14,7 +14,7 @@ from collections.abc import Callable, Generator, Iterator
 from typing import Any, Final, cast
 
 from urscript.errors import ScriptRuntimeError
-from urscript.values import type_name
+from urscript.values import a_type
 from urscript.waits import NEXT_CYCLE, Blocked, Wait
 
 ThreadBody = Generator[Wait, None, Any]
@@ -247,7 +247,7 @@ def thread_of(handle: Any, word: str) -> ScriptThread | None:
         return handle
     if type(handle) is int or handle is None:
         return None
-    raise ScriptRuntimeError(f"{word} needs a thread handle, got a {type_name(handle)}")
+    raise ScriptRuntimeError(f"{word} needs a thread handle, got {a_type(handle)}")
 
 
 def _as_body(function: Callable[[], Any]) -> ThreadBody:

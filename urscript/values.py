@@ -70,7 +70,7 @@ class Matrix:
                 raise ScriptRuntimeError(f"a matrix needs rows of equal length, got {width} and {len(row)}")
             for item in row:
                 if not is_number(item):
-                    raise ScriptRuntimeError(f"a matrix holds numbers only, got a {type_name(item)}")
+                    raise ScriptRuntimeError(f"a matrix holds numbers only, got {a_type(item)}")
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -119,6 +119,12 @@ TYPE_NAMES: Final[dict[type, str]] = {
 def type_name(value: Any) -> str:
     """URScript's word for the type of `value`, for messages."""
     return TYPE_NAMES.get(type(value)) or str(getattr(value, "script_type", type(value).__name__))
+
+
+def a_type(value: Any) -> str:
+    """The type of `value` with its article: "a pose", "an int"."""
+    name = type_name(value)
+    return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
 
 
 def is_number(value: Any) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from urscript import dialect
 from urscript.errors import ScriptRuntimeError
-from urscript.values import type_name
+from urscript.values import a_type, type_name
 
 
 class _Undefined:
@@ -49,7 +49,7 @@ def assign(value: Any, old: Any, name: str) -> Any:
         if len(value) != len(old):
             raise ScriptRuntimeError("Resizing of 'List' is not supported")
         if old and not same_kind(type(old[0]), value[0]):
-            raise _other_type(name, f"list of {type_name(old[0])}", f"list of {type_name(value[0])}")
+            raise _other_type(name, f"a list of {type_name(old[0])}", f"a list of {type_name(value[0])}")
         return value
     return assign_resizing(value, old, name)
 
@@ -58,8 +58,8 @@ def assign_resizing(value: Any, old: Any, name: str) -> Any:
     """`assign` where a list may change its length."""
     if old is UNDEFINED or same_kind(type(old), value):
         return value
-    raise _other_type(name, type_name(old), type_name(value))
+    raise _other_type(name, a_type(old), a_type(value))
 
 
 def _other_type(name: str, old: str, new: str) -> ScriptRuntimeError:
-    return ScriptRuntimeError(f"variable '{name}' is a {old}, cannot assign a {new}")
+    return ScriptRuntimeError(f"variable '{name}' is {old}, cannot assign {new}")

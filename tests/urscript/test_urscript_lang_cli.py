@@ -78,3 +78,12 @@ def test_the_software_version_decides_which_names_exist(call):
     assert call("check", late=late).exit_code == 1
     assert call("check", "--software", "5.11", late=late).exit_code == 0
     assert call("check", "--software", "9.9", late=late).exit_code == 2
+
+
+def test_suggestions_fit_what_is_unknown(call):
+    output = call(
+        "check", hints="def p():\n  speed = 1\n  x = sped + force\n  movej_([0])\n  run moveit()\nend\n"
+    ).output
+    assert "name 'sped' is not defined (did you mean 'speed'?)" in output
+    assert "name 'force' is not defined ('force' is a function, call it as force(...))" in output
+    assert "name 'movej_' is not defined (did you mean 'movej'?)" in output
