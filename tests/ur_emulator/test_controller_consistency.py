@@ -139,3 +139,28 @@ def test_same_seed_same_numbers_other_seed_other_numbers():
     assert first == again
     assert len(other) == len(first)
     assert all(a.actual_q != b.actual_q for a, b in zip(first[50:100], other[50:100], strict=True))
+
+
+def test_momentum_is_mass_times_the_velocity_of_the_centres_of_mass(moved):
+    arm = moved.controller.state.arm
+    rows = calibrated_dh(arm.robot, arm.calibration)
+    links = arm.robot.links
+    snapshot = moved.snapshots[60]
+    step = 1e-6
+
+    def centres(q):
+        return [(dh_fk(rows[: i + 1], q[: i + 1]) @ [*link.com, 1.0])[:3] for i, link in enumerate(links)]
+
+    q, qd = np.array(snapshot.actual_q), np.array(snapshot.actual_qd)
+    before, after = centres(q - step * qd), centres(q + step * qd)
+    momentum = sum(link.mass * (b - a) / (2 * step) for link, a, b in zip(links, before, after, strict=True))
+    assert snapshot.actual_momentum == pytest.approx(np.linalg.norm(momentum), rel=1e-6)
+
+
+def test_a_declared_payload_hangs_on_the_arm():
+    bench = Bench(fidelity="ideal")
+    light = bench.now.target_moment[1]
+    bench.run("def p():\n  set_payload(2.0, [0, 0, 0.05])\n  sleep(0.5)\nend\n")
+    assert abs(bench.now.target_moment[1] - light) > 1.0
+    assert np.abs(np.subtract(bench.now.actual_q, bench.now.target_q)).max() < 1e-3
+    assert bench.now.payload == 2.0

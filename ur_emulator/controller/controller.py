@@ -82,6 +82,7 @@ class Controller:
             mode=RobotModeMachine(mode, self.period_s),
             tick=BOOT_TICK,
         )
+        self._payload = self.state.payload
         self.programs = ProgramSlot(self.state, network)
         # The first cycle only makes the first snapshot; nothing moves in it.
         self.tick(())
@@ -129,6 +130,10 @@ class Controller:
         if self.programs.has_work:
             self.programs.step()
         was_active = self.programs.has_work or state.motion.is_moving or state.mode.is_changing
+        if state.payload is not self._payload:
+            # What a program declares is taken to be really there: the arm carries it from now on.
+            self._payload = state.payload
+            self.plant.set_payload(state.payload.mass, state.payload.cog)
         target = self._next_target() if running else state.motion.step(self.period_s, state.speed_slider)
         self.plant.step(target if running else None)
         sensed = self.plant.sense()
@@ -175,7 +180,7 @@ class Controller:
             safety_mode=int(state.safety.mode),
             actual_tool_accelerometer=sensed.tool_accelerometer,
             speed_scaling=state.speed_slider,
-            actual_momentum=0.0,
+            actual_momentum=arm.momentum(),
             actual_main_voltage=BUS_VOLTAGE,
             actual_robot_voltage=BUS_VOLTAGE if powered else 0.0,
             actual_robot_current=IDLE_CURRENT + _bus_current(sensed.actual_current) if powered else 0.0,

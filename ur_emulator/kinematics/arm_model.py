@@ -58,6 +58,8 @@ class ArmModel:
         self._flange_motion = data.cvel[self._flange_link]
         self._elbow_motion = data.cvel[elbow_link]
         self._centre = data.subtree_com[root]
+        self._root_velocity = data.subtree_linvel[root]
+        self._mass = float(self._model.body_subtreemass[root])
         self._tcp: Sequence[float] | None = None
         self._tcp_offset: Vector3 = (0.0, 0.0, 0.0)
         self._tcp_rotation: Sequence[float] = rotvec_to_flat(0.0, 0.0, 0.0)
@@ -100,6 +102,12 @@ class ArmModel:
         rx, ry, rz = ex - cx, ey - cy, ez - cz
         elbow_velocity = (vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx)
         return pose, speed, (ex, ey, ez), elbow_velocity
+
+    def momentum(self) -> float:
+        """Norm of the arm's linear momentum [kg m/s] for what `state` evaluated last; no payload."""
+        mujoco.mj_subtreeVel(self._model, self._data)
+        vx, vy, vz = self._root_velocity.tolist()
+        return self._mass * sqrt(vx * vx + vy * vy + vz * vz)
 
     def jacobian(
         self, q: Sequence[float] | NDArray[np.float64], tcp: Sequence[float] | None = None
