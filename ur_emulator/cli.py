@@ -66,7 +66,7 @@ def serve(
         f"{robot.upper()} CB3 {version} ready at {host}, {pace}, {fidelity}, "
         f"seed {seed}, serial {box.serial_number}: "
         f"dashboard {box.ports.dashboard}, primary {box.ports.primary}, secondary {box.ports.secondary}, "
-        f"realtime {box.ports.realtime}",
+        f"realtime {box.ports.realtime}, rtde {box.ports.rtde}",
         flush=True,
     )
     try:

@@ -23,12 +23,13 @@ from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
-from ur_emulator.servers.dashboard_port import BoxIdentity, DashboardPort
+from ur_emulator.servers.dashboard_port import BUILD, BoxIdentity, DashboardPort
 from ur_emulator.servers.listener import Listener, Port
 from ur_emulator.servers.primary_port import PrimaryPort
 from ur_emulator.servers.program_intake import ProgramIntake
 from ur_emulator.servers.realtime_port import RealtimePort
 from ur_emulator.servers.robot_state import StateEncoder
+from ur_emulator.servers.rtde_port import RtdePort
 from ur_emulator.servers.script_sockets import LoopNetwork
 
 DEFAULT_VERSION = "3.15.8"
@@ -97,6 +98,7 @@ class ControlBox:
             "primary": PrimaryPort(software, controller, self._intake, states, all_messages=True),
             "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
             "realtime": RealtimePort(software, self._intake),
+            "rtde": RtdePort(identity.version._replace(build=BUILD), controller, self._box.submit),
             "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
             "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),
             "realtime_ro": RealtimePort(software, None),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from protocol.rtde_types import RtdeValue
 from urscript import CompiledProgram
 
 
@@ -55,6 +56,17 @@ class TriggerProtectiveStop:
     """Stop the arm as a safety function would."""
 
 
+@dataclass(frozen=True, slots=True)
+class WriteInputs:
+    """Write input variables of RTDE.
+
+    Attributes:
+        values: names of `protocol.rtde_fields.INPUTS` with their values, in order.
+    """
+
+    values: tuple[tuple[str, RtdeValue], ...]
+
+
 Command = (
     StartProgram
     | StopProgram
@@ -64,4 +76,5 @@ Command = (
     | UnlockProtectiveStop
     | SetSpeedSlider
     | TriggerProtectiveStop
+    | WriteInputs
 )

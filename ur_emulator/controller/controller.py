@@ -10,6 +10,7 @@ from collections.abc import Iterable
 
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller import commands as cmd
+from ur_emulator.controller.client_inputs import write_inputs
 from ur_emulator.controller.events import ErrorReported, Event, ReportLevel, SafetyModeChanged, ScriptFailed
 from ur_emulator.controller.robot_mode import JOINT_MODE, POWERED, ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (
@@ -196,6 +197,11 @@ class Controller:
             target_speed_fraction=state.speed_slider,
             tcp_offset=state.tcp_offset,
             program_name=self.programs.name,
+            analog_values=state.io.analog_values(),
+            analog_domains=state.io.analog_domains(),
+            tool_output_voltage=state.io.tool_voltage,
+            registers=state.registers.values(),
+            script_control_line=self.programs.line if state.wants_script_line else 0,
         )
         state.q_history.appendleft(sensed.actual_q)
         return state.snapshot
@@ -225,6 +231,8 @@ class Controller:
                 state.speed_slider = min(1.0, max(0.0, fraction))
             case cmd.TriggerProtectiveStop():
                 state.stop_requested = True
+            case cmd.WriteInputs(values):
+                write_inputs(state, values)
 
     def _start(self, program: CompiledProgram) -> None:
         """Start a program if the box is in a state to run one; say so if it is not."""

@@ -7,6 +7,7 @@ Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from operator import attrgetter
 
 N_STANDARD = 8
 N_CONFIGURABLE = 8
@@ -32,9 +33,22 @@ class AnalogLine:
         self.value = low + min(1.0, max(0.0, ratio)) * (high - low)
 
 
+_VALUE, _DOMAIN = attrgetter("value"), attrgetter("domain")
+
+
 @dataclass(slots=True)
 class InputOutput:
-    """The lines of one box."""
+    """The lines of one box.
+
+    Attributes:
+        digital_in: word of the digital inputs.
+        digital_out: word of the digital outputs.
+        analog_in: standard analogue inputs.
+        analog_out: standard analogue outputs.
+        tool_analog_in: analogue inputs of the tool.
+        tool_voltage: supply of the tool: 0, 12 or 24 V.
+        flags: of the scripts.
+    """
 
     digital_in: int = 0
     digital_out: int = 0
@@ -45,6 +59,18 @@ class InputOutput:
     )
     tool_voltage: int = 0
     flags: list[bool] = field(default_factory=lambda: [False] * 32)
+    _analog_lines: tuple[AnalogLine, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._analog_lines = (*self.analog_in, *self.analog_out, *self.tool_analog_in)
+
+    def analog_values(self) -> tuple[float, ...]:
+        """Return all analogue values [A or V]: standard inputs, standard outputs, tool inputs, two each."""
+        return tuple(map(_VALUE, self._analog_lines))
+
+    def analog_domains(self) -> tuple[int, ...]:
+        """Return the domains of the same lines: CURRENT or VOLTAGE."""
+        return tuple(map(_DOMAIN, self._analog_lines))
 
     def read_digital_in(self, bit: int) -> bool:
         """Return the state of input `bit` of the digital word."""

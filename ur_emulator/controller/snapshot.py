@@ -6,8 +6,11 @@ The first block carries the names of the realtime columns, lower-cased (`actual_
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+from ur_emulator.controller.registers import RegisterValues
+from ur_emulator.controller.status_bits import robot_status_bits, safety_status_bits
 from ur_emulator.models.robot_model import Vector3, Vector6
 
 
@@ -56,3 +59,34 @@ class Snapshot(NamedTuple):
     target_speed_fraction: float
     tcp_offset: Vector6
     program_name: str
+    # --- what only RTDE needs; lines in the order standard inputs, standard outputs, tool inputs
+    analog_values: tuple[float, ...]
+    analog_domains: tuple[int, ...]
+    tool_output_voltage: int
+    registers: RegisterValues
+    script_control_line: int
+
+    @property
+    def robot_status_bits(self) -> int:
+        """Power and program, as RobotStatusBits."""
+        return robot_status_bits(self.robot_mode, self.runtime_state)
+
+    @property
+    def safety_status_bits(self) -> int:
+        """The safety mode, as SafetyStatusBits."""
+        return safety_status_bits(self.safety_mode)
+
+    @property
+    def tcp_force_scalar(self) -> float:
+        """Norm of the force part of `actual_tcp_force` [N]."""
+        return math.hypot(*self.actual_tcp_force[:3])
+
+    @property
+    def analog_io_types(self) -> int:
+        """Bits 0, 1: domains of the standard inputs; 2, 3: of the standard outputs."""
+        return sum(domain << i for i, domain in enumerate(self.analog_domains[:4]))
+
+    @property
+    def tool_analog_input_types(self) -> int:
+        """Bits 0, 1: domains of the tool inputs."""
+        return sum(domain << i for i, domain in enumerate(self.analog_domains[4:]))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from typing import Any
 
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.io import InputOutput
@@ -48,6 +49,8 @@ class ControllerState:
         speed_slider: 0..1.
         stop_requested: a script or a client asked for a protective stop in this cycle.
         q_history: measured joint positions of the last cycles, the newest first.
+        client_inputs: last values of RTDE inputs that are no registers, by name.
+        wants_script_line: somebody reads the line that the program executes.
         steady_cycles: for how many cycles the target has stood still.
     """
 
@@ -68,5 +71,7 @@ class ControllerState:
     steady_cycles: int = 0
     tick: int = 0
     stop_requested: bool = False
+    wants_script_line: bool = False
+    client_inputs: dict[str, Any] = field(default_factory=dict)
     q_history: deque[Vector6] = field(default_factory=lambda: deque(maxlen=HISTORY_CYCLES))
     events: list[Event] = field(default_factory=list)

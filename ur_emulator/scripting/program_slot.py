@@ -38,6 +38,13 @@ class ProgramSlot:
         return ProgramState.STOPPING if self._state.motion.is_moving else ProgramState.STOPPED
 
     @property
+    def line(self) -> int:
+        """Line of the primary program's main thread as sent, the `def` line being 1; 0 without a program."""
+        if self._primary is None:
+            return 0
+        return self._primary.position(self._primary.threads[0])[0]
+
+    @property
     def waits_outside(self) -> bool:
         """True when a program cannot go on before something comes from outside the box."""
         return self._primary is not None and self._primary.waits_outside

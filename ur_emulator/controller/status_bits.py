@@ -1,0 +1,39 @@
+"""The two words of status bits that RTDE publishes, as functions of the modes. Nothing is remembered here."""
+
+from __future__ import annotations
+
+from protocol.rtde_types import RobotStatusBits, SafetyStatusBits
+from protocol.ur_types import ProgramState, SafetyMode
+from ur_emulator.controller.robot_mode import POWERED
+
+_EMERGENCY = SafetyStatusBits.EMERGENCY_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
+
+# Inferred from the names of the bits: every mode has one of its own, and what keeps the arm from moving also
+# says so. The bits of a mode that is not listed are 0.
+SAFETY_BITS: dict[int, int] = {
+    SafetyMode.NORMAL: int(SafetyStatusBits.NORMAL_MODE),
+    SafetyMode.REDUCED: int(SafetyStatusBits.REDUCED_MODE),
+    SafetyMode.RECOVERY: int(SafetyStatusBits.RECOVERY_MODE),
+    SafetyMode.PROTECTIVE_STOP: int(
+        SafetyStatusBits.PROTECTIVE_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
+    ),
+    SafetyMode.SAFEGUARD_STOP: int(
+        SafetyStatusBits.SAFEGUARD_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
+    ),
+    SafetyMode.SYSTEM_EMERGENCY_STOP: int(SafetyStatusBits.SYSTEM_EMERGENCY_STOPPED | _EMERGENCY),
+    SafetyMode.ROBOT_EMERGENCY_STOP: int(SafetyStatusBits.ROBOT_EMERGENCY_STOPPED | _EMERGENCY),
+    SafetyMode.VIOLATION: int(SafetyStatusBits.VIOLATION | SafetyStatusBits.STOPPED_DUE_TO_SAFETY),
+    SafetyMode.FAULT: int(SafetyStatusBits.FAULT | SafetyStatusBits.STOPPED_DUE_TO_SAFETY),
+}
+
+
+def robot_status_bits(robot_mode: int, runtime_state: int) -> int:
+    """Return `robot_status_bits`; the buttons of the pendant are never pressed."""
+    power = RobotStatusBits.POWER_ON if robot_mode in POWERED else RobotStatusBits(0)
+    running = RobotStatusBits.PROGRAM_RUNNING if runtime_state == ProgramState.PLAYING else RobotStatusBits(0)
+    return int(power | running)
+
+
+def safety_status_bits(safety_mode: int) -> int:
+    """Return `safety_status_bits` for a SafetyMode."""
+    return SAFETY_BITS.get(safety_mode, 0)

@@ -1,0 +1,154 @@
+"""Port 30004: RTDE. Every client gets the variables it asked for at its own rate, and writes inputs.
+
+What may be said when is `protocol.rtde_connection`'s; here are rates, owners of inputs, and sockets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from protocol.dashboard_connection import Role
+from protocol.errors import RemoteProtocolError
+from protocol.rtde_connection import DataReceived, RtdeConnection
+from protocol.rtde_messages import SetupInputs, SetupOutputs, TextMessage
+from protocol.rtde_types import TextLevel
+from protocol.ur_types import SoftwareVersion
+from ur_emulator.controller.commands import Command, WriteInputs
+from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.events import Event
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.servers.connection import Connection
+
+# Sender of text messages.
+SOURCE = "RTDE"
+# The one variable that costs something to find: only looked up once a client has asked for it.
+_SCRIPT_LINE = "script_control_line"
+
+
+class RtdePort:
+    """Streams data packages and takes inputs."""
+
+    def __init__(
+        self, version: SoftwareVersion, controller: Controller, submit: Callable[[Command], None]
+    ) -> None:
+        """Prepare for clients.
+
+        Args:
+            version: given to clients that ask; decides which variables there are.
+            controller: told when a client wants the script line, otherwise left alone.
+            submit: takes a command for the next cycle.
+        """
+        self._version = version
+        self._controller = controller
+        self._submit = submit
+        self._sessions: dict[Connection, _Session] = {}
+        self._streams: tuple[_Session, ...] = ()
+        self._owners: dict[str, Connection] = {}
+
+    @property
+    def clients(self) -> tuple[Connection, ...]:
+        """Connected clients."""
+        return tuple(self._sessions)
+
+    def opened(self, connection: Connection) -> None:
+        """The client speaks first."""
+        self._sessions[connection] = _Session(connection, RtdeConnection(Role.ROBOT, self._version))
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """Answer requests in order, hand inputs on; what is no RTDE ends the connection."""
+        session = self._sessions[connection]
+        if session.is_lost:
+            return
+        protocol = session.protocol
+        protocol.receive_data(data)
+        try:
+            while connection.is_open and (event := protocol.next_event()) is not None:
+                match event:
+                    case DataReceived(_, names, values):
+                        self._submit(WriteInputs(tuple(zip(names, values, strict=True))))
+                    case TextMessage():
+                        pass
+                    case _:
+                        self._answer(connection, event)
+        except RemoteProtocolError as problem:
+            session.is_lost = True
+            connection.send(protocol.say(TextMessage(str(problem), SOURCE, TextLevel.ERROR)))
+            connection.close_when_sent()
+
+    def closed(self, connection: Connection) -> None:
+        """Forget the client; its input variables are free at once."""
+        self._sessions.pop(connection, None)
+        self._owners = {name: owner for name, owner in self._owners.items() if owner is not connection}
+        self._find_streams()
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Send the data packages that are due in this cycle."""
+        for session in self._streams:
+            session.publish(snapshot)
+
+    def say(self, event: Event) -> None:
+        """Nothing is said unasked: clients read one package after a request, whatever it is."""
+
+    def _answer(self, connection: Connection, request: object) -> None:
+        session = self._sessions[connection]
+        in_use: tuple[str, ...] = ()
+        if isinstance(request, SetupInputs):
+            in_use = tuple(n for n in request.names if self._owners.get(n, connection) is not connection)
+        n_recipes = len(session.protocol.input_recipes)
+        reply = session.protocol.reply(in_use)
+        if isinstance(request, SetupInputs) and len(session.protocol.input_recipes) > n_recipes:
+            self._owners.update(dict.fromkeys(request.names, connection))
+        if isinstance(request, SetupOutputs) and _SCRIPT_LINE in request.names:
+            self._controller.state.wants_script_line = True
+        session.restart()
+        self._find_streams()
+        if not connection.send(reply):
+            connection.close()  # without its reply, everything after would answer the wrong request
+
+    def _find_streams(self) -> None:
+        self._streams = tuple(s for s in self._sessions.values() if s.encode is not None)
+
+
+class _Session:
+    """One client: its connection, its protocol, and when its next data package is due.
+
+    Attributes:
+        encode: makes its data packages; None while it gets none.
+        is_lost: what comes from it makes no sense any more; it is told so, then the connection ends.
+    """
+
+    def __init__(self, connection: Connection, protocol: RtdeConnection) -> None:
+        self.protocol = protocol
+        self.encode: Callable[[Snapshot], bytes] | None = None
+        self.is_lost = False
+        self._connection = connection
+        self._divisor = 1
+        self._first_tick = -1
+        self._last_tick = -1
+        self._repeats = 0
+
+    def restart(self) -> None:
+        """Take over what the last request has changed; a new stream begins in the next cycle."""
+        encode = self.protocol.encoder
+        if encode is not self.encode:
+            self.encode = encode
+            self._first_tick = self._last_tick = -1
+        self._divisor = self.protocol.cycles_per_package
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Send a package if one is due.
+
+        Packages are due in every n-th cycle after the first one. While time stands still, snapshots repeat
+        themselves at real pace: then every n-th repetition is sent, so that the client is fed at its rate.
+        """
+        tick = snapshot.tick
+        if tick == self._last_tick:
+            self._repeats += 1
+            is_due = self._repeats % self._divisor == 0
+        else:
+            if self._first_tick < 0:
+                self._first_tick = tick
+            self._last_tick, self._repeats = tick, 0
+            is_due = (tick - self._first_tick) % self._divisor == 0
+        if is_due and self.encode is not None:
+            self._connection.send(self.encode(snapshot))
