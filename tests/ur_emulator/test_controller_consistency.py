@@ -45,7 +45,7 @@ def test_the_snapshot_has_every_column_of_the_realtime_interface():
 def test_every_value_is_finite_in_motion(moved):
     for snapshot in moved.snapshots:
         for name, value in snapshot._asdict().items():
-            if name != "program_name":
+            if name not in ("program_name", "registers"):
                 assert np.isfinite(value).all(), name
 
 
