@@ -167,6 +167,7 @@ _STATE: tuple[Builtin, ...] = (
         "bool",
         "whether a pose or joint position is reachable inside the safety limits",
         support=APPROXIMATE,
+        note="checks reach and joint ranges; safety planes and tool orientation limits are not modelled",
     ),
     _row(
         "tool_contact",
