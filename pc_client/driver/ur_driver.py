@@ -6,9 +6,7 @@ Works by the real protocol only. Every way out of a motion (done, refused, Ctrl-
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Self
 
@@ -23,8 +21,9 @@ from pc_client.driver.receiver_script import receiver_script
 from pc_client.driver.reverse_server import ReverseServer
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
 from pc_client.driver.transport import Network, TcpNetwork, Transport
-from pc_client.driver.velocity_stream import RowSink, StreamReport, VelocityStream
-from pc_client.driver.watchdog import check_idle, check_safety, has_ended, is_at_rest, is_stopped
+from pc_client.driver.velocity_stream import RowSink, StreamReport, VelocityStream, collector_paused
+from pc_client.driver.waiting import REST_TIMEOUT, wait_for_rest, wait_until
+from pc_client.driver.watchdog import check_idle, check_safety, has_ended, is_stopped
 from pc_client.errors import DriverError
 from protocol.realtime_layout import RealtimeFrame, RealtimeLayout
 from protocol.ur_types import Ports
@@ -33,12 +32,6 @@ from protocol.velocity_stream import VelocityMode, encode_velocity
 CONNECT_TIMEOUT = 5.0
 START_TIMEOUT = 5.0
 """A program that does not show as running within this [s] was not accepted."""
-
-REST_TIMEOUT = 5.0
-"""[s] for the arm to come to rest after the stop word, and again after the stop program."""
-
-_REST_TIME = 0.5
-"""The arm rests after this [s] of frames without motion, or at once when time itself stands still."""
 
 _ARRIVAL_TOLERANCE = 5e-3
 """Largest distance of a joint from the posture after an approach [rad]; a blocked arm is far off."""
@@ -78,6 +71,9 @@ class UrDriver:
 
     info: RobotInfo
     layout: RealtimeLayout
+    _primary: PackageStream
+    _scripts: PackageStream
+    _frames: RealtimeClient
 
     def __init__(self, host: str, ports: Ports | None = None, *, network: Network | None = None) -> None:
         self._host = host
@@ -159,7 +155,7 @@ class UrDriver:
             self._start(text)
             limit = expected + _APPROACH_RESERVE
             self._wait(is_stopped, limit, f"the approach did not end within {limit:.0f} s")
-            at_rest = self._wait_for_rest()
+            at_rest = wait_for_rest(self._frames, self._network)
         error = float(np.abs(at_rest.actual_q - goal).max())
         if not error <= _ARRIVAL_TOLERANCE:
             self._raise_robot_errors()
@@ -194,10 +190,10 @@ class UrDriver:
                 stream = VelocityStream(
                     self._frames, reverse, self._network, self.info.period, self._raise_robot_errors
                 )
-                with _collector_paused():
+                with collector_paused():
                     report = stream.run(tracker, on_row)
                 self._wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
-                self._wait_for_rest()
+                wait_for_rest(self._frames, self._network)
         finally:
             server.close()
             if reverse is not None:
@@ -217,7 +213,7 @@ class UrDriver:
             lambda: reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
         ):
             return
-        if self._attempt(lambda: self._scripts.send_program(stop_script())):
+        if self._attempt(self._send_stop_program):
             return
         raise DriverError("the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves")
 
@@ -225,30 +221,43 @@ class UrDriver:
         """Try one way to stop; True when the arm then rests and no program runs."""
         try:
             act()
-            self._wait(has_ended, REST_TIMEOUT, "the robot's program goes on", checked=False)
-            self._wait_for_rest()
+            wait_until(has_ended, self._frames, self._network, REST_TIMEOUT, "the robot's program goes on")
+            wait_for_rest(self._frames, self._network)
         except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
             return False
         self._in_motion = False
         return True
 
-    def _connect(self) -> None:
-        network, ports = self._network, self._ports
-        primary = PackageStream(
-            network.connect(self._host, ports.primary, CONNECT_TIMEOUT), network, "primary"
-        )
-        self._open.append(primary)
-        version = primary.wait_for_version()
-        scripts = PackageStream(
-            network.connect(self._host, ports.secondary, CONNECT_TIMEOUT), network, "secondary"
-        )
-        self._open.append(scripts)
-        self._primary, self._scripts = primary, scripts
-        self.info = read_robot_info(network, self._host, ports.dashboard, version)
-        frames = RealtimeClient(network.connect(self._host, ports.realtime, CONNECT_TIMEOUT), network)
+    def _send_stop_program(self) -> None:
+        """Replace whatever runs by a program that stops the arm.
+
+        On new connections: those we have may be what broke.
+        """
+        for connection in (self._scripts, self._frames):
+            connection.close()
+        self._scripts = self._open_packages(self._ports.secondary, "secondary")
+        self._frames = self._open_frames()
+        self._scripts.send_program(stop_script())
+
+    def _open_packages(self, port: int, name: str) -> PackageStream:
+        transport = self._network.connect(self._host, port, CONNECT_TIMEOUT)
+        stream = PackageStream(transport, self._network, name)
+        self._open.append(stream)
+        return stream
+
+    def _open_frames(self) -> RealtimeClient:
+        transport = self._network.connect(self._host, self._ports.realtime, CONNECT_TIMEOUT)
+        frames = RealtimeClient(transport, self._network)
         self._open.append(frames)
-        self._frames = frames
-        self.layout = frames.layout
+        return frames
+
+    def _connect(self) -> None:
+        self._primary = self._open_packages(self._ports.primary, "primary")
+        version = self._primary.wait_for_version()
+        self._scripts = self._open_packages(self._ports.secondary, "secondary")
+        self.info = read_robot_info(self._network, self._host, self._ports.dashboard, version)
+        self._frames = self._open_frames()
+        self.layout = self._frames.layout
         if missing := [name for name in _NEEDED_COLUMNS if name not in self.layout.slices]:
             raise DriverError(
                 f"software {version} does not report {', '.join(missing)}: streaming needs 3.2 or later"
@@ -283,74 +292,14 @@ class UrDriver:
             check_safety(arrival.latest)
         self._raise_robot_errors()
 
-    def _wait(
-        self,
-        condition: Callable[[RealtimeFrame], bool],
-        timeout: float,
-        complaint: str,
-        *,
-        checked: bool = True,
-    ) -> None:
-        """Read frames until one meets the condition.
+    def _wait(self, condition: Callable[[RealtimeFrame], bool], timeout: float, complaint: str) -> None:
+        """Wait for a frame; raise on safety stops and on errors that the robot reports."""
 
-        Time-outs count by our clock, which in a faster than real-time world is the patient one.
+        def check(frame: RealtimeFrame) -> None:
+            check_safety(frame)
+            self._raise_robot_errors()
 
-        Args:
-            condition: on every single frame, so that no short state is missed.
-            timeout: [s].
-            complaint: message of the DriverError when it takes longer.
-            checked: also raise on safety stops and on errors that the robot reports.
-        """
-        deadline = self._network.now() + timeout
-        while True:
-            arrival = self._frames.receive()
-            if checked:  # first: a safety stop or a script error ends the program too
-                check_safety(arrival.latest)
-                self._raise_robot_errors()
-            if any(condition(frame) for frame in arrival.new) or condition(arrival.latest):
-                return
-            if self._network.now() > deadline:
-                raise DriverError(complaint)
-
-    def _wait_for_rest(self) -> RealtimeFrame:
-        """Wait until the arm has been at rest for a while, or rests while time itself stands still.
-
-        Returns:
-            The state at rest.
-        """
-        at_rest_since: float | None = None
-
-        def rests(frame: RealtimeFrame) -> bool:
-            nonlocal at_rest_since
-            stamp: float = frame.timestamp
-            if not is_at_rest(frame):
-                at_rest_since = None
-                return False
-            if at_rest_since is None:
-                at_rest_since = stamp
-            return stamp - at_rest_since >= _REST_TIME
-
-        deadline = self._network.now() + REST_TIMEOUT
-        while True:
-            arrival = self._frames.receive()
-            settled = [rests(frame) for frame in arrival.new]
-            stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
-            if any(settled) or (stands_still and is_at_rest(arrival.latest)):
-                return arrival.latest
-            if self._network.now() > deadline:
-                raise DriverError(f"the arm did not come to rest within {REST_TIMEOUT:g} s")
-
-
-@contextmanager
-def _collector_paused() -> Iterator[None]:
-    """Keep the garbage collector out of the control loop, where one pass may cost more than a cycle."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
+        wait_until(condition, self._frames, self._network, timeout, complaint, check)
 
 
 class _AlwaysStopped:

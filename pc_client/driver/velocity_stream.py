@@ -6,7 +6,9 @@ frames wait, we were late: all are logged, the newest is answered. So at most on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import gc
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from pc_client.control.tracker import Tracker, TrackerStep
@@ -183,6 +185,18 @@ class VelocityStream:
                 report.lost_frames += round(gap / self._period) - 1
             last_stamp = stamp
         return last_stamp
+
+
+@contextmanager
+def collector_paused() -> Iterator[None]:
+    """Keep the garbage collector out of the control loop, where one pass may cost more than a cycle."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def check_command(qd: Sequence[float], limits: Sequence[float]) -> None:

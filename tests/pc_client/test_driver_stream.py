@@ -154,6 +154,15 @@ def frames_socket_closes(robot):
     robot.pipes["realtime"].broken = True
 
 
+def script_socket_closes(robot):
+    robot.pipes["secondary"].broken = True
+
+
+def everything_closes(robot):
+    for pipe in (*robot.pipes.values(), robot.reverse):
+        pipe.broken = True
+
+
 def reverse_socket_closes(robot):
     robot.reverse.broken = True
 
@@ -171,6 +180,8 @@ def long_gap(robot):
         (script_fails, RobotStoppedError, "C153A2"),
         (robot_gone, DriverError, "no realtime frame"),
         (frames_socket_closes, DriverError, "closed the realtime"),
+        (script_socket_closes, DriverError, "closed the secondary"),
+        (everything_closes, DriverError, "closed the"),
         (reverse_socket_closes, DriverError, "closed the connection"),
         (long_gap, DriverError, "jump"),
     ],
@@ -180,7 +191,7 @@ def test_what_goes_wrong_ends_the_run_with_one_line_and_a_stopped_arm(action, er
     with pytest.raises(error, match=words) as caught:
         stream(robot)
     assert "\n" not in str(caught.value)
-    if action in (robot_gone, frames_socket_closes):
+    if action is robot_gone:
         # nothing more can be seen; both ways to stop were tried, and the user is told
         assert robot.programs[-1].startswith("def ur_client_stop")
         assert "EMERGENCY STOP" in caught.value.__notes__[0]

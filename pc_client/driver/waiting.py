@@ -1,0 +1,84 @@
+"""Waiting for something to show in the frames. Looks at every single frame, so that no short state is missed.
+
+Time-outs count by our clock: in a world faster than real time it is the patient one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pc_client.driver.realtime_client import RealtimeClient
+from pc_client.driver.transport import Network
+from pc_client.driver.watchdog import is_at_rest
+from pc_client.errors import DriverError
+from protocol.realtime_layout import RealtimeFrame
+
+REST_TIMEOUT = 5.0
+"""An arm that is told to stop rests within this [s]; UR's safety stops take 0.4 s."""
+
+_REST_TIME = 0.5
+"""The arm rests after this [s] of frames without motion, or at once when time itself stands still."""
+
+
+def wait_until(
+    condition: Callable[[RealtimeFrame], bool],
+    frames: RealtimeClient,
+    network: Network,
+    timeout: float,
+    complaint: str,
+    check: Callable[[RealtimeFrame], None] | None = None,
+) -> None:
+    """Read frames until one meets a condition.
+
+    Args:
+        condition: what to wait for.
+        frames: the realtime port.
+        network: the clock.
+        timeout: [s].
+        complaint: message of the error when it takes longer.
+        check: called with the newest frame before the condition is looked at; raises what ends the waiting.
+
+    Raises:
+        DriverError: it took too long, or the frames ended.
+    """
+    deadline = network.now() + timeout
+    while True:
+        arrival = frames.receive()
+        if check is not None:  # first: what went wrong may also meet the condition, e.g. end the program
+            check(arrival.latest)
+        if any(condition(frame) for frame in arrival.new) or condition(arrival.latest):
+            return
+        if network.now() > deadline:
+            raise DriverError(complaint)
+
+
+def wait_for_rest(frames: RealtimeClient, network: Network) -> RealtimeFrame:
+    """Wait until the arm has been at rest for a while, or rests while time itself stands still.
+
+    Returns:
+        The state at rest.
+
+    Raises:
+        DriverError: it took longer than REST_TIMEOUT, or the frames ended.
+    """
+    at_rest_since: float | None = None
+
+    def has_rested(frame: RealtimeFrame) -> bool:
+        nonlocal at_rest_since
+        stamp: float = frame.timestamp
+        if not is_at_rest(frame):
+            at_rest_since = None
+            return False
+        if at_rest_since is None:
+            at_rest_since = stamp
+        return stamp - at_rest_since >= _REST_TIME
+
+    deadline = network.now() + REST_TIMEOUT
+    while True:
+        arrival = frames.receive()
+        rested = [has_rested(frame) for frame in arrival.new]
+        stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
+        if (rested and rested[-1]) or (stands_still and is_at_rest(arrival.latest)):
+            return arrival.latest
+        if network.now() > deadline:
+            raise DriverError(f"the arm did not come to rest within {REST_TIMEOUT:g} s")
