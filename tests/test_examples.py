@@ -1,0 +1,48 @@
+"""Every example runs, and says what its docstring promises."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+EXAMPLES = ROOT / "examples"
+
+
+def run(name, *arguments):
+    result = subprocess.run(
+        [sys.executable, str(EXAMPLES / name), *map(str, arguments)],
+        capture_output=True, text=True, cwd=ROOT, timeout=100, check=False,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "said"),
+    [
+        ("01_run_a_program.py", (), "and now at p["),
+        ("02_read_the_stream.py", ("--seconds", "0.1"), "q = ["),
+        ("03_script_without_a_robot.py", (), "did you mean 'textmsg'?"),
+        ("04_plan_a_movement.py", (), "top joint speed"),
+    ],
+)
+def test_example(name, arguments, said):
+    assert said in run(name, *arguments)
+
+
+@pytest.mark.slow
+def test_demo_and_plot(tmp_path):
+    said = run("demo.py", "--out", tmp_path, "--repeat", 1)
+    assert "Table I" in said
+    assert (tmp_path / "table1.json").exists()
+    figure = tmp_path / "speed.png"
+    run("05_plot_a_recording.py", tmp_path / "lognorm_5_1_r1.mcap", "--out", figure)
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_no_example_is_left_out():
+    tested = {"demo.py", "01_run_a_program.py", "02_read_the_stream.py", "03_script_without_a_robot.py"}
+    tested |= {"04_plan_a_movement.py", "05_plot_a_recording.py"}
+    assert {path.name for path in EXAMPLES.glob("*.py")} == tested
