@@ -1,0 +1,253 @@
+"""RTDE packages and data: every package four ways, golden bytes, round trips."""
+
+from __future__ import annotations
+
+import math
+import struct
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocol import rtde_messages as M
+from protocol.dashboard_connection import Role
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.rtde_codec import HEADER_SIZE, MAX_NAMES_SIZE, data_header, decode_message, encode_message
+from protocol.rtde_connection import RtdeConnection
+from protocol.rtde_fields import OUTPUTS
+from protocol.rtde_recipe import Recipe, snapshot_encoder
+from protocol.rtde_types import RtdeType
+from protocol.ur_types import SoftwareVersion
+
+ROBOT, PC = Role.ROBOT, Role.PC
+DOUBLE = struct.pack(">d", 1.5)
+
+# (sender, protocol version, package, bytes); 40 5f 40 .. is 125.0
+PACKAGES = [
+    (PC, 1, M.RequestProtocolVersion(2), "00 05 56 00 02"),
+    (ROBOT, 1, M.RequestProtocolVersionReply(True), "00 04 56 01"),
+    (ROBOT, 2, M.RequestProtocolVersionReply(False), "00 04 56 00"),
+    (PC, 2, M.GetControllerVersion(), "00 03 76"),
+    (
+        ROBOT,
+        2,
+        M.GetControllerVersionReply(SoftwareVersion(3, 15, 8, 106339)),
+        "00 13 76 00000003 0000000f 00000008 00019f63",
+    ),
+    (
+        PC,
+        2,
+        M.SetupOutputs(("timestamp", "actual_q"), 125.0),
+        "00 1d 4f 40 5f 40 00 00 00 00 00" + b"timestamp,actual_q".hex(),
+    ),
+    (PC, 1, M.SetupOutputs(("timestamp",)), "00 0c 4f" + b"timestamp".hex()),
+    (
+        ROBOT,
+        2,
+        M.SetupOutputsReply(("DOUBLE", "VECTOR6D"), 1),
+        "00 13 4f 01" + b"DOUBLE,VECTOR6D".hex(),
+    ),
+    (ROBOT, 1, M.SetupOutputsReply(("DOUBLE",)), "00 09 4f" + b"DOUBLE".hex()),
+    (PC, 2, M.SetupInputs(("input_int_register_0",)), "00 17 49" + b"input_int_register_0".hex()),
+    (PC, 2, M.SetupInputs(()), "00 03 49"),
+    (ROBOT, 2, M.SetupInputsReply(("IN_USE",), 0), "00 0a 49 00" + b"IN_USE".hex()),
+    (ROBOT, 1, M.SetupInputsReply((), 7), "00 04 49 07"),
+    (PC, 2, M.Start(), "00 03 53"),
+    (ROBOT, 2, M.StartReply(True), "00 04 53 01"),
+    (PC, 1, M.Pause(), "00 03 50"),
+    (ROBOT, 1, M.PauseReply(True), "00 04 50 01"),
+    (PC, 1, M.TextMessage("hi"), "00 05 4d 6869"),
+    (ROBOT, 1, M.TextMessage("hi", level=1), "00 06 4d 01 6869"),
+    (PC, 2, M.TextMessage("hi", "me", 2), "00 0a 4d 02 6869 02 6d65 02"),
+    (ROBOT, 2, M.TextMessage("", "", 0), "00 06 4d 00 00 00"),
+    (PC, 2, M.DataPackage(DOUBLE, 1), "00 0c 55 01 3ff8000000000000"),
+    (PC, 1, M.DataPackage(DOUBLE, 1), "00 0c 55 01 3ff8000000000000"),
+    (ROBOT, 2, M.DataPackage(DOUBLE, 1), "00 0c 55 01 3ff8000000000000"),
+    (ROBOT, 1, M.DataPackage(DOUBLE), "00 0b 55 3ff8000000000000"),
+]
+IDS = [f"{sender.value}-v{version}-{type(message).__name__}" for sender, version, message, _ in PACKAGES]
+
+
+@pytest.mark.parametrize(("sender", "version", "message", "golden"), PACKAGES, ids=IDS)
+def test_written(sender, version, message, golden):
+    assert encode_message(message, sender, version) == bytes.fromhex(golden)
+
+
+@pytest.mark.parametrize(("sender", "version", "message", "golden"), PACKAGES, ids=IDS)
+def test_read(sender, version, message, golden):
+    data = bytes.fromhex(golden)
+    assert int.from_bytes(data[:2], "big") == len(data)
+    assert decode_message(data[2], data[HEADER_SIZE:], sender, version) == message
+
+
+REQUESTS = [row for row in PACKAGES if row[0] is PC and type(row[2]) in M.REQUESTS]
+
+
+@pytest.mark.parametrize("step", [1, 2, 7, None])
+@pytest.mark.parametrize("trailing", [b"", b"\0", b"\0\3S"])
+@pytest.mark.parametrize(("sender", "version", "message", "golden"), REQUESTS)
+def test_read_from_a_stream_bytewise_and_with_trailing_data(sender, version, message, golden, step, trailing):
+    connection = RtdeConnection(ROBOT)
+    connection.protocol_version = version
+    data = bytes.fromhex(golden) + trailing
+    found = []
+    for start in range(0, len(data), step or len(data)):
+        connection.receive_data(data[start : start + (step or len(data))])
+        while (event := connection.next_event()) is not None:
+            found.append(event)
+            connection.reply()
+    assert found == [message, M.Start()][: 1 + (len(trailing) == 3)]
+
+
+@pytest.mark.parametrize(("sender", "version", "message", "golden"), PACKAGES, ids=IDS)
+def test_cut_payloads_raise_or_lose_the_end_but_nothing_else(sender, version, message, golden):
+    data = bytes.fromhex(golden)
+    for end in range(HEADER_SIZE, len(data)):
+        try:
+            decoded = decode_message(data[2], data[HEADER_SIZE:end], sender, version)
+        except RemoteProtocolError:
+            continue
+        assert type(decoded) is type(message)
+
+
+def test_unknown_types_are_nobodys():
+    assert decode_message(ord("X"), b"", PC, 2) is None
+
+
+def test_a_trailing_comma_is_ignored_as_public_clients_send_one():
+    assert decode_message(ord("I"), b"a,b,", PC, 2) == M.SetupInputs(("a", "b"))
+    assert decode_message(ord("O"), bytes(8), PC, 2) == M.SetupOutputs((), 0.0)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        M.SetupOutputs(("a",)),
+        M.SetupInputs(("a,b",)),
+        M.SetupInputs(("",)),
+        M.SetupInputs(("é",)),
+        M.SetupInputs(("x" * (MAX_NAMES_SIZE + 1),)),
+        M.RequestProtocolVersion(70000),
+        M.DataPackage(b"", 256),
+        M.DataPackage(bytes(70000), 1),
+        M.SetupOutputsReply(("DOUBLE",)),
+    ],
+)
+def test_what_cannot_be_sent_is_refused(bad):
+    with pytest.raises(LocalProtocolError):
+        encode_message(bad, PC, 2)
+
+
+def test_long_texts_lose_their_end():
+    data = encode_message(M.TextMessage("m" * 300, "s" * 300), ROBOT, 2)
+    message = decode_message(data[2], data[3:], ROBOT, 2)
+    assert message == M.TextMessage("m" * 255, "s" * 255)
+
+
+# --- values
+
+_NUMBERS = {
+    "?": st.booleans(),
+    "B": st.integers(0, 2**8 - 1),
+    "I": st.integers(0, 2**32 - 1),
+    "i": st.integers(-(2**31), 2**31 - 1),
+    "Q": st.integers(0, 2**64 - 1),
+    "d": st.floats(allow_nan=False),
+}
+
+
+def value_of(kind):
+    number = _NUMBERS[kind.letters[0]]
+    return number if kind.count == 1 else st.tuples(*[number] * kind.count)
+
+
+typed_values = st.lists(
+    st.sampled_from(RtdeType).flatmap(lambda kind: value_of(kind).map(lambda value: (kind, value)))
+)
+
+
+@given(typed_values)
+def test_values_round_trip(pairs):
+    recipe = Recipe([f"v{i}" for i in range(len(pairs))], [kind for kind, _ in pairs])
+    values = tuple(value for _, value in pairs)
+    data = recipe.encode(values)
+    assert len(data) == recipe.size
+    assert recipe.decode(data) == recipe.decode_leading(data) == values
+
+
+@given(typed_values, st.integers(0, 400))
+def test_wrong_sizes_give_what_fits(pairs, size):
+    recipe = Recipe([f"v{i}" for i in range(len(pairs))], [kind for kind, _ in pairs])
+    values = tuple(value for _, value in pairs)
+    data = (recipe.encode(values) + b"\x7f" * 400)[:size]
+    leading = recipe.decode_leading(data)
+    assert leading == values[: len(leading)]
+    whole = sum(kind.size for kind in recipe.types[: len(leading)])
+    assert whole <= size
+    assert len(leading) == len(values) or whole + recipe.types[len(leading)].size > size
+    if size != recipe.size:
+        with pytest.raises(RemoteProtocolError, match="bytes of values"):
+            recipe.decode(data)
+
+
+@pytest.mark.parametrize(
+    "values", [(1, 2.0), (1, 2.0, 3, 4), (2**31, 2.0, (0.0,) * 3), (1, "x", (0.0,) * 3), (1, 2.0, (0.0,) * 2)]
+)
+def test_values_that_do_not_fit_are_refused(values):
+    recipe = Recipe("abc", [RtdeType.INT32, RtdeType.DOUBLE, RtdeType.VECTOR3D])
+    with pytest.raises(LocalProtocolError):
+        recipe.encode(values)
+
+
+class Numbered:
+    """An object that has every attribute of the table: numbered registers, six of everything else."""
+
+    def __getattr__(self, name):
+        if name == "registers":
+            return self
+        if name in ("analog_values", "joint_mode"):
+            return (10, 11, 12, 13, 14, 15)
+        return tuple(range(128)) if name.startswith(("input_", "output_")) else 7
+
+
+def test_data_package_of_the_guide():
+    fields = [field for field in OUTPUTS if field.name in ("timestamp", "actual_q")]
+    recipe = Recipe([f.name for f in fields], [f.type for f in fields])
+    assert recipe.size == 56
+    encode = snapshot_encoder(fields, data_header(recipe.size, 1))
+    package = encode(SimpleNamespace(timestamp=1.5, actual_q=(0.5, -0.5, 1.0, 2.0, 3.0, math.pi)))
+    assert len(package) == 60
+    assert package.hex(" ", 8).startswith("003c5501")
+    assert package[:12] == bytes.fromhex("00 3c 55 01 3ff8000000000000")
+    assert recipe.decode(package[4:]) == (1.5, (0.5, -0.5, 1.0, 2.0, 3.0, math.pi))
+
+
+@pytest.mark.parametrize("field", [f for f in OUTPUTS if f.filled is not None and f.type.count == 1])
+def test_every_scalar_is_taken_from_where_the_table_says(field):
+    encode = snapshot_encoder([field], data_header(field.type.size, None))
+    (value,) = Recipe([field.name], [field.type]).decode(encode(Numbered())[HEADER_SIZE:])
+    if field.comes_from.startswith("registers.") and field.type is not RtdeType.BOOL:
+        digits = "".join(c for c in field.name.replace("registers0_to_31", "0") if c.isdigit())
+        expected = 1 if field.name.endswith("registers32_to_63") else int(digits)
+        assert value == expected
+    elif field.comes_from:
+        assert value in (7, True, 10, 11, 12, 13, 14, 15)
+    else:
+        assert value == field.constant
+
+
+def test_a_snapshot_that_does_not_fit_is_explained():
+    fields = [field for field in OUTPUTS if field.name in ("timestamp", "actual_q", "robot_mode")]
+    encode = snapshot_encoder(fields, b"")
+    good = {"timestamp": 0.0, "actual_q": (0.0,) * 6, "robot_mode": 7}
+    assert len(encode(SimpleNamespace(**good))) == 60
+    for name, value in (("actual_q", (0.0,) * 5), ("actual_q", 3.0), ("robot_mode", 2**31)):
+        with pytest.raises(LocalProtocolError, match=name):
+            encode(SimpleNamespace(**{**good, name: value}))
+
+
+def test_variables_that_nothing_fills_have_no_encoder():
+    field = next(field for field in OUTPUTS if field.name == "ft_raw_wrench")
+    with pytest.raises(LocalProtocolError, match="ft_raw_wrench"):
+        snapshot_encoder([field], b"")
