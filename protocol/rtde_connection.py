@@ -196,7 +196,7 @@ class RtdeConnection:
             if recipe is None:
                 return None
             values = recipe.decode_leading(message.values)
-            return DataReceived(message.recipe_id, recipe.names[: len(values)], values)
+            return DataReceived(message.recipe_id, recipe.names[: len(values)], values) if values else None
         if isinstance(message, Request):
             self._unanswered.append(message)
             return message

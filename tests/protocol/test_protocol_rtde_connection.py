@@ -1,0 +1,387 @@
+"""RTDE connections: both ends wired together, every package in every state, and what must be survived."""
+
+from __future__ import annotations
+
+import struct
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocol import rtde_messages as M
+from protocol.dashboard_connection import Role
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.rtde_codec import MAX_NAMES_SIZE, encode_message
+from protocol.rtde_connection import MAX_REQUEST_SIZE, DataReceived, RtdeConnection
+from protocol.rtde_states import TRANSITIONS, RtdeState, control_rate, cycles_per_package
+from protocol.ur_types import SoftwareVersion
+
+V3_15 = SoftwareVersion(3, 15, 8)
+SNAPSHOT = SimpleNamespace(timestamp=1.5, robot_mode=7, actual_q=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+
+
+class Pair:
+    """Both ends without a network."""
+
+    def __init__(self, version=2):
+        self.robot, self.pc = RtdeConnection(Role.ROBOT, V3_15), RtdeConnection(Role.PC)
+        if version == 2:
+            assert self.ask(M.RequestProtocolVersion(2)) == M.RequestProtocolVersionReply(True)
+
+    def ask(self, request, in_use=()):
+        """One request and its reply."""
+        self.robot.receive_data(self.pc.send(request))
+        assert self.robot.next_event() == request
+        (reply,) = self.to_pc(self.robot.reply(in_use))
+        assert self.robot.next_event() is None
+        return reply
+
+    def to_pc(self, data):
+        self.pc.receive_data(data)
+        events = []
+        while (event := self.pc.next_event()) is not None:
+            events.append(event)
+        return events
+
+    def to_robot(self, data):
+        self.robot.receive_data(data)
+        return self.robot.next_event()
+
+
+@pytest.fixture
+def pair():
+    return Pair()
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_session_with_both_ends(version):
+    pair = Pair(version)
+    assert pair.ask(M.GetControllerVersion()) == M.GetControllerVersionReply(V3_15)
+    outputs = M.SetupOutputs(("timestamp", "actual_q"), 125.0 if version == 2 else None)
+    number = 1 if version == 2 else None
+    assert pair.ask(outputs) == M.SetupOutputsReply(("DOUBLE", "VECTOR6D"), number)
+    inputs = M.SetupInputs(("input_int_register_0", "external_force_torque"))
+    assert pair.ask(inputs) == M.SetupInputsReply(("INT32", "VECTOR6D"), 1)
+    assert pair.robot.encoder is None
+    assert pair.ask(M.Start()) == M.StartReply(True)
+    assert pair.to_pc(pair.robot.encoder(SNAPSHOT) * 2) == 2 * [
+        DataReceived(number, ("timestamp", "actual_q"), (1.5, SNAPSHOT.actual_q))
+    ]
+    values = (-5, (0.0, 1.0, 2.0, 3.0, 4.0, 5.0))
+    received = pair.to_robot(pair.pc.send_values(1, values))
+    assert received == DataReceived(1, inputs.names, values)
+    assert received.as_dict() == dict(zip(inputs.names, values, strict=True))
+    assert pair.ask(M.Pause()) == M.PauseReply(True)
+    assert pair.robot.encoder is None
+    assert pair.ask(M.Start()) == M.StartReply(True)
+    assert pair.robot.encoder is not None
+
+
+REQUESTS = [
+    M.RequestProtocolVersion(2),
+    M.RequestProtocolVersion(1),
+    M.RequestProtocolVersion(3),
+    M.GetControllerVersion(),
+    M.SetupOutputs(("robot_mode",), 10.0),
+    M.SetupOutputs(("nonsense",), 10.0),
+    M.SetupInputs(("input_int_register_0",)),
+    M.SetupInputs(("nonsense",)),
+    M.Start(),
+    M.Pause(),
+]
+
+
+@pytest.mark.parametrize("state", list(RtdeState))
+@pytest.mark.parametrize("request_", REQUESTS)
+def test_every_request_in_every_state_gets_one_reply_and_the_state_of_the_table(pair, state, request_):
+    pair.ask(M.SetupOutputs(("timestamp",), 125.0))
+    if state is RtdeState.STARTED:
+        pair.ask(M.Start())
+    reply = pair.ask(request_)
+    assert type(reply) is M.REQUESTS[type(request_)]
+    accepted, after = TRANSITIONS[state, type(request_)]
+    assert pair.robot.state is pair.pc.state is after
+    if isinstance(request_, M.RequestProtocolVersion):
+        assert reply.accepted == (accepted and request_.version in M.VERSIONS)
+        assert pair.robot.protocol_version == pair.pc.protocol_version
+        assert pair.robot.protocol_version == (request_.version if reply.accepted else 2)
+
+
+def test_the_table_has_every_request_in_every_state():
+    assert set(TRANSITIONS) == {(state, kind) for state in RtdeState for kind in M.REQUESTS}
+
+
+@pytest.mark.parametrize("state", list(RtdeState))
+def test_data_and_text_are_taken_in_every_state_and_never_answered(pair, state):
+    pair.ask(M.SetupInputs(("input_int_register_0",)))
+    if state is RtdeState.STARTED:
+        pair.ask(M.Start())
+    assert pair.to_robot(pair.pc.send_values(1, (3,))) == DataReceived(1, ("input_int_register_0",), (3,))
+    assert pair.to_robot(pair.pc.say(M.TextMessage("hello", "test"))) == M.TextMessage("hello", "test")
+    with pytest.raises(LocalProtocolError, match="nothing has been asked"):
+        pair.robot.reply()
+
+
+def test_a_request_must_be_answered_before_the_next_event(pair):
+    pair.robot.receive_data(pair.pc.send(M.Start()) + pair.pc.send(M.Pause()))
+    assert pair.robot.next_event() == M.Start()
+    with pytest.raises(LocalProtocolError, match="no reply yet"):
+        pair.robot.next_event()
+    data = pair.robot.reply()
+    assert pair.robot.next_event() == M.Pause()
+    assert pair.to_pc(data + pair.robot.reply()) == [M.StartReply(True), M.PauseReply(True)]
+
+
+def test_a_pipelined_version_request_decides_how_the_next_package_is_read():
+    robot = RtdeConnection(Role.ROBOT, V3_15)
+    robot.receive_data(
+        encode_message(M.RequestProtocolVersion(2), Role.PC, 1)
+        + encode_message(M.SetupOutputs(("timestamp",), 50.0), Role.PC, 2)
+    )
+    assert robot.next_event() == M.RequestProtocolVersion(2)
+    assert robot.reply() == bytes.fromhex("00045601")
+    assert robot.next_event() == M.SetupOutputs(("timestamp",), 50.0)
+    assert robot.reply() == b"\x00\x0aO\x01DOUBLE"
+    assert robot.cycles_per_package == 2
+
+
+# --- recipes
+
+
+def test_input_and_output_ids_are_counted_separately_from_one(pair):
+    assert pair.ask(M.SetupOutputs(("timestamp",), 1.0)).recipe_id == 1
+    ids = [pair.ask(M.SetupInputs((f"input_int_register_{i}",))).recipe_id for i in range(23)]
+    assert ids == list(range(1, 24))
+    assert pair.ask(M.SetupOutputs(("robot_mode",), 1.0)).recipe_id == 2
+
+
+def test_the_second_output_recipe_replaces_the_first(pair):
+    pair.ask(M.SetupOutputs(("timestamp",), 125.0))
+    pair.ask(M.Start())
+    pair.ask(M.SetupOutputs(("robot_mode",), 125.0))
+    assert pair.to_pc(pair.robot.encoder(SNAPSHOT)) == [DataReceived(2, ("robot_mode",), (7,))]
+
+
+def test_an_unknown_output_makes_the_recipe_invalid_as_a_whole(pair):
+    reply = pair.ask(M.SetupOutputs(("timestamp", "ft_raw_wrench", "actual_q"), 125.0))
+    assert reply == M.SetupOutputsReply(("DOUBLE", "NOT_FOUND", "VECTOR6D"), 0)
+    assert pair.ask(M.Start()) == M.StartReply(True)
+    assert pair.robot.encoder is None
+    assert pair.ask(M.SetupOutputs(("timestamp",), 125.0)).recipe_id == 1
+    assert pair.robot.encoder is not None
+
+
+def test_an_input_in_use_makes_the_recipe_invalid_and_takes_no_id(pair):
+    names = ("input_int_register_0", "input_int_register_1", "nonsense")
+    reply = pair.ask(M.SetupInputs(names), {"input_int_register_1"})
+    assert reply == M.SetupInputsReply(("INT32", "IN_USE", "NOT_FOUND"), 0)
+    assert not pair.robot.input_recipes
+    assert not pair.pc.input_recipes
+    assert pair.ask(M.SetupInputs(names[:2])).recipe_id == 1
+
+
+def test_one_variable_in_several_recipes_of_a_connection_is_no_conflict(pair):
+    for number in (1, 2, 3):
+        assert pair.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == number
+
+
+def test_empty_recipes_get_a_reply_and_no_id(pair):
+    assert pair.ask(M.SetupInputs(())) == M.SetupInputsReply((), 0)
+    assert pair.ask(M.SetupOutputs((), 125.0)) == M.SetupOutputsReply((), 0)
+    pair.ask(M.Start())
+    assert pair.robot.encoder is None
+
+
+def test_recipes_end_with_the_last_id(pair):
+    for _ in range(255):
+        assert pair.ask(M.SetupInputs(("input_int_register_0",))).recipe_id > 0
+    assert pair.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 0
+    for _ in range(255):
+        pair.ask(M.SetupOutputs(("timestamp",), 1.0))
+    assert pair.ask(M.SetupOutputs(("timestamp",), 1.0)).recipe_id == 1
+
+
+def test_a_list_of_names_beyond_the_limit_is_answered_but_not_found(pair):
+    names = ["input_double_register_0"] * 100  # 23 characters and a comma each
+    pair.robot.receive_data(b"\x09\x62I" + ",".join(names).encode())
+    assert pair.robot.next_event() == M.SetupInputs(tuple(names))
+    words = pair.robot.reply()[4:].decode().split(",")
+    fit = (MAX_NAMES_SIZE + 1) // 24
+    assert words == ["DOUBLE"] * fit + ["NOT_FOUND"] * (100 - fit)
+    assert not pair.robot.input_recipes
+
+
+# --- rates
+
+
+@pytest.mark.parametrize(
+    ("frequency", "cycles"),
+    [
+        *((125, 1), (100, 1), (63, 1), (62.5, 2), (60, 2), (50, 2), (25, 5), (10, 12), (1, 125)),
+        *((1000, 1), (0, 125), (-1, 125), (0.1, 125), (float("nan"), 1), (float("inf"), 1), (None, 1)),
+    ],
+)
+def test_cycles_per_package_of_a_cb3(frequency, cycles):
+    assert cycles_per_package(frequency, control_rate(V3_15)) == cycles
+
+
+def test_an_e_series_has_500_cycles_a_second():
+    assert control_rate(SoftwareVersion(5, 12)) == 500
+    assert cycles_per_package(125.0, 500) == 4
+
+
+# --- wrong bytes, robot's side
+
+
+@pytest.mark.parametrize("data", [b"\0\0", b"\0\2S", b"\0\1", b"GET / HTTP/1.1\r\n", b"\x20\x00S"])
+def test_absurd_sizes_end_the_connection_for_good(pair, data):
+    pair.robot.receive_data(data + b"\0\3S")
+    for _ in range(2):
+        with pytest.raises(RemoteProtocolError, match="RTDE package of"):
+            pair.robot.next_event()
+    (text,) = pair.to_pc(pair.robot.say(M.TextMessage("not RTDE", "test", 1)))
+    assert text == M.TextMessage("not RTDE", "test", 1)
+
+
+@pytest.mark.parametrize("data", [b"\0\3V", b"\0\4V\0", b"\0\x0aO1234567"])
+def test_requests_without_what_they_ask_end_the_connection(pair, data):
+    pair.robot.receive_data(data)
+    with pytest.raises(RemoteProtocolError, match="cannot have only"):
+        pair.robot.next_event()
+
+
+@pytest.mark.parametrize(
+    "junk",
+    [
+        b"\0\3U",  # no recipe id
+        b"\0\4U\0",
+        b"\0\4U\1",  # not one value
+        b"\0\x08U\2abcd",  # no such recipe
+        b"\0\3M",
+        b"\0\6M\xffab",
+        b"\0\3X",
+        b"\0\3\0",
+    ],
+)
+def test_senseless_data_text_and_types_are_skipped(pair, junk):
+    pair.ask(M.SetupInputs(("input_int_register_0",)))
+    assert pair.to_robot(junk + pair.pc.send(M.Start())) == M.Start()
+
+
+def test_data_of_the_wrong_size_as_ur_rtde_sends_it(pair):
+    """Source: ur_rtde 1.6.5, getForwardKinematics and setExternalForceTorque."""
+    doubles = tuple(f"input_double_register_{i}" for i in range(6))
+    assert pair.ask(M.SetupInputs(("input_int_register_0", *doubles))).recipe_id == 1
+    assert pair.ask(M.SetupInputs(("input_int_register_0", *doubles, "input_int_register_1"))).recipe_id == 2
+    command = struct.pack(">i12d", 44, *range(12))
+    too_long = encode_message(M.DataPackage(command, 1), Role.PC, 2)
+    assert pair.to_robot(too_long).values == (44, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
+    too_short = encode_message(M.DataPackage(command[:52], 2), Role.PC, 2)
+    received = pair.to_robot(too_short)
+    assert received.values == (44, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
+    assert received.names == ("input_int_register_0", *doubles)
+
+
+@given(st.binary(max_size=200), st.integers(1, 50))
+def test_no_bytes_do_more_than_end_the_connection(data, step):
+    robot = RtdeConnection(Role.ROBOT, V3_15)
+    robot.receive_data(b"\0\5V\0\2\0\x17Iinput_int_register_0")
+    for start in range(0, len(data), step):
+        robot.receive_data(data[start : start + step])
+        try:
+            while (event := robot.next_event()) is not None:
+                if type(event) in M.REQUESTS:
+                    reply = robot.reply()
+                    assert int.from_bytes(reply[:2], "big") == len(reply)
+        except RemoteProtocolError:
+            return
+
+
+def test_the_longest_package_is_taken(pair):
+    size = MAX_REQUEST_SIZE
+    pair.robot.receive_data(size.to_bytes(2, "big") + b"I" + b"x" * (size - 3))
+    assert pair.robot.next_event() == M.SetupInputs(("x" * (size - 3),))
+    assert pair.robot.reply() == b"\0\x0dI\0NOT_FOUND"
+
+
+# --- wrong bytes, PC's side
+
+
+@pytest.mark.parametrize(
+    ("before", "package", "match"),
+    [
+        ([], M.StartReply(True), "nothing was asked"),
+        ([], M.DataPackage(bytes(8), 1), "before it had answered"),
+        ([M.SetupOutputs(("timestamp",), 1.0)], M.DataPackage(bytes(8), 1), "before it had answered"),
+        ([M.Start()], M.DataPackage(bytes(8), 1), "not set up"),
+        ([M.SetupOutputs(("timestamp",), 1.0), M.Start()], M.DataPackage(bytes(7), 1), "bytes of values"),
+        ([M.SetupOutputs(("timestamp",), 1.0), M.Start()], M.DataPackage(bytes(8), 2), "not set up"),
+    ],
+)
+def test_a_robot_that_breaks_the_rules_is_named(pair, before, package, match):
+    for request in before:
+        pair.ask(request)
+    with pytest.raises(RemoteProtocolError, match=match):
+        pair.to_pc(encode_message(package, Role.ROBOT, 2))
+
+
+@pytest.mark.parametrize(
+    ("request_", "reply", "match"),
+    [
+        (M.Start(), M.PauseReply(True), "Start.. was asked"),
+        (M.SetupInputs(("a", "b")), M.SetupInputsReply(("INT32",), 1), "1 types for 2 names"),
+        (M.SetupInputs(("a",)), M.SetupInputsReply(("FLOAT",), 1), "unknown type"),
+    ],
+)
+def test_a_wrong_reply_is_named(pair, request_, reply, match):
+    pair.pc.send(request_)
+    with pytest.raises(RemoteProtocolError, match=match):
+        pair.to_pc(encode_message(reply, Role.ROBOT, 2))
+
+
+def test_a_robot_with_unknown_packages_is_named(pair):
+    with pytest.raises(RemoteProtocolError, match="unknown type 88"):
+        pair.to_pc(b"\0\3X")
+
+
+def test_text_may_come_between_request_and_reply(pair):
+    """Source: newer software warns before its version reply, see the public client library."""
+    pair.pc.send(M.Start())
+    warning = M.TextMessage("SafetySetup has not been confirmed yet", "", 2)
+    data = encode_message(warning, Role.ROBOT, 2) + encode_message(M.StartReply(True), Role.ROBOT, 2)
+    assert pair.to_pc(data) == [warning, M.StartReply(True)]
+
+
+def test_data_on_its_way_when_we_paused_is_skipped(pair):
+    pair.ask(M.SetupOutputs(("timestamp",), 1.0))
+    pair.ask(M.Start())
+    data = pair.robot.encoder(SNAPSHOT)
+    pair.ask(M.Pause())
+    assert pair.to_pc(data) == []
+
+
+def test_refused_requests_change_nothing_at_the_pc(pair):
+    pair.pc.send(M.Start())
+    assert pair.to_pc(encode_message(M.StartReply(False), Role.ROBOT, 2)) == [M.StartReply(False)]
+    assert pair.pc.state is RtdeState.PAUSED
+
+
+def test_each_end_has_its_own_methods(pair):
+    with pytest.raises(LocalProtocolError, match="robot's end"):
+        pair.pc.reply()
+    with pytest.raises(LocalProtocolError, match="pc's end"):
+        pair.robot.send(M.Start())
+    with pytest.raises(LocalProtocolError, match="pc's end"):
+        pair.robot.send_values(1, ())
+
+
+def test_the_pc_writes_only_recipes_that_exist(pair):
+    with pytest.raises(LocalProtocolError, match="no input recipe 1"):
+        pair.pc.send_values(1, (1,))
+
+
+def test_what_cannot_be_sent_is_not_waited_for(pair):
+    with pytest.raises(LocalProtocolError):
+        pair.pc.send(M.SetupOutputs(("timestamp",)))
+    assert pair.ask(M.Start()) == M.StartReply(True)
