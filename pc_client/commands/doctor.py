@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.options import PortBaseOption, RobotOption, console, ports_of
+from pc_client.commands.options import PortBaseOption, RobotOption, ports_of, say
 
 if TYPE_CHECKING:
     from pc_client.driver.probe import FrameRhythm
@@ -25,28 +25,26 @@ def doctor(
 
     found = probe(TcpNetwork(), robot, ports_of(port_base), seconds)
     for name, number in found.open_ports.items():
-        console.print(f"port {number:5}  {name:13} open")
+        say(f"port {number:5}  {name:13} open")
     for name, number in found.closed_ports.items():
-        console.print(f"port {number:5}  {name:13} closed")
+        say(f"port {number:5}  {name:13} closed")
     if found.info is not None:
-        console.print(f"robot       {found.info}", markup=False)
+        say(f"robot       {found.info}")
     if found.rhythm is not None:
         _show_rhythm(found.rhythm)
     if found.obstacle:
-        console.print(f"streaming   NOT NOW: {found.obstacle}", markup=False)
+        say(f"streaming   NOT NOW: {found.obstacle}")
         raise typer.Exit(1)
-    console.print("streaming   ready: RUNNING, no safety stop, no program running")
+    say("streaming   ready: RUNNING, no safety stop, no program running")
 
 
 def _show_rhythm(rhythm: FrameRhythm) -> None:
-    console.print(
-        f"frames      {rhythm.frame_size} bytes, {rhythm.n_new} new, {rhythm.n_heartbeats} heartbeats"
-    )
+    say(f"frames      {rhythm.frame_size} bytes, {rhythm.n_new} new, {rhythm.n_heartbeats} heartbeats")
     if rhythm.cycle is None:
-        console.print("cycle       the robot's time stands still until a program runs (lockstep)")
+        say("cycle       the robot's time stands still until a program runs (lockstep)")
     else:
-        console.print(f"cycle       {rhythm.cycle * 1e3:.3f} ms, {rhythm.lost} cycles lost")
-    console.print(
+        say(f"cycle       {rhythm.cycle * 1e3:.3f} ms, {rhythm.lost} cycles lost")
+    say(
         f"arrival     jitter {rhythm.arrival_sd * 1e3:.2f} ms (standard deviation), "
         f"longest pause {rhythm.arrival_worst * 1e3:.1f} ms"
     )

@@ -17,6 +17,7 @@ from pc_client.commands.options import (
     YesOption,
     console,
     ports_of,
+    say,
     show_report,
 )
 from pc_client.errors import ClientError
@@ -83,7 +84,7 @@ def _run(
     wall_time = sum(stream.wall_time for stream in report.streams)
     late = sum(stream.late_frames for stream in report.streams)
     lost = sum(stream.lost_frames for stream in report.streams)
-    console.print(
+    say(
         f"{robot_time:.1f} s of robot time in {wall_time:.1f} s "
         f"({robot_time / max(wall_time, 1e-9):.1f} x real time), "
         f"loop delay {report.delay.delay * 1e3:.1f} ms, {late} late and {lost} lost frames"
@@ -106,9 +107,9 @@ def _ask(planned: Experiment, robot: str, ports: Ports) -> None:
         info, q_now = driver.info, driver.actual_q()
         driver.check_ready()
     approach = plan_approach(planned.planned[0].plan, q_now, model=planned.model)
-    console.print(f"robot at {robot}: {info}")
-    console.print(experiment_text(planned))
-    console.print(approach_text(approach))
+    say(f"robot at {robot}: {info}")
+    say(experiment_text(planned))
+    say(approach_text(approach))
     typer.confirm(
         "The arm is going to move. Is the space around it free, and the emergency stop at hand?", abort=True
     )

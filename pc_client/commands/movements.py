@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from pc_client.commands.options import console
+from pc_client.commands.options import console, say
 
 app = typer.Typer(help="The movement library.", rich_markup_mode=None)
 
@@ -52,8 +52,8 @@ def show(
         return
     for key, value in figures.items():
         if key != "strokes":
-            console.print(f"{key:28} {_text(value)}", markup=False)
-    console.print(plan_text(plan_movement(loaded)), markup=False)
+            say(f"{key:28} {_text(value)}")
+    say(plan_text(plan_movement(loaded)))
 
 
 @app.command("generate")
@@ -72,8 +72,8 @@ def generate(
     movement = generate_movement(kind, targets, seed, name=out.stem)
     plan = plan_movement(movement)
     save_movement(movement, out)
-    console.print(plan_text(plan), markup=False)
-    console.print(f"saved: {out}", markup=False)
+    say(plan_text(plan))
+    say(f"saved: {out}")
 
 
 def _text(value: object) -> str:

@@ -29,6 +29,11 @@ RepeatOption = Annotated[int, typer.Option("--repeat", min=1, max=99, help="Runs
 YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a real arm moves.")]
 
 
+def say(text: str) -> None:
+    """Print text as it is: no markup, no line breaks of our own."""
+    console.print(text, markup=False, soft_wrap=True)
+
+
 def show_report(folder: Path) -> None:
     """Build tables and report from a folder of recordings, and print Table I beside the paper's."""
     from pc_client.analysis.report import build_report
@@ -36,8 +41,8 @@ def show_report(folder: Path) -> None:
     report = build_report(folder, console)
     console.print(report.table.to_rich())
     for line in report.left_out:
-        console.print(line, markup=False)
-    console.print(f"report: {report.paths[-1]}", markup=False)
+        say(line)
+    say(f"report: {report.paths[-1]}")
 
 
 def ports_of(port_base: int) -> Ports:

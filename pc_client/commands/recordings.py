@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pc_client.commands.options import console, show_report
+from pc_client.commands.options import say, show_report
 
 
 def report(
@@ -34,6 +34,6 @@ def export(
         raise typer.BadParameter(f"cannot export to {to!r}: use csv or parquet")
     recording = load_recording(file)
     if recording.damage:
-        console.print(f"{file}: {recording.damage}; exporting {recording.n_rows} rows", markup=False)
+        say(f"{file}: {recording.damage}; exporting {recording.n_rows} rows")
     path = write_table(recording, out or file.with_suffix(f".{to}"), "csv" if to == "csv" else "parquet")
-    console.print(str(path), markup=False)
+    say(str(path))

@@ -57,7 +57,7 @@ def experiment_text(experiment: Experiment) -> str:
     axes = "  ".join(f"{axis} {a:.3f}..{b:.3f}" for axis, a, b in zip("xyz", low, high, strict=True))
     return "\n".join(
         (
-            f"{len(reports)} movements, {experiment.repeat} times each, on a {experiment.model.name}, "
+            f"{_count(len(reports), 'movement')}, {_count(experiment.repeat, 'run')} of each, on a {experiment.model.name}, "
             "TCP at the flange",
             f"  box of motion   {axes} m, robot base frame",
             f"  duration        {moving:.0f} s of movement, plus a slow approach before each",
@@ -69,6 +69,10 @@ def experiment_text(experiment: Experiment) -> str:
             "  before the first movement all joints turn to and fro by 1 degree to find the loop's delay",
         )
     )
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"
 
 
 def _joint(index: int | None) -> str:

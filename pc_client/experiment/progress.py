@@ -49,7 +49,7 @@ class Progress:
 
     def connected(self, info: RobotInfo) -> None:
         """Name the robot."""
-        self._console.print(f"robot: {info}")
+        self._console.print(f"robot: {info}", soft_wrap=True)
 
     def approaching(self, approach: Approach) -> None:
         """Say that the arm moves to a start."""

@@ -194,7 +194,14 @@ def test_folder_that_cannot_be_made(two, tmp_path):
 
 def test_plan_for_bystanders_names_what_matters(two):
     text = experiment_text(two)
-    for words in ("box of motion", "duration", "top TCP speed", "top joint speed", "joint range", "2 times"):
+    for words in (
+        "box of motion",
+        "duration",
+        "top TCP speed",
+        "top joint speed",
+        "joint range",
+        "2 runs of each",
+    ):
         assert words in text
 
 
