@@ -57,8 +57,8 @@ def experiment_text(experiment: Experiment) -> str:
     axes = "  ".join(f"{axis} {a:.3f}..{b:.3f}" for axis, a, b in zip("xyz", low, high, strict=True))
     return "\n".join(
         (
-            f"{_count(len(reports), 'movement')}, {_count(experiment.repeat, 'run')} of each, on a {experiment.model.name}, "
-            "TCP at the flange",
+            f"{_count(len(reports), 'movement')}, {_count(experiment.repeat, 'run')} of each, "
+            f"on a {experiment.model.name}, TCP at the flange",
             f"  box of motion   {axes} m, robot base frame",
             f"  duration        {moving:.0f} s of movement, plus a slow approach before each",
             f"  top TCP speed   {reports[fastest].tcp_speed.value:.3f} m/s ({fastest})",
