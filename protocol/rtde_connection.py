@@ -57,6 +57,7 @@ MAX_REQUEST_SIZE = 0x1FFF
 """Longest package in bytes that the robot believes: four times the longest list of names, and less than what
 any printable text says in its first two characters, such as an HTTP request on the wrong port."""
 
+_LENGTH_SIZE = 2
 _LAST_ID = 255
 _NEWEST_CB3 = SoftwareVersion(3, 15)
 
@@ -128,9 +129,9 @@ class RtdeConnection:
 
     def _next_package(self) -> tuple[int, bytes] | None:
         buffer = self._buffer
-        if len(buffer) < HEADER_SIZE:
+        if len(buffer) < _LENGTH_SIZE:
             return None
-        size = int.from_bytes(buffer[:2], "big")
+        size = int.from_bytes(buffer[:_LENGTH_SIZE], "big")
         if size < HEADER_SIZE or (self._role is Role.ROBOT and size > MAX_REQUEST_SIZE):
             raise RemoteProtocolError(
                 f"an RTDE package of {size} bytes: at least {HEADER_SIZE}"
@@ -139,7 +140,7 @@ class RtdeConnection:
             )
         if len(buffer) < size:
             return None
-        kind, payload = buffer[2], bytes(buffer[HEADER_SIZE:size])
+        kind, payload = buffer[_LENGTH_SIZE], bytes(buffer[HEADER_SIZE:size])
         del buffer[:size]
         return kind, payload
 

@@ -1,0 +1,242 @@
+"""What input variables do in the box, and what the snapshot publishes for RTDE. No sockets."""
+
+import math
+
+import pytest
+from box_support import Bench
+
+from protocol.rtde_codec import data_header
+from protocol.rtde_fields import INPUTS, OUTPUTS, output_fields
+from protocol.rtde_recipe import Recipe, snapshot_encoder
+from protocol.rtde_types import RtdeType
+from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
+from ur_emulator.controller.commands import TriggerProtectiveStop, WriteInputs
+from ur_emulator.controller.status_bits import safety_status_bits
+
+V3_15 = SoftwareVersion(3, 15, 8)
+
+
+@pytest.fixture
+def bench():
+    return Bench(fidelity="ideal")
+
+
+def write(bench, *recipes):
+    """Write in one cycle; each recipe is a dictionary."""
+    return bench.tick(1, *(WriteInputs(tuple(recipe.items())) for recipe in recipes))
+
+
+def published(snapshot, *names):
+    """Outputs of a snapshot as a client reads them."""
+    fields = [output_fields(V3_15)[name] for name in names]
+    recipe = Recipe(names, [field.type for field in fields])
+    return recipe.decode(snapshot_encoder(fields, data_header(recipe.size, 1))(snapshot)[4:])
+
+
+def test_every_output_of_the_table_can_be_encoded_from_a_snapshot(bench):
+    fields = list(output_fields(V3_15).values())
+    values = published(bench.now, *(field.name for field in fields))
+    for field, value in zip(fields, values, strict=True):
+        assert all(map(math.isfinite, value if field.type.count > 1 else (value,))), field.name
+
+
+def test_every_input_of_the_table_can_be_written(bench):
+    for field in INPUTS:
+        value = (1.0,) * 6 if field.type is RtdeType.VECTOR6D else 1
+        write(bench, {field.name: value})
+    assert bench.now.registers.input_integers == (1,) * 48
+    assert bench.now.registers.input_floats == (1,) * 48
+    assert bench.now.registers.input_booleans[64:] == (True,) * 64
+
+
+REGISTERS = {
+    "input_bit_registers0_to_31": 0x80000001,
+    "input_bit_registers32_to_63": 0xDEADBEEF,
+    "input_bit_register_64": True,
+    "input_bit_register_127": True,
+    "input_int_register_0": -5,
+    "input_int_register_47": 2**31 - 1,
+    "input_double_register_0": 0.1,
+    "input_double_register_47": -1e300,
+}
+
+
+def test_registers_are_read_back_in_the_cycle_they_are_written(bench):
+    now = write(bench, REGISTERS)
+    assert published(now, *REGISTERS) == tuple(REGISTERS.values())
+    assert published(now, "input_bit_register_65", "input_int_register_1") == (False, 0)
+
+
+def test_scripts_read_what_clients_wrote(bench):
+    write(bench, REGISTERS)
+    said = bench.run(
+        "def r():\n"
+        "  textmsg([read_input_boolean_register(0), read_input_boolean_register(1),"
+        " read_input_boolean_register(31), read_input_boolean_register(127)])\n"
+        "  textmsg([read_input_integer_register(0), read_input_integer_register(47)])\n"
+        "  textmsg(read_input_float_register(0))\n"
+        "end\n"
+    )
+    assert said == ["[True,False,True,True]", "[-5,2147483647]", "0.1"]
+
+
+def test_clients_read_what_scripts_wrote_and_it_outlives_the_program(bench):
+    bench.run(
+        "def w():\n"
+        "  write_output_integer_register(24, -7)\n"
+        "  write_output_float_register(3, 2.5)\n"
+        "  write_output_boolean_register(33, True)\n"
+        "  write_output_boolean_register(70, True)\n"
+        "end\n"
+    )
+    bench.run("def other():\n  sync()\nend\n")
+    names = ("output_int_register_24", "output_double_register_3")
+    assert published(bench.now, *names) == (-7, 2.5)
+    bits = ("output_bit_registers0_to_31", "output_bit_registers32_to_63", "output_bit_register_70")
+    assert published(bench.now, *bits) == (0, 2, True)
+
+
+def test_registers_are_copied_only_after_a_write(bench):
+    first = bench.tick().registers
+    assert bench.tick().registers is first
+    second = write(bench, {"input_int_register_5": 1}).registers
+    assert second is not first
+    assert second.output_integers is first.output_integers
+    assert first.input_integers[5] == 0
+
+
+def test_integer_registers_hold_32_bits(bench):
+    bench.controller.state.registers.outputs.integers[0] = 2**31
+    assert published(bench.tick(), "output_int_register_0") == (-(2**31),)
+
+
+def test_the_last_of_several_inputs_in_a_cycle_wins(bench):
+    now = write(bench, {"input_int_register_0": 1}, {"input_int_register_0": 2})
+    assert now.registers.input_integers[0] == 2
+
+
+@pytest.mark.parametrize(("group", "shift"), [("standard", 0), ("configurable", 8), ("tool", 16)])
+def test_digital_outputs_obey_their_mask(bench, group, shift):
+    mask, value = f"{group}_digital_output_mask", f"{group}_digital_output"
+    assert write(bench, {mask: 0b11, value: 0b10}).actual_digital_output_bits == 0b10 << shift
+    assert write(bench, {mask: 0b01, value: 0b01}).actual_digital_output_bits == 0b11 << shift
+    assert write(bench, {mask: 0b00, value: 0b00}).actual_digital_output_bits == 0b11 << shift
+    assert write(bench, {mask: 0b10, value: 0b00}).actual_digital_output_bits == 0b01 << shift
+
+
+def test_bits_that_a_group_does_not_have_are_left_alone(bench):
+    now = write(bench, {"tool_digital_output_mask": 0xFF, "tool_digital_output": 0xFF})
+    assert now.actual_digital_output_bits == 0b11 << 16
+
+
+def test_mask_and_value_may_come_in_any_order_and_in_different_recipes(bench):
+    assert (
+        write(
+            bench, {"standard_digital_output": 8, "standard_digital_output_mask": 8}
+        ).actual_digital_output_bits
+        == 8
+    )
+    assert write(bench, {"standard_digital_output": 0}).actual_digital_output_bits == 0
+
+
+def test_outputs_set_by_a_script_stay_until_a_client_writes_again(bench):
+    write(bench, {"standard_digital_output_mask": 1, "standard_digital_output": 1})
+    bench.run("def d():\n  set_standard_digital_out(0, False)\nend\n")
+    assert bench.tick(3).actual_digital_output_bits == 0
+    assert write(bench, {"input_int_register_0": 1}).actual_digital_output_bits == 0
+
+
+def test_analog_outputs_take_a_ratio_in_their_domain_and_obey_their_mask(bench):
+    names = ("standard_analog_output0", "standard_analog_output1", "analog_io_types")
+    write(
+        bench,
+        {
+            "standard_analog_output_mask": 0b10,
+            "standard_analog_output_type": 0b10,
+            "standard_analog_output_0": math.nan,  # ur_rtde leaves the other channel uninitialised
+            "standard_analog_output_1": 0.25,
+        },
+    )
+    assert published(bench.now, *names) == (0.004, 2.5, 0b1011)
+    write(
+        bench,
+        {
+            "standard_analog_output_mask": 0b01,
+            "standard_analog_output_type": 0b00,
+            "standard_analog_output_0": 0.5,
+            "standard_analog_output_1": math.nan,
+        },
+    )
+    assert published(bench.now, *names) == (pytest.approx(0.012), 2.5, 0b1011)
+
+
+def test_the_speed_slider_obeys_its_mask(bench):
+    def fraction(mask, value):
+        now = write(bench, {"speed_slider_mask": mask, "speed_slider_fraction": value})
+        return published(now, "target_speed_fraction")[0]
+
+    assert fraction(1, 0.5) == 0.5
+    assert fraction(0, 0.9) == 0.5
+    assert fraction(1, 7.0) == 1.0
+    assert fraction(1, math.nan) == 1.0
+    assert fraction(1, -1.0) == 0.0
+
+
+def test_an_external_wrench_is_kept(bench):
+    wrench = (1.0, 2.0, 3.0, 0.1, 0.2, 0.3)
+    before = bench.now.actual_tcp_force
+    assert write(bench, {"external_force_torque": wrench}).actual_tcp_force == pytest.approx(before, abs=1.0)
+    assert bench.controller.state.client_inputs == {"external_force_torque": wrench}
+
+
+# --- outputs that only RTDE has
+
+
+def test_status_bits_follow_the_modes(bench):
+    names = ("robot_status_bits", "safety_status_bits")
+    assert published(bench.now, *names) == (0b01, 1)
+    bench.start("def p():\n  while True:\n    sync()\n  end\nend\n")
+    assert published(bench.tick(), *names) == (0b11, 1)
+    bench.tick(1, TriggerProtectiveStop())
+    assert published(bench.tick(), *names) == (0b01, 1 << 2 | 1 << 10)
+
+
+def test_an_unpowered_arm_says_so():
+    bench = Bench(mode=RobotMode.POWER_OFF)
+    assert published(bench.now, "robot_status_bits") == (0,)
+
+
+def test_every_safety_mode_that_stops_the_arm_has_a_bit_of_its_own():
+    stopping = [mode for mode in SafetyMode if 3 <= mode <= 9 and mode is not SafetyMode.RECOVERY]
+    words = [safety_status_bits(mode) for mode in stopping]
+    assert all(word & 1 << 10 for word in words)
+    assert len(set(words)) == len(words)
+    emergency = (SafetyMode.SYSTEM_EMERGENCY_STOP, SafetyMode.ROBOT_EMERGENCY_STOP)
+    assert [mode for mode in stopping if safety_status_bits(mode) & 1 << 7] == list(emergency)
+
+
+def test_the_force_scalar_is_the_norm_of_the_force(bench):
+    force, scalar = published(bench.now, "actual_TCP_force", "tcp_force_scalar")
+    assert scalar == pytest.approx(math.sqrt(sum(f * f for f in force[:3])))
+
+
+def test_the_tool_says_what_a_script_sets(bench):
+    bench.run("def t():\n  set_tool_voltage(24)\nend\n")
+    names = ("tool_output_voltage", "tool_mode", "tool_analog_input_types")
+    assert published(bench.now, *names) == (24, 253, 0b11)
+
+
+def test_the_script_line_is_looked_up_only_when_somebody_wants_it(bench):
+    program = "def p():\n  sync()\n  while True:\n    sync()\n  end\nend\n"
+    bench.start(program)
+    assert published(bench.tick(3), "script_control_line") == (0,)
+    bench.controller.state.wants_script_line = True
+    assert published(bench.tick(), "script_control_line") == (4,)
+    bench.run("def q():\n  sync()\nend\n")
+    assert published(bench.tick(), "script_control_line") == (0,)
+
+
+def test_the_table_names_only_what_the_snapshot_has(bench):
+    for field in OUTPUTS:
+        if field.comes_from:
+            assert hasattr(bench.now, field.comes_from.partition(".")[0].partition("[")[0]), field.name
