@@ -93,15 +93,16 @@ class ControlBox:
         self._intake = ProgramIntake(self._loop, software, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)
         states = StateEncoder(software)
+        # In the order in which they hear of a cycle: first those whose clients act on it.
         self._port_objects: dict[str, Port] = {
-            "dashboard": DashboardPort(identity, controller, self._box.submit),
-            "primary": PrimaryPort(software, controller, self._intake, states, all_messages=True),
-            "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
             "realtime": RealtimePort(software, self._intake),
             "rtde": RtdePort(identity.version._replace(build=BUILD), controller, self._box.submit),
+            "primary": PrimaryPort(software, controller, self._intake, states, all_messages=True),
+            "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
+            "dashboard": DashboardPort(identity, controller, self._box.submit),
+            "realtime_ro": RealtimePort(software, None),
             "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
             "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),
-            "realtime_ro": RealtimePort(software, None),
         }
         self._listeners: dict[str, Listener] = {}
         self._thread: threading.Thread | None = None

@@ -32,6 +32,12 @@ def test_a_program_moves_the_arm_and_ends(bench):
     assert kinds[-1] is ProgramStopped
 
 
+def test_even_the_shortest_program_is_seen_to_run(bench):
+    bench.start("textmsg(1)\n")
+    assert bench.now.runtime_state == ProgramState.PLAYING
+    assert bench.tick().runtime_state == ProgramState.STOPPED
+
+
 def test_speedj_with_the_step_time_takes_exactly_one_cycle_a_call(bench):
     bench.start(
         "def s():\n  i = 0\n  while i < 50:\n    speedj([0.1,0,0,0,0,0], 5, get_steptime())\n    i = i + 1\n  end\n"

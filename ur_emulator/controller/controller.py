@@ -128,8 +128,7 @@ class Controller:
             self._apply(command)
         state.mode.step()
         running = state.mode.mode is RobotMode.RUNNING
-        if self.programs.has_work:
-            self.programs.step()
+        self.programs.step()
         was_active = self.programs.has_work or state.motion.is_moving or state.mode.is_changing
         if state.payload is not self._payload:
             # What a program declares is taken to be really there: the arm carries it from now on.

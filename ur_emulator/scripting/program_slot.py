@@ -18,6 +18,7 @@ class ProgramSlot:
         self._network = network
         self._primary: RunningProgram | None = None
         self._secondaries: list[RunningProgram] = []
+        self._ran = False
         self.name = ""
 
     @property
@@ -27,13 +28,17 @@ class ProgramSlot:
 
     @property
     def has_work(self) -> bool:
-        """True while any program wants cycles."""
-        return self._primary is not None or bool(self._secondaries)
+        """True while any program wants cycles, and in the cycle in which one ended."""
+        return self._primary is not None or self._ran or bool(self._secondaries)
 
     @property
     def runtime_state(self) -> ProgramState:
-        """Program state as published: STOPPING while the arm still ramps down after the end of a program."""
-        if self._primary is not None:
+        """Program state as published.
+
+        PLAYING also in the cycle in which a program ends, so that clients see even the shortest one run;
+        STOPPING while the arm still ramps down after it.
+        """
+        if self._primary is not None or self._ran:
             return ProgramState.PLAYING
         return ProgramState.STOPPING if self._state.motion.is_moving else ProgramState.STOPPED
 
@@ -67,6 +72,7 @@ class ProgramSlot:
 
     def step(self) -> None:
         """Run all programs for one cycle."""
+        self._ran = self._primary is not None
         if self._secondaries:
             for program in self._secondaries:
                 if program.step() is ProgramStatus.FAILED:
