@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from protocol.dashboard_commands import USER_ROLES, unknown_command_reply
-from protocol.dashboard_connection import CommandReceived, DashboardConnection, Role, UnknownCommand
+from protocol.dashboard_connection import MAX_LINE, CommandReceived, DashboardConnection, Role, UnknownCommand
 from protocol.errors import ProtocolError
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus, SoftwareVersion
 from ur_emulator.controller import commands as cmd
@@ -124,7 +124,8 @@ class DashboardPort:
                     pass
                 case _:
                     continue
-            connection.send(session.reply(text))
+            # A reply may repeat what the client sent, and must stay one line of allowed length.
+            connection.send(session.reply(text.replace("\r", " ")[: MAX_LINE - 1]))
         if session.is_closed:
             connection.close_when_sent()
 
