@@ -1,0 +1,283 @@
+"""What the integration tests share: a client without a library, the PC's side of the velocity receiver, processes.
+
+Everything goes over real sockets. Time-outs are limits for hangs: no test waits for one to pass.
+"""
+
+import json
+import os
+import random
+import socket
+import struct
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+from protocol.frame_buffer import FrameBuffer
+from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, decode_package
+from protocol.realtime_layout import layout_for_version
+from protocol.ur_types import Ports, ProgramState, SoftwareVersion
+from urscript.programs import velocity_receiver
+
+VERSION = SoftwareVersion(3, 15, 8)
+LAYOUT = layout_for_version(VERSION)
+TIMEOUT = 20.0  # s
+PERIOD = 0.008  # s
+REPEATS = 1000  # frames with one stamp: eight seconds in which nothing happened
+QD_MAX = 3.1415927  # rad/s; the slowest joints of a UR3
+SPIN = "def spin():\n  while True:\n    speedj([0.3,0,0,0,0,0], 2.0, get_steptime())\n  end\nend\n"
+HELLO_PROGRAM = 'def hello():\n  textmsg("hello")\nend\n'
+
+
+def connect(box, port):
+    """Connect to a port of a box by its name in `Ports`."""
+    sock = socket.create_connection((box.host, getattr(box.ports, port)), timeout=TIMEOUT)
+    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return sock
+
+
+class Frames:
+    """Reads realtime frames; remembers every stamp, so that a hole shows."""
+
+    def __init__(self, box, port="realtime"):
+        self.sock = connect(box, port)
+        self.stamps = []
+        self._rest = bytearray()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.sock.close()
+
+    def raw(self):
+        """Return the bytes of the next frame."""
+        while len(self._rest) < LAYOUT.size:
+            data = self.sock.recv(1 << 16)
+            if not data:
+                raise EOFError("the box closed the stream")
+            self._rest += data
+        frame = bytes(self._rest[: LAYOUT.size])
+        del self._rest[: LAYOUT.size]
+        size, stamp = struct.unpack_from(">id", frame)
+        assert size == LAYOUT.size, "a package was cut in half"
+        self.stamps.append(stamp)
+        return frame
+
+    def next(self):
+        """Return the next frame."""
+        return LAYOUT.decode(self.raw())
+
+    def until(self, condition, read=None):
+        """Return the first frame that meets the condition."""
+        read = read or self.next
+        repeats = 0
+        while repeats < REPEATS:
+            frame = read()
+            if condition(frame):
+                return frame
+            repeats = repeats + 1 if self.stamps[-2:-1] == self.stamps[-1:] else 0
+        raise AssertionError("time stands still before the frame that was waited for")
+
+    def until_stamp(self, stamp):
+        """Read on, cheaply, until a stamp."""
+        self.until(lambda frame: self.stamps[-1] >= stamp - PERIOD / 2, self.raw)
+
+    def new(self):
+        """Return the next frame with a stamp of its own."""
+        last = self.stamps[-1] if self.stamps else -1.0
+        return self.until(lambda frame: frame.timestamp > last)
+
+    def lost(self):
+        """Return how many cycles between the first and the last frame never came."""
+        cycles = [round(stamp / PERIOD) for stamp in self.stamps]
+        assert cycles == sorted(cycles), "time went backwards"
+        return cycles[-1] - cycles[0] + 1 - len(set(cycles))
+
+    def rest(self):
+        """Wait until no program runs and the arm rests; return that frame."""
+        return self.until(
+            lambda f: (
+                f.runtime_state == ProgramState.STOPPED
+                and not any(f.target_qd)
+                and abs(f.actual_qd).max() < 2e-3
+            )
+        )
+
+
+class Messages:
+    """Reads packages of a primary or secondary port."""
+
+    def __init__(self, box, port="primary"):
+        self.sock = connect(box, port)
+        self.all = []
+        self._buffer = FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.sock.close()
+
+    def next(self):
+        while (frame := self._buffer.next_frame()) is None:
+            data = self.sock.recv(1 << 16)
+            if not data:
+                raise EOFError("the box closed the port")
+            self._buffer.feed(data)
+        package = decode_package(frame, VERSION)
+        self.all.append(package)
+        return package
+
+    def message(self, kind, limit=5000, **wanted):
+        """Return the next message of a class, with these values, skipping everything else."""
+        for _ in range(limit):
+            package = self.next()
+            if isinstance(package, kind) and all(getattr(package, k) == v for k, v in wanted.items()):
+                return package
+        raise AssertionError(f"no {kind.__name__} came")
+
+
+def send(box, port, data):
+    """Send bytes on a connection of their own and close it."""
+    with connect(box, port) as sock:
+        sock.sendall(data.encode("latin-1") if isinstance(data, str) else data)
+
+
+class VelocitySession:
+    """The PC's side of the velocity receiver, without the client's checks: may send anything."""
+
+    def __init__(self, box, **values):
+        self.frames = Frames(box)
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            server.settimeout(TIMEOUT)
+            send(box, "secondary", velocity_receiver("127.0.0.1", server.getsockname()[1], **values))
+            self.reverse, _ = server.accept()
+        self.reverse.settimeout(TIMEOUT)
+        self.reverse.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        hello = self.reverse.recv(4)
+        assert hello == b"\0\0\0\1"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.reverse.close()
+        self.frames.sock.close()
+
+    def send(self, mode, values=(0,) * 6):
+        """Send a message of integers as they are on the wire."""
+        self.reverse.sendall(struct.pack(">7i", mode, *values))
+
+    def velocity(self, *qd):
+        """Send a velocity [rad/s] (missing joints rest) and return the next new frame."""
+        self.send(1, [round(v * 1e6) for v in (*qd, 0, 0, 0, 0, 0, 0)[:6]])
+        return self.frames.new()
+
+    def spin_up(self, speed=0.4):
+        """Bring the base joint to a speed."""
+        for _ in range(60):
+            frame = self.velocity(speed)
+        assert frame.target_qd[0] == speed
+        return frame
+
+
+# --- processes
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A command that has ended."""
+
+    code: int
+    out: str
+    err: str
+
+    def complaint(self):
+        """Return the one line on stderr; anything more is a failure."""
+        assert "Traceback" not in self.err, self.err
+        assert self.err.count("\n") == 1, self.err
+        return self.err
+
+
+def start(package, *arguments, **options):
+    """Start `python -m package arguments...`; output is captured as text."""
+    command = [sys.executable, "-m", package, *map(str, arguments)]
+    settings = {
+        "stdin": subprocess.DEVNULL,
+        "stdout": subprocess.PIPE,
+        "stderr": subprocess.PIPE,
+        "text": True,
+    }
+    return subprocess.Popen(command, **{**settings, **options})
+
+
+def finish(process, text=None):
+    """Wait for the end of a process."""
+    try:
+        out, err = process.communicate(text, timeout=60)
+    except BaseException:
+        process.kill()
+        process.communicate()
+        raise
+    return Finished(process.returncode, out or "", err or "")
+
+
+def command(package, *arguments, text=None, **options):
+    """Run `python -m package arguments...` to its end."""
+    if text is not None:
+        options["stdin"] = subprocess.PIPE
+    return finish(start(package, *arguments, **options), text)
+
+
+def client_on(box, *arguments, **options):
+    """Run a `ur-client` command on a box of this process."""
+    return command("pc_client", *arguments, "--robot", box.host, "--port-base", port_base_of(box), **options)
+
+
+def port_base_of(box):
+    """The offset of a box, as the client wants it."""
+    return box.ports.realtime - Ports.standard().realtime
+
+
+def free_port_base():
+    """An offset at which all ports of a box are free, above the ports that the kernel gives to clients."""
+    bases = list(range(31_000, 35_500, 20))
+    random.Random(os.getpid() + time.monotonic_ns()).shuffle(bases)
+    for base in bases:
+        ports = Ports.standard(base)
+        if all(_is_free(getattr(ports, name)) for name in ports.__dataclass_fields__):
+            return base
+    raise AssertionError("no free ports")
+
+
+def _is_free(port):
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+        return True
+
+
+@contextmanager
+def serving(folder, *options, **process_options):
+    """Run `ur-emulator serve` as long as the block lasts; gives process, host and ports."""
+    base, ready = free_port_base(), folder / f"ready-{time.monotonic_ns()}.json"
+    process = start(
+        "ur_emulator", "serve", "--port-base", base, "--ready-file", ready, *options, **process_options
+    )
+    try:
+        line = process.stdout.readline()
+        assert " ready at " in line, process.stderr.read()
+        facts = json.loads(ready.read_text())
+        yield SimpleNamespace(
+            process=process, host=facts["host"], ports=Ports(**facts["ports"]), base=base, facts=facts
+        )
+    finally:
+        if process.poll() is None:
+            process.terminate()
+        finish(process)
