@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 from pc_client.commands.options import console, say
@@ -20,7 +21,8 @@ def list_movements() -> None:
     from pc_client.movements.description import describe
     from pc_client.movements.files import library_names, load_movement
 
-    table = Table("name", "kind", "points", "duration [s]", "path [m]", "top speed [m/s]")
+    headings = ("name", "kind", "points", "duration [s]", "path [m]", "top speed [m/s]")
+    table = Table(*map(escape, headings))  # rich would take a unit in brackets for a style
     for name in library_names():
         figures = describe(load_movement(name))
         table.add_row(
