@@ -70,7 +70,7 @@ class ExperimentRunner:
         self._config = config
         self._observer = Silent() if observer is None else observer
         self._qd_max = experiment.model.limits.qd_max
-        self._signals = [(column.name, column.count) for column in driver.layout.columns]
+        self._signals = [(column.name, column.count, column.unit) for column in driver.layout.columns]
 
     def run(self) -> ExperimentReport:
         """Do everything.
