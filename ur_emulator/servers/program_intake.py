@@ -18,6 +18,7 @@ from ur_emulator.realtime.event_loop import EventLoop
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.errors import ScriptError
+from urscript.parser import prepare
 
 # The controller's own words and the command each stands for; words that change nothing here map to None.
 # Source: what PolyScope and public clients send on the script ports (protocol.controller_words).
@@ -56,6 +57,7 @@ class ProgramIntake:
         self._catalogue = catalogue_for(version)
         self._submit = submit
         self._announce = announce
+        prepare()  # now, so that the first program does not pay for it in the middle of a stream
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="compile")
 
     def take(self, items: Iterable[ScriptItem]) -> None:
