@@ -5,10 +5,11 @@ import struct
 from itertools import pairwise
 
 import pytest
-from box_support import TIMEOUT, FrameReader, connect
+from box_support import TIMEOUT, FrameReader, MessageReader, connect
 from rtde_support import RtdeClient
 
 from protocol import rtde_messages as M
+from protocol.primary_layout import MasterboardData, ToolData
 from protocol.rtde_fields import INPUTS, output_fields
 from protocol.ur_types import ProgramState, SoftwareVersion
 from ur_emulator import ControlBox
@@ -159,6 +160,29 @@ def test_an_output_switched_by_a_client_is_seen_by_all(box, client):
         client.until(lambda v: not v["actual_digital_output_bits"] & 0b1000)
 
 
+def test_analog_lines_agree_with_the_primary_port(box, client):
+    names = ("standard_analog_output0", "standard_analog_output1", "tool_analog_input0", "analog_io_types")
+    client.subscribe(*names)
+    recipe = client.own(
+        "standard_analog_output_mask", "standard_analog_output_type", "standard_analog_output_1"
+    )
+    client.write(recipe, 0b10, 0b10, 0.5)
+    values = client.until(lambda v: v["standard_analog_output1"] == 5.0)
+    with connect(box, "primary") as sock:
+        records = {type(record): record for record in MessageReader(sock).state().sub_packages}
+    board, tool = records[MasterboardData], records[ToolData]
+    assert values["standard_analog_output0"] == board.analog_output0
+    assert values["standard_analog_output1"] == board.analog_output1
+    assert values["tool_analog_input0"] == tool.analog_input2
+    domains = (
+        board.analog_input_range0,
+        board.analog_input_range1,
+        board.analog_output_domain0,
+        board.analog_output_domain1,
+    )
+    assert values["analog_io_types"] == sum(domain << i for i, domain in enumerate(domains))
+
+
 def test_inputs_are_free_after_their_owner_is_gone(box):
     names = tuple(field.name for field in INPUTS if field.name.startswith("input_int"))
     with connect(box, "rtde") as first, connect(box, "rtde") as second:
@@ -230,3 +254,24 @@ def test_a_client_that_does_not_read_gets_whole_packages_and_does_not_stop_the_o
         gaps = [round((b - a) / 0.008) for a, b in pairwise(stamps)]
         assert max(gaps) > 1
         assert min(gaps) == 1
+
+
+def test_in_lockstep_time_waits_for_a_client_that_reads_late(box):
+    fields = output_fields(SoftwareVersion(3, 15, 8))
+    names = ("output_int_register_24", *[name for name in fields if fields[name].type.count == 6])
+    n_cycles = 2000
+    size = sum(fields[name].type.size for name in names)
+    assert size * n_cycles > 1_000_000  # more than the buffers on the way hold
+    with socket.socket() as sock:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        sock.settimeout(TIMEOUT)
+        sock.connect((box.host, box.ports.rtde))
+        late = RtdeClient(sock)
+        late.subscribe(*names)
+        run(box, COUNT.format(n_cycles))
+        with connect(box, "primary") as other:
+            other.recv(1)  # the box goes on serving others meanwhile
+        counts = [0]
+        while counts[-1] < n_cycles:
+            counts.append(late.data()["output_int_register_24"])
+    assert {after - before for before, after in pairwise(counts)} <= {0, 1}

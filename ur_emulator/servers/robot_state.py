@@ -32,6 +32,7 @@ def state_records(snapshot: Snapshot) -> tuple[SubPackage, ...]:
     """Return the sub-packages that change from state to state."""
     snap = snapshot
     powered = snap.robot_mode in POWERED
+    domains, analog = snap.analog_domains, snap.analog_values
     return (
         RobotModeData(
             timestamp=snap.tick * PERIOD_US,
@@ -57,11 +58,26 @@ def state_records(snapshot: Snapshot) -> tuple[SubPackage, ...]:
         MasterboardData(
             digital_input_bits=snap.actual_digital_input_bits,
             digital_output_bits=snap.actual_digital_output_bits,
+            analog_input_range0=domains[0],
+            analog_input_range1=domains[1],
+            analog_input0=analog[0],
+            analog_input1=analog[1],
+            analog_output_domain0=domains[2],
+            analog_output_domain1=domains[3],
+            analog_output0=analog[2],
+            analog_output1=analog[3],
             robot_voltage_48v=snap.actual_robot_voltage,
             robot_current=snap.actual_robot_current,
             safety_mode=SafetyMode(snap.safety_mode),
         ),
-        ToolData(tool_mode=snap.joint_mode[-1]),
+        ToolData(
+            analog_input_range2=domains[4],
+            analog_input_range3=domains[5],
+            analog_input2=analog[4],
+            analog_input3=analog[5],
+            tool_output_voltage=snap.tool_output_voltage,
+            tool_mode=snap.joint_mode[-1],
+        ),
         ForceModeData(wrench=snap.actual_tcp_force),
         AdditionalInfo(),
         SafetyData(),
