@@ -75,7 +75,7 @@ class PrimaryPort:
     def received(self, connection: Connection, data: bytes) -> None:
         """Take script text."""
         if self._intake is not None:
-            self._intake.take(self._channels[connection].feed(data))
+            self._intake.take(connection, self._channels[connection].feed(data))
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; a program it sent goes on."""

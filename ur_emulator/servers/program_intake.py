@@ -7,6 +7,7 @@ sent after a program must stop it.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -33,6 +34,10 @@ WORDS: dict[str, cmd.Command | None] = {
     "confirm user safety parameters": None,
 }
 SPEED_WORD = "set speed"
+# Script of one sender that may wait for the compiler, each program counted with its cost beside its text
+# [bytes]; what comes on top is dropped: who floods the port must neither fill the memory nor delay others.
+MAX_WAITING = 4 << 20
+_PROGRAM_COST = 1 << 10
 
 
 class ProgramIntake:
@@ -59,23 +64,44 @@ class ProgramIntake:
         self._announce = announce
         prepare()  # now, so that the first program does not pay for it in the middle of a stream
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="compile")
+        self._waiting: Counter[object] = Counter()
+        self._flooding: set[object] = set()
 
-    def take(self, items: Iterable[ScriptItem]) -> None:
-        """Queue what one connection has sent."""
+    def take(self, sender: object, items: Iterable[ScriptItem]) -> None:
+        """Queue what one connection has sent: words always, programs as long as not too much waits."""
         for item in items:
-            self._worker.submit(self._process, item)
+            cost = _PROGRAM_COST + len(item.text) if isinstance(item, ProgramText) else 0
+            waiting = self._waiting[sender]
+            if cost and waiting and waiting + cost > MAX_WAITING:
+                if sender not in self._flooding:
+                    self._announce(_warning("programs come faster than they compile, some were dropped"))
+                self._flooding.add(sender)
+                continue
+            self._waiting[sender] += cost
+            self._worker.submit(self._process, item, sender, cost)
 
     def close(self) -> None:
         """End the worker; what is still queued is dropped."""
         self._worker.shutdown(wait=True, cancel_futures=True)
 
-    def _process(self, item: ScriptItem) -> None:
+    def _process(self, item: ScriptItem, sender: object, cost: int) -> None:
         """Compile or translate one item; runs in the worker, hands the result to the loop."""
-        result = self._translate(item)
+        try:
+            result = self._translate(item)
+        except Exception as error:  # a defect of ours must not swallow the program without a word
+            result = ScriptFailed(1, 1, f"the program cannot be compiled: {error!r}")
+        self._loop.call_soon_threadsafe(lambda: self._finish(result, sender, cost))
+
+    def _finish(self, result: cmd.Command | Event | None, sender: object, cost: int) -> None:
+        """Hand on a result; runs in the loop."""
+        self._waiting[sender] -= cost
+        if not self._waiting[sender]:
+            del self._waiting[sender]
+            self._flooding.discard(sender)
         if isinstance(result, cmd.Command):
-            self._loop.call_soon_threadsafe(lambda: self._submit(result))
+            self._submit(result)
         elif result is not None:
-            self._loop.call_soon_threadsafe(lambda: self._announce(result))
+            self._announce(result)
 
     def _translate(self, item: ScriptItem) -> cmd.Command | Event | None:
         match item:
