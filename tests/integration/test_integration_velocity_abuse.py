@@ -1,0 +1,256 @@
+"""What a wrong or hostile PC can send to the velocity receiver, and to a box that is already stopped.
+
+Whatever comes: no target beyond the limits of the joints, and in the end the arm rests and takes the next program.
+"""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from integration_support import HELLO_PROGRAM, Frames, Messages, VelocitySession, connect, send
+
+import ur_emulator.realtime.pacing as pacing
+from protocol.primary_messages import (
+    ErrorCodeMessage,
+    RuntimeExceptionMessage,
+    SafetyModeMessage,
+    TextMessage,
+)
+from protocol.ur_types import ProgramState, SafetyMode
+from ur_emulator.models.robots import robot_by_name
+
+UR3 = robot_by_name("ur3")
+INT_MIN, INT_MAX = -(2**31), 2**31 - 1
+RAMP_ROUNDING = 1e-3  # rad; the last cycle of a ramp is a whole one
+
+
+class Judge:
+    """Reads every frame and holds the limits against it."""
+
+    def __init__(self, frames):
+        self.frames = frames
+        self.before = None
+
+    def check(self, frame):
+        for values in (frame.target_q, frame.target_qd, frame.target_qdd, frame.actual_q, frame.actual_qd):
+            assert np.isfinite(values).all()
+        assert (np.abs(frame.target_qd) <= np.array(UR3.qd_max) * (1 + 1e-6)).all()
+        assert (frame.target_q >= np.array(UR3.q_min) - RAMP_ROUNDING).all()
+        assert (frame.target_q <= np.array(UR3.q_max) + RAMP_ROUNDING).all()
+        if self.before is not None and frame.timestamp > self.before.timestamp:
+            assert np.abs(frame.target_q - self.before.target_q).max() <= max(UR3.qd_max) * 0.008 * (1 + 1e-6)
+        self.before = frame
+
+    def until(self, condition):
+        def seen(frame):
+            self.check(frame)
+            return condition(frame)
+
+        return self.frames.until(seen)
+
+    def until_rest(self):
+        return self.until(lambda f: f.runtime_state == ProgramState.STOPPED and not f.target_qd.any())
+
+
+def next_program_works(box, frames):
+    with Messages(box) as primary:
+        primary.next()
+        send(box, "secondary", HELLO_PROGRAM)
+        frames.until_stamp(primary.message(TextMessage, text="hello").timestamp * 1e-6)
+        send(box, "secondary", "def m():\n  movej([0.3,-1.6,-1.8,0,1.2,1.5])\nend\n")
+        frames.until(lambda f: f.runtime_state == ProgramState.PLAYING)
+        assert frames.rest().target_q == pytest.approx([0.3, -1.6, -1.8, 0, 1.2, 1.5])
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        (INT_MAX,) * 6,
+        (INT_MIN,) * 6,
+        (INT_MIN, INT_MAX, INT_MIN, INT_MAX, INT_MIN, INT_MAX),
+        (0, 0, 0, 0, 0, 50_000_000),
+        (3_300_000, 0, 0, 0, 0, 0),
+    ],
+)
+def test_velocities_beyond_the_limits_end_in_a_protective_stop(lockstep_box, values):
+    with Messages(lockstep_box) as primary, VelocitySession(lockstep_box, acceleration=40.0) as session:
+        judge = Judge(session.frames)
+        stopped = False
+        while not stopped:
+            session.send(1, values)
+            frame = session.frames.new()
+            judge.check(frame)
+            stopped = frame.safety_mode == SafetyMode.PROTECTIVE_STOP
+        rest = judge.until_rest()
+        assert rest.safety_mode == SafetyMode.PROTECTIVE_STOP
+        told = primary.message(ErrorCodeMessage)
+        assert told.code == 204
+        assert "rad/s, limit" in told.text
+        assert primary.message(SafetyModeMessage).safety_mode == SafetyMode.PROTECTIVE_STOP
+        assert session.reverse.recv(1) == b""
+        send(lockstep_box, "secondary", "set unlock protective stop\n")
+        judge.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
+        next_program_works(lockstep_box, session.frames)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_joint_that_is_driven_to_the_end_of_its_range_stops_within_it(lockstep_box, sign):
+    with VelocitySession(lockstep_box) as session:
+        judge = Judge(session.frames)
+        frame = session.frames.next()
+        while frame.safety_mode == SafetyMode.NORMAL:
+            frame = session.velocity(sign * 3.0, sign * -0.4)
+            judge.check(frame)
+        rest = judge.until_rest()
+        assert abs(rest.target_q[0]) == pytest.approx(2 * math.pi, abs=0.05)
+        send(lockstep_box, "secondary", "set unlock protective stop\n")
+        judge.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
+        next_program_works(lockstep_box, session.frames)
+
+
+@pytest.mark.parametrize("mode", [3, -1, INT_MAX, INT_MIN])
+def test_an_unknown_mode_ends_the_program_with_a_ramp(lockstep_box, mode):
+    with Messages(lockstep_box) as primary, VelocitySession(lockstep_box) as session:
+        session.spin_up()
+        session.send(mode, (INT_MAX,) * 6)
+        assert Judge(session.frames).until_rest().safety_mode == SafetyMode.NORMAL
+        assert primary.message(TextMessage).text == "velocity_receiver: unknown mode"
+        next_program_works(lockstep_box, session.frames)
+
+
+def test_hold_ramps_to_rest_and_keeps_the_program(lockstep_box):
+    with VelocitySession(lockstep_box) as session:
+        session.spin_up()
+        for _ in range(60):
+            session.send(2, (INT_MAX,) * 6)  # the velocities of a hold are ignored
+            frame = session.frames.new()
+        assert not frame.target_qd.any()
+        assert frame.runtime_state == ProgramState.PLAYING
+        session.spin_up()
+        session.send(0)
+        Judge(session.frames).until_rest()
+
+
+@pytest.mark.parametrize("size", [1, 4, 27])
+def test_half_a_message_and_silence_end_the_program_in_the_end(lockstep_box, monkeypatch, size):
+    monkeypatch.setattr(pacing, "HANG_LIMIT", 0.1)  # s, instead of ten
+    with Messages(lockstep_box) as primary, VelocitySession(lockstep_box, read_timeout=0.2) as session:
+        session.spin_up()
+        session.reverse.sendall(struct.pack(">7i", 1, *(INT_MAX,) * 6)[:size])
+        assert Judge(session.frames).until_rest().safety_mode == SafetyMode.NORMAL
+        assert primary.message(TextMessage).text == "velocity_receiver: no message from the client"
+        assert session.reverse.recv(1) == b""
+        next_program_works(lockstep_box, session.frames)
+
+
+def test_half_a_message_and_a_closed_socket_end_the_program(lockstep_box):
+    with VelocitySession(lockstep_box) as session:
+        session.spin_up()
+        session.reverse.sendall(b"\0\0\0\1\x7f\xff")
+        session.reverse.close()
+        Judge(session.frames).until_rest()
+        next_program_works(lockstep_box, session.frames)
+
+
+def test_messages_that_slipped_by_a_byte_do_not_break_the_limits(lockstep_box):
+    with VelocitySession(lockstep_box) as session:
+        session.spin_up()
+        session.reverse.sendall(b"\x55" + struct.pack(">7i", 1, 400_000, 0, 0, 0, 0, 0) * 20)
+        session.reverse.close()
+        Judge(session.frames).until_rest()
+
+
+def test_a_flood_of_commands_at_once_does_not_break_the_limits(lockstep_box):
+    with VelocitySession(lockstep_box) as session:
+        judge = Judge(session.frames)
+        burst = b"".join(struct.pack(">7i", 1, sign * 2_000_000, 0, 0, 0, 0, 0) for sign in (1, -1) * 500)
+        session.reverse.sendall(burst + struct.pack(">7i", 0, 0, 0, 0, 0, 0, 0))
+        judge.until_rest()
+        next_program_works(lockstep_box, session.frames)
+
+
+def test_random_messages_never_break_the_limits(lockstep_box):
+    random = np.random.default_rng(3)
+    for _ in range(15):
+        with VelocitySession(lockstep_box) as session:
+            judge = Judge(session.frames)
+            frame = session.frames.next()
+            scale = 10.0 ** random.uniform(4, 9.3)
+            while frame.safety_mode == SafetyMode.NORMAL and len(session.frames.stamps) < 60:
+                session.send(1, random.uniform(-scale, scale, 6).astype(int).tolist())
+                frame = session.frames.new()
+                judge.check(frame)
+            session.reverse.close()
+            judge.until_rest()
+            send(lockstep_box, "secondary", "set unlock protective stop\n")
+            judge.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
+
+
+PROGRAMS = {
+    "speedj, huge a": "speedj([50,0,0,0,0,0], 1e9, 0.1)",
+    "speedj, absurd": "speedj([1e300,-1e300,0,0,0,0], 1e300, 0.1)",
+    "movej, no time": "movej([1,-1.5,-1.8,0,1.2,1.5], t=0.001)",
+    "movej, huge a and v": "movej([1,-1.5,-1.8,0,1.2,1.5], a=1e300, v=1e300)",
+    "movej, out of range": "movej([1e9,0,0,0,0,0], a=10, v=3)",
+}
+
+
+@pytest.mark.parametrize("call", PROGRAMS.values(), ids=PROGRAMS.keys())
+def test_no_call_brings_the_target_beyond_the_limits(lockstep_box, call):
+    with Messages(lockstep_box) as primary, Frames(lockstep_box) as frames:
+        judge = Judge(frames)
+        judge.check(frames.next())
+        send(lockstep_box, "secondary", f"def f():\n  {call}\nend\n")
+        judge.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
+        rest = judge.until_rest()
+        assert primary.message(ErrorCodeMessage).code == 204
+        assert rest.safety_mode == SafetyMode.PROTECTIVE_STOP
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ("speedj([1e999,0,0,0,0,0], 1, 0.1)", "must be finite"),
+        ("speedj([0.1,0,0,0,0,0], 1e999, 0.1)", "must be finite"),
+        ("movej([0,0,0,0,0,1e999])", "must be finite"),
+        ("movej(p[100,0,0,0,0,0])", "cannot reach"),
+        ("speedj([1,2], 1, 1)", "list of 6 numbers"),
+        ("set_tcp(p[1e300,0,0,1e200,0,0])", "set_tcp"),
+        ("set_payload(1e300)", "payload"),
+    ],
+)
+def test_numbers_that_make_no_sense_are_errors_with_a_line(lockstep_box, call, words):
+    with Messages(lockstep_box) as primary, Frames(lockstep_box) as frames:
+        judge = Judge(frames)
+        judge.check(frames.next())
+        send(lockstep_box, "secondary", f"def f():\n  x = 1\n  {call}\nend\n")
+        told = primary.message(RuntimeExceptionMessage)
+        assert told.line == 3
+        assert words in told.text
+        judge.until_rest()
+
+
+def test_a_move_that_replaces_a_motion_begins_at_rest(lockstep_box):
+    with VelocitySession(lockstep_box) as session:
+        session.spin_up()
+        before = session.frames.next()
+        send(lockstep_box, "secondary", "def m():\n  movej([0.3,-1.6,-1.8,0,1.2,1.5])\nend\n")
+        while not (before.runtime_state == ProgramState.STOPPED and not before.target_qd.any()):
+            frame = session.frames.new()
+            assert np.abs(frame.target_qd - before.target_qd).max() <= 20.0 * 0.008 * (1 + 1e-6)
+            before = frame
+        assert before.target_q == pytest.approx([0.3, -1.6, -1.8, 0, 1.2, 1.5])
+
+
+def test_in_a_protective_stop_nothing_moves_until_it_is_unlocked(lockstep_box):
+    with Frames(lockstep_box) as frames, connect(lockstep_box, "secondary") as scripts:
+        frames.next()
+        scripts.sendall(b"sec stop():\n  protective_stop()\nend\n")
+        frames.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
+        scripts.sendall(b"def m():\n  movej([1,-1.5,-1.8,0,1.2,1.5])\nend\n")
+        scripts.sendall(b"speedj([0.2,0,0,0,0,0], 1, 1)\n")
+        scripts.sendall(b"set unlock protective stop\n")
+        frames.until(lambda f: f.safety_mode == SafetyMode.NORMAL or f.target_qd.any())
+        assert not frames.next().target_qd.any()
+        next_program_works(lockstep_box, frames)
