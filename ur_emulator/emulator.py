@@ -89,7 +89,9 @@ class ControlBox:
         controller = Controller(
             model, fidelity_by_name(fidelity), seed, LoopNetwork(self._loop), mode=RobotMode.RUNNING
         )
-        self._box = ServedBox(controller, make_pacer(_parse_pace(pace), controller.period_s, speed))
+        self._box = ServedBox(
+            controller, make_pacer(_parse_pace(pace), controller.period_s, speed), self._loop.expect_soon
+        )
         self._intake = ProgramIntake(self._loop, software, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)
         states = StateEncoder(software)

@@ -5,6 +5,7 @@ No protocol here: bytes in, bytes out, and every failure is a DriverError that n
 
 from __future__ import annotations
 
+import select
 import socket
 import time
 from typing import Protocol
@@ -13,6 +14,16 @@ from pc_client.errors import DriverError
 
 RECEIVE_SIZE = 16384
 """Bytes taken at once: more than ten realtime frames, so one call shows all that is waiting."""
+
+
+EAGER_TIME = 300e-6
+"""How long to look again and again before sleeping [s]: twice a cycle of an emulated box in lockstep."""
+
+_LONGEST_PAUSE = 32
+"""Most waits in a row that are not tried eagerly: on a real arm that leaves one try in a quarter second."""
+
+SEND_TIMEOUT = 5.0
+"""A peer that takes nothing for this long [s] is gone."""
 
 
 class Transport(Protocol):
@@ -75,15 +86,21 @@ class Network(Protocol):
 
 
 class TcpTransport:
-    """A connected TCP socket without Nagle's delay."""
+    """A connected TCP socket without Nagle's delay.
 
-    __slots__ = ("_name", "_socket", "_timeout")
+    A robot that answers within a fraction of a millisecond, as an emulated one in lockstep does, is waited
+    for by looking again and again: going to sleep and being woken would take longer than the answer. Whether
+    that pays is found out by trying; see `EagerWait`.
+    """
+
+    __slots__ = ("_eager", "_name", "_socket")
 
     def __init__(self, connected: socket.socket, name: str) -> None:
+        connected.setblocking(False)
+        connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = connected
         self._name = name
-        self._timeout: float | None = -1.0
-        connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._eager = EagerWait()
 
     @property
     def local_address(self) -> str:
@@ -102,7 +119,11 @@ class TcpTransport:
             DriverError: the connection is gone, or the peer took nothing for the time-out.
         """
         try:
-            self._socket.sendall(data)
+            sent = self._socket.send(data)
+            while sent < len(data):
+                sent += self._send_later(data[sent:])
+        except BlockingIOError:
+            self.send(data[self._send_later(data) :])
         except OSError as error:
             raise DriverError(f"{self._name}: cannot send, {_reason(error)}") from error
 
@@ -112,12 +133,24 @@ class TcpTransport:
         Raises:
             DriverError: the connection broke.
         """
+        receive = self._socket.recv
         try:
-            if timeout != self._timeout:  # a system call that is not needed every cycle
-                self._socket.settimeout(timeout)
-                self._timeout = timeout
-            return self._socket.recv(RECEIVE_SIZE)
-        except (TimeoutError, BlockingIOError):
+            if timeout > 0.0 and self._eager.pays:
+                end = time.perf_counter() + EAGER_TIME
+                while True:
+                    try:
+                        data = receive(RECEIVE_SIZE)
+                    except BlockingIOError:
+                        if time.perf_counter() > end:
+                            self._eager.failed()
+                            break
+                    else:
+                        self._eager.succeeded()
+                        return data
+            if timeout > 0.0:
+                select.select((self._socket,), (), (), timeout)
+            return receive(RECEIVE_SIZE)
+        except BlockingIOError:
             return None
         except OSError as error:
             raise DriverError(f"{self._name}: {_reason(error)}") from error
@@ -125,6 +158,39 @@ class TcpTransport:
     def close(self) -> None:
         """Close; harmless when closed."""
         self._socket.close()
+
+    def _send_later(self, data: bytes) -> int:
+        """Wait until the peer takes something; returns how many bytes it took."""
+        if not select.select((), (self._socket,), (), SEND_TIMEOUT)[1]:
+            raise TimeoutError
+        return self._socket.send(data)
+
+
+class EagerWait:
+    """Finds out whether looking again and again pays: after each failure it is not tried for longer."""
+
+    __slots__ = ("_pause", "_skip")
+
+    def __init__(self) -> None:
+        self._pause = 1
+        self._skip = 0
+
+    @property
+    def pays(self) -> bool:
+        """Whether to try this time; each call counts as one wait."""
+        if self._skip:
+            self._skip -= 1
+            return False
+        return True
+
+    def succeeded(self) -> None:
+        """Something came in time."""
+        self._pause = 1
+
+    def failed(self) -> None:
+        """Nothing came in time."""
+        self._skip = self._pause
+        self._pause = min(2 * self._pause, _LONGEST_PAUSE)
 
 
 class TcpListener:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Protocol
 
 from ur_emulator.controller.commands import Command
@@ -37,7 +38,15 @@ class ServedBox:
         backlog: the connections that have not read all they were sent; they keep themselves up to date in it.
     """
 
-    def __init__(self, controller: Controller, pacer: Pacer) -> None:
+    def __init__(self, controller: Controller, pacer: Pacer, expect_soon: Callable[[], None]) -> None:
+        """Take over a controller.
+
+        Args:
+            controller: the box without its ports.
+            pacer: decides when it ticks.
+            expect_soon: told when a script waits for bytes that a client is about to send.
+        """
+        self._expect_soon = expect_soon
         self.controller = controller
         self._pacer = pacer
         self._repeats = not isinstance(pacer, RealtimePacer)
@@ -92,8 +101,10 @@ class ServedBox:
         if self._pacer.may_tick(now, self):
             commands, self._commands = self._commands, []
             self._publish(self.controller.tick(commands), now)
-            if self._repeats and self.is_active and not self.waits_outside:
-                return now  # the next cycle may follow at once, after the sockets have had their turn
+            if self._repeats and self.is_active:
+                if not self.waits_outside:
+                    return now  # the next cycle may follow at once, after the sockets have had their turn
+                self._expect_soon()
             return self._pacer.next_call(now)
         if self._repeats and now - self._last_frame >= HEARTBEAT:
             self._publish(self.controller.snapshot, now)
