@@ -7,7 +7,6 @@ Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from operator import attrgetter
 
 N_STANDARD = 8
 N_CONFIGURABLE = 8
@@ -21,19 +20,53 @@ ANALOG_RANGE = {CURRENT: (0.004, 0.020), VOLTAGE: (0.0, 10.0)}
 
 
 @dataclass(slots=True)
+class AnalogLines:
+    """All analogue lines of a box: standard inputs, standard outputs, tool inputs, two each.
+
+    They are kept as what is published every cycle: a write makes new tuples, a cycle without one nothing.
+
+    Attributes:
+        domains: CURRENT or VOLTAGE of each line.
+        values: of each line [A or V].
+    """
+
+    domains: tuple[int, ...] = (VOLTAGE, VOLTAGE, CURRENT, CURRENT, VOLTAGE, VOLTAGE)
+    values: tuple[float, ...] = (0.0, 0.0, 0.004, 0.004, 0.0, 0.0)
+
+
 class AnalogLine:
     """One analogue line: its domain and its value in A or V."""
 
-    domain: int = CURRENT
-    value: float = 0.004
+    __slots__ = ("_index", "_lines")
+
+    def __init__(self, lines: AnalogLines, index: int) -> None:
+        self._lines = lines
+        self._index = index
+
+    @property
+    def domain(self) -> int:
+        """CURRENT or VOLTAGE."""
+        return self._lines.domains[self._index]
+
+    @domain.setter
+    def domain(self, domain: int) -> None:
+        domains = self._lines.domains
+        self._lines.domains = (*domains[: self._index], domain, *domains[self._index + 1 :])
+
+    @property
+    def value(self) -> float:
+        """Present value [A or V]."""
+        return self._lines.values[self._index]
+
+    @value.setter
+    def value(self, value: float) -> None:
+        values = self._lines.values
+        self._lines.values = (*values[: self._index], value, *values[self._index + 1 :])
 
     def set_ratio(self, ratio: float) -> None:
         """Set the value to a ratio 0..1 of the range of the domain, clipped."""
         low, high = ANALOG_RANGE[self.domain]
         self.value = low + min(1.0, max(0.0, ratio)) * (high - low)
-
-
-_VALUE, _DOMAIN = attrgetter("value"), attrgetter("domain")
 
 
 @dataclass(slots=True)
@@ -43,34 +76,24 @@ class InputOutput:
     Attributes:
         digital_in: word of the digital inputs.
         digital_out: word of the digital outputs.
-        analog_in: standard analogue inputs.
-        analog_out: standard analogue outputs.
-        tool_analog_in: analogue inputs of the tool.
+        analog: all analogue lines; the three lists below are its parts.
         tool_voltage: supply of the tool: 0, 12 or 24 V.
         flags: of the scripts.
     """
 
     digital_in: int = 0
     digital_out: int = 0
-    analog_in: list[AnalogLine] = field(default_factory=lambda: [AnalogLine(VOLTAGE, 0.0) for _ in range(2)])
-    analog_out: list[AnalogLine] = field(default_factory=lambda: [AnalogLine() for _ in range(2)])
-    tool_analog_in: list[AnalogLine] = field(
-        default_factory=lambda: [AnalogLine(VOLTAGE, 0.0) for _ in range(2)]
-    )
+    analog: AnalogLines = field(default_factory=AnalogLines)
+    analog_in: list[AnalogLine] = field(init=False)
+    analog_out: list[AnalogLine] = field(init=False)
+    tool_analog_in: list[AnalogLine] = field(init=False)
     tool_voltage: int = 0
     flags: list[bool] = field(default_factory=lambda: [False] * 32)
-    _analog_lines: tuple[AnalogLine, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        self._analog_lines = (*self.analog_in, *self.analog_out, *self.tool_analog_in)
-
-    def analog_values(self) -> tuple[float, ...]:
-        """Return all analogue values [A or V]: standard inputs, standard outputs, tool inputs, two each."""
-        return tuple(map(_VALUE, self._analog_lines))
-
-    def analog_domains(self) -> tuple[int, ...]:
-        """Return the domains of the same lines: CURRENT or VOLTAGE."""
-        return tuple(map(_DOMAIN, self._analog_lines))
+        self.analog_in = [AnalogLine(self.analog, i) for i in (0, 1)]
+        self.analog_out = [AnalogLine(self.analog, i) for i in (2, 3)]
+        self.tool_analog_in = [AnalogLine(self.analog, i) for i in (4, 5)]
 
     def read_digital_in(self, bit: int) -> bool:
         """Return the state of input `bit` of the digital word."""
