@@ -11,8 +11,10 @@ from collections.abc import Iterable
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.client_inputs import write_inputs
+from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US, controller_time
 from ur_emulator.controller.events import ErrorReported, Event, ReportLevel, SafetyModeChanged, ScriptFailed
-from ur_emulator.controller.robot_mode import JOINT_MODE, POWERED, ModeCommand, RobotModeMachine
+from ur_emulator.controller.reporting import make_snapshot
+from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (
     PROTECTIVE_STOP_DECELERATION,
     UNLOCK_DELAY,
@@ -27,23 +29,16 @@ from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, ArmMotion
-from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant import Plant
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import CompiledProgram
 
-PERIOD_US = 8_000  # control cycle of a CB3: 125 Hz
-# A box that serves has booted a minute ago: clients distrust a controller clock below 40 s (public client
-# library).
-BOOT_TICK = 60 * 1_000_000 // PERIOD_US
 # After the last activity the arm gets this many cycles to come to rest before time may stand still (0.2 s).
 SETTLE_CYCLES = 25
 # A protective stop can be unlocked after a while; time must not stand still before that.
 UNLOCK_CYCLES = round(UNLOCK_DELAY * 1_000_000 / PERIOD_US)
-# Bus voltage and idle current of the box; modelled, chosen from captures of resting arms (48 V bus).
-BUS_VOLTAGE = 48.0
-IDLE_CURRENT = 0.25
 
 
 class Controller:
@@ -148,60 +143,7 @@ class Controller:
         state.steady_cycles = 0 if any(target.qd) else state.steady_cycles + 1
         self._settle = max(self._settle - 1, SETTLE_CYCLES if was_active else 0)
 
-        arm = state.arm
-        tcp = state.tcp_offset if any(state.tcp_offset) else None
-        target_pose, target_speed, _, _ = arm.state(target.q, target.qd, tcp)
-        pose, speed, elbow_position, elbow_velocity = arm.state(sensed.actual_q, sensed.actual_qd, tcp)
-        t = state.tick * PERIOD_US / 1e6
-        mode = state.mode.mode
-        powered = mode in POWERED
-        state.snapshot = Snapshot(
-            tick=state.tick,
-            timestamp=t,
-            target_q=target.q,
-            target_qd=target.qd,
-            target_qdd=target.qdd,
-            target_current=sensed.target_current,
-            target_moment=sensed.target_moment,
-            actual_q=sensed.actual_q,
-            actual_qd=sensed.actual_qd,
-            actual_current=sensed.actual_current,
-            joint_control_output=sensed.joint_control_output,
-            actual_tcp_pose=pose,
-            actual_tcp_speed=speed,
-            actual_tcp_force=_wrench_at_tcp(sensed.tcp_force, pose, arm, sensed.actual_q, tcp),
-            target_tcp_pose=target_pose,
-            target_tcp_speed=target_speed,
-            actual_digital_input_bits=state.io.digital_in,
-            joint_temperatures=sensed.joint_temperatures,
-            actual_execution_time=0.0,
-            robot_mode=int(mode),
-            joint_mode=(int(JOINT_MODE[mode]),) * 6,
-            safety_mode=int(state.safety.mode),
-            actual_tool_accelerometer=sensed.tool_accelerometer,
-            speed_scaling=state.speed_slider,
-            actual_momentum=arm.momentum(),
-            actual_main_voltage=BUS_VOLTAGE,
-            actual_robot_voltage=BUS_VOLTAGE if powered else 0.0,
-            actual_robot_current=IDLE_CURRENT + _bus_current(sensed.actual_current) if powered else 0.0,
-            actual_joint_voltage=sensed.joint_voltage if powered else ZERO6,
-            actual_digital_output_bits=state.io.digital_out,
-            runtime_state=int(self.programs.runtime_state),
-            elbow_position=elbow_position,
-            elbow_velocity=elbow_velocity,
-            safety_status=int(state.safety.mode),
-            payload=state.payload.mass,
-            payload_cog=state.payload.cog,
-            payload_inertia=ZERO6,
-            target_speed_fraction=state.speed_slider,
-            tcp_offset=state.tcp_offset,
-            program_name=self.programs.name,
-            analog_values=state.io.analog.values,
-            analog_domains=state.io.analog.domains,
-            tool_output_voltage=state.io.tool_voltage,
-            registers=state.registers.values(),
-            script_control_line=self.programs.line if state.wants_script_line else 0,
-        )
+        state.snapshot = make_snapshot(state, self.programs, target, sensed)
         state.q_history.appendleft(sensed.actual_q)
         return state.snapshot
 
@@ -263,7 +205,7 @@ class Controller:
 
     def _stop_for(self, violation: Violation, actual_q: Vector6) -> None:
         state = self.state
-        state.safety.protective_stop(state.tick * self.period_s)
+        state.safety.protective_stop(controller_time(state.tick))
         self._settle = UNLOCK_CYCLES
         state.events.append(violation.error)
         state.events.append(SafetyModeChanged(int(state.safety.mode)))
@@ -278,21 +220,4 @@ class Controller:
         self.state.motion.place(self.state.snapshot.actual_q)
 
 
-def _bus_current(currents: Iterable[float]) -> float:
-    """Return a plausible current on the 48 V bus for joint currents [A]: the drives chop, a tenth shows."""
-    return 0.1 * sum(map(abs, currents))
-
-
 _REQUESTED_STOP = Violation(ErrorReported(209, 0, ReportLevel.WARNING, "Protective stop requested"))
-
-
-def _wrench_at_tcp(
-    wrench: Vector6, tcp_pose: Vector6, arm: ArmModel, q: Vector6, tcp: Vector6 | None
-) -> Vector6:
-    """Move a wrench at the flange (base axes, N and Nm) to the TCP: the moment loses lever times force."""
-    if tcp is None:
-        return wrench
-    flange = arm.fk(q)
-    rx, ry, rz = (a - b for a, b in zip(tcp_pose[:3], flange[:3], strict=True))
-    fx, fy, fz, mx, my, mz = wrench
-    return (fx, fy, fz, mx - ry * fz + rz * fy, my - rz * fx + rx * fz, mz - rx * fy + ry * fx)

@@ -47,6 +47,8 @@ class ControllerState:
         snapshot: state at the end of the last cycle; what scripts see as "actual" during this one.
         events: what was said since the last cycle ended, in order.
         speed_slider: 0..1.
+        force_mode_damping: as scripts have set it, for a force mode to come; 0..1.
+        force_mode_gain_scaling: likewise, 0..2.
         stop_requested: a script or a client asked for a protective stop in this cycle.
         q_history: measured joint positions of the last cycles, the newest first.
         client_inputs: last values of RTDE inputs that are no registers, by name.
@@ -68,6 +70,8 @@ class ControllerState:
     gravity: Vector3 = (0.0, 0.0, 9.82)
     tcp_offset: Vector6 = ZERO6
     speed_slider: float = 1.0
+    force_mode_damping: float = 0.0
+    force_mode_gain_scaling: float = 1.0
     steady_cycles: int = 0
     tick: int = 0
     stop_requested: bool = False

@@ -8,7 +8,8 @@ from protocol.primary_messages import StartupMessage, version_message
 from protocol.primary_packages import encode_message_package, encode_safety_tolerances, encode_state
 from protocol.script_channel import ScriptChannel
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.controller.controller import PERIOD_US, Controller
+from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.models.calibration import calibrated_dh

@@ -18,7 +18,7 @@ from protocol.primary_layout import (
 )
 from protocol.primary_packages import encode_state
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
-from ur_emulator.controller.controller import PERIOD_US
+from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.models.robot_model import DhRow, RobotModel

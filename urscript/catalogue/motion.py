@@ -212,6 +212,8 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "None",
         "how fast force mode brakes when no force acts; 0 none",
         since=releases("3.5", "5.0", "10.0"),
+        support=APPROXIMATE,
+        note="the value is kept; force mode itself is only declared",
     ),
     _row(
         "force_mode_set_gain_scaling",
@@ -219,6 +221,8 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "None",
         "scale the gain of the force loop",
         since=releases("3.14", "5.0", "10.0"),
+        support=APPROXIMATE,
+        note="the value is kept; force mode itself is only declared",
         undocumented=(Generation.CB3,),
         source=f"Script Manual e-Series 5.11, module motion; CB3: {DRIVER_SCRIPT}",
     ),

@@ -1,0 +1,102 @@
+"""What a cycle has come to, as a snapshot: measured, derived and constant values side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ur_emulator.controller.cycle import controller_time
+from ur_emulator.controller.robot_mode import JOINT_MODE, POWERED
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.robot_model import Vector6
+from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.plant.plant_state import PlantState
+from ur_emulator.scripting.program_slot import ProgramSlot
+
+# Bus voltage and idle current of the box; modelled, chosen from captures of resting arms (48 V bus).
+BUS_VOLTAGE = 48.0
+IDLE_CURRENT = 0.25
+
+
+def make_snapshot(
+    state: ControllerState, programs: ProgramSlot, target: JointTarget, sensed: PlantState
+) -> Snapshot:
+    """Return everything that any port may publish of this cycle.
+
+    Args:
+        state: after commands, scripts, motion and safety.
+        programs: for what runs, and where.
+        target: set-point at the end of the cycle.
+        sensed: what the box reads from its arm.
+    """
+    arm = state.arm
+    tcp = state.tcp_offset if any(state.tcp_offset) else None
+    target_pose, target_speed, _, _ = arm.state(target.q, target.qd, tcp)
+    pose, speed, elbow_position, elbow_velocity = arm.state(sensed.actual_q, sensed.actual_qd, tcp)
+    mode = state.mode.mode
+    powered = mode in POWERED
+    return Snapshot(
+        tick=state.tick,
+        timestamp=controller_time(state.tick),
+        target_q=target.q,
+        target_qd=target.qd,
+        target_qdd=target.qdd,
+        target_current=sensed.target_current,
+        target_moment=sensed.target_moment,
+        actual_q=sensed.actual_q,
+        actual_qd=sensed.actual_qd,
+        actual_current=sensed.actual_current,
+        joint_control_output=sensed.joint_control_output,
+        actual_tcp_pose=pose,
+        actual_tcp_speed=speed,
+        actual_tcp_force=_wrench_at_tcp(sensed.tcp_force, pose, arm, sensed.actual_q, tcp),
+        target_tcp_pose=target_pose,
+        target_tcp_speed=target_speed,
+        actual_digital_input_bits=state.io.digital_in,
+        joint_temperatures=sensed.joint_temperatures,
+        actual_execution_time=0.0,
+        robot_mode=int(mode),
+        joint_mode=(int(JOINT_MODE[mode]),) * 6,
+        safety_mode=int(state.safety.mode),
+        actual_tool_accelerometer=sensed.tool_accelerometer,
+        speed_scaling=state.speed_slider,
+        actual_momentum=arm.momentum(),
+        actual_main_voltage=BUS_VOLTAGE,
+        actual_robot_voltage=BUS_VOLTAGE if powered else 0.0,
+        actual_robot_current=IDLE_CURRENT + _bus_current(sensed.actual_current) if powered else 0.0,
+        actual_joint_voltage=sensed.joint_voltage if powered else ZERO6,
+        actual_digital_output_bits=state.io.digital_out,
+        runtime_state=int(programs.runtime_state),
+        elbow_position=elbow_position,
+        elbow_velocity=elbow_velocity,
+        safety_status=int(state.safety.mode),
+        payload=state.payload.mass,
+        payload_cog=state.payload.cog,
+        payload_inertia=ZERO6,
+        target_speed_fraction=state.speed_slider,
+        tcp_offset=state.tcp_offset,
+        program_name=programs.name,
+        analog_values=state.io.analog.values,
+        analog_domains=state.io.analog.domains,
+        tool_output_voltage=state.io.tool_voltage,
+        registers=state.registers.values(),
+        script_control_line=programs.line if state.wants_script_line else 0,
+    )
+
+
+def _bus_current(currents: Iterable[float]) -> float:
+    """Return a plausible current on the 48 V bus for joint currents [A]: the drives chop, a tenth shows."""
+    return 0.1 * sum(map(abs, currents))
+
+
+def _wrench_at_tcp(
+    wrench: Vector6, tcp_pose: Vector6, arm: ArmModel, q: Vector6, tcp: Vector6 | None
+) -> Vector6:
+    """Move a wrench at the flange (base axes, N and Nm) to the TCP: the moment loses lever times force."""
+    if tcp is None:
+        return wrench
+    flange = arm.fk(q)
+    rx, ry, rz = (a - b for a, b in zip(tcp_pose[:3], flange[:3], strict=True))
+    fx, fy, fz, mx, my, mz = wrench
+    return (fx, fy, fz, mx - ry * fz + rz * fy, my - rz * fx + rx * fz, mz - rx * fy + ry * fx)
