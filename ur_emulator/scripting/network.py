@@ -8,7 +8,10 @@ from typing import Protocol
 class ScriptSocket(Protocol):
     """One TCP connection opened by a script. All calls return at once."""
 
-    inbox: bytearray  # bytes that have come and were not read yet
+    @property
+    def inbox(self) -> bytearray:
+        """Bytes that have come and were not read yet; the reader takes them out of it."""
+        ...
 
     @property
     def is_connecting(self) -> bool:

@@ -67,14 +67,16 @@ class ProgramSockets:
         old = self._sockets.pop(name, None)
         if old is not None:
             old.close()
-        socket = self._network.open(address, port)
+        # Known from the first moment: a program that is killed meanwhile closes it.
+        socket = self._sockets[name] = self._network.open(address, port)
         expired = self._timer(OPEN_TIMEOUT)
         if socket.is_connecting:
             yield Blocked(lambda: not socket.is_connecting or expired(), outside=True)
         if not socket.is_open or socket.is_connecting:
             socket.close()
+            if self._sockets.get(name) is socket:
+                del self._sockets[name]
             return False
-        self._sockets[name] = socket
         return True
 
     def _close(self, thread: object, name: str) -> None:

@@ -12,6 +12,9 @@ from ur_emulator.realtime.event_loop import EventLoop
 _READ_SIZE = 64 * 1024
 # Bytes a script may have in flight to a peer that does not read; further sends fail.
 _SEND_LIMIT = 256 * 1024
+# Bytes that may wait for a script that does not read; beyond, the peer is held back. Above the longest text
+# that a read waits for (socket_functions.MAX_INBOX).
+_INBOX_LIMIT = 2 << 20
 _IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOULDBLOCK", errno.EINPROGRESS)}
 
 
@@ -21,7 +24,8 @@ class LoopSocket:
     def __init__(self, loop: EventLoop, host: str, port: int) -> None:
         """Begin to connect; a name is looked up in a thread of its own, the loop never waits for it."""
         self._loop = loop
-        self.inbox = bytearray()
+        self._inbox = bytearray()
+        self._held_back = False
         self.is_open = False
         self.is_connecting = True
         self._outbox = bytearray()
@@ -32,6 +36,14 @@ class LoopSocket:
             threading.Thread(
                 target=self._look_up, args=(host, port), name="script-lookup", daemon=True
             ).start()
+
+    @property
+    def inbox(self) -> bytearray:
+        """Bytes that have come and were not read yet; asking lets a peer that was held back go on."""
+        if self._held_back and self._sock is not None:
+            self._held_back = False
+            self._watch()
+        return self._inbox
 
     def send(self, data: bytes) -> bool:
         """Send now what the kernel takes, queue the rest."""
@@ -49,7 +61,7 @@ class LoopSocket:
                 return False
         if sent < len(data):
             self._outbox += data[sent:]
-            self._loop.watch(sock, selectors.EVENT_READ | selectors.EVENT_WRITE, self._on_ready)
+            self._watch()
         return True
 
     def close(self) -> None:
@@ -74,13 +86,13 @@ class LoopSocket:
     def _connect(self, address: str, port: int) -> None:
         if not self.is_connecting:
             return  # closed while the name was looked up
-        self._sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        self._sock.setblocking(False)
         try:
+            self._sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+            self._sock.setblocking(False)
             code = self._sock.connect_ex((address, port))
-        except (OSError, OverflowError):
+        except (OSError, OverflowError):  # descriptors are out, or that is no address
             code = errno.EINVAL
-        if code in _IN_PROGRESS:
+        if self._sock is not None and code in _IN_PROGRESS:
             self._loop.watch(self._sock, selectors.EVENT_WRITE, self._on_connected)
         else:
             self.close()
@@ -93,9 +105,20 @@ class LoopSocket:
         self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.is_connecting = False
         self.is_open = True
-        self._loop.watch(self._sock, selectors.EVENT_READ, self._on_ready)
+        self._watch()
 
     # --- bytes
+
+    def _watch(self) -> None:
+        """Tell the loop what this socket waits for at present."""
+        assert self._sock is not None
+        events = 0 if self._held_back else selectors.EVENT_READ
+        if self._outbox:
+            events |= selectors.EVENT_WRITE
+        if events:
+            self._loop.watch(self._sock, events, self._on_ready)
+        else:
+            self._loop.unwatch(self._sock)
 
     def _on_ready(self, events: int) -> None:
         if events & selectors.EVENT_WRITE:
@@ -108,7 +131,10 @@ class LoopSocket:
             except OSError:
                 data = b""
             if data:
-                self.inbox += data
+                self._inbox += data
+                if len(self._inbox) > _INBOX_LIMIT:
+                    self._held_back = True
+                    self._watch()
             else:
                 self.close()
 
@@ -123,7 +149,7 @@ class LoopSocket:
             return
         del self._outbox[:sent]
         if not self._outbox:
-            self._loop.watch(self._sock, selectors.EVENT_READ, self._on_ready)
+            self._watch()
 
 
 def _is_numeric(host: str) -> bool:
