@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 
 from protocol.frame_buffer import FrameBuffer
+from protocol.primary_messages import KeyMessage
 from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, decode_package
 from protocol.realtime_layout import layout_for_version
 from protocol.ur_types import Ports, ProgramState, SoftwareVersion
@@ -28,6 +29,7 @@ PERIOD = 0.008  # s
 REPEATS = 1000  # frames with one stamp: eight seconds in which nothing happened
 QD_MAX = 3.1415927  # rad/s; the slowest joints of a UR3
 SPIN = "def spin():\n  while True:\n    speedj([0.3,0,0,0,0,0], 2.0, get_steptime())\n  end\nend\n"
+STARTED = "PROGRAM_XXX_STARTED"
 HELLO_PROGRAM = 'def hello():\n  textmsg("hello")\nend\n'
 
 
@@ -146,6 +148,13 @@ def send(box, port, data):
         sock.sendall(data.encode("latin-1") if isinstance(data, str) else data)
 
 
+def programs_since(primary, box):
+    """Names of the programs that the box has started since `primary` connected; a program of our own marks the end."""
+    send(box, "secondary", "def marker():\n  sync()\nend\n")
+    primary.message(KeyMessage, title=STARTED, text="marker")
+    return [m.text for m in primary.all if isinstance(m, KeyMessage) and m.title == STARTED][:-1]
+
+
 class VelocitySession:
     """The PC's side of the velocity receiver, without the client's checks: may send anything."""
 
@@ -235,6 +244,21 @@ def command(package, *arguments, text=None, **options):
 def client_on(box, *arguments, **options):
     """Run a `ur-client` command on a box of this process."""
     return command("pc_client", *arguments, "--robot", box.host, "--port-base", port_base_of(box), **options)
+
+
+@contextmanager
+def run_in_movement(box, frames, out):
+    """A `ur-client run` on a box of this process; the block begins when the arm is well inside the movement."""
+    options = ("--robot", box.host, "--port-base", port_base_of(box), "--out", out)
+    client = start("pc_client", "run", "lognorm_4_1", *options)
+    try:
+        frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(out.glob("*.mcap")))
+        assert client.poll() is None
+        yield client
+    finally:
+        if not client.stdout.closed:
+            client.kill()
+            finish(client)
 
 
 def port_base_of(box):

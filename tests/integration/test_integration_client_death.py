@@ -11,9 +11,8 @@ from integration_support import (
     VelocitySession,
     client_on,
     finish,
-    port_base_of,
+    run_in_movement,
     send,
-    start,
 )
 
 from protocol.primary_messages import KeyMessage, TextMessage
@@ -116,18 +115,6 @@ def test_an_interrupted_client_stops_the_arm_and_says_so_in_one_line(standard_bo
 
 def cut_off(box, frames, out, signal_number):
     """Start a run, signal the client well inside the movement, return how it ended."""
-    client = start(
-        "pc_client", "run", "lognorm_4_1", "--robot", box.host, "--port-base", port_base_of(box), "--out", out
-    )
-    try:
-        # Faster than any approach or excitation.
-        frames.until(
-            lambda f: (
-                f.runtime_state == ProgramState.PLAYING and (f.actual_tcp_speed[:3] ** 2).sum() > 0.15**2
-            )
-        )
-        assert client.poll() is None
-    finally:
+    with run_in_movement(box, frames, out) as client:
         client.send_signal(signal_number)
-        ended = finish(client)
-    return ended
+        return finish(client)

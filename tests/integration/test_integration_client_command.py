@@ -1,0 +1,261 @@
+"""`ur-client` against what may go wrong: one line on stderr, exit code 1, the arm at rest, no traceback."""
+
+import re
+import socket
+import threading
+from contextlib import ExitStack, contextmanager
+
+import pytest
+from integration_support import (
+    Frames,
+    Messages,
+    client_on,
+    command,
+    finish,
+    free_port_base,
+    programs_since,
+    run_in_movement,
+    send,
+)
+
+from pc_client import cli
+from pc_client.driver import dashboard_query, package_stream, realtime_client
+from protocol.ur_types import Ports, ProgramState, SafetyMode
+
+FAR = "t,x,y,z\n" + "".join(f"{0.2 * i:.1f},{0.3 + 0.05 * i:.2f},0.1,0.3\n" for i in range(20))
+MOVEMENT_FILES = {
+    "far.csv": (FAR, ""),
+    "empty.toml": ("", "empty.toml"),
+    "empty.csv": ("", "empty.csv"),
+    "no.toml": ("this is no TOML [", "no.toml"),
+    "other.toml": ("[tool]\nname = 3\n", "other.toml"),
+    "nan.csv": (FAR.replace("0.30,", "nan,"), "nan"),
+    "words.csv": (FAR.replace("0.1,", "left,"), "left"),
+    "backwards.csv": (FAR.replace("0.4,0.40", "0.1,0.40"), "line"),
+    "binary.toml": ("\udcff\udcfe", "UTF-8"),
+}
+
+
+@pytest.mark.parametrize("name", MOVEMENT_FILES)
+def test_a_movement_file_that_cannot_be_done_is_refused_before_anything_is_asked_of_a_robot(tmp_path, name):
+    text, words = MOVEMENT_FILES[name]
+    (tmp_path / name).write_bytes(text.encode("utf-8", "surrogateescape"))
+    done = command(
+        "pc_client", "run", tmp_path / name, "--robot", "robot.invalid", "--yes", "--out", tmp_path / "out"
+    )
+    assert done.code == 1
+    complaint = done.complaint()
+    assert words in complaint
+    assert "robot.invalid" not in complaint
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["lognorm_9_9", "nowhere.toml", ".", ""])
+def test_a_movement_that_does_not_exist_is_one_line(tmp_path, name):
+    done = command("pc_client", "run", name, "--robot", "127.0.0.1", "--out", tmp_path / "out", cwd=tmp_path)
+    assert done.code == 1
+    assert done.complaint()
+
+
+@pytest.mark.parametrize(
+    ("host", "words"),
+    [
+        ("127.0.0.1", "refuses the connection"),
+        ("robot.invalid", "cannot be looked up"),
+        ("256.1.1.1", "cannot be looked up"),
+        ("127.0.0.1:30003", "cannot be looked up"),
+        pytest.param(
+            "a..b",
+            "a..b",
+            marks=pytest.mark.xfail(strict=True, reason="UnicodeError of the name codec: traceback"),
+        ),
+        pytest.param(
+            "x" * 300,
+            "xxx",
+            marks=pytest.mark.xfail(strict=True, reason="UnicodeError of the name codec: traceback"),
+        ),
+    ],
+)
+def test_a_wrong_address_is_one_line(tmp_path, host, words):
+    options = ("--robot", host, "--yes", "--port-base", free_port_base())
+    done = command("pc_client", "run", "uniform_4_1", *options, "--out", tmp_path / "out")
+    assert done.code == 1
+    assert words in done.complaint()
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run",),
+        ("run", "uniform_4_1", "--robot", "127.0.0.1"),
+        ("run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o", "--repeat", "0"),
+        ("run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o", "--port-base", "60000"),
+        ("fly",),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_2(arguments, tmp_path):
+    done = command("pc_client", *arguments, cwd=tmp_path)
+    assert done.code == 2
+    assert done.complaint()
+
+
+# --- ports that are no robot's; time-outs are shortened, so these run in this process
+
+
+@pytest.fixture
+def hasty(monkeypatch):
+    monkeypatch.setattr(package_stream, "VERSION_TIMEOUT", 0.3)
+    monkeypatch.setattr(realtime_client, "FRAME_TIMEOUT", 0.3)
+    monkeypatch.setattr(realtime_client.RealtimeClient.receive, "__defaults__", (0.3,))
+    monkeypatch.setattr(dashboard_query, "REPLY_TIMEOUT", 0.3)
+
+
+@contextmanager
+def pretender(**answers):
+    """Ports of a robot that say what they are told to, whatever they are asked, and then nothing."""
+    base = free_port_base()
+    ports = Ports.standard(base)
+    with ExitStack() as stack:
+        for name in ("dashboard", "primary", "secondary", "realtime"):
+            server = stack.enter_context(socket.create_server(("127.0.0.1", getattr(ports, name))))
+            thread = threading.Thread(target=_answer, args=(server, answers.get(name, b"")))
+            thread.start()
+            stack.callback(thread.join)
+            stack.callback(server.shutdown, socket.SHUT_RDWR)
+        yield base
+
+
+def _answer(server, data):
+    with ExitStack() as callers:
+        while True:
+            try:
+                caller, _ = server.accept()
+            except OSError:
+                return
+            callers.enter_context(caller)
+            try:
+                caller.sendall(data)
+                if data.endswith(b"bye"):
+                    caller.close()
+            except OSError:
+                pass
+
+
+@pytest.mark.usefixtures("hasty")
+@pytest.mark.parametrize("command_name", ["run", "doctor"])
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        ({}, "says nothing about its version"),
+        ({"primary": b"HTTP/1.1 400 Bad Request\r\n\r\n"}, "does not speak its protocol"),
+        ({"primary": b"\x00\x00\x00\x05\x14"}, "does not speak its protocol"),
+        ({"primary": b"\xff" * 5000}, "does not speak its protocol"),
+        ({"primary": b"\x00\x00\x00\x00bye"}, "primary"),
+        ({"primary": b"bye"}, "primary"),
+    ],
+)
+def test_a_port_that_is_no_robots_is_one_line(answers, words, command_name, tmp_path, capsys):
+    out = ["--out", str(tmp_path / "out")] if command_name == "run" else ["--seconds", "0.1"]
+    movement = ["uniform_4_1"] if command_name == "run" else []
+    with pretender(**answers) as base:
+        code = cli.run([command_name, *movement, "--robot", "127.0.0.1", "--port-base", str(base), *out])
+    assert code == 1
+    told = capsys.readouterr()
+    said = told.err if command_name == "run" else told.out
+    assert words in said
+    assert "Traceback" not in told.err + told.out
+    if command_name == "run":
+        assert told.err.count("\n") == 1
+
+
+@pytest.mark.usefixtures("hasty")
+@pytest.mark.parametrize("realtime", [b"", b"\x00\x00\x04\x74" + bytes(500), b"garbage!" * 400, b"bye"])
+def test_a_realtime_port_that_gives_no_frames_is_one_line(lockstep_box, realtime, tmp_path, capsys):
+    with Messages(lockstep_box) as primary:
+        greeting = _first_package(primary.sock)
+    with pretender(primary=greeting, secondary=greeting, realtime=realtime) as base:
+        code = cli.run(
+            [
+                "run",
+                "uniform_4_1",
+                "--robot",
+                "127.0.0.1",
+                "--port-base",
+                str(base),
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+    assert code == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "realtime" in error
+
+
+def _first_package(sock):
+    data = sock.recv(4096)
+    return data[: int.from_bytes(data[:4], "big")]
+
+
+# --- what goes wrong in the middle of a run
+
+
+# Whether the client first sees that its socket is closed or that its program has gone is a matter of timing.
+REPLACED = r"program|closed the connection"
+
+
+@pytest.mark.parametrize(
+    ("meddling", "words"),
+    [
+        ("sec p():\n  protective_stop()\nend\n", "PROTECTIVE_STOP"),
+        ("stop program\n", "program"),
+        ("def other():\n  sleep(0.1)\nend\n", REPLACED),
+        ("def bad():\n  x = 1 / 0\nend\n", REPLACED),
+        ("power off\n", "motion needs RUNNING"),
+    ],
+    ids=["protective stop", "stop", "other program", "program error", "power off"],
+)
+def test_what_stops_the_robot_in_a_run_is_one_line_and_the_arm_rests(standard_box, tmp_path, meddling, words):
+    with Frames(standard_box) as frames, run_in_movement(standard_box, frames, tmp_path) as client:
+        send(standard_box, "secondary", meddling)
+        frames.until(lambda f: not f.target_qd.any() and f.runtime_state == ProgramState.STOPPED)
+        reader = threading.Thread(target=frames.until, args=(lambda _: client.poll() is not None, frames.raw))
+        reader.start()
+        done = finish(client)
+        reader.join()
+    assert done.code == 1
+    assert re.search(words, done.complaint())
+    assert list(tmp_path.glob("*.mcap")), "what was recorded stays"
+    assert not list(tmp_path.glob("table1.*"))
+
+
+def test_a_robot_in_a_protective_stop_is_refused_before_anything_moves(standard_box, tmp_path):
+    with Messages(standard_box) as primary, Frames(standard_box) as frames:
+        send(standard_box, "secondary", "sec p():\n  protective_stop()\nend\n")
+        frames.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
+        done = client_on(standard_box, "run", "uniform_4_1", "--out", tmp_path / "out")
+        assert done.code == 1
+        assert "PROTECTIVE_STOP" in done.complaint()
+        send(standard_box, "secondary", "set unlock protective stop\n")
+        frames.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
+        assert programs_since(primary, standard_box) == []
+
+
+def test_a_robot_that_runs_a_program_is_refused(standard_box, tmp_path):
+    with Frames(standard_box) as frames:
+        send(
+            standard_box,
+            "secondary",
+            'def busy():\n  socket_open("127.0.0.1", 9)\n  while True:\n    sync()\n  end\nend\n',
+        )
+        frames.until(lambda f: f.runtime_state == ProgramState.PLAYING)
+        reader = threading.Thread(
+            target=frames.until, args=(lambda f: f.runtime_state == ProgramState.STOPPED,)
+        )
+        reader.start()
+        done = client_on(standard_box, "run", "uniform_4_1", "--out", tmp_path / "out")
+        send(standard_box, "secondary", "stop program\n")
+        reader.join()
+    assert done.code == 1
+    assert "a program is PLAYING on the robot" in done.complaint()
