@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import socket
+import subprocess
+import sys
 import time
 
 import numpy as np
 from rich.progress import track
 
+from bench import bare_timer
 from bench.box_process import box_process
 from protocol.frame_buffer import FrameBuffer
 from protocol.realtime_layout import MAX_FRAME_SIZE, layout_for_size
@@ -18,6 +21,9 @@ PERIOD = 0.008  # s
 def measure_realtime(minutes: float) -> dict[str, float]:
     """Attach one client for so many minutes; compare arrivals with the grid on which the earliest lie."""
     with box_process("--seed", "7") as box:
+        timer = subprocess.Popen(
+            [sys.executable, bare_timer.__file__, str(minutes * 60.0)], stdout=subprocess.PIPE, text=True
+        )
         stamps, arrivals = [], []
         n_frames = round(minutes * 60.0 / PERIOD)
         with socket.create_connection(("127.0.0.1", box.ports.realtime), timeout=5.0) as sock:
@@ -32,6 +38,7 @@ def measure_realtime(minutes: float) -> dict[str, float]:
             cpu = box.process.cpu_percent()
             rss = box.process.memory_info().rss
         startup = box.startup_s
+        timer_p999, timer_max = map(float, timer.communicate()[0].split())
     ticks = np.round(np.array(stamps) / PERIOD).astype(int)
     phase = np.array(arrivals) - ticks * PERIOD
     lateness_us = 1e6 * (phase - phase.min())
@@ -42,6 +49,8 @@ def measure_realtime(minutes: float) -> dict[str, float]:
         "stream_late_p99_us": float(np.percentile(lateness_us, 99.0)),
         "stream_late_p999_us": float(np.percentile(lateness_us, 99.9)),
         "stream_late_max_us": float(lateness_us.max()),
+        "bare_timer_late_p999_us": timer_p999,
+        "bare_timer_late_max_us": timer_max,
         "cpu_percent": cpu,
         "rss_mb": rss / 2**20,
         "startup_s": startup,

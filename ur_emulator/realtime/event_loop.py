@@ -20,12 +20,17 @@ from typing import Protocol
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
 # microseconds.
 _COARSE = 0.050
+# A sleeping process wakes up about this much late [s]; so long before a deadline it stays awake.
+_WAKE_UP = 250e-6
 # How long to look again and again for what is expected soon [s]: a client in lockstep takes half of it.
 _EAGER_TIME = 200e-6
 # Most waits in a row that are not tried eagerly after failures.
 _LONGEST_PAUSE = 32
 # Collect garbage rarely: a full collection over a large heap costs more than a cycle has to spare.
 _GC_THRESHOLD = (50_000, 20, 100)
+
+
+_Ready = tuple[selectors.SelectorKey, int]
 
 
 class Service(Protocol):
@@ -133,15 +138,24 @@ class EventLoop:
         ready = self._look_eagerly(timeout) if self._expects_soon else []
         if not ready:
             if self._descriptor is not None and 0.0 < timeout < _COARSE:
-                select.select([self._descriptor], [], [], timeout)
-                timeout = 0.0
-            ready = self._selector.select(timeout)
+                ready = self._wait_precisely(self._descriptor, deadline)
+            else:
+                ready = self._selector.select(timeout)
         for key, events in ready:
             key.data(events)
         while self._calls:
             self._calls.popleft()()
 
-    def _look_eagerly(self, timeout: float) -> list[tuple[selectors.SelectorKey, int]]:
+    def _wait_precisely(self, descriptor: int, deadline: float) -> list[_Ready]:
+        """Wait for a deadline to some microseconds: sleep for most of it, watch the clock for the rest."""
+        sleep = deadline - time.monotonic() - _WAKE_UP
+        if sleep > 0.0:
+            select.select([descriptor], [], [], sleep)
+        while not (ready := self._selector.select(0.0)) and time.monotonic() < deadline:
+            pass
+        return ready
+
+    def _look_eagerly(self, timeout: float) -> list[_Ready]:
         """Look again and again for a ready socket, for a fraction of a millisecond, as long as that pays."""
         self._expects_soon = False
         if self._skip:
