@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from protocol.primary_messages import ReportLevel
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.client_inputs import write_inputs
 from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US, controller_time
-from ur_emulator.controller.events import ErrorReported, Event, ReportLevel, SafetyModeChanged, ScriptFailed
+from ur_emulator.controller.events import ErrorReported, Event, SafetyModeChanged, ScriptFailed
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (

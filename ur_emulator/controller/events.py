@@ -3,17 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
-
-class ReportLevel(IntEnum):
-    """Severity of an error code. Source: UR primary/secondary client interface, robot message "RobotComm"."""
-
-    DEBUG = 0
-    INFO = 1
-    WARNING = 2
-    VIOLATION = 3
-    FAULT = 4
+from protocol.primary_messages import ReportLevel
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +47,7 @@ class ScriptFailed:
 
 @dataclass(frozen=True, slots=True)
 class ErrorReported:
-    """The controller reports code C<code>A<argument>."""
+    """The controller reports code C<code>A<argument>; `level` is a protocol.primary_messages.ReportLevel."""
 
     code: int
     argument: int

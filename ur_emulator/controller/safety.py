@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from protocol.primary_messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
-from ur_emulator.controller.events import ErrorReported, ReportLevel
+from ur_emulator.controller.events import ErrorReported
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.target import JointTarget
 

@@ -11,10 +11,11 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 
+from protocol.primary_messages import ReportLevel
 from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptItem
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller import commands as cmd
-from ur_emulator.controller.events import ErrorReported, Event, ReportLevel, ScriptFailed
+from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
 from ur_emulator.realtime.event_loop import EventLoop
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
