@@ -11,6 +11,7 @@ from pc_client.kinematics.robot_model import RobotModel, robot_model
 from pc_client.movements.files import load_movement, movement_text
 from pc_client.movements.movement import Movement
 from pc_client.planning.plan import JointPlan, plan_movement
+from pc_client.recording.loader import load_recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +93,10 @@ def prepare_experiment(
 def clear_folder(experiment: Experiment) -> None:
     """Make the folder ready: create it, take away recordings that this experiment records again.
 
+    Only simulated ones are taken away: they can be made again by the seed, those of a real arm cannot.
+
     Raises:
-        RecordingError: the folder cannot be written, or holds recordings of another experiment.
+        RecordingError: the folder cannot be written, or holds recordings of another experiment or a real arm.
     """
     ours = {
         experiment.recording_path(planned, k + 1)
@@ -108,10 +111,22 @@ def clear_folder(experiment: Experiment) -> None:
                 f"{experiment.out} holds recordings of another experiment ({foreign[0].name}); "
                 "give another folder, or delete them"
             )
+        if real := sorted(path for path in old if _is_of_a_real_arm(path)):
+            raise RecordingError(
+                f"{experiment.out} holds recordings of a real arm ({real[0].name}); "
+                "they are not overwritten, give another folder"
+            )
         for path in old:
             path.unlink()
     except OSError as error:
         raise RecordingError(f"cannot use the folder {experiment.out}: {error.strerror or error}") from error
+
+
+def _is_of_a_real_arm(path: Path) -> bool:
+    try:
+        return not load_recording(path).provenance.simulated
+    except RecordingError:  # cut off before it said anything: nothing is lost with it
+        return False
 
 
 def _text_of(movement: Movement) -> str:

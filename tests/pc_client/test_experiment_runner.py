@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from fake_robot import PERIOD, FakeRobot
+from recording_samples import SIGNALS, provenance
 
 from pc_client.control.controller_config import CONTROLLERS
 from pc_client.driver.ur_driver import UrDriver
@@ -13,6 +14,7 @@ from pc_client.experiment.prepare import clear_folder, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import load_recording
+from pc_client.recording.recorder import Recorder
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
 
@@ -184,6 +186,16 @@ def test_folder_of_another_experiment_is_left_alone(two, tmp_path):
         clear_folder(experiment)
     assert ours.exists()
     assert foreign.exists()
+
+
+def test_recordings_of_a_real_arm_are_never_overwritten(two, tmp_path):
+    experiment = with_folder(two, tmp_path)
+    real = tmp_path / "uniform_4_1_r2.mcap"
+    with Recorder(real, provenance(simulated=False, serial="2017355123", seed=None), SIGNALS):
+        pass
+    with pytest.raises(RecordingError, match="real arm"):
+        clear_folder(experiment)
+    assert real.exists()
 
 
 def test_folder_that_cannot_be_made(two, tmp_path):
