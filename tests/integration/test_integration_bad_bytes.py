@@ -1,6 +1,7 @@
 """Garbage on the script ports: the box lives, every other client gets every frame, errors are told on 30001."""
 
 import random
+from contextlib import suppress
 
 import pytest
 from integration_support import HELLO_PROGRAM, Frames, Messages, connect, send
@@ -8,6 +9,19 @@ from integration_support import HELLO_PROGRAM, Frames, Messages, connect, send
 from protocol.primary_messages import ErrorCodeMessage, KeyMessage, RuntimeExceptionMessage, TextMessage
 from protocol.ur_types import ProgramState
 
+RTDE_GARBAGE = {
+    "no size": b"\x00\x00V",
+    "size below the header": b"\x00\x02V",
+    "size beyond sense": b"\xff\xffV" + bytes(70_000),
+    "unknown type": b"\x00\x04\x00\x00" * 100,
+    "short version": b"\x00\x03V",
+    "odd version": b"\x00\x05V\xff\xff",
+    "outputs of nothing": b"\x00\x05V\x00\x02\x00\x0bO" + bytes(8),
+    "outputs at no rate": b"\x00\x05V\x00\x02\x00\x14O" + b"\x7f\xf8" + bytes(6) + b"timestamp",
+    "unknown output": b"\x00\x05V\x00\x02\x00\x0fO" + bytes(8) + b"nope",
+    "start of nothing": b"\x00\x05V\x00\x02\x00\x03S",
+    "inputs never set up": b"\x00\x05V\x00\x02\x00\x10U" + bytes(13),
+}
 SCRIPT_PORTS = ["primary", "secondary", "realtime"]
 READ_ONLY_PORTS = ["primary_ro", "secondary_ro", "realtime_ro"]
 BINARY = random.Random(1).randbytes(20_000)
@@ -177,3 +191,20 @@ def test_garbage_on_the_dashboard_harms_nobody(lockstep_box, data):
         sock.sendall(b"robotmode\n")
         assert lines.readline() == b"Connected: Universal Robots Dashboard Server\n"
         assert lines.readline() == b"Robotmode: RUNNING\n"
+
+
+@pytest.mark.parametrize("data", [*GARBAGE.values(), *RTDE_GARBAGE.values()], ids=[*GARBAGE, *RTDE_GARBAGE])
+def test_garbage_on_the_rtde_port_harms_nobody(lockstep_box, data):
+    with (
+        Messages(lockstep_box) as primary,
+        Frames(lockstep_box) as frames,
+        connect(lockstep_box, "rtde") as rtde,
+    ):
+        frames.next()
+        send(lockstep_box, "rtde", data)
+        with suppress(OSError):  # it may be cut off in the middle
+            rtde.sendall(data)
+        hello_still_runs(lockstep_box, primary, frames)
+    with connect(lockstep_box, "rtde") as rtde:
+        rtde.sendall(b"\x00\x05V\x00\x02")
+        assert rtde.recv(64) == b"\x00\x04V\x01"

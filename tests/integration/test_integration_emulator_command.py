@@ -3,6 +3,8 @@
 import dataclasses
 import signal
 import socket
+import subprocess
+import sys
 from contextlib import suppress
 
 import pytest
@@ -19,11 +21,21 @@ from integration_support import (
 )
 
 from protocol.ur_types import Ports
+from ur_emulator import ControlBox
+from ur_emulator.errors import EmulatorError
 
 
 def serve(*arguments):
     """Run the command with a mistake in it; --port-base comes first, so that another one wins."""
     return command("ur_emulator", "serve", "--port-base", free_port_base(), *arguments)
+
+
+def check_complaint(done, words):
+    assert done.code == 1
+    complaint = done.complaint()
+    assert complaint.startswith("ur-emulator: ")
+    assert words in complaint
+    assert done.out == ""
 
 
 @pytest.mark.parametrize(
@@ -32,46 +44,68 @@ def serve(*arguments):
         ("--robot", "ur9"),
         ("--version", "5.11.0"),
         ("--version", "latest"),
-        ("--fidelity", "perfect"),
         ("--pace", "warp"),
         ("--speed", "0"),
         ("--speed", "nan"),
-        pytest.param(
-            "--speed", "inf", marks=pytest.mark.xfail(strict=True, reason="ends in a ZeroDivisionError")
-        ),
         ("--seed", "-1"),
         ("--port-base", "60000"),
         ("--host", "192.0.2.1"),
         ("--host", "robot.invalid"),
-        ("--ready-file", "/nowhere/ready.json"),
     ],
 )
-def test_a_mistake_is_one_line_and_exit_1(option, value):
-    done = serve(option, value)
-    assert done.code == 1
-    complaint = done.complaint()
-    assert complaint.startswith("ur-emulator: ")
-    assert value.removeprefix("-") in complaint
-    assert done.out == ""
+def test_a_mistake_is_one_line_and_exit_1(ur_emulator_command, option, value):
+    done = ur_emulator_command("serve", "--port-base", free_port_base(), option, value)
+    check_complaint(done, value.removeprefix("-"))
+
+
+def test_the_process_leaves_with_that_code_and_line():
+    check_complaint(serve("--fidelity", "perfect"), "perfect")
+
+
+def test_a_ready_file_that_cannot_be_written_is_one_line_and_exit_1():
+    check_complaint(serve("--ready-file", "/nowhere/ready.json"), "/nowhere/ready.json")
+
+
+@pytest.mark.xfail(strict=True, reason="ends in a ZeroDivisionError")
+def test_a_speed_that_is_no_number_is_one_line_and_exit_1():
+    check_complaint(serve("--speed", "inf"), "inf")
+
+
+@pytest.mark.xfail(
+    strict=True, reason="an empty host listens on every address of the machine, without a word"
+)
+def test_an_empty_host_does_not_open_the_box_to_other_machines():
+    box = ControlBox(host="", port_base=None)
+    with pytest.raises(EmulatorError), box:
+        pass
+
+
+@pytest.mark.xfail(strict=True, reason="the loop is made before the fidelity is looked up, and not closed")
+def test_a_box_that_cannot_be_made_leaves_nothing_open():
+    code = "import gc, ur_emulator\ntry: ur_emulator.ControlBox(fidelity='perfect')\nexcept Exception: pass\ngc.collect()"
+    done = subprocess.run(
+        [sys.executable, "-W", "default", "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert "ResourceWarning" not in done.stderr
 
 
 @pytest.mark.parametrize("arguments", [("--pase", "lockstep"), ("--seed", "many"), ("again",)])
-def test_wrong_usage_is_exit_2_without_a_traceback(arguments):
-    done = serve(*arguments)
+def test_wrong_usage_is_exit_2_without_a_traceback(ur_emulator_command, arguments):
+    done = ur_emulator_command("serve", *arguments)
     assert done.code == 2
     assert "Traceback" not in done.err
     assert arguments[-1] in done.err or arguments[0] in done.err
 
 
 @pytest.mark.parametrize("port", ["dashboard", "secondary", "realtime", "realtime_ro"])
-def test_a_taken_port_is_one_line_and_exit_1(port, tmp_path):
-    base = free_port_base()
-    with socket.create_server(("127.0.0.1", getattr(Ports.standard(base), port))):
-        done = serve("--port-base", base, "--ready-file", tmp_path / "ready.json")
-    assert done.code == 1
-    assert str(getattr(Ports.standard(base), port)) in done.complaint()
+def test_a_taken_port_is_one_line_and_exit_1(ur_emulator_command, port, tmp_path):
+    base, ready = free_port_base(), tmp_path / "ready.json"
+    taken = getattr(Ports.standard(base), port)
+    with socket.create_server(("127.0.0.1", taken)):
+        done = ur_emulator_command("serve", "--port-base", base, "--ready-file", ready)
+    check_complaint(done, str(taken))
     assert "--port-base" in done.err
-    assert not (tmp_path / "ready.json").exists()
+    assert not ready.exists()
 
 
 def test_a_second_box_on_the_same_ports_is_refused_and_the_first_goes_on(tmp_path):
@@ -104,7 +138,7 @@ def test_the_ready_file_says_what_answers(tmp_path):
         assert box.facts["host"] == "127.0.0.1"
         assert box.facts["serial_number"] == "20993000007"
         assert box.facts["ports"] == dataclasses.asdict(Ports.standard(box.base))
-        for name in set(box.facts["ports"]) - {"rtde"}:  # nothing serves RTDE yet
+        for name in box.facts["ports"]:
             connect(box, name).close()
         assert [p.name for p in tmp_path.iterdir()] == [p.name for p in tmp_path.glob("ready-*.json")]
 

@@ -25,7 +25,16 @@ from protocol.ur_types import Ports, ProgramState
 from ur_emulator import ControlBox
 from ur_emulator.errors import PortError
 
-ALL_PORTS = ["dashboard", "primary", "secondary", "realtime", "primary_ro", "secondary_ro", "realtime_ro"]
+ALL_PORTS = [
+    "rtde",
+    "dashboard",
+    "primary",
+    "secondary",
+    "realtime",
+    "primary_ro",
+    "secondary_ro",
+    "realtime_ro",
+]
 
 
 @pytest.fixture(params=["lockstep_box", "realtime_box"], ids=["lockstep", "realtime"])
@@ -242,7 +251,7 @@ def test_two_hundred_visits_leave_no_descriptors(lockstep_box, port):
         before = descriptors()
         for i in range(200):
             with connect(lockstep_box, port) as sock:
-                if i % 2:
+                if i % 2 and port != "rtde":
                     sock.recv(1)  # half of them leave before they are greeted
         until_descriptors(frames, before)
 
