@@ -11,7 +11,7 @@ import struct
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -177,8 +177,9 @@ class VelocitySession:
         self.frames.sock.close()
 
     def send(self, mode, values=(0,) * 6):
-        """Send a message of integers as they are on the wire."""
-        self.reverse.sendall(struct.pack(">7i", mode, *values))
+        """Send a message of integers as they are on the wire; the program may have ended in the meantime."""
+        with suppress(BrokenPipeError, ConnectionResetError):
+            self.reverse.sendall(struct.pack(">7i", mode, *values))
 
     def velocity(self, *qd):
         """Send a velocity [rad/s] (missing joints rest) and return the next new frame."""
@@ -241,16 +242,15 @@ def command(package, *arguments, text=None, **options):
     return finish(start(package, *arguments, **options), text)
 
 
-def client_on(box, *arguments, **options):
-    """Run a `ur-client` command on a box of this process."""
-    return command("pc_client", *arguments, "--robot", box.host, "--port-base", port_base_of(box), **options)
+def at(box):
+    """The options that lead the client to a box."""
+    return ("--robot", box.host, "--port-base", port_base_of(box))
 
 
 @contextmanager
 def run_in_movement(box, frames, out):
     """A `ur-client run` on a box of this process; the block begins when the arm is well inside the movement."""
-    options = ("--robot", box.host, "--port-base", port_base_of(box), "--out", out)
-    client = start("pc_client", "run", "lognorm_4_1", *options)
+    client = start("pc_client", "run", "lognorm_4_1", *at(box), "--out", out)
     try:
         frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(out.glob("*.mcap")))
         assert client.poll() is None

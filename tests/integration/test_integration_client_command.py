@@ -9,7 +9,7 @@ import pytest
 from integration_support import (
     Frames,
     Messages,
-    client_on,
+    at,
     command,
     finish,
     free_port_base,
@@ -115,10 +115,10 @@ def test_the_process_leaves_with_that_code_and_one_line(arguments, code, tmp_pat
 
 @pytest.fixture
 def hasty(monkeypatch):
-    monkeypatch.setattr(package_stream, "VERSION_TIMEOUT", 0.3)
-    monkeypatch.setattr(realtime_client, "FRAME_TIMEOUT", 0.3)
-    monkeypatch.setattr(realtime_client.RealtimeClient.receive, "__defaults__", (0.3,))
-    monkeypatch.setattr(dashboard_query, "REPLY_TIMEOUT", 0.3)
+    monkeypatch.setattr(package_stream, "VERSION_TIMEOUT", 0.1)
+    monkeypatch.setattr(realtime_client, "FRAME_TIMEOUT", 0.1)
+    monkeypatch.setattr(realtime_client.RealtimeClient.receive, "__defaults__", (0.1,))
+    monkeypatch.setattr(dashboard_query, "REPLY_TIMEOUT", 0.1)
 
 
 @contextmanager
@@ -239,11 +239,11 @@ def test_what_stops_the_robot_in_a_run_is_one_line_and_the_arm_rests(standard_bo
     assert not list(tmp_path.glob("table1.*"))
 
 
-def test_a_robot_in_a_protective_stop_is_refused_before_anything_moves(standard_box, tmp_path):
+def test_a_robot_in_a_protective_stop_is_refused_before_anything_moves(ur_client, standard_box, tmp_path):
     with Messages(standard_box) as primary, Frames(standard_box) as frames:
         send(standard_box, "secondary", "sec p():\n  protective_stop()\nend\n")
         frames.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
-        done = client_on(standard_box, "run", "uniform_4_1", "--out", tmp_path / "out")
+        done = ur_client("run", "uniform_4_1", *at(standard_box), "--out", tmp_path / "out")
         assert done.code == 1
         assert "PROTECTIVE_STOP" in done.complaint()
         send(standard_box, "secondary", "set unlock protective stop\n")
@@ -251,7 +251,7 @@ def test_a_robot_in_a_protective_stop_is_refused_before_anything_moves(standard_
         assert programs_since(primary, standard_box) == []
 
 
-def test_a_robot_that_runs_a_program_is_refused(standard_box, tmp_path):
+def test_a_robot_that_runs_a_program_is_refused(ur_client, standard_box, tmp_path):
     with Frames(standard_box) as frames:
         send(
             standard_box,
@@ -263,7 +263,7 @@ def test_a_robot_that_runs_a_program_is_refused(standard_box, tmp_path):
             target=frames.until, args=(lambda f: f.runtime_state == ProgramState.STOPPED,)
         )
         reader.start()
-        done = client_on(standard_box, "run", "uniform_4_1", "--out", tmp_path / "out")
+        done = ur_client("run", "uniform_4_1", *at(standard_box), "--out", tmp_path / "out")
         send(standard_box, "secondary", "stop program\n")
         reader.join()
     assert done.code == 1

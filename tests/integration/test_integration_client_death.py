@@ -9,7 +9,7 @@ from integration_support import (
     Frames,
     Messages,
     VelocitySession,
-    client_on,
+    at,
     finish,
     run_in_movement,
     send,
@@ -94,12 +94,12 @@ def test_a_program_outlives_the_connection_that_sent_it(lockstep_box, port):
         assert frames.rest().target_q == pytest.approx([0.1, -1.6, -1.8, 0, 1.2, 1.5])
 
 
-def test_a_killed_client_leaves_the_arm_at_rest_and_the_next_one_works(standard_box, tmp_path):
+def test_a_killed_client_leaves_the_arm_at_rest_and_the_next_one_works(ur_client, standard_box, tmp_path):
     with Frames(standard_box) as frames:
         assert cut_off(standard_box, frames, tmp_path / "killed", signal.SIGKILL).code == -signal.SIGKILL
         assert not ramp(frames, STOP_DECELERATION).target_qd.any()
         assert frames.lost() == 0
-    done = client_on(standard_box, "run", "uniform_4_1", "--out", tmp_path / "next")
+    done = ur_client("run", "uniform_4_1", *at(standard_box), "--out", tmp_path / "next")
     assert done.code == 0, done.err
     assert (tmp_path / "next" / "uniform_4_1_r1.mcap").exists()
 

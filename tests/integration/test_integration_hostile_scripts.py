@@ -291,7 +291,7 @@ def test_a_box_on_a_taken_port_gives_everything_back(lockstep_box):
 def test_a_program_cannot_hold_up_time_by_starting_threads(tmp_path):
     text = "def f():\n  thread t():\n    while True:\n      sync()\n    end\n  end\n  while True:\n    run t()\n  end\nend\n"
     with serving(tmp_path, "--pace", "lockstep") as box, Messages(box) as primary:
-        primary.sock.settimeout(2.0)
+        primary.sock.settimeout(1.0)
         send(box, "secondary", text)
         try:
             assert primary.message(RuntimeExceptionMessage).text

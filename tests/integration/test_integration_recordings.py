@@ -8,10 +8,10 @@ import pytest
 from integration_support import (
     Frames,
     Messages,
-    client_on,
+    at,
+    command,
     finish,
     free_port_base,
-    port_base_of,
     programs_since,
     start,
 )
@@ -43,9 +43,9 @@ def recorded(out, seed, *, watched=False):
     with ControlBox(pace="lockstep", port_base=free_port_base(), seed=seed) as box:
         if watched:
             with bystander(box):
-                done = client_on(box, "run", "uniform_4_1", "--repeat", "1", "--out", out)
+                done = command("pc_client", "run", "uniform_4_1", *at(box), "--repeat", "1", "--out", out)
         else:
-            done = client_on(box, "run", "uniform_4_1", "--repeat", "1", "--out", out)
+            done = command("pc_client", "run", "uniform_4_1", *at(box), "--repeat", "1", "--out", out)
     assert done.code == 0, done.err
     return (out / "uniform_4_1_r1.mcap").read_bytes()
 
@@ -77,8 +77,7 @@ def test_a_full_disk_stops_the_arm_says_what_is_saved_and_that_can_be_read(stand
     with Frames(standard_box) as frames:
         client = start(
             "pc_client",
-            *("run", "uniform_4_1", "--robot", standard_box.host, "--port-base", port_base_of(standard_box)),
-            *("--out", tmp_path),
+            *("run", "uniform_4_1", *at(standard_box), "--out", tmp_path),
             preexec_fn=no_room,
         )
         reader = threading.Thread(target=frames.until, args=(lambda _: client.poll() is not None, frames.raw))
@@ -96,9 +95,6 @@ def test_a_full_disk_stops_the_arm_says_what_is_saved_and_that_can_be_read(stand
     assert f"{recording.n_rows} of" in complaint
     assert recording.n_rows > 100
     assert abs(rest.actual_qd).max() < 2e-3
-    again = client_on(standard_box, "run", "uniform_4_1", "--out", tmp_path)
-    assert again.code == 0, again.err
-    assert load_recording(tmp_path / "uniform_4_1_r1.mcap").complete
 
 
 @pytest.mark.parametrize("out", ["/dev/full", "/proc/here", "FILE", "FILE/below"])
@@ -106,8 +102,7 @@ def test_a_folder_that_cannot_be_is_one_line_and_nothing_moves(standard_box, ur_
     (tmp_path / "file").write_text("taken\n")
     out = out.replace("FILE", str(tmp_path / "file"))
     with Messages(standard_box) as primary:
-        options = ("--robot", standard_box.host, "--port-base", port_base_of(standard_box))
-        done = ur_client("run", "uniform_4_1", *options, "--out", out)
+        done = ur_client("run", "uniform_4_1", *at(standard_box), "--out", out)
         assert done.code == 1
         assert out in done.complaint()
         assert programs_since(primary, standard_box) == []
