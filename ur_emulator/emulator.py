@@ -10,6 +10,7 @@ line does.
 from __future__ import annotations
 
 import dataclasses
+import math
 import sys
 import threading
 from types import TracebackType
@@ -76,21 +77,23 @@ class ControlBox:
         """
         model = robot_by_name(robot)
         software = _parse_version(version)
-        if not speed > 0.0:
-            raise EmulatorError(f"speed {speed:g} given: it must be above 0, 1 is real time")
+        imperfections = fidelity_by_name(fidelity)
+        named_pace = _parse_pace(pace)
+        if not 0.0 < speed < math.inf:
+            raise EmulatorError(f"speed {speed:g} given: it must be above 0 and finite, 1 is real time")
         if seed < 0:
             raise EmulatorError(f"seed {seed} given: it must be 0 or above")
+        if not host:
+            raise EmulatorError("no host given: name an address, 127.0.0.1 keeps other machines out")
         self.host = host
         self.port_base = port_base or 0
         self.ports = Ports.standard(self.port_base)
         self.serial_number = simulated_serial(model.robot_type, seed)
         self._free_ports = port_base is None
-        self._loop = EventLoop(precise=_parse_pace(pace) is Pace.REALTIME)
-        controller = Controller(
-            model, fidelity_by_name(fidelity), seed, LoopNetwork(self._loop), mode=RobotMode.RUNNING
-        )
+        self._loop = EventLoop(precise=named_pace is Pace.REALTIME)
+        controller = Controller(model, imperfections, seed, LoopNetwork(self._loop), mode=RobotMode.RUNNING)
         self._box = ServedBox(
-            controller, make_pacer(_parse_pace(pace), controller.period_s, speed), self._loop.expect_soon
+            controller, make_pacer(named_pace, controller.period_s, speed), self._loop.expect_soon
         )
         self._intake = ProgramIntake(self._loop, software, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)

@@ -18,6 +18,9 @@ start without a sync, so real budgets are at least 10^4 to 10^5 (O)."""
 RECURSION_LIMIT: Final = 200
 """Depth at which a recursive function is stopped with a run-time error (U; no field script recurses)."""
 
+MAX_THREADS: Final = 200
+"""Threads that one program may have running at the same time (U). Driver scripts have a handful."""
+
 INT_OVERFLOW: Literal["wrap", "error"] = "wrap"
 """Results outside 32 bits fold around as in the controller's C (I)."""
 

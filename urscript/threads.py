@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator
 from typing import Any, Final, cast
 
+from urscript.dialect import MAX_THREADS
 from urscript.errors import ScriptRuntimeError
 from urscript.values import a_type
 from urscript.waits import NEXT_CYCLE, Blocked, Wait
@@ -109,7 +110,13 @@ class Scheduler:
         self.main: ScriptThread | None = None
 
     def start(self, function: Callable[[], Any], name: str, parent: ScriptThread | None) -> ScriptThread:
-        """Start `function` as a thread; it first runs when its turn in the cycle comes."""
+        """Start `function` as a thread; it first runs when its turn in the cycle comes.
+
+        Raises:
+            ScriptRuntimeError: the program has as many threads as it may.
+        """
+        if len(self.threads) >= MAX_THREADS:
+            raise ScriptRuntimeError(f"a program may have {MAX_THREADS} threads at the same time")
         self._count += 1
         thread = ScriptThread(self._count, name, parent, _as_body(function))
         thread.budget = self._budget

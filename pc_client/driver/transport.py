@@ -231,6 +231,8 @@ class TcpNetwork:
         """
         try:
             connected = socket.create_connection((host, port), timeout)
+        except UnicodeError as error:  # of the codec for host names
+            raise DriverError(f"{host[:60]!r} is no host name or address") from error
         except OSError as error:
             raise DriverError(f"{host}:{port} {_reason(error)}") from error
         return TcpTransport(connected, f"{host}:{port}")

@@ -68,12 +68,10 @@ def test_a_movement_that_does_not_exist_is_one_line(ur_client, tmp_path, monkeyp
         pytest.param(
             "a..b",
             "a..b",
-            marks=pytest.mark.xfail(strict=True, reason="UnicodeError of the name codec: traceback"),
         ),
         pytest.param(
             "x" * 300,
             "xxx",
-            marks=pytest.mark.xfail(strict=True, reason="UnicodeError of the name codec: traceback"),
         ),
     ],
 )

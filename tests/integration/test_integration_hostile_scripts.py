@@ -285,9 +285,6 @@ def test_a_box_on_a_taken_port_gives_everything_back(lockstep_box):
     assert descriptors() == before
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a program may start threads without limit: 50,000 in one cycle take 40 s"
-)
 def test_a_program_cannot_hold_up_time_by_starting_threads(tmp_path):
     text = "def f():\n  thread t():\n    while True:\n      sync()\n    end\n  end\n  while True:\n    run t()\n  end\nend\n"
     with serving(tmp_path, "--pace", "lockstep") as box, Messages(box) as primary:
