@@ -30,6 +30,7 @@ __all__ = [
     "MessageSource",
     "PopupMessage",
     "ReportLevel",
+    "RequestValueMessage",
     "RequestedType",
     "RobotMessage",
     "RuntimeExceptionMessage",
@@ -179,6 +180,17 @@ class KeyMessage(RobotMessage):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RequestValueMessage(RobotMessage):
+    """A program asks for a value (`request_integer_from_primary_client` and its kin)."""
+
+    MESSAGE_TYPE: ClassVar[int] = 9
+
+    request_id: int = wire("I")
+    requested_type: int = wire("I", "RequestedType", default=RequestedType.BOOLEAN)
+    text: str = wire("s", default="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RuntimeExceptionMessage(RobotMessage):
     """A program failed, while compiling or while running; line 1 is the `def` line, columns count from 1."""
 
@@ -221,6 +233,7 @@ MESSAGES: tuple[type[RobotMessage], ...] = (
     SafetyModeMessage,
     ErrorCodeMessage,
     KeyMessage,
+    RequestValueMessage,
     RuntimeExceptionMessage,
     StartupMessage,
 )

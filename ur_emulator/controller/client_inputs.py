@@ -40,6 +40,9 @@ def write_inputs(state: ControllerState, values: Iterable[tuple[str, Any]]) -> N
         values: names with values of the types that `protocol.rtde_fields.INPUTS` gives.
     """
     acts: dict[Callable[[ControllerState], None], None] = {}
+    values = tuple(values)
+    if state.watchdogs:
+        state.watchdogs.written((name for name, _ in values), state.tick)
     for name, value in values:
         register = _REGISTERS.get(name)
         if register is None:
@@ -86,7 +89,7 @@ def _set_speed_slider(state: ControllerState) -> None:
 
 
 def _keep(state: ControllerState) -> None:
-    """Nothing acts on the value yet; it is kept for a script to enable."""
+    """Nothing acts on the value; it is kept for a script to enable."""
 
 
 _DIGITAL_GROUPS = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from protocol.rtde_types import RtdeValue
+from ur_emulator.controller.operator import Answer
 from urscript import CompiledProgram
 
 
@@ -67,6 +68,26 @@ class WriteInputs:
     values: tuple[tuple[str, RtdeValue], ...]
 
 
+@dataclass(frozen=True, slots=True)
+class AnswerRequest:
+    """Answer a question of a program (`request_integer_from_primary_client` and its kin).
+
+    An answer to a question that does not stand, or of another type, changes nothing.
+
+    Attributes:
+        value: the answer; its type must be the one asked for.
+        request_id: number of the question; None answers the oldest of that type.
+    """
+
+    value: Answer
+    request_id: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ClosePopup:
+    """Press the button of all popups, so that programs that wait for it go on."""
+
+
 Command = (
     StartProgram
     | StopProgram
@@ -77,4 +98,6 @@ Command = (
     | SetSpeedSlider
     | TriggerProtectiveStop
     | WriteInputs
+    | AnswerRequest
+    | ClosePopup
 )

@@ -123,8 +123,16 @@ class Controller:
         for command in commands:
             self._apply(command)
         state.mode.step()
-        running = state.mode.mode is RobotMode.RUNNING
+        if state.watchdogs and (report := state.watchdogs.late(state.tick)) is not None:
+            state.events.append(report)
+            state.watchdogs.clear()
+            self.programs.stop()
+        state.encoders.step(state.io.digital_in)
         self.programs.step()
+        if state.power_off_requested:
+            state.power_off_requested = False
+            self._apply(cmd.PowerOff())
+        running = state.mode.mode is RobotMode.RUNNING
         was_active = self.programs.has_work or state.motion.is_moving or state.mode.is_changing
         if state.payload is not self._payload:
             # What a program declares is taken to be really there: the arm carries it from now on.
@@ -140,6 +148,9 @@ class Controller:
                 violation = _REQUESTED_STOP
             if violation is not None:
                 self._stop_for(violation, sensed.actual_q)
+            warning = state.error_settings.deviation_warning(sensed.position_error)
+            if warning is not None:
+                state.events.append(warning)
         state.stop_requested = False
         state.steady_cycles = 0 if any(target.qd) else state.steady_cycles + 1
         self._settle = max(self._settle - 1, SETTLE_CYCLES if was_active else 0)
@@ -175,6 +186,10 @@ class Controller:
                 state.stop_requested = True
             case cmd.WriteInputs(values):
                 write_inputs(state, values)
+            case cmd.AnswerRequest(value, request_id):
+                state.operator.answer(value, request_id)
+            case cmd.ClosePopup():
+                state.operator.close_popups()
 
     def _start(self, program: CompiledProgram) -> None:
         """Start a program if the box is in a state to run one; say so if it is not."""

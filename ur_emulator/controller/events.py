@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary_messages import ReportLevel, RequestedType
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +64,29 @@ class SafetyModeChanged:
 
 @dataclass(frozen=True, slots=True)
 class PopupShown:
-    """A script called `popup`."""
+    """A script called `popup`. `request_id`: number of a blocking one, see `Operator`; 0 otherwise."""
 
     title: str
     text: str
     warning: bool
     error: bool
     blocking: bool
+    request_id: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ValueRequested:
+    """A script asks the operator for a value.
+
+    Attributes:
+        request_id: number of the question, see `Operator`.
+        kind: type of the value.
+        text: the question.
+    """
+
+    request_id: int
+    kind: RequestedType
+    text: str
 
 
 Event = (
@@ -81,4 +97,5 @@ Event = (
     | ErrorReported
     | SafetyModeChanged
     | PopupShown
+    | ValueRequested
 )

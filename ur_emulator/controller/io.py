@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ur_emulator.controller.euromap import Euromap
+
 N_STANDARD = 8
 N_CONFIGURABLE = 8
 N_TOOL = 2
@@ -63,6 +65,19 @@ class AnalogLine:
         values = self._lines.values
         self._lines.values = (*values[: self._index], value, *values[self._index + 1 :])
 
+    @property
+    def ratio(self) -> float:
+        """Present value as a ratio 0..1 of the range of the domain, clipped."""
+        low, high = ANALOG_RANGE[self.domain]
+        return min(1.0, max(0.0, (self.value - low) / (high - low)))
+
+    def set_domain(self, domain: int) -> None:
+        """Change the domain; the value stays at the same ratio of the range."""
+        if domain != self.domain:
+            ratio = self.ratio
+            self.domain = domain
+            self.set_ratio(ratio)
+
     def set_ratio(self, ratio: float) -> None:
         """Set the value to a ratio 0..1 of the range of the domain, clipped."""
         low, high = ANALOG_RANGE[self.domain]
@@ -79,6 +94,7 @@ class InputOutput:
         analog: all analogue lines; the three lists below are its parts.
         tool_voltage: supply of the tool: 0, 12 or 24 V.
         flags: of the scripts.
+        euromap: signals to and from a moulding machine.
     """
 
     digital_in: int = 0
@@ -89,6 +105,7 @@ class InputOutput:
     tool_analog_in: list[AnalogLine] = field(init=False)
     tool_voltage: int = 0
     flags: list[bool] = field(default_factory=lambda: [False] * 32)
+    euromap: Euromap = field(default_factory=Euromap)
 
     def __post_init__(self) -> None:
         self.analog_in = [AnalogLine(self.analog, i) for i in (0, 1)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ur_emulator.controller.cycle import controller_time
+from ur_emulator.controller.external_sensor import VARIABLE
 from ur_emulator.controller.robot_mode import JOINT_MODE, POWERED
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
@@ -34,6 +35,9 @@ def make_snapshot(
     tcp = state.tcp_offset if any(state.tcp_offset) else None
     target_pose, target_speed, _, _ = arm.state(target.q, target.qd, tcp)
     pose, speed, elbow_position, elbow_velocity = arm.state(sensed.actual_q, sensed.actual_qd, tcp)
+    sensor, wrench = state.external_sensor, sensed.tcp_force
+    if sensor is not None:
+        wrench = sensor.wrench_at_flange(state.client_inputs.get(VARIABLE, ZERO6), arm.fk(sensed.actual_q))
     mode = state.mode.mode
     powered = mode in POWERED
     return Snapshot(
@@ -50,7 +54,7 @@ def make_snapshot(
         joint_control_output=sensed.joint_control_output,
         actual_tcp_pose=pose,
         actual_tcp_speed=speed,
-        actual_tcp_force=_wrench_at_tcp(sensed.tcp_force, pose, arm, sensed.actual_q, tcp),
+        actual_tcp_force=_wrench_at_tcp(wrench, pose, arm, sensed.actual_q, tcp),
         target_tcp_pose=target_pose,
         target_tcp_speed=target_speed,
         actual_digital_input_bits=state.io.digital_in,

@@ -9,12 +9,19 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
+from ur_emulator.controller.encoders import Encoders
+from ur_emulator.controller.error_settings import ErrorSettings
 from ur_emulator.controller.events import Event
+from ur_emulator.controller.external_sensor import ExternalSensor
 from ur_emulator.controller.io import InputOutput
+from ur_emulator.controller.io_configuration import IoConfiguration
+from ur_emulator.controller.operator import Operator
+from ur_emulator.controller.port_memory import PortMemory
 from ur_emulator.controller.registers import Registers
 from ur_emulator.controller.robot_mode import RobotModeMachine
 from ur_emulator.controller.safety import SafetyState
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.controller.watchdogs import Watchdogs
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
@@ -54,6 +61,14 @@ class ControllerState:
         client_inputs: last values of RTDE inputs that are no registers, by name.
         wants_script_line: somebody reads the line that the program executes.
         steady_cycles: for how many cycles the target has stood still.
+        io_configuration: which inputs act, which outputs follow the program.
+        watchdogs: of the running program over RTDE inputs.
+        external_sensor: takes the place of the estimated wrench while it is enabled.
+        encoders: of conveyors.
+        ports: own memory of the Modbus map.
+        operator: what programs ask of the operator.
+        error_settings: what programs have said about errors.
+        power_off_requested: a script asked for it in this cycle.
     """
 
     robot: RobotModel
@@ -79,3 +94,15 @@ class ControllerState:
     client_inputs: dict[str, Any] = field(default_factory=dict)
     q_history: deque[Vector6] = field(default_factory=lambda: deque(maxlen=HISTORY_CYCLES))
     events: list[Event] = field(default_factory=list)
+    io_configuration: IoConfiguration = field(init=False)
+    watchdogs: Watchdogs = field(init=False)
+    external_sensor: ExternalSensor | None = None
+    encoders: Encoders = field(default_factory=Encoders)
+    ports: PortMemory = field(default_factory=PortMemory)
+    operator: Operator = field(default_factory=Operator)
+    error_settings: ErrorSettings = field(default_factory=ErrorSettings)
+    power_off_requested: bool = False
+
+    def __post_init__(self) -> None:
+        self.io_configuration = IoConfiguration(self.io, self.registers)
+        self.watchdogs = Watchdogs(self.period_s)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 
 class ScriptSocket(Protocol):
@@ -32,9 +33,46 @@ class ScriptSocket(Protocol):
         ...
 
 
+class RemoteCallError(Exception):
+    """A remote procedure call failed; the text says why."""
+
+
+class RemoteCall(Protocol):
+    """One call of a remote procedure, under way or done."""
+
+    @property
+    def is_done(self) -> bool:
+        """True once the result, or the failure, is known."""
+        ...
+
+    def result(self) -> Any:
+        """Return what the procedure returned.
+
+        Raises:
+            RemoteCallError: the call failed.
+        """
+        ...
+
+
+class RemoteServer(Protocol):
+    """A server of remote procedures. All calls return at once."""
+
+    def call(self, method: str, arguments: Sequence[Any]) -> RemoteCall:
+        """Begin to call a procedure, connecting first if need be; calls are made one after the other."""
+        ...
+
+    def close(self) -> None:
+        """Close the connection and forget the calls under way; a later call connects again."""
+        ...
+
+
 class Network(Protocol):
     """Opens connections for scripts."""
 
     def open(self, host: str, port: int) -> ScriptSocket:
         """Begin to connect to `host`:`port`; the result tells when it is done."""
+        ...
+
+    def remote_server(self, url: str) -> RemoteServer:
+        """Return a server of remote procedures; nothing is connected before its first call."""
         ...

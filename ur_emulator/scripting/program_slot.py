@@ -62,6 +62,7 @@ class ProgramSlot:
         self.stop()
         self.name = program.name
         self._primary = program.start(RobotHost(self._state, self._network))
+        self._state.io_configuration.program_started()
         self._state.events.append(ProgramStarted(program.name))
 
     def stop(self) -> None:
@@ -94,4 +95,7 @@ class ProgramSlot:
 
     def _end(self) -> None:
         self._primary = None
+        self._state.io_configuration.program_stopped()
+        self._state.watchdogs.clear()
+        self._state.error_settings.pause_codes.clear()
         self._state.events.append(ProgramStopped(self.name))

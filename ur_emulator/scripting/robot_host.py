@@ -7,12 +7,19 @@ from typing import Any
 
 from ur_emulator.controller.events import TextPrinted
 from ur_emulator.controller.state import ControllerState
+from ur_emulator.scripting.encoder_functions import encoder_functions
+from ur_emulator.scripting.error_functions import error_functions
+from ur_emulator.scripting.io_configuration_functions import io_configuration_functions
 from ur_emulator.scripting.io_functions import io_functions, register_functions
 from ur_emulator.scripting.motion_functions import motion_functions
 from ur_emulator.scripting.network import Network
+from ur_emulator.scripting.operator_functions import operator_functions
+from ur_emulator.scripting.port_functions import port_functions
+from ur_emulator.scripting.remote_procedures import ProgramRemotes
 from ur_emulator.scripting.settings_functions import settings_functions
 from ur_emulator.scripting.socket_functions import ProgramSockets
 from ur_emulator.scripting.state_functions import state_functions
+from ur_emulator.scripting.watchdog_functions import watchdog_functions
 from urscript.builtins import pure_builtins
 
 
@@ -30,13 +37,21 @@ class RobotHost:
         self.step_time = state.period_s
         self._state = state
         self._sockets = ProgramSockets(state, network)
+        self._remotes = ProgramRemotes(network)
         self._builtins: Mapping[str, Callable[..., Any]] = {
             **motion_functions(state),
             **state_functions(state),
             **settings_functions(state),
             **io_functions(state),
             **register_functions(state),
+            **io_configuration_functions(state),
+            **port_functions(state),
+            **watchdog_functions(state),
+            **encoder_functions(state),
+            **operator_functions(state),
+            **error_functions(state),
             **self._sockets.functions(),
+            **self._remotes.functions(),
             "random": lambda thread: random(),
         }
 
@@ -55,3 +70,4 @@ class RobotHost:
     def program_ended(self) -> None:
         """Close what the program opened."""
         self._sockets.close_all()
+        self._remotes.close_all()

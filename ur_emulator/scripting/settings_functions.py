@@ -1,16 +1,14 @@
-"""Builtins that change what the controller assumes or ask it for something: TCP, payload, stops, popups."""
+"""Builtins that change what the controller assumes or ask it for something: TCP, payload, stops."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.events import PopupShown
 from ur_emulator.controller.state import ControllerState, Payload
 from ur_emulator.models.robot_model import six
 from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
-from urscript.waits import Blocked
 
 # No tool is longer than this [m], no rotation vector either [rad]; beyond, poses would lose all their digits.
 MAX_TCP_OFFSET = 100.0
@@ -60,14 +58,6 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
     def protective_stop(thread: object) -> None:
         state.stop_requested = True
 
-    def popup(
-        thread: object, s: Any, title: str, warning: bool, error: bool, blocking: bool
-    ) -> Generator[Blocked, None, None]:
-        if blocking:
-            raise ScriptRuntimeError("popup(blocking=True) is declared only: no operator can answer it yet")
-        state.events.append(PopupShown(title, wire_text(s), warning, error, blocking))
-        yield from ()
-
     return {
         "set_tcp": set_tcp,
         "set_payload": set_payload,
@@ -77,5 +67,4 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
         "force_mode_set_damping": force_mode_set_damping,
         "force_mode_set_gain_scaling": force_mode_set_gain_scaling,
         "protective_stop": protective_stop,
-        "popup": popup,
     }

@@ -81,7 +81,7 @@ class DashboardPort:
             "unlock protective stop": self._unlock,
             "close safety popup": lambda event: event.command.reply(),
             "popup": self._popup,
-            "close popup": lambda event: event.command.reply(),
+            "close popup": lambda event: self._after(event, cmd.ClosePopup()),
             "addToLog": lambda event: event.command.reply("ok" if event.argument else "empty"),
             "setUserRole": self._set_user_role,
             "getUserRole": lambda event: event.command.reply(role=self._user_role),

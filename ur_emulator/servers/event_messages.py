@@ -8,6 +8,7 @@ from protocol.primary_messages import (
     KeyMessage,
     MessageSource,
     PopupMessage,
+    RequestValueMessage,
     RobotMessage,
     RuntimeExceptionMessage,
     SafetyModeMessage,
@@ -53,9 +54,14 @@ def message_for(event: events.Event, timestamp: int) -> RobotMessage:
             return SafetyModeMessage(
                 timestamp=timestamp, source=MessageSource.CONTROLLER, safety_mode=safety_mode
             )
-        case events.PopupShown(title, text, warning, error, blocking):
+        case events.ValueRequested(request_id, kind, text):
+            return RequestValueMessage(
+                timestamp=timestamp, request_id=request_id, requested_type=kind, text=text
+            )
+        case events.PopupShown(title, text, warning, error, blocking, request_id):
             return PopupMessage(
                 timestamp=timestamp,
+                request_id=request_id,
                 is_warning=warning,
                 is_error=error,
                 is_blocking=blocking,

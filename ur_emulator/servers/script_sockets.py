@@ -8,6 +8,7 @@ import socket
 import threading
 
 from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.servers.xmlrpc_client import XmlRpcServer
 
 _READ_SIZE = 64 * 1024
 # Bytes a script may have in flight to a peer that does not read; further sends fail.
@@ -169,3 +170,7 @@ class LoopNetwork:
     def open(self, host: str, port: int) -> LoopSocket:
         """Begin to connect to `host`:`port`."""
         return LoopSocket(self._loop, host, port)
+
+    def remote_server(self, url: str) -> XmlRpcServer:
+        """Return an XML-RPC server; nothing is connected before its first call."""
+        return XmlRpcServer(self._loop, url)

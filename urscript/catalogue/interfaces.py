@@ -60,15 +60,34 @@ _INPUTS_OUTPUTS: tuple[Builtin, ...] = (
         "None",
         "range of an analogue input",
         deprecated=True,
+        support=EXACT,
     ),
-    _row("get_euromap_input", (Param("port_number", INT),), "bool", "a Euromap67 input", since=CB3_ONLY),
-    _row("get_euromap_output", (Param("port_number", INT),), "bool", "a Euromap67 output", since=CB3_ONLY),
+    _row(
+        "get_euromap_input",
+        (Param("port_number", INT),),
+        "bool",
+        "a Euromap67 input",
+        since=CB3_ONLY,
+        support=APPROXIMATE,
+        note="the signals are kept; no machine is connected",
+    ),
+    _row(
+        "get_euromap_output",
+        (Param("port_number", INT),),
+        "bool",
+        "a Euromap67 output",
+        since=CB3_ONLY,
+        support=APPROXIMATE,
+        note="the signals are kept; no machine is connected",
+    ),
     _row(
         "set_euromap_output",
         (Param("port_number", INT), Param("signal_value", BOOL)),
         "None",
         "switch a Euromap67 output",
         since=CB3_ONLY,
+        support=APPROXIMATE,
+        note="the signals are kept; no machine is connected",
     ),
     _row(
         "set_euromap_runstate_dependent_choice",
@@ -79,6 +98,8 @@ _INPUTS_OUTPUTS: tuple[Builtin, ...] = (
         "None",
         "what a Euromap67 output does when no program runs",
         since=CB3_ONLY,
+        support=APPROXIMATE,
+        note="the signals are kept; no machine is connected",
     ),
     _row(
         "set_tool_voltage",
@@ -156,18 +177,27 @@ _REGISTERS: tuple[Builtin, ...] = (
         support=EXACT,
         nan_ok=True,
     ),
-    _row("read_port_bit", (Param("address", INT, low=0, high=65535),), "bool", "a bit of the Modbus server"),
+    _row(
+        "read_port_bit",
+        (Param("address", INT, low=0, high=65535),),
+        "bool",
+        "a bit of the Modbus server",
+        support=EXACT,
+    ),
     _row(
         "read_port_register",
         (Param("address", INT, low=0, high=65535),),
         "int",
         "a word of the Modbus server",
+        support=EXACT,
     ),
     _row(
         "write_port_bit",
         (Param("address", INT, low=0, high=65535), Param("value", BOOL)),
         "None",
         "set a bit of the Modbus server",
+        support=APPROXIMATE,
+        note="what can only be read ignores writes",
     ),
     _row(
         "write_port_register",
@@ -177,6 +207,8 @@ _REGISTERS: tuple[Builtin, ...] = (
         ),
         "None",
         "set a word of the Modbus server",
+        support=APPROXIMATE,
+        note="what can only be read ignores writes",
     ),
     _row(
         "rtde_set_watchdog",
@@ -187,6 +219,8 @@ _REGISTERS: tuple[Builtin, ...] = (
         ),
         "None",
         "pause or stop when an RTDE input is not refreshed often enough; cleared at program stop",
+        support=APPROXIMATE,
+        note="pause stops the program, for programs cannot be paused",
     ),
     _row(
         "get_rtde_value",
@@ -212,6 +246,8 @@ def _force_sensor(name: str, *, deprecated: bool) -> Builtin:
         "take the wrench from an external sensor through RTDE",
         since=EVERYWHERE if deprecated else releases("3.14", "5.9", "10.0"),
         deprecated=deprecated,
+        support=APPROXIMATE,
+        note="the input is taken as the external wrench; no weight of the sensor is subtracted",
     )
 
 
@@ -477,6 +513,7 @@ _FACTORIES: tuple[Builtin, ...] = (
         (Param("type", STRING, choices=("xmlrpc",)), Param("url", STRING)),
         "handle",
         "a handle whose methods are calls to an XML-RPC server",
+        support=EXACT,
     ),
     *(
         _row(

@@ -299,7 +299,7 @@ _FLOW: tuple[Builtin, ...] = (
         "show a message to the operator",
         time=TimeClass.BLOCKING,
         support=APPROXIMATE,
-        note="the text is sent to the clients; nobody can press Continue on a box without a pendant",
+        note="the text is sent to the clients; the dashboard's close popup presses Continue",
     ),
     *(
         _row(
@@ -308,7 +308,9 @@ _FLOW: tuple[Builtin, ...] = (
             returned,
             f"ask the operator for a {kind}",
             time=TimeClass.BLOCKING,
+            support=APPROXIMATE,
             undocumented=BOTH,
+            note="waits for AnswerRequest of the controller; no client's reply is known",
             source=POLYSCOPE_EXPORT,
         )
         for kind, returned in (
@@ -318,7 +320,14 @@ _FLOW: tuple[Builtin, ...] = (
             ("string", "string"),
         )
     ),
-    _row("powerdown", (), "None", "shut down the arm and the controller"),
+    _row(
+        "powerdown",
+        (),
+        "None",
+        "shut down the arm and the controller",
+        support=APPROXIMATE,
+        note="the arm loses its power, the controller stays up",
+    ),
     _row(
         "protective_stop",
         (),

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from .chapter import FIELD_USE, POLYSCOPE_EXPORT, Chapter
-from .types import Builtin, Param, ParamType
+from .types import Builtin, Param, ParamType, Support
 from .versions import CB3_ONLY, NOT_CB3, Generation, PerGeneration
 
 _row = Chapter("ioconfiguration").row
 
+EXACT, APPROXIMATE, DECLARED = Support.EXACT, Support.APPROXIMATE, Support.DECLARED_ONLY
 INT, NUMBER, STRING, LIST = ParamType.INT, ParamType.NUMBER, ParamType.STRING, ParamType.LIST
 
+_KEPT = "kept as configuration; nobody guides the arm by hand"
 _ACTION = Param("action", STRING, choices=("default", "freedrive"))
 _DOMAIN = Param("domain", INT, unit="0 current 4-20 mA, 1 voltage 0-10 V", low=0, high=1)
 _RUNSTATE_UNIT = "0 keep, 1 low when stopped, 2 high when stopped, 3 high running and low stopped"
@@ -20,14 +22,67 @@ def _port(last: int, name: str = "port") -> Param:
 
 
 _ACTIONS: tuple[Builtin, ...] = (
-    _row("set_standard_analog_input_domain", (_port(1), _DOMAIN), "None", "current or voltage input"),
-    _row("set_tool_analog_input_domain", (_port(1), _DOMAIN), "None", "current or voltage input of the tool"),
-    _row("set_analog_outputdomain", (_port(1), _DOMAIN), "None", "current or voltage output"),
-    _row("set_input_actions_to_default", (), "None", "no input does anything beside being read"),
-    _row("set_standard_digital_input_action", (_port(7), _ACTION), "None", "what an input does"),
-    _row("set_configurable_digital_input_action", (_port(7), _ACTION), "None", "what an input does"),
-    _row("set_tool_digital_input_action", (_port(1), _ACTION), "None", "what an input does"),
-    _row("set_gp_boolean_input_action", (_port(127), _ACTION), "None", "what an input register does"),
+    _row(
+        "set_standard_analog_input_domain",
+        (_port(1), _DOMAIN),
+        "None",
+        "current or voltage input",
+        support=EXACT,
+    ),
+    _row(
+        "set_tool_analog_input_domain",
+        (_port(1), _DOMAIN),
+        "None",
+        "current or voltage input of the tool",
+        support=EXACT,
+    ),
+    _row(
+        "set_analog_outputdomain",
+        (_port(1), _DOMAIN),
+        "None",
+        "current or voltage output",
+        support=EXACT,
+    ),
+    _row(
+        "set_input_actions_to_default",
+        (),
+        "None",
+        "no input does anything beside being read",
+        support=APPROXIMATE,
+        note=_KEPT,
+    ),
+    _row(
+        "set_standard_digital_input_action",
+        (_port(7), _ACTION),
+        "None",
+        "what an input does",
+        support=APPROXIMATE,
+        note=_KEPT,
+    ),
+    _row(
+        "set_configurable_digital_input_action",
+        (_port(7), _ACTION),
+        "None",
+        "what an input does",
+        support=APPROXIMATE,
+        note=_KEPT,
+    ),
+    _row(
+        "set_tool_digital_input_action",
+        (_port(1), _ACTION),
+        "None",
+        "what an input does",
+        support=APPROXIMATE,
+        note=_KEPT,
+    ),
+    _row(
+        "set_gp_boolean_input_action",
+        (_port(127), _ACTION),
+        "None",
+        "what an input register does",
+        support=APPROXIMATE,
+        note=_KEPT,
+    ),
 )
 
 
@@ -49,6 +104,7 @@ def _runstate_rows(since: PerGeneration, last_choice: int) -> tuple[Builtin, ...
                 "None",
                 "what an output does when programs start and stop",
                 since=since,
+                support=EXACT if since is CB3_ONLY else DECLARED,
             )
             for output, last in outputs
         ),
@@ -72,6 +128,7 @@ _REGISTERS: tuple[Builtin, ...] = tuple(
         "None",
         "what an output register does when programs start and stop",
         since=CB3_ONLY,
+        support=EXACT,
     )
     for kind in ("integer", "float")
 )
@@ -82,6 +139,8 @@ _UNDOCUMENTED: tuple[Builtin, ...] = tuple(
         (Param("outputs", LIST),),
         "None",
         "which outputs follow the program",
+        support=APPROXIMATE,
+        note="listed outputs are high while a program runs",
         undocumented=(Generation.CB3, Generation.E_SERIES),
         source=source,
     )

@@ -167,12 +167,16 @@ _MOVES: tuple[Builtin, ...] = (
         (Param("qNear", JOINTS, None, "rad", shown="the present turns"),),
         "None",
         "renumber the turns of joints without position limit; nothing moves",
+        support=APPROXIMATE,
+        note="kept only; it acts when new safety settings limit a joint",
     ),
     _row(
         "pause_on_error_code",
         (Param("code", INT, unit="x of CxAy"), Param("argument", INT, None, "y of CxAy", shown="any")),
         "None",
         "pause the program when that error occurs; forgotten at program stop",
+        support=APPROXIMATE,
+        note="kept only; programs cannot be paused",
     ),
     _row(
         "position_deviation_warning",
@@ -182,12 +186,16 @@ _MOVES: tuple[Builtin, ...] = (
         ),
         "None",
         "warn in the log when the joints deviate this much from the path",
+        support=APPROXIMATE,
+        note="code and text of the log entry are chosen",
     ),
     _row(
         "set_safety_mode_transition_hardness",
         (Param("type", INT, unit="0 hard, 1 soft", low=0, high=1),),
         "None",
         "how hard the transition into reduced mode and safeguard stop is",
+        support=APPROXIMATE,
+        note="kept only; reduced mode and safeguard stop are not modelled",
     ),
 )
 
@@ -327,18 +335,22 @@ _CONVEYORS: tuple[Builtin, ...] = (
         ),
         "None",
         "count the pulses of a conveyor encoder on two digital inputs",
+        support=APPROXIMATE,
+        note="inputs are sampled once a cycle, not at 40 kHz",
     ),
     _row(
         "encoder_enable_set_tick_count",
         (_ENCODER_REQUIRED, Param("range_id", INT, unit="0 int32, 1 u8, 2 u16, 3 u24, 4 u32", low=0, high=4)),
         "None",
         "let the program feed the encoder",
+        support=EXACT,
     ),
     _row(
         "encoder_set_tick_count",
         (_ENCODER_REQUIRED, Param("count", NUMBER, unit="ticks")),
         "None",
         "feed the encoder",
+        support=EXACT,
     ),
     _row(
         "encoder_get_tick_count",
@@ -347,6 +359,8 @@ _CONVEYORS: tuple[Builtin, ...] = (
         "the filtered count",
         since=releases("3.0", "5.0"),
         until=releases(None, "5.21"),
+        support=APPROXIMATE,
+        note="not filtered",
     ),
     _row(
         "encoder_get_tick_count",
@@ -361,6 +375,7 @@ _CONVEYORS: tuple[Builtin, ...] = (
         (_ENCODER_REQUIRED, Param("delta_tick_count", NUMBER, unit="ticks")),
         "float or None, ticks",
         "remove the wrap from a difference of counts",
+        support=EXACT,
     ),
     _row(
         "track_conveyor_linear",
@@ -403,9 +418,17 @@ _CONVEYORS: tuple[Builtin, ...] = (
         "None",
         "old form of encoder_enable_pulse_decode",
         deprecated=True,
+        support=APPROXIMATE,
+        note="inputs are sampled once a cycle, not at 40 kHz",
     ),
     _row(
-        "get_conveyor_tick_count", (), "float, ticks", "old form of encoder_get_tick_count", deprecated=True
+        "get_conveyor_tick_count",
+        (),
+        "float, ticks",
+        "old form of encoder_get_tick_count",
+        deprecated=True,
+        support=APPROXIMATE,
+        note="not filtered",
     ),
     _row(
         "set_conveyor_tick_count",
@@ -416,6 +439,7 @@ _CONVEYORS: tuple[Builtin, ...] = (
         "None",
         "old form of encoder_set_tick_count",
         deprecated=True,
+        support=EXACT,
     ),
 )
 

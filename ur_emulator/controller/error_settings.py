@@ -1,0 +1,54 @@
+"""What programs have said about errors and limits. Most of it is only kept: this box has no use for it.
+
+Source: URScript manual CB3 3.15, module motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from protocol.primary_messages import ReportLevel
+from protocol.ur_types import JOINT_NAMES
+from ur_emulator.controller.events import ErrorReported
+from ur_emulator.controller.safety import MAX_POSITION_DEVIATION
+from ur_emulator.models.robot_model import Vector6
+
+# Code of the log entry; the real one is not known.
+DEVIATION_CODE = 174
+
+
+@dataclass(slots=True)
+class ErrorSettings:
+    """Settings of `pause_on_error_code` and its kin.
+
+    Attributes:
+        pause_codes: (code, argument or None for any) at which the program should pause; kept only.
+        deviation_threshold: part of the deviation limit at which to warn; None for no warning.
+        transition_hardness: 0 hard, 1 soft; kept only.
+        revolution_reference: joint positions of the last `reset_revolution_counter` [rad]; kept only.
+    """
+
+    pause_codes: set[tuple[int, int | None]] = field(default_factory=set)
+    deviation_threshold: float | None = None
+    transition_hardness: int = 0
+    revolution_reference: Vector6 | None = None
+    _has_warned: bool = False
+
+    def deviation_warning(self, position_error: tuple[float, ...]) -> ErrorReported | None:
+        """Return the log entry when a joint begins to deviate too far, once until it is back.
+
+        Args:
+            position_error: delayed target minus true position [rad], (6,).
+        """
+        if self.deviation_threshold is None:
+            return None
+        error, joint = max((abs(error), joint) for joint, error in enumerate(position_error))
+        was_warned, self._has_warned = (
+            self._has_warned,
+            error > self.deviation_threshold * MAX_POSITION_DEVIATION,
+        )
+        if was_warned or not self._has_warned:
+            return None
+        return ErrorReported(
+            DEVIATION_CODE, joint, ReportLevel.INFO, f"Large position deviation: {JOINT_NAMES[joint]}"
+        )

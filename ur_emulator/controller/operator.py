@@ -1,0 +1,79 @@
+"""What programs ask of the operator: values, and popups to be closed. Nobody stands there: a client answers.
+
+Answers come as `commands.AnswerRequest` and `commands.ClosePopup`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from protocol.primary_messages import RequestedType
+
+Answer = bool | int | float | str
+
+_TYPES: dict[RequestedType, tuple[type, ...]] = {
+    RequestedType.BOOLEAN: (bool,),
+    RequestedType.INTEGER: (int,),
+    RequestedType.FLOAT: (float, int),
+    RequestedType.STRING: (str,),
+}
+
+
+@dataclass(slots=True)
+class OperatorRequest:
+    """A question that stands on the screen.
+
+    Attributes:
+        request_id: number of it, from 1.
+        kind: what it wants; NONE is a popup, which wants to be closed.
+        text: of the question.
+        answer: what was answered; None so far.
+        is_answered: it was answered, or the popup closed.
+    """
+
+    request_id: int
+    kind: RequestedType
+    text: str
+    answer: Answer | None = None
+    is_answered: bool = False
+
+
+class Operator:
+    """All open questions, the oldest first."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._open: dict[int, OperatorRequest] = {}
+
+    @property
+    def requests(self) -> tuple[OperatorRequest, ...]:
+        """The questions that wait for an answer."""
+        return tuple(self._open.values())
+
+    def ask(self, kind: RequestedType, text: str) -> OperatorRequest:
+        """Put a question on the screen."""
+        self._count += 1
+        request = self._open[self._count] = OperatorRequest(self._count, kind, text)
+        return request
+
+    def withdraw(self, request: OperatorRequest) -> None:
+        """Take a question off the screen, answered or not."""
+        self._open.pop(request.request_id, None)
+
+    def answer(self, value: Answer, request_id: int | None = None) -> None:
+        """Answer a question, or the oldest; one that does not exist or wants another type stays as it is."""
+        for request in self.requests:
+            if request_id in (None, request.request_id) and type(value) in _TYPES.get(request.kind, ()):
+                request.answer = float(value) if request.kind is RequestedType.FLOAT else value
+                self._finish(request)
+                return
+
+    def close_popups(self) -> None:
+        """Press the button of every popup."""
+        for request in self.requests:
+            if request.kind is RequestedType.NONE:
+                self._finish(request)
+
+    def _finish(self, request: OperatorRequest) -> None:
+        request.is_answered = True
+        self.withdraw(request)

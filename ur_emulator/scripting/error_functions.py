@@ -1,0 +1,42 @@
+"""Builtins about errors, limits and the end of it all: most are only kept as configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NoReturn
+
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.models.robot_model import six
+from urscript.threads import ProgramHalted
+
+
+def error_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins bound to one controller."""
+    settings = state.error_settings
+
+    def pause_on_error_code(thread: object, code: float, argument: float | None) -> None:
+        settings.pause_codes.add((int(code), None if argument is None else int(argument)))
+
+    def position_deviation_warning(thread: object, enabled: bool, threshold: float) -> None:
+        settings.deviation_threshold = float(threshold) if enabled else None
+
+    def set_safety_mode_transition_hardness(thread: object, kind: float) -> None:
+        settings.transition_hardness = int(kind)
+
+    def reset_revolution_counter(thread: object, q_near: Any) -> None:
+        # A real box uses it when new safety settings limit a joint that had no limits: not here.
+        settings.revolution_reference = (
+            state.snapshot.actual_q if q_near is None else six([float(x) for x in q_near])
+        )
+
+    def powerdown(thread: object) -> NoReturn:
+        state.power_off_requested = True
+        raise ProgramHalted
+
+    return {
+        "pause_on_error_code": pause_on_error_code,
+        "position_deviation_warning": position_deviation_warning,
+        "set_safety_mode_transition_hardness": set_safety_mode_transition_hardness,
+        "reset_revolution_counter": reset_revolution_counter,
+        "powerdown": powerdown,
+    }

@@ -1,0 +1,135 @@
+"""Builtins that set up lines: domains, input actions, outputs that follow the program, Euromap67."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from ur_emulator.controller.euromap import N_EUROMAP
+from ur_emulator.controller.io import CURRENT, N_STANDARD, N_TOOL, VOLTAGE, AnalogLine
+from ur_emulator.controller.io_configuration import OutputKind, RunState
+from ur_emulator.controller.state import ControllerState
+from urscript.errors import ScriptRuntimeError
+
+Function = Callable[..., Any]
+
+_INPUT_GROUPS = ("standard_digital", "configurable_digital", "tool_digital", "gp_boolean")
+# Builtins that let an output follow the program, by group.
+_RUNSTATE_NAMES = {
+    OutputKind.STANDARD: "standard_digital_output",
+    OutputKind.CONFIGURABLE: "configurable_digital_output",
+    OutputKind.TOOL: "tool_digital_output",
+    OutputKind.ANALOG: "standard_analog_output",
+    OutputKind.GP_BOOLEAN: "gp_boolean_output",
+    OutputKind.GP_INTEGER: "gp_integer_output",
+    OutputKind.GP_FLOAT: "gp_float_output",
+}
+# Meaning of the range codes of set_analog_inputrange on the ports of the box and of the tool. 0 to 5 V is
+# mapped to 0 to 10 V; ranges with negative voltages ended with CB2. Source: URScript manual CB3.
+_BOX_RANGES = {0: VOLTAGE, 2: VOLTAGE}
+_TOOL_RANGES = {0: VOLTAGE, 1: VOLTAGE, 2: CURRENT}
+# The outputs that the undocumented list forms speak of, in the order of the old numbering.
+_LISTED_OUTPUTS = (
+    *((OutputKind.STANDARD, i) for i in range(N_STANDARD)),
+    *((OutputKind.TOOL, i) for i in range(N_TOOL)),
+)
+
+
+def io_configuration_functions(state: ControllerState) -> Mapping[str, Function]:
+    """Return the builtins for the set-up of lines bound to one controller."""
+    return {**_domains(state), **_actions(state), **_runstates(state), **_euromap(state)}
+
+
+def _domains(state: ControllerState) -> dict[str, Function]:
+    io = state.io
+
+    def domain_setter(lines: Sequence[AnalogLine]) -> Function:
+        return lambda thread, port, domain: lines[int(port)].set_domain(int(domain))
+
+    def set_analog_inputrange(thread: object, port: float, code: float) -> None:
+        ranges, line = (
+            (_BOX_RANGES, io.analog_in[int(port)])
+            if port < 2
+            else (_TOOL_RANGES, io.tool_analog_in[int(port) - 2])
+        )
+        domain = ranges.get(int(code))
+        if domain is None:
+            allowed = ", ".join(map(str, ranges))
+            raise ScriptRuntimeError(
+                f"set_analog_inputrange: range {code:g} is not supported on port {port:g}, "
+                f"allowed are {allowed}"
+            )
+        line.set_domain(domain)
+
+    return {
+        "set_standard_analog_input_domain": domain_setter(io.analog_in),
+        "set_tool_analog_input_domain": domain_setter(io.tool_analog_in),
+        "set_analog_outputdomain": domain_setter(io.analog_out),
+        "set_analog_inputrange": set_analog_inputrange,
+    }
+
+
+def _actions(state: ControllerState) -> dict[str, Function]:
+    configuration = state.io_configuration
+
+    def setter(group: str) -> Function:
+        return lambda thread, port, action: configuration.set_input_action(group, int(port), action)
+
+    return {
+        **{f"set_{group}_input_action": setter(group) for group in _INPUT_GROUPS},
+        "set_input_actions_to_default": lambda thread: configuration.input_actions.clear(),
+    }
+
+
+def _runstates(state: ControllerState) -> dict[str, Function]:
+    configuration = state.io_configuration
+
+    def setter(kind: OutputKind, name: str) -> Function:
+        def set_runstate(thread: object, output: float, code: float) -> None:
+            if code not in tuple(RunState):
+                raise ScriptRuntimeError(f"{name}: state {code:g} does not exist, allowed are 0 to 3")
+            configuration.set_rule(kind, int(output), RunState(int(code)))
+
+        return set_runstate
+
+    def set_listed(names: Sequence[tuple[OutputKind, int]], builtin: str) -> Function:
+        def set_list(thread: object, outputs: list[Any]) -> None:
+            if not all(type(i) in (int, float) and i in range(len(names)) for i in outputs):
+                raise ScriptRuntimeError(f"{builtin}: outputs are numbers from 0 to {len(names) - 1}")
+            for i, (kind, index) in enumerate(names):
+                configuration.set_rule(
+                    kind, index, RunState.HIGH_WHEN_RUNNING if i in outputs else RunState.KEEP
+                )
+
+        return set_list
+
+    functions: dict[str, Function] = {}
+    for kind, output in _RUNSTATE_NAMES.items():
+        name = f"set_runstate_{output}_to_value"
+        functions[name] = setter(kind, name)
+    for name, listed in (
+        ("set_runstate_standard_digital_outputs", _LISTED_OUTPUTS[:N_STANDARD]),
+        ("set_runstate_outputs", _LISTED_OUTPUTS),
+    ):
+        functions[name] = set_listed(listed, name)
+    return functions
+
+
+def _euromap(state: ControllerState) -> dict[str, Function]:
+    euromap = state.io.euromap
+
+    def port(number: float) -> int:
+        if not 0 <= number < N_EUROMAP:
+            raise ScriptRuntimeError(
+                f"Euromap67 port {number:g} does not exist, allowed are 0 to {N_EUROMAP - 1}"
+            )
+        return int(number)
+
+    return {
+        "get_euromap_input": lambda thread, n: euromap.read_input(port(n)),
+        "get_euromap_output": lambda thread, n: euromap.read_output(port(n)),
+        "set_euromap_output": lambda thread, n, value: euromap.write_output(port(n), value),
+        "set_euromap_runstate_dependent_choice": lambda thread, n, choice: state.io_configuration.set_rule(
+            OutputKind.EUROMAP, port(n), RunState(int(choice))
+        ),
+    }

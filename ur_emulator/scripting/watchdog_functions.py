@@ -1,0 +1,57 @@
+"""Builtins about what clients write through RTDE: watchdogs, and an external force sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from protocol.rtde_fields import INPUTS
+from ur_emulator.controller.external_sensor import VARIABLE, ExternalSensor
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.watchdogs import WatchdogAction
+from ur_emulator.models.robot_model import Vector3
+from urscript.errors import ScriptRuntimeError
+
+# An enabled sensor is watched with this frequency [Hz] and action. Source: URScript manual,
+# ft_rtde_input_enable.
+SENSOR_FREQUENCY = 10.0
+SENSOR_ACTION = WatchdogAction.PAUSE
+
+_INPUT_NAMES = frozenset(field.name for field in INPUTS)
+
+
+def watchdog_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins bound to one controller."""
+
+    def rtde_set_watchdog(thread: object, variable: str, min_frequency: float, action: str) -> None:
+        if variable not in _INPUT_NAMES:
+            raise ScriptRuntimeError(f'rtde_set_watchdog: there is no RTDE input "{variable}"')
+        try:
+            chosen = WatchdogAction(action.lower())
+        except ValueError:
+            raise ScriptRuntimeError(
+                f'rtde_set_watchdog: action "{action}" does not exist, choose ignore, pause or stop'
+            ) from None
+        state.watchdogs.set(variable, min_frequency, chosen, state.tick)
+
+    def sensor_function(lever_sign: float) -> Callable[..., None]:
+        def enable_sensor(thread: object, enable: bool, mass: float, offset: Any, cog: Any) -> None:
+            if enable:
+                state.external_sensor = ExternalSensor(float(mass), _three(offset), _three(cog), lever_sign)
+                state.watchdogs.set(VARIABLE, SENSOR_FREQUENCY, SENSOR_ACTION, state.tick)
+            else:
+                state.external_sensor = None
+                state.watchdogs.set(VARIABLE, 0.0, WatchdogAction.IGNORE, state.tick)
+
+        return enable_sensor
+
+    return {
+        "rtde_set_watchdog": rtde_set_watchdog,
+        "ft_rtde_input_enable": sensor_function(1.0),
+        "enable_external_ft_sensor": sensor_function(-1.0),
+    }
+
+
+def _three(values: Any) -> Vector3:
+    x, y, z = map(float, values)
+    return (x, y, z)
