@@ -1,7 +1,7 @@
 """Tree -> text: the canonical layout of a program, which parses to the same tree.
 
-Two blanks a level, one statement a line, only the brackets that are needed. Comments are not in the
-tree, so they are not printed.
+Two blanks a level, one statement a line, only the brackets that are needed. Comments, blank lines and spare
+brackets are not in the tree, so they are not printed; `formatter` keeps them.
 """
 
 from __future__ import annotations
@@ -77,14 +77,14 @@ def _short_statement(statement: Statement) -> str:
         case nodes.Simple(word=word):
             return word
         case nodes.Label(text=text):
-            return f"$ {text}"
+            return f"$ {text}" if text else "$"
     raise TypeError(f"not a statement: {statement!r}")
 
 
 def _parameter(parameter: nodes.Parameter) -> str:
     if parameter.default is None:
         return parameter.name
-    return f"{parameter.name} = {_expression(parameter.default, 0)}"
+    return f"{parameter.name}={_expression(parameter.default, 0)}"
 
 
 def _expression(expression: Expression, level: int) -> str:

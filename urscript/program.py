@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from types import CodeType
 
     from urscript.host import Host
+    from urscript.lint_rules import ScriptWarning
 
 
 def compile_program(
@@ -59,8 +60,13 @@ def compile_program(
 
 def check_program(
     text: str, *, catalogue: Catalogue = CB3_3_15, dialect: Dialect | None = None, name: str = "<program>"
-) -> tuple[Sequence[ScriptCompileError], Sequence[ScriptCompileError]]:
-    """All errors and warnings of a text, each in order; names are looked up once the syntax is right."""
+) -> tuple[Sequence[ScriptCompileError], Sequence[ScriptWarning]]:
+    """All errors of a text, in order, or, when it has none, all warnings.
+
+    Names are looked up once the syntax is right.
+    """
+    from urscript.lint import find_warnings
+
     source = Source(_as_bytes(text), name)
     dialect = dialect or dialect_for(catalogue.version)
     program, errors = _resolve(source, catalogue, dialect)
@@ -71,7 +77,7 @@ def check_program(
             _compile(program, catalogue, dialect)
         except ScriptCompileError as error:
             errors = [error]
-    return errors, program.warnings
+    return (errors, ()) if errors else ((), find_warnings(program, catalogue))
 
 
 def _resolve(
@@ -94,7 +100,6 @@ def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -
     return CompiledProgram(
         name=program.name,
         kind=program.kind,
-        warnings=tuple(program.warnings),
         source=program.source,
         dialect=dialect,
         catalogue=catalogue,
@@ -127,14 +132,12 @@ class CompiledProgram:
     Attributes:
         name: The `def` name; of a one-line program the function it calls.
         kind: "def" (primary), "sec" (secondary), or "statement".
-        warnings: What is allowed but probably not meant.
         builtins: Builtin functions it uses.
         globals: Its global variables.
     """
 
     name: str
     kind: str
-    warnings: tuple[ScriptCompileError, ...]
     source: Source
     dialect: Dialect
     catalogue: Catalogue

@@ -110,8 +110,6 @@ class _Resolver:
             self._error(
                 ScriptContextError("a secondary program cannot stand inside another program"), function.span
             )
-        if function.name in scope.functions:
-            self._warn(f"'{function.name}' is defined twice here, the last definition counts", function.span)
         python_name = f"f{len(self.program.functions)}_{function.name}"
         inner = FunctionScope(function.name, function, scope, function.body, python_name)
         scope.functions[function.name] = inner
@@ -233,7 +231,6 @@ class _Resolver:
                 self._error(
                     ScriptTypeError(f"cannot run {run.thread}: a thread takes no parameters"), run.span
                 )
-            self._warn(f"'{run.thread}' is run as a thread but defined with 'def'", run.span)
 
     def _check_arguments(self, call: nodes.Call, callee: FunctionScope) -> None:
         """Count and names of the arguments of a user function."""
@@ -285,10 +282,6 @@ class _Resolver:
     def _error(self, error: ScriptCompileError, span: Span) -> None:
         width = span.end_column - span.column if span.line == span.end_line else 1
         self.errors.append(error.locate(self.source, span.line, span.column, width))
-
-    def _warn(self, message: str, span: Span) -> None:
-        warning = ScriptContextError(message)
-        self.program.warnings.append(warning.locate(self.source, span.line, span.column))
 
 
 def _declared_name(statement: nodes.Assign | nodes.Declare) -> str | None:

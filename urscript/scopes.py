@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from urscript.errors import ScriptCompileError
 from urscript.nodes import Block, Function
 from urscript.source import Source
 
@@ -81,7 +80,6 @@ class ResolvedProgram:
         globals: All global variables.
         unsure_globals: Those that may be read before anything was assigned to them.
         builtins: Builtin functions the program uses.
-        warnings: What is allowed but probably not meant.
     """
 
     source: Source
@@ -92,7 +90,6 @@ class ResolvedProgram:
     globals: set[str] = field(default_factory=set)
     unsure_globals: set[str] = field(default_factory=set)
     builtins: set[str] = field(default_factory=set)
-    warnings: list[ScriptCompileError] = field(default_factory=list)
 
     def scopes(self) -> list[FunctionScope]:
         """The program body and all functions."""

@@ -8,7 +8,7 @@ This module renders carets; it must not know what is wrong or why.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 
 class Span(NamedTuple):
@@ -21,6 +21,18 @@ class Span(NamedTuple):
 
 
 NOWHERE = Span(1, 1, 1, 1)
+
+BLANKS: Final = " \t\r\n\f\v"
+"""White space of the language. More than these must not be stripped: in latin-1 text, str.strip() would take
+bytes 0x85 and 0xA0 too, which end many a UTF-8 character."""
+
+
+def as_utf8(text: str) -> str:
+    """Text of a program for people: bytes that are UTF-8 become the characters they mean."""
+    try:
+        return text.encode("latin-1").decode("utf-8")
+    except UnicodeError:
+        return text
 
 
 @dataclass(frozen=True, slots=True)

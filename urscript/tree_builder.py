@@ -11,7 +11,7 @@ from typing import Any, cast
 
 from urscript import nodes
 from urscript.errors import ScriptSyntaxError
-from urscript.source import Span
+from urscript.source import BLANKS, Span
 
 
 def _span(item: Any) -> Span:
@@ -112,7 +112,7 @@ class TreeBuilder:
         return nodes.Evaluate(items[0], span=items[0].span)
 
     def label(self, items: list[Any]) -> nodes.Label:
-        return nodes.Label(str(items[0])[1:].strip(), span=_span(items[0]))
+        return nodes.Label(str(items[0])[1:].strip(BLANKS), span=_span(items[0]))
 
     # expressions
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from urscript import ProgramStatus, RecordingHost, compile_program
+from urscript import ProgramStatus, RecordingHost, check_program, compile_program
 from urscript.programs import velocity_receiver
 from urscript.recording_host import FakeSocket
 
@@ -114,7 +114,7 @@ def test_it_is_plain_text_for_any_controller():
     lines = text.splitlines()
     assert (lines[0], lines[-1]) == ("def velocity_receiver():", "end")
     assert all(line.startswith(" ") or not line for line in lines[1:-1])
-    assert compile_program(text).warnings == ()
+    assert check_program(text) == ((), [])
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,99 @@
+"""What `urscript check` warns about: one table, and the warning itself.
+
+A code never changes its meaning and is never used again for another one.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from urscript.errors import ScriptError
+from urscript.source import Source, Span
+
+
+class Rule(NamedTuple):
+    """One kind of warning.
+
+    Attributes:
+        code: What people ignore it by.
+        meaning: What the program does.
+        reason: Why that is probably not meant.
+    """
+
+    code: str
+    meaning: str
+    reason: str
+
+
+UNUSED_GLOBAL: Final = Rule(
+    "W101",
+    "a global variable is never read",
+    "misspelt elsewhere, or left over; a name with _ in front is exempt",
+)
+UNUSED_LOCAL: Final = Rule("W102", "a local variable is never read", "as W101")
+UNUSED_PARAMETER: Final = Rule("W103", "a parameter is never read", "as W101")
+UNUSED_FUNCTION: Final = Rule("W104", "a function is never called", "nothing that runs calls it")
+UNUSED_THREAD: Final = Rule("W105", "a thread is never run", "nothing that runs starts it")
+BUSY_LOOP: Final = Rule(
+    "W106",
+    "a loop takes no time and cannot end by itself",
+    "nothing it looks at changes within a control cycle, so the controller stops the program",
+)
+UNCHECKED_READ: Final = Rule(
+    "W107",
+    "the count of a socket read is never checked",
+    "element 0 says how many numbers came; after a time-out the others mean nothing",
+)
+UNREACHABLE: Final = Rule(
+    "W108", "code is never reached", "it stands after return, halt, break, continue or a loop without an end"
+)
+HIDES_BUILTIN: Final = Rule(
+    "W109",
+    "a name hides a builtin",
+    "the builtin cannot be called where the name counts, readers take it for it",
+)
+DEAD_BRANCH: Final = Rule(
+    "W110", "an elif or else is never reached", "a condition before it is always true, or the same"
+)
+DEFINED_TWICE: Final = Rule(
+    "W111", "a function is defined twice", "the last definition counts, also before it"
+)
+RUN_OF_DEF: Final = Rule(
+    "W112", "a function is run as a thread", "a controller may refuse it; define it with thread"
+)
+
+RULES: Final = (
+    UNUSED_GLOBAL,
+    UNUSED_LOCAL,
+    UNUSED_PARAMETER,
+    UNUSED_FUNCTION,
+    UNUSED_THREAD,
+    BUSY_LOOP,
+    UNCHECKED_READ,
+    UNREACHABLE,
+    HIDES_BUILTIN,
+    DEAD_BRANCH,
+    DEFINED_TWICE,
+    RUN_OF_DEF,
+)
+
+
+class ScriptWarning(ScriptError):
+    """Allowed but probably not meant.
+
+    Attributes:
+        rule: The row of the table.
+        span: The stretch of text it is about.
+    """
+
+    kind = "Warning"
+
+    def __init__(self, rule: Rule, message: str, span: Span, source: Source, hint: str | None = None) -> None:
+        width = span.end_column - span.column if span.line == span.end_line else 1
+        super().__init__(message, line=span.line, column=span.column, width=width, source=source, hint=hint)
+        self.rule = rule
+        self.span = span
+
+    def headline(self) -> str:
+        """One line for people, the code at its end."""
+        return f"{super().headline()} [{self.rule.code}]"
