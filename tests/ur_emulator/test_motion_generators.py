@@ -4,12 +4,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, ArmMotion, OwnershipError
-from ur_emulator.motion.generators import MoveJ, SpeedJ, StopJ
+from ur_emulator.motion.generators import SpeedJ, StopJ
+from ur_emulator.motion.leg import move_j
+from ur_emulator.motion.move import Move
 from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.motion.tool import Tool
 
 DT = 0.008
+TOOL = Tool(ArmModel(robot_by_name("ur3")), ZERO6)
 joints = st.tuples(*[st.floats(-3.0, 3.0)] * 6)
+
+
+def joint_move(start, goal, *, a, v):
+    return Move(move_j(start, goal, TOOL, a=a, v=v))
 
 
 def run(generator, target, cycles, scale=1.0):
@@ -56,7 +66,7 @@ def test_stopj_decelerates_at_a_and_ends_at_exact_rest():
 
 @given(joints, joints, st.floats(0.2, 3.0), st.floats(0.2, 10.0))
 def test_movej_arrives_exactly_and_keeps_the_limits_of_the_leading_axis(start, goal, v, a):
-    generator = MoveJ(start, goal, a=a, v=v)
+    generator = joint_move(start, goal, a=a, v=v)
     cycles = int(generator.duration / DT) + 2
     targets = run(generator, JointTarget(start), cycles)
     assert generator.done
@@ -68,14 +78,14 @@ def test_movej_arrives_exactly_and_keeps_the_limits_of_the_leading_axis(start, g
 
 def test_movej_is_a_straight_line_in_joint_space():
     start, goal = (0.0,) * 6, (1.0, -2.0, 0.5, 0.0, 0.25, 3.0)
-    generator = MoveJ(start, goal, a=1.4, v=1.05)
+    generator = joint_move(start, goal, a=1.4, v=1.05)
     for target in run(generator, JointTarget(start), 100)[1:]:
         share = target.q[5] / 3.0
         assert target.q == pytest.approx([share * g for g in goal], abs=1e-12)
 
 
 def test_speed_slider_stretches_time_on_the_path():
-    full, half = (MoveJ(ZERO6, (1.0,) * 6, a=1.4, v=1.05) for _ in range(2))
+    full, half = (joint_move(ZERO6, (1.0,) * 6, a=1.4, v=1.05) for _ in range(2))
     fast = run(full, JointTarget(ZERO6), 50)
     slow = run(half, JointTarget(ZERO6), 100, scale=0.5)
     assert slow[100].q == pytest.approx(fast[50].q)

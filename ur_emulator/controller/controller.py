@@ -19,6 +19,7 @@ from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (
     PROTECTIVE_STOP_DECELERATION,
     UNLOCK_DELAY,
+    UNREACHABLE_PATH,
     Violation,
     find_invalid_setpoint,
     find_violation,
@@ -31,6 +32,7 @@ from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, ArmMotion
 from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.tool import UnreachableError
 from ur_emulator.plant.plant import Plant
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.program_slot import ProgramSlot
@@ -127,7 +129,8 @@ class Controller:
             state.events.append(report)
             state.watchdogs.clear()
             self.programs.stop()
-        state.encoders.step(state.io.digital_in)
+        if state.encoders.decoding:
+            state.encoders.step(state.io.digital_in)
         self.programs.step()
         if state.power_off_requested:
             state.power_off_requested = False
@@ -148,8 +151,8 @@ class Controller:
                 violation = _REQUESTED_STOP
             if violation is not None:
                 self._stop_for(violation, sensed.actual_q)
-            warning = state.error_settings.deviation_warning(sensed.position_error)
-            if warning is not None:
+            settings = state.error_settings
+            if settings.warns_of_deviation and (warning := settings.deviation_warning(sensed.position_error)):
                 state.events.append(warning)
         state.stop_requested = False
         state.steady_cycles = 0 if any(target.qd) else state.steady_cycles + 1
@@ -209,10 +212,13 @@ class Controller:
     def _next_target(self) -> JointTarget:
         """Advance the motion; an invalid set-point never reaches the joints: they brake before it."""
         state, before = self.state, self.state.motion.target
-        target = state.motion.step(self.period_s, state.speed_slider)
-        if target is before or state.safety.is_stopped:
-            return target
-        violation = find_invalid_setpoint(state.robot, before, target, self.period_s)
+        try:
+            target = state.motion.step(self.period_s, state.speed_slider)
+            if target is before or state.safety.is_stopped:
+                return target
+            violation = find_invalid_setpoint(state.robot, before, target, self.period_s)
+        except UnreachableError:
+            violation = UNREACHABLE_PATH
         if violation is None:
             return target
         state.motion.target = before

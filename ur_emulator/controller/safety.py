@@ -84,6 +84,12 @@ def find_invalid_setpoint(
     return None
 
 
+# The arm cannot go where a tool path leads. The real code is not known: 204 is that of other set-points.
+UNREACHABLE_PATH = _stop(
+    204, 0, "Protective Stop: Invalid setpoints: the path leads to a pose that the robot cannot reach"
+)
+
+
 def find_violation(position_error: tuple[float, ...], saturated_s: float) -> Violation | None:
     """Return what the arm has done wrong in this cycle, or None.
 

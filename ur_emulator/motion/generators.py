@@ -1,4 +1,6 @@
-"""One generator per kind of motion: `step` gives the joint target at the end of the next cycle.
+"""What a generator of motion is, and those that stream or stop in joint space.
+
+`step` gives the joint target at the end of the next cycle.
 
 A generator is started from the target that holds at that moment and keeps the rest of its state itself.
 `done` says that it has nothing more to do; the last target it gave then holds.
@@ -10,7 +12,6 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from ur_emulator.models.robot_model import Vector6, six
-from ur_emulator.motion.profile import Trapezoid
 from ur_emulator.motion.target import ZERO6, JointTarget
 
 # A joint speed below this counts as standstill: one cycle of it moves a joint by less than an encoder step.
@@ -79,55 +80,21 @@ class Hold:
         return target if target.qd is ZERO6 else JointTarget(target.q)
 
 
-class MoveJ:
-    """Rest-to-rest move, linear in joint space, all joints starting and stopping together.
+class Streamed:
+    """A motion that lasts only while a script renews it in every cycle."""
 
-    Source: URScript manual CB3 3.15, movej. Time on the path is scaled by the speed slider.
-    """
+    done: bool
 
-    def __init__(
-        self, start: Sequence[float], goal: Sequence[float], *, a: float, v: float, t: float = 0.0
-    ) -> None:
-        """Plan the move.
-
-        Args:
-            start: joint positions now [rad], (6,).
-            goal: joint positions to reach [rad], (6,).
-            a: acceleration of the leading axis [rad/s^2].
-            v: speed of the leading axis [rad/s].
-            t: duration [s]; above 0 it has priority over `a` and `v`.
-        """
-        self._start = six(start)
-        self.goal = six(goal)
-        self._way = six([b - a for a, b in zip(self._start, self.goal, strict=True)])
-        distance = max(map(abs, self._way))
-        self._profile = Trapezoid.from_limits(distance, v, a)
-        if t > 0.0:
-            self._profile = Trapezoid.from_duration(distance, t, self._profile)
-        self._share = six([d / distance if distance > 0.0 else 0.0 for d in self._way])
-        self._time = 0.0
-        self.done = self._profile.duration == 0.0
-
-    @property
-    def duration(self) -> float:
-        """Planned duration at full speed [s]."""
-        return self._profile.duration
+    def when_lost(self) -> Generator:
+        """Return what the arm does when the next command does not come."""
+        raise NotImplementedError
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Advance on the path by `scale * dt`."""
-        self._time += scale * dt
-        if self._time >= self._profile.duration:
-            self.done = True
-            return JointTarget(self.goal)
-        s, sd, sdd = self._profile.at(self._time)
-        return JointTarget(
-            six([p + s * u for p, u in zip(self._start, self._share, strict=True)]),
-            six([scale * sd * u for u in self._share]),
-            six([scale * scale * sdd * u for u in self._share]),
-        )
+        """See Generator."""
+        raise NotImplementedError
 
 
-class SpeedJ:
+class SpeedJ(Streamed):
     """Accelerate to a joint velocity and keep it.
 
     Source: URScript manual CB3 3.15, speedj (semantics since 3.2): linear acceleration of the leading axis,
@@ -146,6 +113,10 @@ class SpeedJ:
         after = ramp_towards(target, goal, self.a, dt)
         self.done = after.qd == goal
         return after
+
+    def when_lost(self) -> Generator:
+        """Stop with the acceleration of the last command."""
+        return StopJ(self.a)
 
 
 class StopJ:

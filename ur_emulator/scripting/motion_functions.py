@@ -1,83 +1,147 @@
-"""Builtins that move the arm: each takes the arm for its thread, sets a generator and waits for it."""
+"""Moves from waypoint to waypoint: each takes the arm for its thread, or joins the move it blends out of."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from protocol.pose import Pose as ToolPose
+from protocol.primary_messages import ReportLevel
+from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.models.robot_model import Vector6, six
-from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, OwnershipError
-from ur_emulator.motion.generators import Generator as MotionGenerator
-from ur_emulator.motion.generators import MoveJ, SpeedJ, StopJ
+from ur_emulator.models.robot_model import Vector6
+from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION
+from ur_emulator.motion.generators import StopJ
+from ur_emulator.motion.leg import Leg, move_j, move_tool
+from ur_emulator.motion.move import Follow, Move
+from ur_emulator.motion.path import PoseLine, PosePath, arc_through
+from ur_emulator.motion.tool import Tool
+from ur_emulator.scripting.arm_taking import Cycles, floats, require_positive, take_arm
+from ur_emulator.scripting.speed_functions import speed_functions
 from urscript.errors import ScriptRuntimeError
 from urscript.values import Pose
 from urscript.waits import NEXT_CYCLE
 
-# What a motion builtin is to the interpreter: a generator that yields once per cycle it lasts.
-Cycles = Generator[Any, None, None]
+# The controller's number of the warning "Overlapping Blends" is not known: it goes out with the text alone.
+OVERLAPPING_BLENDS = ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blends")
 
 
 def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return the motion builtins bound to one controller."""
+    """Return all builtins that move the arm, bound to one controller."""
     motion = state.motion
 
-    def take(thread: object, generator: MotionGenerator) -> None:
-        try:
-            motion.command(thread, generator)
-        except OwnershipError:
-            raise ScriptRuntimeError("Another thread is already controlling the robot") from None
+    def tool() -> Tool:
+        return Tool(state.arm, state.tcp_offset)
 
-    def positive(function: str, **limits: float) -> None:
-        for name, value in limits.items():
-            if not value > 0.0:
-                raise ScriptRuntimeError(f"{function}: {name} must be above 0, got {value:g}")
+    def travel(thread: object, make: Callable[[Vector6, ToolPose], Leg]) -> Cycles:
+        """Follow a leg made for joint angles and tool pose at its start; from rest, or out of a blend."""
+        move = motion.move_of(thread)
+        if move is not None and move.left and not move.done:
+            corner = move.leg
+            outcome = Follow.REFUSED
+            if corner.goal is not None:
+                outcome = move.follow(make(corner.goal, corner.goal_pose))
+            if outcome is Follow.SKIPPED:
+                state.events.append(OVERLAPPING_BLENDS)
+                yield NEXT_CYCLE
+                return
+            if outcome is Follow.BLENDED:
+                yield from ride(move)
+                return
+            while not move.done:
+                yield NEXT_CYCLE
+        if any(motion.target.qd):  # a move begins at rest, also after a program that was replaced in motion
+            take_arm(state, thread, stop := StopJ(PROGRAM_END_DECELERATION))
+            while not stop.done:
+                yield NEXT_CYCLE
+        start = motion.target.q
+        move = Move(make(start, state.arm.fk(start, state.tcp_offset)))
+        take_arm(state, thread, move)
+        yield from ride(move)
+
+    def ride(move: Move) -> Cycles:
+        yield NEXT_CYCLE
+        while not move.open:
+            yield NEXT_CYCLE
+        move.left = True
+
+    def pose_of(target: Any) -> ToolPose:
+        return _pose(target) if isinstance(target, Pose) else state.arm.fk(floats(target), state.tcp_offset)
 
     def movej(thread: object, q: Any, a: float, v: float, t: float, r: float) -> Cycles:
-        positive("movej", a=a, v=v)
-        if any(motion.target.qd):  # a move begins at rest, also after a program that was replaced in motion
-            yield from stopj(thread, PROGRAM_END_DECELERATION)
-        start = motion.target.q
-        if isinstance(q, Pose):
-            solution = state.arm.inverse(tuple(q), start, state.tcp_offset)
-            if solution is None:
-                raise ScriptRuntimeError(
-                    "The robot cannot reach the requested pose. "
-                    "Script function movej is unable to find an inverse kinematics solution."
-                )
-            goal = solution
-        else:
-            goal = _floats(q)
-        generator = MoveJ(start, goal, a=a, v=v, t=t)
-        take(thread, generator)
-        while not generator.done:
-            yield NEXT_CYCLE
+        _require_limits("movej", a, v, t, r)
 
-    def speedj(thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
-        positive("speedj", a=a)
-        generator = SpeedJ(_floats(qd), a)
-        take(thread, generator)
-        if t is not None and t > 0.0:
-            # Exactly one cycle for t = step time, whatever the rounding of the division.
-            for _ in range(max(1, math.ceil(t / state.period_s - 1e-6))):
-                motion.renew()
-                yield NEXT_CYCLE
-        else:
-            while not generator.done:
-                motion.renew()
-                yield NEXT_CYCLE
+        def make(start: Vector6, _: ToolPose) -> Leg:
+            return move_j(start, joints_of(q, start), tool(), a=a, v=v, t=t, r=r)
 
-    def stopj(thread: object, a: float) -> Cycles:
-        positive("stopj", a=a)
-        generator = StopJ(a)
-        take(thread, generator)
-        while not generator.done:
-            yield NEXT_CYCLE
+        return travel(thread, make)
 
-    return {"movej": movej, "speedj": speedj, "stopj": stopj}
+    def joints_of(target: Any, near: Vector6) -> Vector6:
+        if not isinstance(target, Pose):
+            return floats(target)
+        solution = state.arm.inverse(_pose(target), near, state.tcp_offset)
+        if solution is None:
+            raise ScriptRuntimeError(
+                "The robot cannot reach the requested pose. "
+                "Script function movej is unable to find an inverse kinematics solution."
+            )
+        return solution
+
+    def along(
+        thread: object,
+        make_path: Callable[[ToolPose], PosePath],
+        a: float,
+        v: float,
+        t: float,
+        r: float,
+        *,
+        process: bool,
+    ) -> Cycles:
+        def make(q: Vector6, start: ToolPose) -> Leg:
+            return move_tool(make_path(start), q, tool(), a=a, v=v, t=t, r=r, process=process)
+
+        return travel(thread, make)
+
+    def movel(thread: object, pose: Any, a: float, v: float, t: float, r: float) -> Cycles:
+        _require_limits("movel", a, v, t, r)
+        goal = pose_of(pose)
+        return along(thread, lambda start: PoseLine(start, goal), a, v, t, r, process=False)
+
+    def movep(thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
+        _require_limits("movep", a, v, 0.0, r)
+        goal = pose_of(pose)
+        return along(thread, lambda start: PoseLine(start, goal), a, v, 0.0, r, process=True)
+
+    def servoc(thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
+        _require_limits("servoc", a, v, 0.0, r)
+        goal = pose_of(pose)
+        return along(thread, lambda start: PoseLine(start, goal), a, v, 0.0, r, process=True)
+
+    def movec(
+        thread: object, pose_via: Any, pose_to: Any, a: float, v: float, r: float, mode: float
+    ) -> Cycles:
+        _require_limits("movec", a, v, 0.0, r)
+        via, goal, fixed = pose_of(pose_via), pose_of(pose_to), mode == 1
+        return along(
+            thread, lambda start: arc_through(start, via, goal, fixed=fixed), a, v, 0.0, r, process=True
+        )
+
+    return {
+        "movej": movej,
+        "movel": movel,
+        "movep": movep,
+        "movec": movec,
+        "servoc": servoc,
+        **speed_functions(state),
+    }
 
 
-def _floats(values: Sequence[float]) -> Vector6:
-    """Return joint values as floats; a script may write whole numbers."""
-    return six([float(value) for value in values])
+def _require_limits(function: str, a: float, v: float, t: float, r: float) -> None:
+    require_positive(function, a=a, v=v)
+    for name, value in (("t", t), ("r", r)):
+        if not value >= 0.0:
+            raise ScriptRuntimeError(f"{function}: {name} must not be below 0, got {value:g}")
+
+
+def _pose(value: Sequence[float]) -> ToolPose:
+    return floats(tuple(value))

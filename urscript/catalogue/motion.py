@@ -58,7 +58,8 @@ _MOVES: tuple[Builtin, ...] = (
         "None",
         "joint-linear move; a pose goes through inverse kinematics; t > 0 overrides a and v",
         time=MOTION,
-        support=EXACT,
+        support=APPROXIMATE,
+        note="the shape of blends, and of the profile with t, is chosen",
     ),
     _row(
         "movel",
@@ -72,6 +73,8 @@ _MOVES: tuple[Builtin, ...] = (
         "None",
         "move with the tool on a straight line; joint positions go through forward kinematics",
         time=MOTION,
+        support=APPROXIMATE,
+        note="timing of pure turns and the shape of blends are chosen",
     ),
     _row(
         "movep",
@@ -79,6 +82,8 @@ _MOVES: tuple[Builtin, ...] = (
         "None",
         "process move: lines with circular blends at constant tool speed",
         time=MOTION,
+        support=APPROXIMATE,
+        note="blends of arcs, and sharper than 162 degrees, are not circular",
     ),
     _row(
         "movec",
@@ -93,6 +98,8 @@ _MOVES: tuple[Builtin, ...] = (
         "None",
         "move on the arc through a via point; the rotation of the via point is ignored",
         time=MOTION,
+        support=APPROXIMATE,
+        note="three points on a line give a straight move",
     ),
     _row(
         "servoj",
@@ -102,6 +109,8 @@ _MOVES: tuple[Builtin, ...] = (
         time=MOTION,
         until=releases(None, "5.21"),
         since=releases("3.0", "5.0"),
+        support=APPROXIMATE,
+        note="gain and lookahead time are read as the coefficients of a second-order lag",
     ),
     _row(
         "servoj",
@@ -111,6 +120,8 @@ _MOVES: tuple[Builtin, ...] = (
         time=MOTION,
         since=LATE_E_SERIES,
         source=MANUAL_LATE,
+        support=APPROXIMATE,
+        note="gain and lookahead time are read as the coefficients of a second-order lag",
     ),
     _row(
         "servoc",
@@ -120,6 +131,8 @@ _MOVES: tuple[Builtin, ...] = (
         time=MOTION,
         undocumented=(Generation.CB3, Generation.E_SERIES),
         source=FIELD_USE,
+        support=APPROXIMATE,
+        note="undocumented; done as movep",
     ),
     _row(
         "speedj",
@@ -145,6 +158,8 @@ _MOVES: tuple[Builtin, ...] = (
         "None",
         "accelerate the tool linearly to the spatial velocity xd in the base frame, then keep it",
         time=MOTION,
+        support=APPROXIMATE,
+        note="what happens when the program goes on without a further motion command is not documented",
     ),
     _row(
         "stopj",
@@ -160,6 +175,7 @@ _MOVES: tuple[Builtin, ...] = (
         "None",
         "decelerate the tool to rest",
         time=MOTION,
+        support=EXACT,
     ),
     _row("set_pos", (Param("q", JOINTS, unit="rad"),), "None", "put the simulated robot at q"),
     _row(

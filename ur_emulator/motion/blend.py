@@ -1,0 +1,190 @@
+"""The blend between two moves: a curve from r before the waypoint to r behind it, tangent to both.
+
+Three shapes. Two moves of the tool: a cubic in position and orientation relative to the waypoint; between
+straight lines that is the parabola of a constant acceleration. Two straight process moves (movep): a circular
+arc, so that the speed stays. As soon as a joint move takes part: the same cubic in joint space.
+Source: URScript manual CB3 3.15, `r` of the moves, "circular blends" of movep; the other shapes are chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import acos, cos, hypot, inf, pi, sin, sqrt, tan
+
+from protocol.pose import Pose, pose_add, pose_sub
+from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.motion.cubic import Cubic, Vector
+from ur_emulator.motion.joint_path import JointCurve, JointLine, JointPath, ToolPath
+from ur_emulator.motion.leg import Leg
+from ur_emulator.motion.path import PoseLine
+
+# Beyond this turn the circular blend of a movep gets so narrow that the cubic takes its place.
+SHARPEST_ARC = 0.9 * pi
+_STRAIGHT = 1e-6  # rad
+
+
+@dataclass(frozen=True, slots=True)
+class Blend:
+    """A blend, ready to be travelled at a constant rate.
+
+    Attributes:
+        path: the curve, in units of the move that it leaves.
+        leave: where on the first move it begins.
+        enter: where on the second move it ends.
+        ratio: speed on entering the second move for a speed of 1 on leaving the first [unit 2 / unit 1].
+        top_speed: greatest speed that keeps the accelerations of both moves, in units of the first.
+    """
+
+    path: JointPath
+    leave: float
+    enter: float
+    ratio: float
+    top_speed: float
+
+
+def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
+    """Return the blend of two moves around the waypoint between them.
+
+    Args:
+        first: the move that leads to the waypoint.
+        second: the move that begins there.
+        r: radius [m]; cut where it covers more than half of the second move.
+        most: how much of the first move may be cut off at its end.
+
+    Returns:
+        None when there is nothing to blend.
+    """
+    before = first.last_part(r, most)
+    after = second.first_part(r, 0.5 * second.path.length)
+    if before <= 0.0 or after <= 0.0 or first.goal is None:
+        return None
+    leave = first.path.length - before
+    a, b = first.path, second.path
+    if isinstance(a, ToolPath) and isinstance(b, ToolPath):
+        if (
+            first.process
+            and second.process
+            and isinstance(a.path, PoseLine)
+            and isinstance(b.path, PoseLine)
+            and (corner := _corner(a.path, b.path, first, leave, after)) is not None
+        ):
+            return Blend(ToolPath(corner, first.tool), leave, after, 1.0, inf)
+        start, slope = a.path.at(leave)
+        end, end_slope = b.path.at(after)
+        waypoint = first.goal_pose
+        cubic = Cubic.between(
+            pose_sub(start, waypoint),
+            _times(2.0 * before, slope),
+            pose_sub(end, waypoint),
+            _times(2.0 * after, end_slope),
+        )
+        bend = max(hypot(*bend[:3]) for bend in cubic.bends())
+        curve: JointPath = ToolPath(PoseCurve(cubic, waypoint, 2.0 * before), first.tool)
+        limit = min(first.a, second.a)
+    else:
+        start_q, slope = a.at(leave, first.goal)
+        end_q, end_slope = b.at(after, first.goal)
+        cubic = Cubic.between(start_q, _times(2.0 * before, slope), end_q, _times(2.0 * after, end_slope))
+        bend = max(abs(x) for bend in cubic.bends() for x in bend)
+        curve = JointCurve(cubic, 2.0 * before)
+        limit = min(leg.a for leg in (first, second) if isinstance(leg.path, JointLine))
+    top = 2.0 * before * sqrt(limit / bend) if bend > 0.0 else inf
+    return Blend(curve, leave, after, after / before, top)
+
+
+class PoseCurve:
+    """A cubic in position and rotation vector relative to a waypoint; travelled at constant rate."""
+
+    def __init__(self, cubic: Cubic, waypoint: Pose, length: float) -> None:
+        self._cubic = cubic
+        self._waypoint = waypoint
+        self.length = length
+
+    def at(self, s: float) -> tuple[Pose, Vector6]:
+        """See PosePath."""
+        value, slope = self._cubic.at(s / self.length)
+        twist = (*slope[:3], *_turn_rate(value[3:], slope[3:]))
+        return pose_add(value, self._waypoint), _times(1.0 / self.length, twist)
+
+
+class PoseCorner:
+    """A circular arc between two lines; the orientation turns smoothly from one rate to the other."""
+
+    def __init__(
+        self, start: Pose, u: Vector, w: Vector, radius: float, angle: float, turn: Cubic, waypoint: Pose
+    ) -> None:
+        self._start = start
+        self._u, self._w = u, w  # unit vectors: direction of the first line, and into the turn
+        self._radius, self._angle = radius, angle
+        self._turn = turn
+        self._waypoint = waypoint
+        self.length = radius * angle
+
+    def at(self, s: float) -> tuple[Pose, Vector6]:
+        """See PosePath."""
+        phi = s / self._radius
+        sine, rise = self._radius * sin(phi), self._radius * (1.0 - cos(phi))
+        x, y, z = (p + sine * u + rise * w for p, u, w in zip(self._start[:3], self._u, self._w, strict=True))
+        vx, vy, vz = (cos(phi) * u + sin(phi) * w for u, w in zip(self._u, self._w, strict=True))
+        value, slope = self._turn.at(s / self.length)
+        turned = pose_add((0.0, 0.0, 0.0, *value), (0.0, 0.0, 0.0, *self._waypoint[3:]))
+        rx, ry, rz = (k / self.length for k in _turn_rate(value, slope))
+        return (x, y, z, turned[3], turned[4], turned[5]), (vx, vy, vz, rx, ry, rz)
+
+
+def _corner(first: PoseLine, second: PoseLine, leg: Leg, leave: float, enter: float) -> PoseCorner | None:
+    """Return the arc tangent to two lines; None where it would be too narrow, or the lines are turns only."""
+    start, slope = first.at(leave)
+    end, end_slope = second.at(enter)
+    waypoint = leg.goal_pose
+    d1, d2 = slope[:3], end_slope[:3]
+    r = min(hypot(*_minus(start[:3], waypoint[:3])), hypot(*_minus(end[:3], waypoint[:3])))
+    # Only lines whose s is the tool's own way keep one speed through an arc.
+    if abs(hypot(*d1) - 1.0) > _STRAIGHT or abs(hypot(*d2) - 1.0) > _STRAIGHT or r <= 0.0:
+        return None
+    if abs(hypot(*_minus(start[:3], waypoint[:3])) - hypot(*_minus(end[:3], waypoint[:3]))) > 1e-6 * r:
+        return None
+    cosine = sum(x * y for x, y in zip(d1, d2, strict=True))
+    angle = acos(max(-1.0, min(1.0, cosine)))
+    if angle < 1e-4 or angle > SHARPEST_ARC:
+        return None
+    w = tuple((y - cosine * x) / sin(angle) for x, y in zip(d1, d2, strict=True))
+    radius = r / tan(0.5 * angle)
+    length = radius * angle
+    turn = Cubic.between(
+        pose_sub(start, waypoint)[3:],
+        [length * k for k in slope[3:]],
+        pose_sub(end, waypoint)[3:],
+        [length * k for k in end_slope[3:]],
+    )
+    return PoseCorner(start, d1, w, radius, angle, turn, waypoint)
+
+
+def _turn_rate(rotvec: Sequence[float], slope: Sequence[float]) -> tuple[float, float, float]:
+    """Return the angular velocity in base axes of a rotation vector that changes at `slope`.
+
+    The left Jacobian of SO(3).
+    """
+    x, y, z = rotvec
+    theta2 = x * x + y * y + z * z
+    if theta2 < 1e-8:
+        b, c = 0.5 - theta2 / 24.0, 1.0 / 6.0 - theta2 / 120.0
+    else:
+        theta = sqrt(theta2)
+        b, c = (1.0 - cos(theta)) / theta2, (theta - sin(theta)) / (theta2 * theta)
+    i, j, k = slope
+    px, py, pz = y * k - z * j, z * i - x * k, x * j - y * i
+    return (
+        i + b * px + c * (y * pz - z * py),
+        j + b * py + c * (z * px - x * pz),
+        k + b * pz + c * (x * py - y * px),
+    )
+
+
+def _times(k: float, values: Sequence[float]) -> Vector6:
+    return six([k * value for value in values])
+
+
+def _minus(a: Sequence[float], b: Sequence[float]) -> Vector:
+    return tuple(x - y for x, y in zip(a, b, strict=True))

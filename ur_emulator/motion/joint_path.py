@@ -1,0 +1,82 @@
+"""What a move follows, told in joints: a line of joint angles, or a path of the tool through the inverse.
+
+`at(s, near)` gives the joint angles and their derivative with respect to s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.motion.cubic import Cubic
+from ur_emulator.motion.path import PosePath
+from ur_emulator.motion.tool import Tool, UnreachableError
+
+
+class JointPath(Protocol):
+    """A path of the joints; s is radians of the leading axis or metres of the tool."""
+
+    @property
+    def length(self) -> float:
+        """Greatest s."""
+        ...
+
+    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
+        """Return joint angles [rad] and their derivative [rad per unit of s].
+
+        Args:
+            s: way travelled.
+            near: joint angles a little earlier on the path [rad].
+
+        Raises:
+            UnreachableError: the arm cannot be there.
+        """
+        ...
+
+
+class JointLine:
+    """Straight line in joint space; s is the angle of the leading axis."""
+
+    def __init__(self, start: Sequence[float], goal: Sequence[float]) -> None:
+        self._start = six(start)
+        self._goal = six(goal)
+        way = [b - a for a, b in zip(start, goal, strict=True)]
+        self.length = max(map(abs, way))
+        self._share = six([w / self.length if self.length > 0.0 else 0.0 for w in way])
+
+    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
+        """See JointPath; the end is the goal to the last bit."""
+        if s >= self.length:
+            return self._goal, self._share
+        return six([p + s * k for p, k in zip(self._start, self._share, strict=True)]), self._share
+
+
+class JointCurve:
+    """A cubic in joint space, in the units of the move that it leaves."""
+
+    def __init__(self, cubic: Cubic, length: float) -> None:
+        self._cubic = cubic
+        self.length = length
+
+    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
+        """See JointPath."""
+        q, slope = self._cubic.at(s / self.length)
+        return six(q), six([k / self.length for k in slope])
+
+
+class ToolPath:
+    """A path of the tool; s is metres of its way."""
+
+    def __init__(self, path: PosePath, tool: Tool) -> None:
+        self.path = path
+        self.tool = tool
+        self.length = path.length
+
+    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
+        """See JointPath."""
+        pose, twist = self.path.at(s)
+        q = self.tool.joints(pose, near)
+        if q is None:
+            raise UnreachableError
+        return q, self.tool.rates(q, twist)

@@ -1,0 +1,151 @@
+"""One move instruction as data: its path, its limits, and the blend it asks for at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import dist
+
+from protocol.pose import Pose
+from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.motion.joint_path import JointLine, JointPath, ToolPath
+from ur_emulator.motion.path import PosePath
+from ur_emulator.motion.profile import Trapezoid
+from ur_emulator.motion.tool import Tool
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """One instruction's way to its waypoint.
+
+    Attributes:
+        path: from the last waypoint to this one.
+        tool: kinematics of the tool that moves.
+        goal: joint angles at the waypoint [rad]; None if the arm cannot be there.
+        goal_pose: pose at the waypoint.
+        v, a: speed and acceleration along the path [unit/s, unit/s^2]: of the leading axis in rad, or of the
+            tool in m.
+        t: duration [s]; above 0 it has priority over `a` and `v`.
+        r: blend radius at the waypoint [m]; 0 to end at rest.
+        process: the speed stays constant through blends (movep).
+    """
+
+    path: JointPath
+    tool: Tool
+    goal: Vector6 | None
+    goal_pose: Pose
+    v: float
+    a: float
+    t: float = 0.0
+    r: float = 0.0
+    process: bool = False
+
+    def position(self, s: float) -> tuple[float, float, float]:
+        """Return where the tool is after the way s [m]."""
+        if isinstance(self.path, ToolPath):
+            x, y, z = self.path.path.at(s)[0][:3]
+        else:
+            x, y, z = self.tool.pose(self.path.at(s, ())[0])[:3]
+        return x, y, z
+
+    def in_time(self, begin: float = 0.0) -> Leg:
+        """Return the same leg with `v` and `a` such that it takes `t`, if it asks for that.
+
+        The trapezoid of `a` and `v` is stretched; an end that blends has no ramp to or from rest.
+
+        Args:
+            begin: where on the path the leg begins; above 0 at the end of a blend.
+        """
+        way = self.path.length
+        if self.t <= 0.0 or way <= 0.0:
+            return self
+        rolling = self.v if begin > 0.0 else 0.0
+        leave = self.v if self.r > 0.0 else 0.0
+        if rolling == leave == self.v:
+            natural = way / self.v
+        else:
+            # A single ramp over the whole way is the longest that can be made of one.
+            top = min(self.v, (2.0 * self.a * way) ** 0.5) if rolling or leave else self.v
+            rolling, leave = min(rolling, top), min(leave, top)
+            natural = Trapezoid.from_limits(way, top, self.a, rolling, leave).duration
+        stretch = self.t / natural
+        return replace(self, v=self.v / stretch, a=self.a / stretch**2)
+
+    def last_part(self, r: float, most: float) -> float:
+        """Return how much of the path's end lies within `r` of the waypoint, at most `most` [unit of s]."""
+        end = self.path.length
+        return _inside(lambda d: dist(self.position(end - d), self.goal_pose[:3]) <= r, most)
+
+    def first_part(self, r: float, most: float) -> float:
+        """Return how much of the path's beginning lies within `r` of its start, at most `most`."""
+        start = self.position(0.0)
+        return _inside(lambda d: dist(self.position(d), start) <= r, most)
+
+
+def move_j(
+    start: Sequence[float],
+    goal: Sequence[float],
+    tool: Tool,
+    *,
+    a: float,
+    v: float,
+    t: float = 0.0,
+    r: float = 0.0,
+) -> Leg:
+    """Return a move that is linear in joint space, all joints starting and stopping together.
+
+    Source: URScript manual CB3 3.15, movej.
+
+    Args:
+        start: joint angles at its beginning [rad], (6,).
+        goal: joint angles to reach [rad], (6,).
+        tool: kinematics, for blends.
+        a: acceleration of the leading axis [rad/s^2].
+        v: speed of the leading axis [rad/s].
+        t: duration [s]; above 0 it has priority over `a` and `v`.
+        r: blend radius [m].
+    """
+    return Leg(JointLine(start, goal), tool, six(goal), tool.pose(goal), v, a, t, r)
+
+
+def move_tool(
+    path: PosePath,
+    near: Sequence[float],
+    tool: Tool,
+    *,
+    a: float,
+    v: float,
+    t: float = 0.0,
+    r: float = 0.0,
+    process: bool = False,
+) -> Leg:
+    """Return a move of the tool along a path. Source: URScript manual CB3 3.15, movel, movep, movec.
+
+    Args:
+        path: to follow.
+        near: joint angles at its beginning [rad], (6,).
+        tool: kinematics.
+        a: tool acceleration [m/s^2].
+        v: tool speed [m/s].
+        t: duration [s]; above 0 it has priority over `a` and `v`.
+        r: blend radius [m].
+        process: keep the speed through blends.
+    """
+    goal_pose = path.at(path.length)[0] if path.length > 0.0 else tool.pose(near)
+    return Leg(ToolPath(path, tool), tool, tool.joints(goal_pose, near), goal_pose, v, a, t, r, process)
+
+
+# Points tried on the way out of a blend zone, and halvings to find its border.
+_SAMPLES, _HALVINGS = 16, 30
+
+
+def _inside(holds: Callable[[float], bool], most: float) -> float:
+    """Return the greatest d <= most up to which `holds(d)` is true, to a part in 10^9."""
+    for k in range(1, _SAMPLES + 1):
+        if not holds(most * k / _SAMPLES):
+            low, high = most * (k - 1) / _SAMPLES, most * k / _SAMPLES
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if holds(middle) else (low, middle)
+            return low
+    return most

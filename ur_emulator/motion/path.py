@@ -1,0 +1,160 @@
+"""Paths of the tool: straight line and arc, as pure functions of the way travelled.
+
+`at(s)` gives the pose and its derivative with respect to s, a twist in base axes per unit of s. Orientation
+turns on the geodesic at a constant rate, on the same parameter. Sources: URScript manual CB3 3.15, movel and
+movec.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import acos, cos, pi, sin, sqrt
+from typing import Protocol
+
+from protocol.pose import Pose, pose_add, pose_sub
+from ur_emulator.models.robot_model import Vector3, Vector6
+
+# A turn without way needs a speed too; nothing is published. Chosen: a turn counts like the way of a point
+# this far from the tool centre point, if that is longer than the tool's own way [m/rad].
+TURN_LEVER = 0.1
+# Three points closer to a line than this make no arc: sine of the angle between the chords.
+_FLAT = 1e-6
+
+
+class PosePath(Protocol):
+    """A path in the space of poses."""
+
+    @property
+    def length(self) -> float:
+        """Greatest s [m]."""
+        ...
+
+    def at(self, s: float) -> tuple[Pose, Vector6]:
+        """Return the pose at s and its derivative, a twist per unit of s."""
+        ...
+
+
+class PoseLine:
+    """Straight line from one pose to another."""
+
+    def __init__(self, start: Sequence[float], goal: Sequence[float]) -> None:
+        self._start = start
+        self._goal = _pose(goal)
+        self._change = pose_sub(goal, start)
+        x, y, z, rx, ry, rz = self._change
+        self.length = max(sqrt(x * x + y * y + z * z), TURN_LEVER * sqrt(rx * rx + ry * ry + rz * rz))
+        self._twist = _scaled(self._change, 1.0 / self.length if self.length > 0.0 else 0.0)
+
+    def at(self, s: float) -> tuple[Pose, Vector6]:
+        """See PosePath; the end is the goal to the last bit."""
+        if s >= self.length:
+            return self._goal, self._twist
+        return pose_add(_scaled(self._change, s / self.length), self._start), self._twist
+
+
+class PoseArc:
+    """Part of a circle, from a pose through a point to a pose."""
+
+    def __init__(
+        self, start: Sequence[float], centre: Vector3, axis: Vector3, angle: float, goal: Pose, *, fixed: bool
+    ) -> None:
+        """Describe the arc; `arc_through` finds the numbers.
+
+        Args:
+            start: first pose.
+            centre: of the circle [m].
+            axis: unit vector that the motion turns about.
+            angle: turned in all, above 0 [rad].
+            goal: pose at the end.
+            fixed: the orientation turns with the tangent, the one of `goal` does not count.
+        """
+        self._start = start
+        self._centre = centre
+        cx, cy, cz = centre
+        self._u = (start[0] - cx, start[1] - cy, start[2] - cz)
+        self._w = _cross(axis, self._u)
+        self._angle = angle
+        turn = (axis[0] * angle, axis[1] * angle, axis[2] * angle) if fixed else pose_sub(goal, start)[3:]
+        self._turn = turn
+        self.length = max(angle * _norm(self._u), 0.0 if fixed else TURN_LEVER * _norm(turn))
+        self._goal = self._pose(1.0) if fixed else goal
+
+    def at(self, s: float) -> tuple[Pose, Vector6]:
+        """See PosePath."""
+        share = s / self.length
+        phi = share * self._angle
+        sine, cosine = sin(phi), cos(phi)
+        k = self._angle / self.length
+        vx, vy, vz = (k * (cosine * w - sine * u) for u, w in zip(self._u, self._w, strict=True))
+        rx, ry, rz = (value / self.length for value in self._turn)
+        return self._goal if share >= 1.0 else self._pose(share), (vx, vy, vz, rx, ry, rz)
+
+    def _pose(self, share: float) -> Pose:
+        phi = share * self._angle
+        sine, cosine = sin(phi), cos(phi)
+        x, y, z = (c + cosine * u + sine * w for c, u, w in zip(self._centre, self._u, self._w, strict=True))
+        rx, ry, rz = (share * value for value in self._turn)
+        turned = pose_add((0.0, 0.0, 0.0, rx, ry, rz), self._start)
+        return (x, y, z, turned[3], turned[4], turned[5])
+
+
+def arc_through(
+    start: Sequence[float], via: Sequence[float], goal: Sequence[float], *, fixed: bool
+) -> PosePath:
+    """Return the arc from `start` through the position of `via` to `goal`.
+
+    Points on one line have no circle; the tool then goes straight to the goal (chosen: not documented).
+
+    Args:
+        start: first pose.
+        via: its rotation is ignored.
+        goal: last pose.
+        fixed: mode 1 of movec: orientation fixed to the tangent, the goal's rotation is ignored.
+    """
+    a, b, c = _position(start), _position(via), _position(goal)
+    ab, ac = _minus(b, a), _minus(c, a)
+    normal = _cross(ab, ac)
+    size = _norm(normal)
+    if size <= _FLAT * _norm(ab) * _norm(ac) or size == 0.0:
+        return PoseLine(start, (*goal[:3], *start[3:]) if fixed else goal)
+    axis = (normal[0] / size, normal[1] / size, normal[2] / size)
+    # Centre of the circle through three points, seen from the first.
+    p, q = _cross(normal, ab), _cross(ac, normal)
+    ab2, ac2 = _dot(ab, ab), _dot(ac, ac)
+    x, y, z = (o + (ac2 * i + ab2 * j) / (2.0 * size * size) for o, i, j in zip(a, p, q, strict=True))
+    centre = (x, y, z)
+    u, v = _minus(a, centre), _minus(c, centre)
+    angle = acos(max(-1.0, min(1.0, _dot(u, v) / (_norm(u) * _norm(v)))))
+    if _dot(_cross(u, v), axis) < 0.0:
+        angle = 2.0 * pi - angle
+    return PoseArc(start, centre, axis, angle, _pose(goal), fixed=fixed)
+
+
+def _pose(values: Sequence[float]) -> Pose:
+    x, y, z, rx, ry, rz = values
+    return (x, y, z, rx, ry, rz)
+
+
+def _scaled(pose: Sequence[float], k: float) -> Vector6:
+    x, y, z, rx, ry, rz = pose
+    return (k * x, k * y, k * z, k * rx, k * ry, k * rz)
+
+
+def _position(pose: Sequence[float]) -> Vector3:
+    return (pose[0], pose[1], pose[2])
+
+
+def _minus(a: Vector3, b: Vector3) -> Vector3:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _dot(a: Vector3, b: Vector3) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _norm(a: Sequence[float]) -> float:
+    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> Vector3:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

@@ -1,0 +1,65 @@
+"""Builtins that stream: velocities and positions that a script renews every cycle, and the stops."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.motion.generators import SpeedJ, StopJ, Streamed
+from ur_emulator.motion.servo_j import ServoJ
+from ur_emulator.motion.speed_l import SpeedL, StopL
+from ur_emulator.motion.tool import Tool
+from ur_emulator.scripting.arm_taking import Cycles, floats, require_positive, take_arm
+from urscript.waits import NEXT_CYCLE
+
+
+def speed_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
+    """Return the streaming builtins and the stops, bound to one controller."""
+    motion = state.motion
+
+    def stream(thread: object, generator: Streamed, t: float | None) -> Cycles:
+        """Keep a motion alive for the time t [s], or until it has got where it should."""
+        take_arm(state, thread, generator)
+        if t is not None and t > 0.0:
+            # Exactly one cycle for t = step time, whatever the rounding of the division.
+            for _ in range(max(1, math.ceil(t / state.period_s - 1e-6))):
+                motion.renew()
+                yield NEXT_CYCLE
+        else:
+            while not generator.done:
+                motion.renew()
+                yield NEXT_CYCLE
+
+    def stop(thread: object, generator: StopJ | StopL) -> Cycles:
+        take_arm(state, thread, generator)
+        while not generator.done:
+            yield NEXT_CYCLE
+
+    def speedj(thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
+        require_positive("speedj", a=a)
+        return stream(thread, SpeedJ(floats(qd), a), t)
+
+    def speedl(thread: object, xd: Any, a: float, t: float | None, aRot: float | None) -> Cycles:
+        a_rot = a if aRot is None else aRot
+        require_positive("speedl", a=a, aRot=a_rot)
+        twist = floats(tuple(xd))
+        return stream(thread, SpeedL(twist, a, a_rot, Tool(state.arm, state.tcp_offset)), t)
+
+    def servoj(
+        thread: object, q: list[float], a: float, v: float, t: float, lookahead_time: float, gain: float
+    ) -> Cycles:
+        require_positive("servoj", t=t, lookahead_time=lookahead_time, gain=gain)
+        return stream(thread, ServoJ(floats(q), lookahead_time, gain), t)
+
+    def stopj(thread: object, a: float) -> Cycles:
+        require_positive("stopj", a=a)
+        return stop(thread, StopJ(a))
+
+    def stopl(thread: object, a: float, aRot: float | None) -> Cycles:
+        a_rot = a if aRot is None else aRot
+        require_positive("stopl", a=a, aRot=a_rot)
+        return stop(thread, StopL(a, a_rot, Tool(state.arm, state.tcp_offset)))
+
+    return {"speedj": speedj, "speedl": speedl, "servoj": servoj, "stopj": stopj, "stopl": stopl}
