@@ -74,7 +74,10 @@ def _is_busy(loop: nodes.While, scope: FunctionScope, catalogue: Catalogue) -> b
     if constant_truth(loop.condition) is True and not _can_leave(loop.body):
         return True
     changes = any(isinstance(item, (nodes.Assign, nodes.Kill)) for item in statements)
-    return not changes and not any(_has_effect(part, scope, catalogue) for part in parts)
+    leaves_at_once = any(map(_end_of, loop.body))
+    return (
+        not changes and not leaves_at_once and not any(_has_effect(part, scope, catalogue) for part in parts)
+    )
 
 
 def _is_pause(statement: Statement) -> bool:

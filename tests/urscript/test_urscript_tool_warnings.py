@@ -1,0 +1,214 @@
+"""Each warning: programs that get it, with its place, and programs like them that do not."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from urscript.cli import app
+from urscript.lint_rules import RULES
+from urscript.program import check_program
+
+
+def warnings_of(text, *codes):
+    errors, warnings = check_program(text)
+    assert not errors, errors
+    return [
+        f"{warning.line}:{warning.column} {warning.message}"
+        for warning in warnings
+        if not codes or warning.rule.code in codes
+    ]
+
+
+def body(*lines):
+    return "def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n"
+
+
+WARNED = {
+    "W101": [
+        (body("global x = 1"), "2:10 global variable 'x' is never read"),
+        (body("x = [1]", "x[0] = 2"), "2:3 global variable 'x' is never read"),
+        (body("global x"), "2:10 global variable 'x' is never read"),
+        (body("def f():", "x = 1", "textmsg(x)", "end", "f()", "if False:", "global y = 0", "end"), "8:10 global variable 'y' is never read"),
+    ],
+    "W102": [(body("def f():", "local x = 1", "y = 2", "return y", "end", "f()"), "3:9 local variable 'x' is never read")],
+    "W103": [(body("def f(a, b=a):", "return b", "end", "a = 2", "f(a)"), "2:9 parameter 'a' of 'f' is never read"), (body("def f(a, b=1):", "a = 2", "return a", "end", "f(1)"), "2:12 parameter 'b' of 'f' is never read")],
+    "W104": [
+        (body("def f():", "end"), "2:7 function 'f' is never called"),
+        (body("def f():", "f()", "end"), "2:7 function 'f' is never called"),
+    ],
+    "W105": [(body("thread  t():", "sync()", "end"), "2:11 thread 't' is never run")],
+    "W106": [
+        (body("while (True):", "x = 1", "end"), "2:3 this loop takes no time"),
+        (body("while not False:", "while True:", "break", "end", "end"), "2:3 this loop takes no time"),
+        (body("while not get_digital_in(0):", "end"), "2:3 this loop takes no time"),
+        (body("while True:", "if get_digital_in(0):", "break", "end", "end"), "2:3 this loop takes no time"),
+        (body("def f():", "set_flag(0, True)", "end", "while True:", "f()", "end"), "5:3 this loop takes no time"),
+    ],
+    "W107": [
+        (body("r = socket_read_ascii_float(2)", "textmsg(r[1])"), "2:7 how many numbers came is never checked: r[0]"),
+        (body("textmsg(socket_read_byte_list(2)[1])"), "2:11 how many numbers came is never checked"),
+        (body("def f():", "local r = socket_read_binary_integer(1)", "return r[1]", "end", "r = [0]", "textmsg(r[0], f())"), "3:13 how many numbers came is never checked"),
+    ],
+    "W108": [
+        (body("def f():", "return 1", "textmsg(2)", "end", "f()"), "4:3 this is never reached: it stands after return"),
+        (body("halt", "$ 1", "def f():", "end", "f()"), "6:3 this is never reached: it stands after halt"),
+        (body("while True:", "if True:", "break", "textmsg(1)", "end", "sync()", "end"), "5:3 this is never reached: it stands after break"),
+        (body("while True:", "sync()", "end", "if get_flag(0):", "end"), "5:3 this is never reached: it stands after a loop without an end"),
+        (body("if get_flag(0):", "halt", "else:", "halt", "end", "textmsg(1)"), "7:3 this is never reached: it stands after an if whose branches all leave"),
+    ],
+    "W109": [
+        (body("force = 1", "textmsg(force)"), "2:3 variable 'force' hides the builtin"),
+        (body("def sync():", "end", "sync()"), "2:7 function 'sync' hides the builtin"),
+        (body("def f(force):", "return force", "end", "f(1)"), "2:9 parameter 'force' hides the builtin"),
+        (body("def f():", "a_joint_default = 2", "return a_joint_default", "end", "f()"), "3:3 variable 'a_joint_default' hides the builtin"),
+    ],
+    "W110": [
+        (body("if True:", "elif get_flag(0):", "end"), "3:3 this branch is never reached: the condition of line 2 is always true"),
+        (body("if get_flag(0):", "elif 1 == 1:", "else:", "halt", "end"), "5:3 this branch is never reached: the condition of line 3 is always true"),
+        (body("x = 1", "if x == 1:", "elif x == 2:", "elif x == 1:", "end"), "5:3 this branch is never reached: the condition of line 3 is the same"),
+    ],
+    "W111": [(body("def f():", "end", "def f():", "end", "f()"), "2:7 'f' is defined twice here, the last definition counts")],
+    "W112": [(body("def f():", "end", "run f()"), "4:3 'f' is run as a thread but defined with 'def'")],
+}  # fmt: skip
+
+FINE = {
+    "W101": [
+        body("x = 1", "textmsg(x)"),
+        body("x = 1", "def f(a=x):", "return a", "end", "f()"),
+        body("x = 1", "thread t():", "x = x + 1", "end", "run t()"),
+        body("i = 0", "x = [1]", "x[i] = 2", "textmsg(x)"),
+        body("_x = 1"),
+    ],
+    "W102": [body("def f():", "x = [1]", "x[0] = 2", "return x", "end", "f()")],
+    "W103": [body("def f(a, _b):", "return a", "end", "f(1, 2)")],
+    "W104": [body("f()", "def f():", "g()", "end", "def g():", "end"), body("def f(a=g()):", "return a", "end", "def g():", "return 1", "end", "f()")],
+    "W105": [body("h = run t()", "thread t():", "run u()", "end", "thread u():", "end", "join h")],
+    "W106": [
+        body("while True:", "sync()", "end"),
+        body("while True:", "if get_flag(0):", "sleep(1)", "end", "end"),
+        body("x = 0", "while x < 3:", "x = x + 1", "end"),
+        body("x = 0", "while True:", "x = x + 1", "if x > 3:", "break", "end", "end"),
+        body("def f():", "g()", "end", "def g():", "sync()", "end", "while True:", "f()", "end"),
+        body("while not get_flag(0):", "set_flag(0, True)", "end"),
+        body("while random() < 0.5:", "end"),
+        body("while get_flag(0):", "if get_flag(1):", "halt", "else:", "break", "end", "end"),
+        body("thread t():", "end", "while True:", "h = run t()", "join h", "end"),
+        body('x = rpc_factory("xmlrpc", "http://a")', "while True:", "x.f()", "end"),
+    ],
+    "W107": [
+        body("r = socket_read_ascii_float(2)", "if r[0] == 2:", "textmsg(r[1])", "end"),
+        body("r = socket_read_ascii_float(2)", "if r == [1, 2]:", "textmsg(r[1])", "end"),
+        body("def f(r):", "return r[0]", "end", "r = socket_read_ascii_float(2)", "f(r)", "textmsg(r[1])"),
+        body("socket_read_ascii_float(2)"),
+        body("def socket_read_ascii_float(n):", "return [n, n]", "end", "r = socket_read_ascii_float(2)", "textmsg(r[1])"),
+        body("textmsg(socket_read_byte_list(2)[0])"),
+    ],
+    "W108": [
+        body("def f(a):", "if a:", "return 1", "end", "return 2", "end", "f(True)"),
+        body("while True:", "if get_flag(0):", "break", "end", "sync()", "end", "textmsg(1)"),
+        body("halt", "def f():", "end", "$ 2"),
+        body("while get_flag(0):", "sync()", "end", "textmsg(1)"),
+    ],
+    "W109": [body("t = 1", "type = 2", "textmsg(t, type)")],
+    "W110": [
+        body("if (False):", "global x = 0", "end"),
+        body("if random() < 0.5:", "elif random() < 0.5:", "end"),
+        body("if get_flag(0):", "elif True:", "end"),
+    ],
+    "W111": [body("def f():", "def g():", "end", "g()", "end", "def h():", "def g():", "end", "g()", "end", "f()", "h()")],
+    "W112": [body("thread t():", "end", "run t()")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("code", "text", "expected"), [(code, *case) for code, cases in WARNED.items() for case in cases]
+)
+def test_it_is_warned_of(code, text, expected):
+    found = warnings_of(text, code)
+    assert len(found) == 1
+    assert found[0].startswith(expected)
+
+
+@pytest.mark.parametrize(("code", "text"), [(code, text) for code, cases in FINE.items() for text in cases])
+def test_nothing_is_said_about_programs_that_are_meant_so(code, text):
+    assert warnings_of(text, code) == []
+
+
+def test_every_rule_of_the_table_is_tested_and_has_its_own_code():
+    codes = [rule.code for rule in RULES]
+    assert codes == sorted(set(codes)) == sorted(WARNED) == sorted(FINE)
+
+
+def test_programs_with_errors_get_no_warnings():
+    errors, warnings = check_program(body("global x = 1", "nothing()"))
+    assert len(errors) == 1
+    assert warnings == ()
+
+
+# --- the command -----------------------------------------------------------------------------------------
+
+TEXT = body("global gr\u00f6n = 1", "x = 2").replace("\u00f6", "oe") + "# \u00fc\n"
+
+
+@pytest.fixture
+def check(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.script").write_text(TEXT, encoding="utf-8")
+    (tmp_path / "b.script").write_text('def b():\n  txtmsg("\u00fc")\nend\n', encoding="utf-8")
+    return lambda *words, **more: CliRunner().invoke(app, ["check", *words], **more)
+
+
+def test_warnings_end_in_their_code_and_do_not_fail(check):
+    result = check("a.script")
+    assert result.exit_code == 0
+    first = "a.script:2:10: Warning: global variable 'groen' is never read [W101]\n      global groen = 1\n             ^^^^^\n"
+    assert result.output.startswith(first)
+
+
+def test_strict_fails_with_warnings_unless_they_are_ignored(check):
+    assert check("--strict", "a.script").exit_code == 1
+    result = check("--strict", "--ignore", "w102,W101", "a.script")
+    assert (result.exit_code, result.output) == (0, "")
+
+
+def test_ignoring_a_code_that_does_not_exist_is_wrong_use(check):
+    result = check("--ignore", "W999", "a.script")
+    assert result.exit_code == 2
+    assert "W999" in result.output
+
+
+def test_json_is_one_document_with_every_place(check):
+    result = check("--json", "a.script", "b.script")
+    assert result.exit_code == 1
+    warning, other, error = json.loads(result.stdout)["diagnostics"]
+    assert warning == {
+        "file": "a.script",
+        "line": 2,
+        "column": 10,
+        "end_line": 2,
+        "end_column": 15,
+        "severity": "warning",
+        "code": "W101",
+        "message": "global variable 'groen' is never read",
+        "hint": None,
+    }
+    assert other["line"] == 3
+    assert (error["severity"], error["code"], error["hint"]) == ("error", "E103", "did you mean 'textmsg'?")
+    assert (error["line"], error["column"], error["end_column"]) == (2, 3, 9)
+
+
+def test_json_of_a_good_program_is_a_document_too(check):
+    result = check("--json", "-", input="sync()\n")
+    assert (result.exit_code, json.loads(result.stdout)) == (0, {"diagnostics": []})
+
+
+def test_json_of_fmt_says_what_would_change(check):
+    result = CliRunner().invoke(app, ["fmt", "--check", "--json", "a.script", "b.script", "-"], input="x =")
+    assert result.exit_code == 1
+    document = json.loads(result.stdout)
+    assert document["files"] == [
+        {"file": "a.script", "changes": False},
+        {"file": "b.script", "changes": False},
+    ]
+    assert [item["code"] for item in document["diagnostics"]] == ["E101"]
