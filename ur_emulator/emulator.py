@@ -92,6 +92,7 @@ class ControlBox:
         self._free_ports = port_base is None
         self._loop = EventLoop(precise=named_pace is Pace.REALTIME)
         controller = Controller(model, imperfections, seed, LoopNetwork(self._loop), mode=RobotMode.RUNNING)
+        controller.state.ports.version = (software.major, software.minor)
         self._box = ServedBox(
             controller, make_pacer(named_pace, controller.period_s, speed), self._loop.expect_soon
         )

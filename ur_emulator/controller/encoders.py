@@ -101,11 +101,16 @@ class Encoder:
 
 
 class Encoders:
-    """The encoders of a box."""
+    """The encoders of a box.
+
+    Attributes:
+        encoders: all of them.
+        decoding: those that count pulses.
+    """
 
     def __init__(self) -> None:
         self.encoders = tuple(Encoder() for _ in range(N_ENCODERS))
-        self._decoding: tuple[Encoder, ...] = ()
+        self.decoding: tuple[Encoder, ...] = ()
 
     def decode(self, index: int, decoder: Decoder, pin_a: int, pin_b: int, digital_in: int) -> None:
         """Count pulses with an encoder, or stop counting."""
@@ -119,8 +124,8 @@ class Encoders:
 
     def step(self, digital_in: int) -> None:
         """Count what has come on the inputs in this cycle."""
-        for encoder in self._decoding:
+        for encoder in self.decoding:
             encoder.step(digital_in)
 
     def _find_decoding(self) -> None:
-        self._decoding = tuple(e for e in self.encoders if e.decoder is not Decoder.OFF)
+        self.decoding = tuple(e for e in self.encoders if e.decoder is not Decoder.OFF)

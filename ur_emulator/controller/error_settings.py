@@ -23,13 +23,15 @@ class ErrorSettings:
 
     Attributes:
         pause_codes: (code, argument or None for any) at which the program should pause; kept only.
-        deviation_threshold: part of the deviation limit at which to warn; None for no warning.
+        warns_of_deviation: whether joints that deviate from the path are reported.
+        deviation_threshold: part of the deviation limit at which to warn.
         transition_hardness: 0 hard, 1 soft; kept only.
         revolution_reference: joint positions of the last `reset_revolution_counter` [rad]; kept only.
     """
 
     pause_codes: set[tuple[int, int | None]] = field(default_factory=set)
-    deviation_threshold: float | None = None
+    warns_of_deviation: bool = False
+    deviation_threshold: float = 0.8
     transition_hardness: int = 0
     revolution_reference: Vector6 | None = None
     _has_warned: bool = False
@@ -40,8 +42,6 @@ class ErrorSettings:
         Args:
             position_error: delayed target minus true position [rad], (6,).
         """
-        if self.deviation_threshold is None:
-            return None
         error, joint = max((abs(error), joint) for joint, error in enumerate(position_error))
         was_warned, self._has_warned = (
             self._has_warned,

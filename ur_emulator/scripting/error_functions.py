@@ -18,7 +18,7 @@ def error_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
         settings.pause_codes.add((int(code), None if argument is None else int(argument)))
 
     def position_deviation_warning(thread: object, enabled: bool, threshold: float) -> None:
-        settings.deviation_threshold = float(threshold) if enabled else None
+        settings.warns_of_deviation, settings.deviation_threshold = enabled, float(threshold)
 
     def set_safety_mode_transition_hardness(thread: object, kind: float) -> None:
         settings.transition_hardness = int(kind)

@@ -1,8 +1,8 @@
 """`rpc_factory`: handles whose methods are calls to an XML-RPC server. A call blocks its thread only.
 
-Values on the wire: integers, floats, booleans, strings and lists as they are, a pose as a struct of x, y, z,
-rx, ry, rz. Source: URScript manual CB3 3.15, rpc_factory, and UR's XML-RPC article. A call that fails, for
-whatever reason, is a run-time error.
+Values on the wire: integers, floats, booleans, strings and lists as they are, a matrix as a list of rows, a
+pose as a struct of x, y, z, rx, ry, rz. A call that fails, for whatever reason, is a run-time error.
+Source: URScript manual CB3 3.15, rpc_factory, and UR's XML-RPC article.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, Final
 from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, RemoteServer
 from urscript.errors import ScriptRuntimeError
 from urscript.threads import ScriptThread
-from urscript.values import INT_MAX, INT_MIN, Pose, a_type
+from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type
 from urscript.waits import Blocked
 
 _POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
@@ -72,7 +72,7 @@ class RemoteHandle:
 def _to_wire(value: Any) -> Any:
     if isinstance(value, Pose):
         return dict(zip(_POSE_KEYS, value, strict=True))
-    if isinstance(value, list):
+    if isinstance(value, (list, Matrix)):
         return [_to_wire(item) for item in value]
     if isinstance(value, str):
         data = value.encode("latin-1", "replace")  # one character a byte: what clients mean is UTF-8
@@ -102,8 +102,10 @@ def _from_wire(value: Any) -> Any:
     raise RemoteCallError(f"the result has no counterpart in a script: {str(value)[:80]}")
 
 
-def _one_type(items: list[Any]) -> list[Any]:
+def _one_type(items: list[Any]) -> list[Any] | Matrix:
     """Return a list of one type, as the language has them: integers among floats become floats."""
+    if items and all(type(item) is list for item in items):
+        return Matrix(items)
     types = {type(item) for item in items}
     if types == {int, float}:
         return [float(item) for item in items]

@@ -1,0 +1,147 @@
+"""The robot's Modbus map, from scripts and directly."""
+
+import math
+
+import pytest
+from box_support import Bench
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ur_emulator.controller import port_map
+from ur_emulator.controller.commands import TriggerProtectiveStop
+from ur_emulator.controller.port_map import COILS, REGISTERS, PortAddressError
+
+BENCH = Bench()
+
+
+def signed(word):
+    return word - 0x10000 if word & 0x8000 else word
+
+
+def read(bench, address):
+    return port_map.read_register(bench.controller.state, address)
+
+
+def texts(bench, *lines):
+    return bench.run("def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n")
+
+
+@pytest.mark.parametrize("rows", [REGISTERS, COILS])
+def test_rows_do_not_overlap(rows):
+    addresses = [address for row in rows for address in range(row.first, row.first + row.count)]
+    assert len(addresses) == len(set(addresses))
+
+
+@pytest.mark.parametrize(
+    ("rows", "read_one", "largest"),
+    [(REGISTERS, port_map.read_register, 0xFFFF), (COILS, port_map.read_coil, 1)],
+)
+def test_every_address_of_the_tables_can_be_read(rows, read_one, largest):
+    for row in rows:
+        for address in range(row.first, row.first + row.count):
+            assert 0 <= read_one(BENCH.controller.state, address) <= largest
+
+
+@pytest.mark.parametrize("address", [259, 267, 276, 1023, 65535])
+def test_addresses_without_anything(address):
+    with pytest.raises(PortAddressError):
+        port_map.read_register(BENCH.controller.state, address)
+    bench = Bench()
+    texts(bench, f"write_port_register({address}, 1)")
+    assert any(f"no register {address}" in getattr(event, "text", "") for event in bench.events)
+
+
+@given(st.integers(128, 255), st.integers(-32768, 65535))
+def test_general_purpose_words(address, value):
+    state = BENCH.controller.state
+    assert port_map.write_register(state, address, value)
+    assert port_map.read_register(state, address) == value & 0xFFFF
+
+
+def test_scripts_read_signed_words():
+    assert texts(Bench(), "write_port_register(128, 65535)", "textmsg(read_port_register(128))") == ["-1"]
+
+
+def test_joint_angles_count_up_from_zero_beside_their_turns():
+    bench = Bench()
+    q = bench.now.actual_q
+    for joint in range(6):
+        angle, turns = read(bench, 270 + joint) / 1e3, signed(read(bench, 320 + joint))
+        assert 0.0 <= angle <= 6.284
+        assert angle + turns * 2.0 * math.pi == pytest.approx(q[joint], abs=1e-3)
+    assert any(x < 0.0 for x in q)
+
+
+def test_tcp_pose_and_modes():
+    bench = Bench()
+    pose = bench.now.actual_tcp_pose
+    for i in range(3):
+        assert signed(read(bench, 400 + i)) == pytest.approx(pose[i] * 1e4, abs=0.6)
+        assert signed(read(bench, 403 + i)) == pytest.approx(pose[3 + i] * 1e3, abs=0.6)
+    assert [read(bench, 256), read(bench, 257), read(bench, 258), read(bench, 310)] == [3, 15, 7, 253]
+
+
+def test_flags_of_a_protective_stop():
+    bench = Bench()
+    assert [read(bench, address) for address in range(260, 267)] == [1, 0, 0, 0, 0, 0, 1]
+    bench.tick(1, TriggerProtectiveStop())
+    assert [read(bench, address) for address in range(260, 267)] == [1, 1, 0, 0, 0, 1, 3]
+    assert port_map.read_coil(bench.controller.state, 261)
+
+
+def test_outputs_by_word_mask_and_bit():
+    bench = Bench()
+    state = bench.controller.state
+    port_map.write_register(state, 1, 0b10_0000_0001)
+    assert state.io.digital_out == 1 | 1 << 17
+    port_map.write_register(state, 2, 0b110)
+    port_map.write_register(state, 3, 0b001)
+    port_map.write_register(state, 31, 0x80)
+    assert state.io.digital_out == 0b110 | 1 << 15 | 1 << 17
+    port_map.write_register(state, 33, 0x80)
+    port_map.write_coil(state, 48 + 9, True)
+    port_map.write_coil(state, 32 + 1, False)
+    port_map.write_coil(state, 136, True)
+    assert state.io.digital_out == 0b110 | 1 << 8
+    assert read(bench, 1) == 0b110
+    assert [port_map.read_coil(state, 16 + i) for i in range(4)] == [False, True, True, False]
+
+
+def test_inputs_ignore_writes():
+    bench = Bench()
+    bench.controller.state.io.digital_in = 1 << 3 | 1 << 9 | 1 << 16
+    assert texts(bench, "write_port_bit(3, False)", "textmsg(read_port_bit(3))") == ["True"]
+    assert read(bench, 0) == 1 << 3 | 1 << 8
+    assert [read(bench, 21), read(bench, 30)] == [1, 2]
+    assert not port_map.write_register(bench.controller.state, 0, 0)
+
+
+def test_analogue_levels_are_parts_of_the_range():
+    bench = Bench()
+    texts(bench, "set_analog_outputdomain(0, 1)", "set_standard_analog_out(0, 1)")
+    assert [read(bench, 16), read(bench, 17)] == [65535, 1]
+    port_map.write_register(bench.controller.state, 18, 0x8000)
+    port_map.write_register(bench.controller.state, 19, 0)
+    assert bench.controller.state.io.analog_out[1].value == pytest.approx(0.012, abs=1e-6)
+
+
+def test_register_booleans_are_shared():
+    bench = Bench()
+    assert texts(
+        bench,
+        "write_port_bit(300, True)",
+        "textmsg(read_input_boolean_register(0))",
+        "write_output_boolean_register(127, True)",
+        "textmsg(read_port_bit(627))",
+    ) == ["True", "True"]
+
+
+def test_the_clock_stands_until_it_is_latched_again():
+    bench = Bench()
+    assert [read(bench, address) for address in range(2049, 2054)] == [0, 0, 0, 0, 0]
+    bench.tick(200)
+    port_map.write_register(bench.controller.state, 2048, 1)
+    milliseconds = round(bench.now.timestamp * 1e3)
+    bench.tick(5)
+    ms, s, minutes, hours, days = (read(bench, address) for address in range(2049, 2054))
+    assert (((days * 24 + hours) * 60 + minutes) * 60 + s) * 1000 + ms == milliseconds
