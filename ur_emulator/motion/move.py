@@ -54,10 +54,12 @@ class Move:
         length = leg.path.length
         self._zone = leg.last_part(leg.r, 0.5 * length) if leg.r > 0.0 else 0.0
         profile = Trapezoid.from_limits(length, leg.v, leg.a)
+        if length <= 0.0 < leg.t:
+            profile = Trapezoid.from_duration(length, leg.t, profile)
         self._stages = [_Stage(leg.path, 0.0, profile, last=True)]
         self._time = 0.0
         self._step = 0.0
-        self.done = length <= 0.0
+        self.done = profile.duration <= 0.0
         self.left = False
 
     @property

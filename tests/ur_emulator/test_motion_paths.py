@@ -1,0 +1,107 @@
+"""Paths of the tool as geometry: ends, derivatives, arcs."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from motion_support import START, at, line
+
+from protocol.pose import pose_sub
+from ur_emulator.motion.blend import blend
+from ur_emulator.motion.path import TURN_LEVER, PoseArc, PoseLine, arc_through
+
+coordinates = st.floats(-0.5, 0.5)
+turns = st.floats(-1.0, 1.0)
+poses = st.tuples(coordinates, coordinates, coordinates, turns, turns, turns)
+
+
+def derivative(path, s, h=1e-6):
+    return [x / (2 * h) for x in pose_sub(path.at(s + h)[0], path.at(s - h)[0])]
+
+
+def check_derivatives(path):
+    for k in range(1, 8):
+        s = path.length * k / 8
+        assert path.at(s)[1] == pytest.approx(derivative(path, s), abs=1e-5)
+
+
+@given(poses, poses)
+def test_a_line_is_straight_ends_exactly_and_knows_its_derivative(start, goal):
+    path = PoseLine(start, goal)
+    assume(path.length > 0.02)
+    assert path.at(path.length)[0] == goal
+    assert path.at(0.0)[0] == pytest.approx(start, abs=1e-12)
+    middle = path.at(path.length / 2)[0]
+    assert middle[:3] == pytest.approx([(a + b) / 2 for a, b in zip(start[:3], goal[:3], strict=True)])
+    check_derivatives(path)
+
+
+def test_a_turn_on_the_spot_has_a_length():
+    path = PoseLine((0.1, 0.2, 0.3, 0, 0, 0), (0.1, 0.2, 0.3, 0, 0, 1.0))
+    assert path.length == pytest.approx(TURN_LEVER)
+    assert path.at(path.length / 2)[0] == pytest.approx((0.1, 0.2, 0.3, 0, 0, 0.5))
+
+
+@given(poses, poses, poses, st.booleans())
+def test_an_arc_is_a_circle_through_its_three_points(start, via, goal, fixed):
+    a, b, c = (np.array(p[:3]) for p in (start, via, goal))
+    cross = np.linalg.norm(np.cross(b - a, c - a))
+    assume(min(np.linalg.norm(x) for x in (b - a, c - b, c - a)) > 0.05)
+    assume(cross > 0.1 * np.linalg.norm(b - a) * np.linalg.norm(c - a))
+    path = arc_through(start, via, goal, fixed=fixed)
+    assert isinstance(path, PoseArc)
+    assert path.at(0.0)[0] == pytest.approx(start, abs=1e-9)
+    assert path.at(path.length)[0][:3] == pytest.approx(goal[:3], abs=1e-9)
+    if not fixed:
+        assert path.at(path.length)[0] == goal
+    points = np.array([path.at(path.length * k / 2000)[0][:3] for k in range(2001)])
+    assert np.linalg.norm(points - b, axis=1).min() <= 1.01 * np.linalg.norm(points[1] - points[0])
+    check_derivatives(path)
+
+
+def test_mode_1_keeps_the_orientation_to_the_tangent():
+    start = (1.0, 0.0, 0.0, 0.3, 0.0, 0.0)
+    path = arc_through(start, (math.sqrt(0.5), math.sqrt(0.5), 0, 0, 0, 0), (0, 1, 0, 9, 9, 9), fixed=True)
+    assert path.length == pytest.approx(math.pi / 2)
+    quarter = pose_sub(path.at(path.length)[0], start)
+    assert quarter[3:] == pytest.approx((0, 0, math.pi / 2))
+
+
+def test_an_arc_may_be_longer_than_half_a_circle():
+    path = arc_through((1, 0, 0, 0, 0, 0), (-1, 0, 0, 0, 0, 0), (0, -1, 0, 0, 0, 0), fixed=False)
+    assert path.length == pytest.approx(1.5 * math.pi)
+
+
+def test_three_points_on_a_line_give_a_line():
+    path = arc_through((0, 0, 0, 0, 0, 0), (0.1, 0, 0, 0, 0, 0), (0.3, 0, 0, 0, 0, 1), fixed=False)
+    assert isinstance(path, PoseLine)
+    assert path.at(path.length)[0] == (0.3, 0, 0, 0, 0, 1)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.4, 0.4)] * 3),
+    st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.4, 0.4)] * 3),
+    st.floats(0.005, 0.03),
+    st.booleans(),
+)
+def test_a_blend_stays_within_r_of_the_waypoint_and_is_tangent_to_both_moves(one, two, r, process):
+    corner = at(*one)
+    assume(math.dist(one[:3], (0, 0, 0)) > 0.02)
+    assume(math.dist(one[:3], two[:3]) > 0.02)
+    first, second = line(START, corner, process=process), line(corner, at(*two), process=process)
+    found = blend(first, second, r, 0.5 * first.path.length)
+    curve = found.path.path
+    assert all(
+        math.dist(curve.at(curve.length * k / 50)[0][:3], corner[:3]) <= r * (1 + 1e-9) for k in range(51)
+    )
+    start, slope = curve.at(0.0)
+    end, end_slope = curve.at(curve.length)
+    assert pose_sub(start, first.path.path.at(found.leave)[0]) == pytest.approx([0] * 6, abs=1e-9)
+    assert pose_sub(end, second.path.path.at(found.enter)[0]) == pytest.approx([0] * 6, abs=1e-9)
+    assert slope == pytest.approx(first.path.path.at(found.leave)[1], abs=1e-7)
+    ratio = found.ratio
+    assert end_slope == pytest.approx([ratio * x for x in second.path.path.at(found.enter)[1]], abs=1e-7)
+    check_derivatives(curve)

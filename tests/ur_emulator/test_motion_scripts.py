@@ -1,0 +1,173 @@
+"""What a script sees of moves: when they return, what they refuse, what is said."""
+
+import numpy as np
+import pytest
+from box_support import Bench
+
+from protocol.pose import pose_trans
+from protocol.ur_types import ProgramState, SafetyMode
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller.events import ErrorReported, ReportLevel, ScriptFailed
+
+PLACE = "p[0.25,-0.25,0.25,2.2,-2.2,0]"
+POSE = (0.25, -0.25, 0.25, 2.2, -2.2, 0.0)
+
+
+@pytest.fixture
+def bench():
+    bench = Bench(fidelity="ideal")
+    bench.run(f"movej({PLACE}, a=8, v=3)\n")
+    bench.events.clear()
+    bench.snapshots.clear()
+    return bench
+
+
+def shifted(x, y=0.0, z=0.0):
+    return f"pose_add({PLACE},p[{x},{y},{z},0,0,0])"
+
+
+def distances(bench):
+    return np.linalg.norm(np.subtract([s.target_tcp_pose[:3] for s in bench.snapshots], POSE[:3]), axis=1)
+
+
+def errors(bench):
+    return [e for e in bench.events if isinstance(e, ErrorReported)]
+
+
+def test_movel_goes_straight_and_takes_its_time(bench):
+    bench.run(f"movel({shifted(0.1)})\n")
+    assert bench.now.target_tcp_pose[:3] == pytest.approx((0.35, -0.25, 0.25), abs=1e-9)
+    moving = sum(any(s.target_qd) for s in bench.snapshots)
+    assert moving * 0.008 == pytest.approx(0.1 / 0.25 + 0.25 / 1.2, abs=0.02)
+    path = np.array([s.target_tcp_pose for s in bench.snapshots])
+    assert np.abs(path[:, 1:3] - POSE[1:3]).max() < 1e-9
+
+
+def test_movel_takes_joint_positions_and_movej_a_pose(bench):
+    q = list(bench.now.target_q)
+    bench.run(f"def f():\n  movel({shifted(0.05)})\n  movel({q})\n  movej({shifted(0.05)})\nend\n")
+    assert bench.now.target_tcp_pose[:3] == pytest.approx((0.30, -0.25, 0.25), abs=1e-9)
+    assert distances(bench).min() < 1e-9
+
+
+def test_moves_move_the_tool_centre_point(bench):
+    bench.run(
+        "def f():\n  set_tcp(p[0,0,0.1,0,0,0])\n  sync()\n  movel(pose_add(get_target_tcp_pose(),p[0.05,0,0,0,0,0]))\nend\n"
+    )
+    start = pose_trans(POSE, (0, 0, 0.1, 0, 0, 0))
+    assert bench.now.target_tcp_pose[:3] == pytest.approx((start[0] + 0.05, *start[1:3]), abs=1e-9)
+
+
+def test_a_movej_that_cannot_arrive_is_a_runtime_error_before_any_motion(bench):
+    q = bench.now.target_q
+    bench.run("def f():\n  sync()\n  movej(p[3,0,0,0,0,0])\nend\n")
+    (failure,) = [e for e in bench.events if isinstance(e, ScriptFailed)]
+    assert (failure.line, failure.column) == (3, 3)
+    assert "Script function movej is unable to find an inverse kinematics solution" in failure.text
+    assert bench.now.target_q == q
+
+
+def test_a_movel_that_cannot_arrive_sets_out_and_ends_in_a_protective_stop(bench):
+    bench.run(f"movel({shifted(0.9)})\n")
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    (error,) = errors(bench)
+    assert error.level is ReportLevel.WARNING
+    assert not [e for e in bench.events if isinstance(e, ScriptFailed)]
+    assert distances(bench).max() > 0.05
+    assert bench.now.target_qd == (0.0,) * 6
+
+
+def test_a_blending_move_returns_before_its_waypoint_so_that_the_next_can_join(bench):
+    said = bench.run(
+        f"def f():\n  movel({shifted(0.1)}, r=0.02)\n  textmsg(get_target_tcp_pose()[0] < 0.345)\n"
+        f"  movel({shifted(0.1, 0.1)})\nend\n"
+    )
+    assert said == ["True"]
+    speeds = np.array([np.linalg.norm(s.target_tcp_speed[:3]) for s in bench.snapshots])
+    moving = np.nonzero(speeds > 1e-6)[0]
+    assert speeds[moving[0] + 25 : moving[-1] - 25].min() > 0.1
+    corner = np.array((0.35, -0.25, 0.25))
+    nearest = min(np.linalg.norm(np.subtract(s.target_tcp_pose[:3], corner)) for s in bench.snapshots)
+    assert 0.001 < nearest < 0.02
+
+
+def test_the_last_move_with_a_blend_stops_at_its_waypoint(bench):
+    bench.run(f"movel({shifted(0.1)}, r=0.05)\n")
+    assert bench.now.target_tcp_pose[:3] == pytest.approx((0.35, -0.25, 0.25), abs=1e-9)
+    speed = np.array([s.target_tcp_speed[0] for s in bench.snapshots])
+    assert np.abs(np.diff(speed)).max() <= 1.2 * 0.008 * 1.01
+
+
+def test_a_program_that_waits_after_a_blending_move_comes_to_rest_at_the_waypoint(bench):
+    bench.run(f"def f():\n  movel({shifted(0.1)}, r=0.03)\n  sleep(1)\n  movel({shifted(0.1, 0.05)})\nend\n")
+    corner = np.array((0.35, -0.25, 0.25))
+    assert min(np.linalg.norm(np.subtract(s.target_tcp_pose[:3], corner)) for s in bench.snapshots) < 1e-9
+
+
+def test_overlapping_blends_are_told_and_the_waypoint_is_left_out(bench):
+    bench.run(
+        f"def f():\n  movel({shifted(0.1)}, r=0.03)\n  movel({shifted(0.1, 0.04)}, r=0.03)\n"
+        f"  movel({shifted(0.0, 0.1)})\nend\n"
+    )
+    assert [e.text for e in errors(bench)] == ["Overlapping Blends"]
+    skipped = np.array((0.35, -0.21, 0.25))
+    assert min(np.linalg.norm(np.subtract(s.target_tcp_pose[:3], skipped)) for s in bench.snapshots) > 0.02
+    assert bench.now.target_tcp_pose[:3] == pytest.approx((0.25, -0.15, 0.25), abs=1e-9)
+
+
+def test_the_target_waypoint_stays_the_same_during_a_move(bench):
+    said = bench.run(
+        f"def f():\n  thread watch():\n    i = 0\n    while i < 4:\n      sleep(0.1)\n"
+        f"      textmsg(pose_dist(get_target_waypoint(), {shifted(0.1)}) < 0.000001)\n      i = i + 1\n    end\n  end\n"
+        f"  run watch()\n  movel({shifted(0.1)})\nend\n"
+    )
+    assert said == ["True"] * 4
+
+
+def test_a_stopped_program_stops_a_move_abruptly(bench):
+    bench.start(f"movel({shifted(0.1)})\n")
+    bench.tick(30)
+    bench.tick(1, cmd.StopProgram())
+    bench.tick(20)
+    assert bench.now.target_qd == (0.0,) * 6
+    assert 0.005 < distances(bench)[-1] < 0.08
+    assert bench.now.runtime_state == ProgramState.STOPPED
+
+
+def test_a_move_after_a_stream_begins_at_rest(bench):
+    bench.run(f"def f():\n  speedl([0.05,0,0,0,0,0], 0.5, 0.4)\n  movel({PLACE})\nend\n")
+    assert bench.now.target_tcp_pose == pytest.approx(POSE, abs=1e-9)
+
+
+def test_speedl_and_stopl_from_a_script(bench):
+    bench.run("def f():\n  speedl([0.05,0.02,0,0,0,0.1], 0.5, 0.5)\n  stopl(0.5)\nend\n")
+    twist = np.array([s.target_tcp_speed for s in bench.snapshots])
+    assert np.abs(twist - (0.05, 0.02, 0, 0, 0, 0.1)).max(axis=1).min() < 2e-3
+    assert bench.now.target_qd == (0.0,) * 6
+
+
+def test_servoj_takes_one_cycle_a_call_and_keeps_to_names(bench):
+    bench.start(
+        "def f():\n  q = get_target_joint_positions()\n  i = 0\n  while i < 50:\n    q[0] = q[0] + 0.002\n"
+        "    servoj(q, t=get_steptime(), lookahead_time=0.1, gain=300)\n    i = i + 1\n  end\n  textmsg(i)\n  stopj(4)\nend\n"
+    )
+    bench.tick(50)
+    assert [e.text for e in bench.events if type(e).__name__ == "TextPrinted"] == ["50"]
+
+
+@pytest.mark.parametrize(
+    "call", ["movel({p}, v=0)", "movep({p}, a=-1)", "movej({p}, r=-0.1)", "movel({p}, t=-1)", "stopl(0)"]
+)
+def test_senseless_limits_are_runtime_errors(bench, call):
+    bench.run(call.format(p=PLACE) + "\n")
+    assert [e for e in bench.events if isinstance(e, ScriptFailed)]
+
+
+def test_the_speed_slider_is_taken_on_without_a_jump(bench):
+    bench.start(f"movel({shifted(0.1)}, v=0.1)\n")
+    bench.tick(40)
+    bench.tick(1, cmd.SetSpeedSlider(0.1))
+    bench.tick(60)
+    speed = np.array([s.target_tcp_speed[0] for s in bench.snapshots])
+    assert speed[-1] == pytest.approx(0.01, abs=1e-6)
+    assert np.abs(np.diff(speed)).max() <= 1.2 * 0.008 * 1.01

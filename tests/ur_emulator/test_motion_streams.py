@@ -1,0 +1,116 @@
+"""Motions that scripts renew all the time: servoj, speedl; and the stop of the tool."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from motion_support import DT, HOME, TOOL, tool_accelerations, tool_velocities
+
+from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.servo_j import LOST_DECELERATION, ServoJ
+from ur_emulator.motion.speed_l import SpeedL, StopL
+from ur_emulator.motion.target import ZERO6, JointTarget
+
+twists = st.tuples(*[st.floats(-0.1, 0.1)] * 3, *[st.floats(-0.3, 0.3)] * 3)
+
+
+def run(generator, target, cycles, scale=1.0):
+    targets = [target]
+    for _ in range(cycles):
+        targets.append(generator.step(targets[-1], DT, scale))
+    return targets
+
+
+@pytest.mark.parametrize(("lookahead", "gain"), [(0.1, 300), (0.1, 2000), (0.05, 1000), (0.2, 300)])
+def test_servoj_follows_a_slow_sine_with_the_lag_of_its_lookahead_time(lookahead, gain):
+    omega = 2 * math.pi * 0.5
+    targets = [JointTarget(ZERO6)]
+    for k in range(1000):
+        goal = math.sin(omega * k * DT)
+        targets.append(ServoJ((goal,) * 6, lookahead, gain).step(targets[-1], DT, 1.0))
+    times = np.arange(250, 1001) * DT
+    q = np.array([t.q[0] for t in targets])[250:]
+    sine, cosine = (2 * np.mean(q[:750] * f(omega * times[:750])) for f in (np.sin, np.cos))
+    # The target of cycle k holds at its end: one cycle after the goal was given.
+    lag = math.atan2(-cosine, sine) / omega
+    # At low frequencies the lag is the lookahead time itself.
+    expected = math.atan2(omega * lookahead * gain, gain - omega**2) / omega
+    assert lag == pytest.approx(expected + DT, abs=0.003)
+    assert lag == pytest.approx(lookahead + DT, abs=0.02)
+    assert math.hypot(sine, cosine) == pytest.approx(1.0, abs=0.12)
+
+
+@given(st.floats(0.03, 0.2), st.floats(100, 2000), st.floats(-1, 1))
+def test_servoj_settles_at_its_goal_for_every_gain_and_lookahead(lookahead, gain, goal):
+    targets = run(ServoJ((goal,) * 6, lookahead, gain), JointTarget(ZERO6), 800)
+    assert targets[-1].q == pytest.approx((goal,) * 6, abs=1e-3)
+    for before, after in itertools.pairwise(targets):
+        assert after.q[0] - before.q[0] == pytest.approx(0.5 * DT * (before.qd[0] + after.qd[0]), abs=1e-12)
+
+
+def test_a_long_lookahead_prevents_overshoot():
+    def highest(lookahead):
+        return max(t.q[0] for t in run(ServoJ((1.0,) * 6, lookahead, 300), JointTarget(ZERO6), 300))
+
+    assert highest(0.03) > 1.2
+    assert highest(0.2) <= 1.0
+
+
+def test_servoj_is_slowed_down_by_the_speed_slider():
+    fast = run(ServoJ((1.0,) * 6, 0.1, 300), JointTarget(ZERO6), 100)
+    slow = run(ServoJ((1.0,) * 6, 0.1, 300), JointTarget(ZERO6), 200, scale=0.5)
+    assert slow[40].q[0] == pytest.approx(fast[20].q[0], abs=0.03)
+
+
+def test_a_servoj_that_is_not_renewed_stops():
+    motion = ArmMotion(ZERO6)
+    owner = object()
+    for _ in range(10):
+        motion.command(owner, ServoJ((0.5,) * 6, 0.1, 300))
+        motion.step(DT, 1.0)
+    before = motion.target.qd[0]
+    motion.step(DT, 1.0)
+    assert before - motion.target.qd[0] == pytest.approx(LOST_DECELERATION * DT)
+
+
+@settings(max_examples=20, deadline=None)
+@given(twists, st.floats(0.2, 2.0), st.floats(0.2, 3.0))
+def test_speedl_gives_the_tool_the_twist_it_asks_for(twist, a, a_rot):
+    targets = run(SpeedL(twist, a, a_rot, TOOL), JointTarget(HOME), 70)
+    now = TOOL.twist(targets[-1].q, targets[-1].qd)
+    gone = 70 * DT
+    for part, limit in ((slice(0, 3), a), (slice(3, 6), a_rot)):
+        size = math.hypot(*twist[part])
+        share = min(1.0, limit * gone / size) if size > 0 else 1.0
+        assert now[part] == pytest.approx([share * x for x in twist[part]], abs=2e-3)
+
+
+def test_speedl_accelerates_on_a_straight_line():
+    targets = run(SpeedL((0.1, 0.05, 0.0, 0.0, 0.0, 0.0), 0.5, 0.5, TOOL), JointTarget(HOME), 100)
+    assert tool_accelerations(targets).max() <= 0.5 * 1.01
+    v = tool_velocities(targets)[1:]
+    assert np.abs(v[:, 1] - 0.5 * v[:, 0]).max() < 1e-3
+    assert np.abs(v[:, 2]).max() < 1e-3
+
+
+@settings(max_examples=20, deadline=None)
+@given(twists, st.floats(0.2, 2.0))
+def test_stopl_decelerates_the_tool_at_a_and_ends_at_exact_rest(twist, a):
+    moving = JointTarget(HOME, TOOL.rates(HOME, twist))
+    stop = StopL(a, a, TOOL)
+    targets = [moving]
+    while not stop.done:
+        targets.append(stop.step(targets[-1], DT, 1.0))
+        assert len(targets) < 1000
+    assert targets[-1].qd == ZERO6
+    slowest = max(math.hypot(*twist[:3]), math.hypot(*twist[3:])) / a
+    assert len(targets) - 1 == pytest.approx(slowest / DT, abs=2 + 0.03 * slowest / DT)
+
+
+def test_stopl_at_rest_does_nothing():
+    stop = StopL(1.0, 1.0, TOOL)
+    assert stop.step(JointTarget(HOME), DT, 1.0) == JointTarget(HOME)
+    assert stop.done
