@@ -40,7 +40,8 @@ def test_servoj_follows_a_slow_sine_with_the_lag_of_its_lookahead_time(lookahead
     expected = math.atan2(omega * lookahead * gain, gain - omega**2) / omega
     assert lag == pytest.approx(expected + DT, abs=0.003)
     assert lag == pytest.approx(lookahead + DT, abs=0.02)
-    assert math.hypot(sine, cosine) == pytest.approx(1.0, abs=0.12)
+    size = gain / math.hypot(gain - omega**2, omega * lookahead * gain)
+    assert math.hypot(sine, cosine) == pytest.approx(size, abs=0.01)
 
 
 @given(st.floats(0.03, 0.2), st.floats(100, 2000), st.floats(-1, 1))

@@ -21,7 +21,8 @@ from ur_emulator.motion.path import PoseLine
 
 # Beyond this turn the circular blend of a movep gets so narrow that the cubic takes its place.
 SHARPEST_ARC = 0.9 * pi
-_STRAIGHT = 1e-6  # rad
+_STRAIGHT = 1e-6  # m/m
+_SAMPLES = 8  # points of a blend at which its speed is looked at
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +81,7 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
             _times(2.0 * after, end_slope),
         )
         bend = max(hypot(*bend[:3]) for bend in cubic.bends())
+        rate = max(hypot(*cubic.at(k / _SAMPLES)[1][:3]) for k in range(_SAMPLES + 1))
         curve: JointPath = ToolPath(PoseCurve(cubic, waypoint, 2.0 * before), first.tool)
         limit = min(first.a, second.a)
     else:
@@ -87,9 +89,12 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
         end_q, end_slope = b.at(after, first.goal)
         cubic = Cubic.between(start_q, _times(2.0 * before, slope), end_q, _times(2.0 * after, end_slope))
         bend = max(abs(x) for bend in cubic.bends() for x in bend)
+        rate = max(abs(x) for k in range(_SAMPLES + 1) for x in cubic.at(k / _SAMPLES)[1])
         curve = JointCurve(cubic, 2.0 * before)
         limit = min(leg.a for leg in (first, second) if isinstance(leg.path, JointLine))
     top = 2.0 * before * sqrt(limit / bend) if bend > 0.0 else inf
+    if isinstance(a, ToolPath) == isinstance(b, ToolPath) and rate > 0.0:
+        top = min(top, 2.0 * before * max(first.v, second.v) / rate)
     return Blend(curve, leave, after, after / before, top)
 
 

@@ -123,15 +123,16 @@ class Move:
         """
         self._step = dt
         time = self._time + scale * dt
+        near = [p + dt * v for p, v in zip(target.q, target.qd, strict=True)]
         while time >= self._stages[0].profile.duration and len(self._stages) > 1:
             time -= self._stages.pop(0).profile.duration
         stage = self._stages[0]
         if time >= stage.profile.duration:
-            q, _ = stage.path.at(stage.path.length, target.q)
+            q, _ = stage.path.at(stage.path.length, near)
             self.done = True
             return JointTarget(q)
         s, speed, _ = stage.profile.at(time)
-        q, slope = stage.path.at(stage.begin + s, target.q)
+        q, slope = stage.path.at(stage.begin + s, near)
         self._time = time
         qd = six([scale * speed * k for k in slope])
         return JointTarget(q, qd, six([(b - a) / dt for a, b in zip(target.qd, qd, strict=True)]))

@@ -33,7 +33,9 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
     def tool() -> Tool:
         return Tool(state.arm, state.tcp_offset)
 
-    def travel(thread: object, make: Callable[[Vector6, ToolPose], Leg]) -> Cycles:
+    def travel(
+        thread: object, make: Callable[[Vector6, ToolPose], Leg], *, may_overlap: bool = False
+    ) -> Cycles:
         """Follow a leg made for joint angles and tool pose at its start; from rest, or out of a blend."""
         move = motion.move_of(thread)
         if move is not None and move.left and not move.done:
@@ -42,7 +44,8 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
             if corner.goal is not None:
                 outcome = move.follow(make(corner.goal, corner.goal_pose))
             if outcome is Follow.SKIPPED:
-                state.events.append(OVERLAPPING_BLENDS)
+                if not may_overlap:
+                    state.events.append(OVERLAPPING_BLENDS)
                 yield NEXT_CYCLE
                 return
             if outcome is Follow.BLENDED:
@@ -115,7 +118,12 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
     def servoc(thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
         _require_limits("servoc", a, v, 0.0, r)
         goal = pose_of(pose)
-        return along(thread, lambda start: PoseLine(start, goal), a, v, 0.0, r, process=True)
+
+        def make(q: Vector6, start: ToolPose) -> Leg:
+            return move_tool(PoseLine(start, goal), q, tool(), a=a, v=v, r=r, process=True)
+
+        # Drivers call it with the same pose again and again: nothing to warn of.
+        return travel(thread, make, may_overlap=True)
 
     def movec(
         thread: object, pose_via: Any, pose_to: Any, a: float, v: float, r: float, mode: float
