@@ -179,10 +179,8 @@ def run(
         typer.echo(as_utf8(running.error.render()), err=True)
         raise typer.Exit(1)
     if running.status is ProgramStatus.RUNNING:
-        waits = running.waits_outside
         running.kill()
-        why = "waits for a peer that never comes" if waits else "still running"
-        typer.echo(f"stopped: {why} after {seconds:g} s of robot time (--limit)", err=True)
+        typer.echo(f"stopped: still running after {seconds:g} s of robot time (--limit)", err=True)
     elif not quiet:
         typer.echo(f"finished after {seconds:g} s of robot time", err=True)
 

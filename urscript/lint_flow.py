@@ -26,9 +26,7 @@ def flow_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[Sc
         yield from _unreachable(scope.body, program)
         for statement in all_statements(scope.body):
             if isinstance(statement, nodes.While) and _is_busy(statement, scope, catalogue):
-                message = (
-                    "this loop takes no time and nothing in it changes: the controller stops the program"
-                )
+                message = "this loop takes no time and never ends by itself: the controller stops the program"
                 place = _head(statement.span, statement.condition)
                 yield ScriptWarning(BUSY_LOOP, message, place, program.source, "put a sync() into it")
             elif isinstance(statement, nodes.If):
