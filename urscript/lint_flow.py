@@ -39,6 +39,8 @@ def constant_truth(expression: Expression) -> bool | None:
     match expression:
         case nodes.BoolLiteral(value=truth):
             return truth
+        case nodes.StringLiteral(value=text):
+            return text != ""
         case nodes.Prefix(operator="not", operand=operand):
             inner = constant_truth(operand)
             return None if inner is None else not inner
@@ -69,7 +71,10 @@ def _is_busy(loop: nodes.While, scope: FunctionScope, catalogue: Catalogue) -> b
         return False
     if any(_takes_time(part, scope, catalogue) for part in parts):
         return False
-    if constant_truth(loop.condition) is True and not _can_leave(loop.body):
+    truth = constant_truth(loop.condition)
+    if truth is False:
+        return False
+    if truth and not _can_leave(loop.body):
         return True
     changes = any(isinstance(item, (nodes.Assign, nodes.Kill)) for item in statements)
     leaves_at_once = any(map(_end_of, loop.body))

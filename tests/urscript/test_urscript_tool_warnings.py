@@ -92,6 +92,7 @@ FINE = {
         body("def f():", "g()", "end", "def g():", "sync()", "end", "while True:", "f()", "end"),
         body("while not get_flag(0):", "set_flag(0, True)", "end"),
         body("while random() < 0.5:", "end"),
+        body('while "":', "end", "while False:", "end"),
         body("while get_flag(0):", "if get_flag(1):", "halt", "else:", "break", "end", "end"),
         body("thread t():", "end", "while True:", "h = run t()", "join h", "end"),
         body('x = rpc_factory("xmlrpc", "http://a")', "while True:", "x.f()", "end"),
@@ -133,6 +134,16 @@ def test_it_is_warned_of(code, text, expected):
 @pytest.mark.parametrize(("code", "text"), [(code, text) for code, cases in FINE.items() for text in cases])
 def test_nothing_is_said_about_programs_that_are_meant_so(code, text):
     assert warnings_of(text, code) == []
+
+
+def test_every_warning_underlines_something():
+    for cases in WARNED.values():
+        for text, _ in cases:
+            for warning in check_program(text)[1]:
+                span, lines = warning.span, text.split("\n")
+                assert lines[span.line - 1][span.column - 1 : span.end_column - 1].strip()
+                assert (span.line, span.column) < (span.end_line, span.end_column)
+                assert span.end_column <= len(lines[span.end_line - 1]) + 1
 
 
 def test_every_rule_of_the_table_is_tested_and_has_its_own_code():
