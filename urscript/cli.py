@@ -7,6 +7,7 @@ wrongly. docs/urscript-tool.md shows all of it.
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
@@ -168,8 +169,8 @@ def run(
         raise typer.Exit(1) from None
     host = RecordingHost(
         catalogue=catalogue,
-        on_message=lambda text: typer.echo(as_utf8(text)),
-        on_call=None if quiet else lambda call: typer.echo(as_utf8(_shown(call))),
+        on_message=_show,
+        on_call=None if quiet else lambda call: _show(_call_line(call)),
     )
     tracer: AbstractContextManager[Any] = _tracer(program, host, trace_lines) if trace else nullcontext()
     with tracer:
@@ -187,7 +188,7 @@ def run(
 
 def _tracer(program: CompiledProgram, host: RecordingHost, limit: int) -> LineTracer:
     def show(traced: TracedLine) -> None:
-        typer.echo(as_utf8(f"{host.cycle:6d}  {traced.thread}:{traced.line}: {traced.text}"))
+        _show(f"{host.cycle:6d}  {traced.thread}:{traced.line}: {traced.text}")
 
     def stop() -> None:
         typer.echo(f"trace stops after {limit} lines (--trace-lines)", err=True)
@@ -195,7 +196,17 @@ def _tracer(program: CompiledProgram, host: RecordingHost, limit: int) -> LineTr
     return LineTracer(program, show, stop, limit)
 
 
-def _shown(call: RecordedCall) -> str:
+def _show(text: str) -> None:
+    """A line of a running program; whoever has read enough of them (`| head`) ends the run."""
+    try:
+        typer.echo(as_utf8(text))
+    except BrokenPipeError:
+        # Python would complain again when it closes the stream at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(1) from None
+
+
+def _call_line(call: RecordedCall) -> str:
     seconds = call.cycle * RecordingHost.step_time
     return f"{seconds:9.3f} s  {call.thread}: {call.name}({', '.join(map(_argument, call.arguments))})"
 

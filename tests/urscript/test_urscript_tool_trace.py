@@ -1,3 +1,4 @@
+import subprocess
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from urscript.program import compile_program
 from urscript.recording_host import RecordingHost
 from urscript.tracing import LineTracer
 
+ROOT = Path(__file__).parents[2]
 PROGRAM = """def p():
   def f(x):
     return x + 1
@@ -85,3 +87,17 @@ def test_run_trace_mixes_lines_and_effects_in_their_order(tmp_path, monkeypatch)
         '     0  textmsg:1: textmsg("\u00e4")\n\u00e4\n'
         "     0  textmsg:2: set_flag(0, True)\n    0.000 s  textmsg: set_flag(0, True)\n"
     )
+
+
+def test_run_ends_quietly_when_nobody_reads_on(tmp_path):
+    (tmp_path / "a.script").write_text("while True:\n  sync()\nend\n")
+    start = [sys.executable, "-c", "from urscript.cli import main; main()"]
+    # Far more than a pipe holds: it cannot end before its reader does.
+    words = ["run", "--trace", "--trace-lines", "100000", str(tmp_path / "a.script")]
+    with subprocess.Popen(
+        [*start, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert "while True:" in process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
