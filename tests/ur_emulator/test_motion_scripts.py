@@ -155,6 +155,35 @@ def test_servoj_takes_one_cycle_a_call_and_keeps_to_names(bench):
     assert [e.text for e in bench.events if type(e).__name__ == "TextPrinted"] == ["50"]
 
 
+def test_servoc_may_be_called_with_the_same_pose_all_the_time(bench):
+    bench.start(f"def f():\n  while True:\n    servoc({shifted(0.1)}, 1.2, 0.25, 0.02)\n  end\nend\n")
+    bench.tick(150)
+    assert bench.now.target_tcp_pose[:3] == pytest.approx((0.35, -0.25, 0.25), abs=1e-9)
+    assert bench.now.runtime_state == ProgramState.PLAYING
+    assert not bench.events[1:]
+
+
+def test_an_absurd_duration_is_just_slow(bench):
+    bench.start(f"movel({shifted(0.1)}, t=1e300)\n")
+    bench.tick(20)
+    assert bench.now.runtime_state == ProgramState.PLAYING
+    assert distances(bench).max() < 1e-9
+
+
+def test_a_chain_of_all_kinds_of_moves_never_rests_between(bench):
+    bench.run(
+        f"def f():\n  movej({shifted(0.08)}, r=0.02)\n  movel({shifted(0.08, 0.08)}, r=0.02)\n"
+        f"  movep({shifted(0.0, 0.08)}, r=0.02)\n  movec({shifted(-0.04, 0.04)}, {shifted(0.0, 0.0)}, r=0.02)\n"
+        f"  movej({shifted(0.05)})\nend\n"
+    )
+    assert not errors(bench)
+    moving = [k for k, s in enumerate(bench.snapshots) if any(s.target_qd)]
+    assert moving == list(range(moving[0], moving[-1] + 1))
+    speed = np.array([np.linalg.norm(s.target_tcp_speed[:3]) for s in bench.snapshots])
+    assert speed[moving[0] + 40 : moving[-1] - 30].min() > 0.05
+    assert bench.now.target_tcp_pose[:3] == pytest.approx((0.30, -0.25, 0.25), abs=1e-9)
+
+
 @pytest.mark.parametrize(
     "call", ["movel({p}, v=0)", "movep({p}, a=-1)", "movej({p}, r=-0.1)", "movel({p}, t=-1)", "stopl(0)"]
 )

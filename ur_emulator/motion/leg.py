@@ -14,6 +14,10 @@ from ur_emulator.motion.profile import Trapezoid
 from ur_emulator.motion.tool import Tool
 
 
+# A move stretched more than this does not move in any lifetime; keeps its numbers within those of floats.
+_STANDSTILL = 1e12
+
+
 @dataclass(frozen=True, slots=True)
 class Leg:
     """One instruction's way to its waypoint.
@@ -68,7 +72,7 @@ class Leg:
             top = min(self.v, (2.0 * self.a * way) ** 0.5) if rolling or leave else self.v
             rolling, leave = min(rolling, top), min(leave, top)
             natural = Trapezoid.from_limits(way, top, self.a, rolling, leave).duration
-        stretch = self.t / natural
+        stretch = min(self.t / natural, _STANDSTILL)
         return replace(self, v=self.v / stretch, a=self.a / stretch**2)
 
     def last_part(self, r: float, most: float) -> float:
