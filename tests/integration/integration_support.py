@@ -10,6 +10,7 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -153,6 +154,32 @@ def programs_since(primary, box):
     send(box, "secondary", "def marker():\n  sync()\nend\n")
     primary.message(KeyMessage, title=STARTED, text="marker")
     return [m.text for m in primary.all if isinstance(m, KeyMessage) and m.title == STARTED][:-1]
+
+
+@contextmanager
+def in_background(read):
+    """Call `read` again and again in a thread, as a client of its own, until the block ends."""
+    ending = threading.Event()
+
+    def work():
+        while not ending.is_set():
+            read()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield
+    finally:
+        ending.set()
+        thread.join()
+
+
+def is_closed(sock):
+    """Wait for the other end to close; with bytes that it has not read it closes by a reset."""
+    try:
+        return sock.recv(1) == b""
+    except ConnectionResetError:
+        return True
 
 
 class VelocitySession:

@@ -15,6 +15,7 @@ from integration_support import (
     Frames,
     Messages,
     connect,
+    in_background,
     send,
     serving,
 )
@@ -230,11 +231,13 @@ def test_fifty_programs_one_after_the_other_each_replace_the_last(box):
         before = descriptors()
         for i in range(50):
             scripts.sendall(SPIN.replace("spin", f"spin{i}").encode())
-        for i in range(50):
-            primary.message(KeyMessage, title="PROGRAM_XXX_STARTED", text=f"spin{i}")
+        with in_background(frames.raw):
+            for i in range(50):
+                primary.message(KeyMessage, title="PROGRAM_XXX_STARTED", text=f"spin{i}")
         frames.until(lambda f: f.target_qd[0] == pytest.approx(0.3))
         scripts.sendall(b"stop program\n")
-        primary.message(KeyMessage, title="PROGRAM_XXX_STOPPED", text="spin49")
+        with in_background(frames.raw):
+            primary.message(KeyMessage, title="PROGRAM_XXX_STOPPED", text="spin49")
         keys = [
             (m.title.removeprefix("PROGRAM_XXX_"), m.text) for m in primary.all if isinstance(m, KeyMessage)
         ]

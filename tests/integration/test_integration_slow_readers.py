@@ -1,11 +1,10 @@
 """Peers that do not read, or flood: nobody else loses anything, memory stays bounded, time goes on."""
 
-import threading
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 
 import pytest
-from integration_support import PERIOD, Frames, Messages, connect, send, serving
+from integration_support import PERIOD, Frames, Messages, connect, in_background, send, serving
 
 import ur_emulator.realtime.pacing as pacing
 from protocol.primary_layout import RobotModeData
@@ -19,24 +18,6 @@ PATIENCE = 0.2  # s; instead of the seconds that a box waits for a reader in loc
 @pytest.fixture
 def impatient(monkeypatch):
     monkeypatch.setattr(pacing, "READER_LIMIT", PATIENCE)
-
-
-@contextmanager
-def in_background(read):
-    """Call `read` again and again in a thread, as a client of its own, until the block ends."""
-    ending = threading.Event()
-
-    def work():
-        while not ending.is_set():
-            read()
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    try:
-        yield
-    finally:
-        ending.set()
-        thread.join()
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import struct
 
 import numpy as np
 import pytest
-from integration_support import HELLO_PROGRAM, Frames, Messages, VelocitySession, connect, send
+from integration_support import HELLO_PROGRAM, Frames, Messages, VelocitySession, connect, is_closed, send
 
 import ur_emulator.realtime.pacing as pacing
 from protocol.primary_messages import (
@@ -88,7 +88,7 @@ def test_velocities_beyond_the_limits_end_in_a_protective_stop(lockstep_box, val
         assert told.code == 204
         assert "rad/s, limit" in told.text
         assert primary.message(SafetyModeMessage).safety_mode == SafetyMode.PROTECTIVE_STOP
-        assert session.reverse.recv(1) == b""
+        assert is_closed(session.reverse)
         send(lockstep_box, "secondary", "set unlock protective stop\n")
         judge.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
         next_program_works(lockstep_box, session.frames)
@@ -140,7 +140,7 @@ def test_half_a_message_and_silence_end_the_program_in_the_end(lockstep_box, mon
         session.reverse.sendall(struct.pack(">7i", 1, *(INT_MAX,) * 6)[:size])
         assert Judge(session.frames).until_rest().safety_mode == SafetyMode.NORMAL
         assert primary.message(TextMessage).text == "velocity_receiver: no message from the client"
-        assert session.reverse.recv(1) == b""
+        assert is_closed(session.reverse)
         next_program_works(lockstep_box, session.frames)
 
 
