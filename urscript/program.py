@@ -77,7 +77,13 @@ def check_program(
             _compile(program, catalogue, dialect)
         except ScriptCompileError as error:
             errors = [error]
-    return (errors, ()) if errors else ((), find_warnings(program, catalogue))
+    if errors:
+        return errors, ()
+    try:
+        return (), find_warnings(program, catalogue)
+    except RecursionError:
+        # Just not too deep for the compiler; a warning is not worth an error.
+        return (), ()
 
 
 def _resolve(
