@@ -13,9 +13,10 @@ from ur_emulator.motion.path import PosePath
 from ur_emulator.motion.profile import Trapezoid
 from ur_emulator.motion.tool import Tool
 
-
 # A move stretched more than this does not move in any lifetime; keeps its numbers within those of floats.
 _STANDSTILL = 1e12
+# Points tried on the way out of a blend zone, and halvings to find its border.
+_SAMPLES, _HALVINGS = 16, 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,10 +138,6 @@ def move_tool(
     """
     goal_pose = path.at(path.length)[0] if path.length > 0.0 else tool.pose(near)
     return Leg(ToolPath(path, tool), tool, tool.joints(goal_pose, near), goal_pose, v, a, t, r, process)
-
-
-# Points tried on the way out of a blend zone, and halvings to find its border.
-_SAMPLES, _HALVINGS = 16, 30
 
 
 def _inside(holds: Callable[[float], bool], most: float) -> float:
