@@ -88,6 +88,19 @@ def test_when_a_program_is_stopped_the_arm_ramps_to_rest(bench):
     assert bench.now.target_qdd == (0.0,) * 6
 
 
+def test_stopping_a_program_also_stops_a_move_that_it_has_left_behind(bench):
+    bench.start(
+        'def m():\n  movej([1.4,-1.5,-1.8,0,1.2,1.5], a=1.4, v=1.0, r=0.1)\n  textmsg("left")\n  sleep(5)\nend\n'
+    )
+    while not [e for e in bench.events if type(e).__name__ == "TextPrinted"]:
+        bench.tick()
+    assert bench.now.target_qd[0] > 0.1
+    bench.tick(1, cmd.StopProgram())
+    bench.tick(20)
+    assert bench.now.target_qd == (0.0,) * 6
+    assert bench.now.target_q[0] < 1.39
+
+
 def test_a_stream_of_one_line_programs_moves_without_braking(bench):
     for _ in range(60):
         bench.start("speedj([0.3,0,0,0,0,0], 5.0, 0.008)\n")

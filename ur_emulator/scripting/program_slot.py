@@ -5,6 +5,7 @@ from __future__ import annotations
 from protocol.ur_types import ProgramState
 from ur_emulator.controller.events import ProgramStarted, ProgramStopped, ScriptFailed
 from ur_emulator.controller.state import ControllerState
+from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.robot_host import RobotHost
 from urscript import CompiledProgram, ProgramStatus, RunningProgram
@@ -66,10 +67,11 @@ class ProgramSlot:
         self._state.events.append(ProgramStarted(program.name))
 
     def stop(self) -> None:
-        """End the primary program, if one runs; what it left moving is stopped."""
+        """End the primary program, if one runs, and stop the arm, also on its last way to a waypoint."""
         if self._primary is not None:
             self._primary.kill()
             self._end()
+        self._state.motion.stop(PROGRAM_END_DECELERATION)
 
     def step(self) -> None:
         """Run all programs for one cycle."""
