@@ -259,3 +259,11 @@ def test_speed_slider_slows_a_move(bench):
 def test_a_name_that_is_only_declared_says_so_when_it_is_called(bench):
     bench.run("def f():\n  freedrive_mode()\nend\n")
     assert "declared only" in texts(bench.events)[0]
+
+
+def test_a_new_tcp_counts_at_once(bench):
+    said = bench.run(
+        "def f():\n  a = get_target_tcp_pose()\n  set_tcp(p[0,0,0.1,0,0,0])\n"
+        "  textmsg(point_dist(a, get_target_tcp_pose()))\nend\n"
+    )
+    assert float(said[0]) == pytest.approx(0.1)
