@@ -4,7 +4,7 @@ import random
 from contextlib import suppress
 
 import pytest
-from integration_support import HELLO_PROGRAM, Frames, Messages, connect, send
+from integration_support import HELLO_PROGRAM, STARTED, Frames, Messages, connect, send
 
 from protocol.primary_messages import ErrorCodeMessage, KeyMessage, RuntimeExceptionMessage, TextMessage
 from protocol.ur_types import ProgramState
@@ -164,14 +164,16 @@ def test_a_speed_that_is_no_fraction_changes_nothing(lockstep_box, line):
 
 
 def test_a_running_program_is_replaced_only_by_one_that_compiles(lockstep_box):
-    with Messages(lockstep_box) as primary, Frames(lockstep_box) as frames:
+    with Messages(lockstep_box) as primary:
         send(lockstep_box, "secondary", "def wait():\n  while True:\n    sync()\n  end\nend\n")
-        primary.message(KeyMessage, title="PROGRAM_XXX_STARTED", text="wait")
+        primary.message(KeyMessage, title=STARTED, text="wait")
         send(lockstep_box, "secondary", "def bad():\n  x = \nend\n")
         primary.message(RuntimeExceptionMessage)
-        assert frames.new().runtime_state == ProgramState.PLAYING
+        with Frames(lockstep_box) as frames:
+            assert frames.next().runtime_state == ProgramState.PLAYING
         send(lockstep_box, "secondary", "stop program\n")
         primary.message(KeyMessage, title="PROGRAM_XXX_STOPPED", text="wait")
+        assert [m.text for m in primary.all if isinstance(m, KeyMessage)] == ["wait", "wait"]
 
 
 DASHBOARD_GARBAGE = {
