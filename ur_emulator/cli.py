@@ -54,14 +54,14 @@ def serve(
 
     try:
         box = ControlBox(robot, version, host, pace, speed, seed, fidelity, port_base)
+        for name in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(name, lambda number, frame: box.stop())
         box.listen()
         if ready_file is not None:
             _write_ready_file(ready_file, box)
     except (EmulatorError, ProtocolError, OSError) as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(1) from None
-    for name in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(name, lambda number, frame: box.stop())
     print(
         f"{robot.upper()} CB3 {version} ready at {host}, {pace}, {fidelity}, "
         f"seed {seed}, serial {box.serial_number}: "
