@@ -127,7 +127,7 @@ def test_a_lower_rate_gives_stamps_that_far_apart(box, client):
 def test_while_time_stands_still_packages_keep_coming(client):
     client.subscribe("timestamp", "runtime_state")
     last = client.data()
-    while (values := client.data()) != last:  # the test before may have left the arm settling
+    while (values := client.data()) != last:  # until time stands still
         last = values
     assert client.data() == client.data() == last
 
