@@ -87,7 +87,8 @@ class RobotModel:
         coulomb_speed: speed over which friction rises from that share to the full value [rad/s].
         torque_constant: joint torque per motor current, gear included [Nm/A].
         gear_ratio: motor turns per joint turn.
-        stop_deceleration: mean deceleration of a category 0 stop [rad/s²].
+        stop_deceleration: of the leading axis when the safety system or the end of a program stops the arm
+            [rad/s²].
         servo_frequency: natural frequency of the joint position loop [Hz].
         servo_damping: damping ratio of that loop.
         servo_inertia: inertia at the joint that the loop gains are laid out for [kg m²].
@@ -115,7 +116,7 @@ class RobotModel:
     coulomb_speed: float
     torque_constant: Vector6
     gear_ratio: float
-    stop_deceleration: Vector6
+    stop_deceleration: float
     servo_frequency: float
     servo_damping: float
     servo_inertia: Vector6

@@ -1,0 +1,104 @@
+"""Every arm of the family: geometry against an independent model, sensible numbers, at rest and in motion."""
+
+from math import hypot, pi
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from box_support import FakeNetwork, connect
+
+from pc_client.kinematics.robot_model import robot_model
+from protocol.ur_types import parse_serial
+from ur_emulator import ControlBox
+from ur_emulator.controller.commands import StartProgram
+from ur_emulator.controller.controller import Controller
+from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.fidelity import FIDELITIES
+from ur_emulator.models.robots import ROBOTS
+from urscript import compile_program
+
+ARMS = [pytest.param(robot, id=name) for name, robot in ROBOTS.items()]
+
+
+@pytest.mark.parametrize("robot", ARMS)
+def test_geometry_is_that_of_the_published_urdf(robot):
+    arm, other = ArmModel(robot), robot_model(robot.name)
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        q = rng.uniform(-pi, pi, 6)
+        x, y, z, *rotation = arm.fk(q.tolist())
+        pin.framesForwardKinematics(other.pin_model, other.pin_data, q)
+        T_base_tcp = other.pin_data.oMf[other.tcp_frame]
+        assert [x, y, z] == pytest.approx(T_base_tcp.translation, abs=1e-9)
+        assert pin.exp3(np.array(rotation)) == pytest.approx(T_base_tcp.rotation, abs=1e-9)
+
+
+@pytest.mark.parametrize("robot", ARMS)
+def test_client_knows_the_same_limits(robot):
+    limits = robot_model(robot.name).limits
+    assert robot.qd_max == pytest.approx(limits.qd_max)
+    assert robot.q_min == pytest.approx(limits.q_min)
+    assert robot.q_max == pytest.approx(limits.q_max)
+
+
+@pytest.mark.parametrize("robot", ARMS)
+def test_data_sheet_fits_the_geometry(robot):
+    # From the base axis to the axis of wrist 2, arm stretched; data sheets round generously.
+    stretched = hypot(robot.dh[1].a + robot.dh[2].a, robot.dh[3].d)
+    assert stretched == pytest.approx(robot.reach, rel=0.09)
+
+
+@pytest.mark.parametrize(
+    ("name", "mass"), [("ur3", 8.63), ("ur5", 17.05), ("ur10", 28.435)], ids=["ur3", "ur5", "ur10"]
+)
+def test_moving_mass_is_that_of_the_vendor_table(name, mass):
+    assert sum(link.mass for link in ROBOTS[name].links) == pytest.approx(mass, abs=0.01)
+
+
+@pytest.mark.parametrize("robot", ARMS)
+def test_drives_can_carry_the_stretched_arm_with_its_payload(robot):
+    """Static torque of shoulder and elbow, arm stretched horizontally with the rated payload at the flange."""
+    g = 9.81
+    upper, fore = -robot.dh[1].a, -robot.dh[2].a
+    arms = (upper - robot.links[1].com[0], upper + fore - robot.links[2].com[0], *(3 * [upper + fore]))
+    masses = [link.mass for link in robot.links[1:]]
+    shoulder = g * (
+        sum(m * r for m, r in zip(masses, arms, strict=True)) + robot.payload_max * (upper + fore)
+    )
+    assert shoulder < 0.95 * robot.tau_max[1]
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+@pytest.mark.parametrize("robot", ARMS)
+def test_moves_with_the_rated_payload_and_comes_to_rest_on_target(robot, fidelity):
+    controller = Controller(robot, FIDELITIES[fidelity], 7, FakeNetwork())
+    program = compile_program(f"""def prog():
+      set_payload({robot.payload_max}, [0, 0, 0.03])
+      q = get_target_joint_positions()
+      movej([q[0] + 0.5, q[1] + 0.2, q[2], q[3], q[4], q[5]])
+      movel(pose_add(get_target_tcp_pose(), p[0, 0, 0.08, 0, 0, 0]))
+      sleep(0.6)
+    end""")
+    controller.tick([StartProgram(program)])
+    events = []
+    for _ in range(2000):
+        if not controller.is_active:
+            break
+        controller.tick(())
+        events += controller.take_events()
+    assert not controller.is_active
+    assert not [event for event in events if type(event).__name__ in ("ErrorReported", "ScriptFailed")]
+    snapshot = controller.snapshot
+    assert snapshot.actual_q == pytest.approx(snapshot.target_q, abs=2e-4)
+    assert controller.plant.n_contacts == 0
+
+
+@pytest.mark.parametrize("robot", ARMS)
+def test_box_names_its_arm_on_the_wire(robot):
+    with ControlBox(robot=robot.name, pace="lockstep", port_base=None) as box:
+        with connect(box, "dashboard") as sock, sock.makefile("rw") as lines:
+            lines.readline()
+            lines.write("get robot model\n")
+            lines.flush()
+            assert lines.readline() == f"{robot.title}\n"
+        assert parse_serial(box.serial_number).simulated
