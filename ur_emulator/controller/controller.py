@@ -221,7 +221,7 @@ class Controller:
             violation = UNREACHABLE_PATH
         if violation is None:
             return target
-        state.motion.target = before
+        state.motion.retract(before)
         self._stop_for(violation, state.snapshot.actual_q)
         return state.motion.step(self.period_s, state.speed_slider)
 

@@ -53,11 +53,11 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
                 return
             while not move.done:
                 yield NEXT_CYCLE
-        if any(motion.target.qd):  # a move begins at rest, also after a program that was replaced in motion
+        if any(motion.path.qd):  # a move begins at rest, also after a program that was replaced in motion
             take_arm(state, thread, stop := StopJ(PROGRAM_END_DECELERATION))
             while not stop.done:
                 yield NEXT_CYCLE
-        start = motion.target.q
+        start = motion.path.q
         move = Move(make(start, state.arm.fk(start, state.tcp_offset)))
         take_arm(state, thread, move)
         yield from ride(move)

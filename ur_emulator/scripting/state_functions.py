@@ -89,7 +89,7 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
     return {
         "get_actual_joint_positions": lambda thread: list(state.snapshot.actual_q),
         "get_target_joint_positions": lambda thread: list(state.motion.target.q),
-        "get_joint_positions": lambda thread: list(state.motion.target.q),
+        "get_joint_positions": lambda thread: list(state.motion.path.q),
         "get_actual_joint_speeds": lambda thread: list(state.snapshot.actual_qd),
         "get_target_joint_speeds": lambda thread: list(state.motion.target.qd),
         "get_actual_joint_positions_history": get_actual_joint_positions_history,

@@ -1,0 +1,167 @@
+"""Overlays: what displaces the tool from the path of the program while it moves on it.
+
+A conveyor carries the tool along, force mode lets it give way. The program goes on in terms of the path;
+the joints get the displaced target. Without overlays nothing of this runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from protocol.pose import Pose, pose_inv, pose_trans
+from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.motion.tool import Tool, UnreachableError
+
+
+class Overlay(Protocol):
+    """Displaces the tool, cycle by cycle."""
+
+    @property
+    def tool(self) -> Tool:
+        """The tool whose pose is displaced; it may change while the overlay is active."""
+        ...
+
+    def displace(self, tool_pose: Pose, path: JointTarget, dt: float) -> Pose:
+        """Return where the tool shall be at the end of the cycle, in the base frame [m, rad].
+
+        The first call should displace by next to nothing: a jump here is a jump of the arm.
+
+        Args:
+            tool_pose: tool along the path at the end of the cycle, displaced by the overlays before this one.
+            path: joint target along the path at the end of the cycle.
+            dt: time to advance by [s]; shorter than a cycle, never 0, while a pause ramps down or up.
+        """
+        ...
+
+
+class Frozen:
+    """What is left of an overlay that was removed while a move was under way: its last displacement.
+
+    The residual velocity of the displacement is ramped out.
+    """
+
+    # Deceleration of the displacement [m/s^2, rad/s^2]. Chosen: gentle for the conveyor, short for contact.
+    LINEAR, ANGULAR = 1.0, 4.0
+
+    def __init__(self, tool: Tool, shift: Pose, velocity: Vector6) -> None:
+        """Keep a displacement.
+
+        Args:
+            tool: whose pose it displaces.
+            shift: displacement in base axes: added to the position, turned onto the rotation [m, rad].
+            velocity: its rate of change [m/s, rad/s].
+        """
+        self.tool = tool
+        self._shift = shift
+        self._velocity = velocity
+
+    def displace(self, tool_pose: Pose, path: JointTarget, dt: float) -> Pose:
+        """See Overlay."""
+        if self._velocity is not ZERO6:
+            after = six(
+                [
+                    *_braked(self._velocity[:3], self.LINEAR * dt),
+                    *_braked(self._velocity[3:], self.ANGULAR * dt),
+                ]
+            )
+            way = [0.5 * dt * (a + b) for a, b in zip(self._velocity, after, strict=True)]
+            self._shift = apply_shift(six(way), self._shift)
+            self._velocity = after if any(after) else ZERO6
+        return apply_shift(self._shift, tool_pose)
+
+
+def shift_between(before: Sequence[float], after: Sequence[float]) -> Pose:
+    """Return the displacement in base axes that takes one pose to another."""
+    x, y, z = (b - a for a, b in zip(before[:3], after[:3], strict=True))
+    turn = pose_trans((0.0, 0.0, 0.0, *after[3:]), pose_inv((0.0, 0.0, 0.0, *before[3:])))
+    return (x, y, z, turn[3], turn[4], turn[5])
+
+
+def apply_shift(shift: Sequence[float], pose: Sequence[float]) -> Pose:
+    """Return a pose displaced in base axes: the position moved, the rotation turned about the tool."""
+    turned = pose_trans((0.0, 0.0, 0.0, *shift[3:]), (0.0, 0.0, 0.0, *pose[3:]))
+    return (pose[0] + shift[0], pose[1] + shift[1], pose[2] + shift[2], turned[3], turned[4], turned[5])
+
+
+_NO_SHIFT: tuple[Pose, Pose, float] = (ZERO6, ZERO6, 1.0)
+
+
+class OverlayChain:
+    """The active overlays in order, and how the last cycle displaced the tool.
+
+    Attributes:
+        overlays: active ones.
+    """
+
+    def __init__(self) -> None:
+        self.overlays: list[Overlay] = []
+        # By overlay the displacements of the last two cycles, and the time between them.
+        self._shifts: dict[int, tuple[Pose, Pose, float]] = {}
+        self._step_speed: Vector6 = ZERO6
+
+    def add(self, overlay: Overlay, target: JointTarget) -> None:
+        """Append an overlay; it begins without displacement."""
+        if not self.overlays:
+            self._step_speed = target.qd
+        self.overlays.append(overlay)
+
+    def freeze(self, overlay: Overlay) -> None:
+        """Replace an overlay by its last displacement."""
+        last, before, dt = self._shifts.pop(id(overlay), _NO_SHIFT)
+        velocity = six([x / dt for x in shift_between(before, last)])
+        self.overlays[self.overlays.index(overlay)] = Frozen(overlay.tool, last, velocity)
+
+    @property
+    def only_frozen(self) -> bool:
+        """True when no overlay acts any more."""
+        return all(isinstance(overlay, Frozen) for overlay in self.overlays)
+
+    def clear(self) -> None:
+        """Forget all overlays."""
+        self.overlays.clear()
+        self._shifts.clear()
+
+    def displace(self, path: JointTarget, before: JointTarget, dt: float, share: float) -> JointTarget:
+        """Return the displaced target.
+
+        Args:
+            path: target along the path at the end of the cycle.
+            before: displaced target at the end of the last one.
+            dt: control cycle [s].
+            share: part of it that the overlays advance by, above 0.
+
+        Raises:
+            UnreachableError: the arm cannot be where the overlays want it.
+        """
+        arm = self.overlays[0].tool.arm
+        flange = arm.fk(path.q)
+        still = not any(path.qd)
+        for overlay in self.overlays:
+            tcp = overlay.tool.tcp
+            pose = pose_trans(flange, tcp)
+            moved = overlay.displace(pose, path, share * dt)
+            shift = shift_between(pose, moved)
+            previous = self._shifts.get(id(overlay), _NO_SHIFT)[0]
+            self._shifts[id(overlay)] = (shift, previous, share * dt)
+            still = still and shift == previous
+            flange = pose_trans(moved, pose_inv(tcp))
+        near = [q + dt * v for q, v in zip(before.q, before.qd, strict=True)]
+        q = arm.inverse(flange, near)
+        if q is None:
+            raise UnreachableError
+        if still:
+            self._step_speed = ZERO6
+            return JointTarget(q)
+        # Speed at the end of the cycle from those of this one and the last: exact for a constant
+        # acceleration.
+        speed = six([(b - a) / dt for a, b in zip(before.q, q, strict=True)])
+        qd = six([1.5 * new - 0.5 * old for new, old in zip(speed, self._step_speed, strict=True)])
+        self._step_speed = speed
+        return JointTarget(q, qd, six([(b - a) / dt for a, b in zip(before.qd, qd, strict=True)]))
+
+
+def _braked(velocity: Sequence[float], reach: float) -> list[float]:
+    size = sum(v * v for v in velocity) ** 0.5
+    return [0.0] * 3 if size <= reach else [v * (1.0 - reach / size) for v in velocity]
