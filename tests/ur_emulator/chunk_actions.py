@@ -1,0 +1,78 @@
+"""What a chunk can do to the box: the actions of its `#do` and `#at` marks.
+
+in 3 high             a digital input: 0-7 standard, c0-c7 configurable, t0-t1 tool
+analog in 0 0.5       an analogue input at a part of its range; `analog tool 1 0.5`
+euromap 4 high        a signal of the moulding machine
+write NAME VALUE      an RTDE input by its name
+send "text"           the peer of the program's last socket sends
+bytes 0 0 0 3         the same with bytes
+hang up               that peer closes
+run PROGRAM           start a one-line program, primary or `sec`
+stop / unlock / power_off / close_popup / protective_stop / pause / resume
+answer 5              to the oldest question of that type
+slider 0.5            the speed slider
+push 0 0 -20          push the flange, base axes, N; zeros end it
+"""
+
+from ast import literal_eval
+
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller.io import CONFIGURABLE_SHIFT, TOOL_SHIFT
+from urscript import compile_program
+
+_SHIFTS = {"c": CONFIGURABLE_SHIFT, "t": TOOL_SHIFT}
+_PLAIN = {
+    "stop": "StopProgram",
+    "unlock": "UnlockProtectiveStop",
+    "power_off": "PowerOff",
+    "close_popup": "ClosePopup",
+    "protective_stop": "TriggerProtectiveStop",
+    "pause": "PauseProgram",
+    "resume": "ResumeProgram",
+}
+
+
+def act(bench, catalogue, action):
+    """Do one action; returns the commands that the next cycle must get."""
+    word, _, rest = action.partition(" ")
+    state = bench.controller.state
+    match word:
+        case "in":
+            _switch_input(state.io, *rest.split())
+        case "analog":
+            lines, index, ratio = rest.split()
+            getattr(state.io, {"in": "analog_in", "tool": "tool_analog_in"}[lines])[int(index)].set_ratio(
+                float(ratio)
+            )
+        case "euromap":
+            index, level = rest.split()
+            mask = 1 << int(index)
+            state.io.euromap.inputs = state.io.euromap.inputs & ~mask | mask * (level == "high")
+        case "write":
+            name, value = rest.split(" ", 1)
+            return [cmd.WriteInputs(((name, literal_eval(value)),))]
+        case "send":
+            bench.network.sockets[-1].receive(literal_eval(rest).encode("latin-1"))
+        case "bytes":
+            bench.network.sockets[-1].receive(bytes(map(int, rest.split())))
+        case "hang":
+            bench.network.sockets[-1].close()
+        case "run":
+            return [cmd.StartProgram(compile_program(rest, catalogue=catalogue))]
+        case "answer":
+            return [cmd.AnswerRequest(literal_eval(rest))]
+        case "slider":
+            return [cmd.SetSpeedSlider(float(rest))]
+        case "push":
+            bench.controller.plant.push([float(x) for x in rest.split()])
+        case _:
+            assert action in _PLAIN, f"there is no action {action!r}"
+            return [getattr(cmd, _PLAIN[action])()]
+    return []
+
+
+def _switch_input(io, line, level):
+    shift = _SHIFTS.get(line[0], 0)
+    mask = 1 << shift + int(line.lstrip("ct"))
+    assert level in ("high", "low")
+    io.digital_in = io.digital_in & ~mask | (mask if level == "high" else 0)

@@ -1,0 +1,189 @@
+"""Runs the chunks of `chunk_marks` on a controller without ports."""
+
+import re
+from ast import literal_eval
+
+from box_support import Bench
+from chunk_actions import act
+from chunk_peers import ChunkNetwork
+
+from protocol.ur_types import SafetyMode
+from ur_emulator.controller.commands import AnswerRequest, ClosePopup, StartProgram
+from ur_emulator.controller.controller import Controller
+from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robots import robot_by_name
+from urscript import compile_program
+from urscript.catalogue import catalogue_for
+from urscript.program import check_program
+
+MAX_CYCLES = 6_000
+
+
+class ChunkBench(Bench):
+    """A bench on the network of a chunk."""
+
+    def __init__(self, chunk):
+        self.network = ChunkNetwork(chunk)
+        self.controller = Controller(
+            robot_by_name("ur3"), fidelity_by_name(chunk.fidelity), chunk.seed, self.network
+        )
+        self.events = []
+        self.snapshots = []
+
+
+class ChunkRun:
+    """One run of a chunk: what was done and what came of it."""
+
+    def __init__(self, chunk):
+        self.chunk = chunk
+        self.catalogue = catalogue_for(chunk.software)
+        self.bench = ChunkBench(chunk)
+        self.network = self.bench.network
+        self.messages = []
+        self.errors = []
+        self.events = []
+        self.life = []
+        self.cycles = 0
+        self._answers = list(chunk.answers)
+        self._due = []
+
+    def start(self, text, cycles_of_actions):
+        """Start a program and run until it and the arm have come to rest."""
+        program = compile_program(text, catalogue=self.catalogue)
+        actions = sorted(cycles_of_actions, key=lambda action: action[0])
+        for cycle, action in actions:
+            if cycle < 0:
+                self._tick_if(act(self.bench, self.catalogue, action))
+        actions = [action for action in actions if action[0] >= 0]
+        self._tick(0, [StartProgram(program)])
+        if actions and actions[0][0] == 0:
+            raise AssertionError(f"{self.chunk}: use #do for what comes before the program")
+        self.cycles = 1
+        for cycle in range(1, MAX_CYCLES):
+            commands = []
+            while actions and actions[0][0] == cycle:
+                commands += act(self.bench, self.catalogue, actions.pop(0)[1])
+            if not actions and not commands and not self._due and self._is_over():
+                return
+            self._tick(cycle, commands)
+            if self.bench.controller.programs.has_work:
+                self.cycles = cycle + 1
+        raise AssertionError(f"{self.chunk}: still running, texts so far: {self.messages}")
+
+    def _is_over(self):
+        controller = self.bench.controller
+        if getattr(controller.programs, "is_paused", False):
+            return not controller.state.motion.is_moving or controller.state.motion.is_paused
+        return not (controller.programs.is_running or controller.state.motion.is_moving)
+
+    def _tick_if(self, commands):
+        if commands:
+            self._tick(-1, commands)
+
+    def _tick(self, cycle, commands):
+        self.network.deliver()
+        first = len(self.bench.events)
+        due, self._due = self._due, []
+        self.bench.tick(1, *commands, *due)
+        self.bench.snapshots.clear()
+        for event in self.bench.events[first:]:
+            self._take(cycle, event)
+
+    def _take(self, cycle, event):
+        match type(event).__name__:
+            case "TextPrinted":
+                self.messages.append((cycle, event.text))
+            case "ScriptFailed":
+                self.errors.append((event.secondary, event.line, event.column, event.text))
+            case "ErrorReported":
+                self.events.append(f"C{event.code}A{event.argument} {event.text}")
+            case "SafetyModeChanged":
+                self.events.append(f"safety {_mode_name(event.safety_mode)}")
+            case "PopupShown":
+                kind = " warning" * event.warning + " error" * event.error
+                self.events.append(f"popup{kind} {event.title}: {event.text}")
+                if event.blocking:
+                    self._answer()
+            case "ValueRequested":
+                self.events.append(f"asks {event.kind.name.lower()}: {event.text}")
+                self._answer()
+            case name if name.startswith("Program"):
+                self.life.append(f"{name.removeprefix('Program').lower()} {event.name}")
+
+    def _answer(self):
+        if self._answers:
+            answer = self._answers.pop(0)
+            self._due.append(ClosePopup() if answer == "close" else AnswerRequest(literal_eval(answer)))
+
+
+def run_box_chunk(chunk):
+    """Compile and run a chunk; asserts everything it expects."""
+    run = ChunkRun(chunk)
+    compile_errors = check_program(chunk.text, catalogue=run.catalogue)[0]
+    if compile_errors:
+        run.errors = [(False, error.line, error.column, error.message) for error in compile_errors]
+        wire = compile_errors[0].wire_text
+    else:
+        run.start(chunk.text, chunk.actions)
+        first_cycles = run.cycles
+        for program in chunk.then:
+            run.start(program, [])
+        run.cycles = first_cycles
+        wire = run.errors[0][3] if run.errors else None
+    _compare_errors(chunk, run.errors)
+    _compare_texts(chunk, "events", chunk.events, run.events)
+    shown = [
+        (None if want[0] is None else cycle, text)
+        for want, (cycle, text) in zip(
+            [*chunk.messages, *[(None, "")] * len(run.messages)], run.messages, strict=False
+        )
+    ]
+    assert shown == chunk.messages, f"{chunk}: texts {run.messages}"
+    if chunk.wire_text is not None:
+        assert wire == chunk.wire_text
+    if chunk.life:
+        _compare_texts(chunk, "life", chunk.life, run.life)
+    if chunk.cycles is not None:
+        assert run.cycles == chunk.cycles, f"{chunk}: ran {run.cycles} cycles"
+    if chunk.sent is not None:
+        assert run.network.sent == chunk.sent, f"{chunk}: sent {run.network.sent}"
+    assert run.network.called == chunk.called, f"{chunk}: called {run.network.called}"
+    assert not any(socket.is_open for socket in run.network.sockets), f"{chunk}: left a socket open"
+    assert bool(getattr(run.bench.controller.programs, "is_paused", False)) == chunk.paused, (
+        f"{chunk}: paused"
+    )
+    for name, value, tolerance in chunk.states:
+        _compare_value(chunk, name, getattr(run.bench.now, name), value, tolerance)
+    return run
+
+
+def _mode_name(mode):
+    return SafetyMode(mode).name
+
+
+def _matches(pattern, text):
+    parts = pattern.split("...")
+    return re.fullmatch(".*".join(map(re.escape, parts)), text, re.DOTALL) is not None
+
+
+def _compare_errors(chunk, found):
+    places = [error[:3] for error in found]
+    assert places == [error[:3] for error in chunk.errors], f"{chunk}: errors {found}"
+    for error, expected in zip(found, chunk.errors, strict=True):
+        assert _matches(expected[3], error[3]), f"{chunk}: {error[3]!r}, not {expected[3]!r}"
+
+
+def _compare_texts(chunk, what, expected, found):
+    same = len(found) == len(expected) and all(map(_matches, expected, found))
+    assert same, f"{chunk}: {what} {found}"
+
+
+def _compare_value(chunk, name, found, expected, tolerance):
+    if isinstance(expected, (list, tuple)):
+        assert len(found) == len(expected), f"{chunk}: {name} is {found}"
+        for one, other in zip(found, expected, strict=True):
+            assert abs(one - other) <= tolerance, f"{chunk}: {name} is {found}"
+    elif isinstance(expected, str):
+        assert found == expected, f"{chunk}: {name} is {found}"
+    else:
+        assert abs(found - expected) <= tolerance, f"{chunk}: {name} is {found}"
