@@ -52,7 +52,8 @@ def act(bench, catalogue, action):
             name, value = rest.split(" ", 1)
             return [cmd.WriteInputs(((name, literal_eval(value)),))]
         case "send":
-            bench.network.sockets[-1].receive(literal_eval(rest).encode("latin-1"))
+            index, text = rest.split(" ", 1) if rest[0].isdigit() else ("-1", rest)
+            bench.network.sockets[int(index)].receive(literal_eval(text).encode("latin-1"))
         case "bytes":
             bench.network.sockets[-1].receive(bytes(map(int, rest.split())))
         case "hang":

@@ -19,8 +19,6 @@ from urscript.waits import Blocked
 
 # socket_open gives up after this [s of robot time]. Source: URScript manual, socket_open.
 OPEN_TIMEOUT = 2.0
-# Most numbers that one read may ask for. Source: URScript manual, socket_read_binary_integer.
-MAX_NUMBERS = 30
 # Longest text that a string read returns [bytes]. Source: later edition of the manual, socket_read_string.
 MAX_STRING = 1024
 # A text that grows past this without an end is not a line any more; the read fails and the bytes are dropped.
@@ -68,7 +66,7 @@ class ProgramSockets:
         if old is not None:
             old.close()
         # Known from the first moment: a program that is killed meanwhile closes it.
-        socket = self._sockets[name] = self._network.open(address, port)
+        socket = self._sockets[name] = self._network.open(address, int(port))
         expired = self._timer(OPEN_TIMEOUT)
         if socket.is_connecting:
             yield Blocked(lambda: not socket.is_connecting or expired(), outside=True)
@@ -103,7 +101,7 @@ class ProgramSockets:
         return self._send(name, wire_text(text).encode("latin-1", "replace") + b"\n")
 
     def _set_var(self, thread: object, variable: str, value: int, name: str) -> None:
-        self._send(name, f"SET {variable} {value} \n".encode("latin-1", "replace"))
+        self._send(name, f"SET {variable} {wire_text(value)}\n".encode("latin-1", "replace"))
 
     # --- reading
 
@@ -140,25 +138,26 @@ class ProgramSockets:
         return data
 
     def _read_binary_integer(
-        self, thread: object, number: int, name: str, timeout: float
+        self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
-        size = 4 * self._count(number)
+        number = int(number)
+        size = 4 * number
         data = yield from self._take(name, timeout, lambda inbox: size if len(inbox) >= size else 0)
         if data is None:
             return [0] + [-1] * number
         return [number, *struct.unpack(f">{number}i", data)]
 
     def _read_byte_list(
-        self, thread: object, number: int, name: str, timeout: float
+        self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
-        size = self._count(number)
+        size = number = int(number)
         data = yield from self._take(name, timeout, lambda inbox: size if len(inbox) >= size else 0)
         return [0] + [-1] * number if data is None else [number, *data]
 
     def _read_ascii_float(
-        self, thread: object, number: int, name: str, timeout: float
+        self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Blocked, None, list[float]]:
-        self._count(number)
+        number = int(number)
         data = yield from self._take(name, timeout, lambda inbox: inbox.find(b")") + 1)
         failed: list[float] = [0, *([math.nan] * number)]
         if data is None:
@@ -172,7 +171,7 @@ class ProgramSockets:
 
     def _read_line(self, thread: object, name: str, timeout: float) -> Generator[Blocked, None, str]:
         data = yield from self._take(name, timeout, lambda inbox: inbox.find(b"\n") + 1)
-        return "" if data is None else data.decode("latin-1").rstrip("\r\n")
+        return "" if data is None else data.decode("latin-1").removesuffix("\n").removesuffix("\r")
 
     def _read_string(
         self, thread: object, name: str, prefix: str, suffix: str, interpret_escape: bool, timeout: float
@@ -183,9 +182,10 @@ class ProgramSockets:
             begin = inbox.find(start) if start else 0
             if begin < 0:
                 return 0
+            begin += len(start)
             if not end:
-                return min(len(inbox), begin + len(start) + MAX_STRING) if len(inbox) > len(start) else 0
-            stop = inbox.find(end, begin + len(start))
+                return min(len(inbox), begin + MAX_STRING) if len(inbox) > begin else 0
+            stop = inbox.find(end, begin)
             return stop + len(end) if stop >= 0 else 0
 
         data = yield from self._take(name, timeout, find)
@@ -203,12 +203,6 @@ class ProgramSockets:
             return int(value) if answered == variable else 0
         except ValueError:
             return 0
-
-    @staticmethod
-    def _count(number: int) -> int:
-        if not 0 < number <= MAX_NUMBERS:
-            raise ScriptRuntimeError(f"a socket read takes 1 to {MAX_NUMBERS} numbers, got {number}")
-        return number
 
 
 def _delimiter(text: str, interpret_escape: bool) -> bytes:

@@ -268,7 +268,7 @@ _FORCE_SENSOR: tuple[Builtin, ...] = (
 _SOCKET = Param("socket_name", STRING, "socket_0")
 _TIMEOUT = Param("timeout", NUMBER, 2, "s; 0 or less waits for ever")
 # Source: script manual, socket_read_ascii_float: at most 30 numbers in one call.
-_HOW_MANY = Param("number", INT, unit="0 to 30", low=0, high=30)
+_HOW_MANY = Param("number", INT, unit="1 to 30", low=1, high=30)
 
 _SOCKETS: tuple[Builtin, ...] = (
     _row(
