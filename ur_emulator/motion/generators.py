@@ -17,6 +17,9 @@ from ur_emulator.motion.target import ZERO6, JointTarget
 # A joint speed below this counts as standstill: one cycle of it moves a joint by less than an encoder step.
 REST_SPEED = 1e-6  # rad/s
 
+# Deceleration of the leading axis when a stream is paused [rad/s^2]. Chosen: what drivers give to stopj.
+PAUSE_DECELERATION = 4.0
+
 
 class Generator(Protocol):
     """A motion under way."""
@@ -88,6 +91,10 @@ class Streamed:
     def when_lost(self) -> Generator:
         """Return what the arm does when the next command does not come."""
         raise NotImplementedError
+
+    def when_paused(self) -> Generator:
+        """Return how the arm comes to rest when the program pauses."""
+        return StopJ(PAUSE_DECELERATION)
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """See Generator."""

@@ -57,10 +57,18 @@ class Move:
         if length <= 0.0 < leg.t:
             profile = Trapezoid.from_duration(length, leg.t, profile)
         self._stages = [_Stage(leg.path, 0.0, profile, last=True)]
-        self._time = 0.0
+        self._time = self._time_before = 0.0
         self._step = 0.0
         self.done = profile.duration <= 0.0
         self.left = False
+
+    def take_back(self) -> None:
+        """Undo the last step: its target was not accepted."""
+        self._time = self._time_before
+
+    def abandon(self) -> None:
+        """Give the move up: whoever waits for its end need not wait longer."""
+        self.done = True
 
     @property
     def goal(self) -> Vector6 | None:
@@ -133,7 +141,7 @@ class Move:
             return JointTarget(q)
         s, speed, _ = stage.profile.at(time)
         q, slope = stage.path.at(stage.begin + s, near)
-        self._time = time
+        self._time_before, self._time = self._time, time
         qd = six([scale * speed * k for k in slope])
         return JointTarget(q, qd, six([(b - a) / dt for a, b in zip(target.qd, qd, strict=True)]))
 

@@ -10,9 +10,12 @@ from collections.abc import Sequence
 from math import hypot
 
 from ur_emulator.models.robot_model import Vector6, six
-from ur_emulator.motion.generators import REST_SPEED, Generator, Streamed
+from ur_emulator.motion.generators import PAUSE_DECELERATION, REST_SPEED, Generator, Streamed
 from ur_emulator.motion.target import ZERO6, JointTarget
 from ur_emulator.motion.tool import Tool
+
+# Least deceleration of the tool when speedl is paused [m/s^2]. Chosen: the moves' default.
+PAUSE_LINEAR = 1.2
 
 
 def twist_towards(now: Sequence[float], goal: Sequence[float], a: float, a_rot: float, dt: float) -> Vector6:
@@ -60,6 +63,10 @@ class SpeedL(Streamed):
     def when_lost(self) -> Generator:
         """Stop with the accelerations of the last command."""
         return StopL(self._a, self._a_rot, self._tool)
+
+    def when_paused(self) -> Generator:
+        """Stop in the direction of the tool, quickly enough whatever was asked for."""
+        return StopL(max(self._a, PAUSE_LINEAR), max(self._a_rot, PAUSE_DECELERATION), self._tool)
 
 
 class StopL:
