@@ -18,7 +18,7 @@ from typing import Any
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_messages import MESSAGES, VersionMessage
+from protocol.primary_messages import MESSAGES, ThreadLabel, VersionMessage
 from protocol.primary_packages import (
     MAX_PACKAGE_SIZE,
     MIN_PACKAGE_SIZE,
@@ -28,6 +28,7 @@ from protocol.primary_packages import (
     state_size,
     state_types,
 )
+from protocol.primary_values import TypedValue, value_codes
 from protocol.realtime_layout import MAX_FRAME_SIZE, layout_for_size, layout_for_version
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import WireField, wire_fields
@@ -86,6 +87,10 @@ def _describe(package: Any) -> Iterator[str]:
 def _number(value: Any) -> str:
     if isinstance(value, str | bool):
         return repr(value)
+    if isinstance(value, TypedValue):
+        return f"{value.type.value} {value}"
+    if isinstance(value, ThreadLabel):
+        return f"{value.thread_name!r}: {value.label_id} {value.text!r}"
     if isinstance(value, float | int):
         return f"{value:.10g}" if isinstance(value, float) else str(value)
     return "[" + ", ".join(_number(item) for item in list(value)) + "]"
@@ -116,17 +121,23 @@ def describe_layouts(version: SoftwareVersion) -> Iterator[str]:
     for message in MESSAGES:
         yield f"  {message.MESSAGE_TYPE} {message.__name__}"
         yield from _describe_fields(message, version)
+    yield ""
+    yield "Types of global variables in program state messages, port 30001"
+    for kind, code in value_codes(version).items():
+        yield f"      {code:<8} {kind.value}"
 
 
 def _describe_fields(record: type[Any], version: SoftwareVersion) -> Iterator[str]:
     for field in wire_fields(record):
         if field.since.covers(version):
             yield f"      {_type_name(field):<8} {field.name:<36} {field.unit:<10} {field.note}".rstrip()
+            if field.record is not None:
+                yield from (f"  {line}" for line in _describe_fields(field.record, version))
 
 
 _TYPE_NAMES = {
     "?": "bool", "b": "i8", "B": "u8", "i": "i32", "I": "u32", "Q": "u64", "f": "f32", "d": "f64",
-    "p": "u8+text", "s": "text",
+    "p": "u8+text", "t": "i32+text", "s": "text", "*": "records",
 }  # fmt: skip
 
 

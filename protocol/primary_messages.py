@@ -29,6 +29,8 @@ __all__ = [
     "KeyMessage",
     "MessageSource",
     "PopupMessage",
+    "ProgramLabelMessage",
+    "ProgramThreadsMessage",
     "ReportLevel",
     "RequestValueMessage",
     "RequestedType",
@@ -37,6 +39,7 @@ __all__ = [
     "SafetyModeMessage",
     "StartupMessage",
     "TextMessage",
+    "ThreadLabel",
     "UnknownMessage",
     "VersionMessage",
     "decode_message",
@@ -104,6 +107,16 @@ class TextMessage(RobotMessage):
 
     MESSAGE_TYPE: ClassVar[int] = 0
 
+    text: str = wire("s", default="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramLabelMessage(RobotMessage):
+    """Where PolyScope's program tree stands; software up to 3.2. `ProgramThreadsMessage` took its place."""
+
+    MESSAGE_TYPE: ClassVar[int] = 1
+
+    label_id: int = wire("i", "number after the $")
     text: str = wire("s", default="")
 
 
@@ -217,6 +230,27 @@ class StartupMessage(RobotMessage):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ThreadLabel:
+    """Where one thread stands in PolyScope's program tree."""
+
+    label_id: int = wire("i", "number after the $")
+    text: str = wire("t", default="")
+    thread_name: str = wire("t", default="")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramThreadsMessage(RobotMessage):
+    """Where the threads of a program stand in PolyScope's program tree.
+
+    Source: the form from UR's document of 5.9; that 3.3 is the first software to send it is assumed.
+    """
+
+    MESSAGE_TYPE: ClassVar[int] = 14
+
+    threads: tuple[ThreadLabel, ...] = wire("*", default=(), record=ThreadLabel)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class UnknownMessage(RobotMessage):
     """A message that this package has no table for; `body` is what follows the message type."""
 
@@ -228,6 +262,7 @@ class UnknownMessage(RobotMessage):
 
 MESSAGES: tuple[type[RobotMessage], ...] = (
     TextMessage,
+    ProgramLabelMessage,
     PopupMessage,
     VersionMessage,
     SafetyModeMessage,
@@ -236,6 +271,7 @@ MESSAGES: tuple[type[RobotMessage], ...] = (
     RequestValueMessage,
     RuntimeExceptionMessage,
     StartupMessage,
+    ProgramThreadsMessage,
 )
 """All messages with a table."""
 

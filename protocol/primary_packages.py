@@ -28,6 +28,7 @@ from protocol.primary_messages import (
     decode_message,
     encode_message,
 )
+from protocol.primary_program import ProgramStateMessage, decode_program_state
 from protocol.primary_state import (
     RobotState,
     UnknownSubPackage,
@@ -100,7 +101,7 @@ class UnknownPackage:
     body: bytes
 
 
-Package: TypeAlias = RobotState | RobotMessage | SafetyTolerances | UnknownPackage
+Package: TypeAlias = RobotState | RobotMessage | ProgramStateMessage | SafetyTolerances | UnknownPackage
 
 
 # --- sending ---
@@ -131,7 +132,7 @@ def decode_package(frame: bytes, version: SoftwareVersion) -> Package:
     Args:
         frame: header and body.
         version: software of the controller, from its version message (which itself may be read with any);
-            only messages depend on it.
+            only messages and values of variables depend on it.
 
     Raises:
         RemoteProtocolError: the body ends before its fields do, or sub-package sizes do not add up.
@@ -144,6 +145,8 @@ def decode_package(frame: bytes, version: SoftwareVersion) -> Package:
         return decode_state(body)
     if package_type == PackageType.ROBOT_MESSAGE:
         return decode_message(body, version)
+    if package_type == PackageType.PROGRAM_STATE:
+        return decode_program_state(body, version)
     if package_type == PackageType.SAFETY_COMPLIANCE_TOLERANCES and len(body) >= _TOLERANCES.size:
         return SafetyTolerances(_TOLERANCES.unpack_from(body))
     return UnknownPackage(package_type, body)

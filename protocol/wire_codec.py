@@ -18,6 +18,11 @@ __all__ = ["Codec", "codec_for"]
 
 R = TypeVar("R")
 
+_PREFIX_SIZES = {"p": 1, "t": 4}
+"""Bytes of the length before a text; for a text without one the package ends it."""
+_VARIABLE = frozenset("pts*")
+"""Fields whose size depends on their value."""
+
 
 class Codec(Generic[R]):
     """Encoder and decoder of one record class for one set of its fields.
@@ -29,13 +34,17 @@ class Codec(Generic[R]):
         has_text: whether the size depends on the values.
     """
 
-    __slots__ = ("_parts", "fields", "has_text", "record", "size")
+    __slots__ = ("_parts", "_version", "fields", "has_text", "record", "size")
 
-    def __init__(self, record: type[R], fields: tuple[WireField, ...]) -> None:
+    def __init__(self, record: type[R], fields: tuple[WireField, ...], version: SoftwareVersion) -> None:
         self.record = record
         self.fields = fields
+        self._version = version
         self._parts = _make_parts(fields)
-        self.size = sum(part.size if isinstance(part, _Numbers) else part.code == "p" for part in self._parts)
+        self.size = sum(
+            part.size if isinstance(part, _Numbers) else _PREFIX_SIZES.get(part.code, 0)
+            for part in self._parts
+        )
         self.has_text = any(isinstance(part, WireField) for part in self._parts)
 
     def encode(self, source: Any) -> bytes:
@@ -47,7 +56,7 @@ class Codec(Generic[R]):
         get = source.__getitem__ if isinstance(source, Mapping) else partial(getattr, source)
         try:
             return b"".join(
-                _encode_text(part, get(part.name)) if isinstance(part, WireField) else part.encode(get)
+                self._encode_field(part, get(part.name)) if isinstance(part, WireField) else part.encode(get)
                 for part in self._parts
             )
         except (KeyError, AttributeError) as problem:
@@ -65,10 +74,26 @@ class Codec(Generic[R]):
         Raises:
             RemoteProtocolError: the bytes end before the fields do.
         """
+        return self._decode_from(data, 0)[0]
+
+    def _encode_field(self, field: WireField, value: Any) -> bytes:
+        if field.record is None:
+            return _encode_text(field, value)
+        codec = codec_for(field.record, self._version)
+        return b"".join(map(codec.encode, value))
+
+    def _decode_from(self, data: bytes, position: int) -> tuple[dict[str, Any], int]:
+        """The fields that begin at `position`, and where they end."""
         values: dict[str, Any] = {}
-        position = 0
         for part in self._parts:
-            if isinstance(part, WireField):
+            if isinstance(part, WireField) and part.record is not None:
+                codec = codec_for(part.record, self._version)
+                records: list[Any] = []
+                while position < len(data):
+                    fields, position = codec._decode_from(data, position)
+                    records.append(part.record(**fields))
+                values[part.name] = tuple(records)
+            elif isinstance(part, WireField):
                 values[part.name], position = _decode_text(part, data, position)
             elif len(data) - position < part.size:
                 raise RemoteProtocolError(
@@ -77,7 +102,7 @@ class Codec(Generic[R]):
             else:
                 part.decode(data, position, values)
                 position += part.size
-        return values
+        return values, position
 
 
 class _Numbers:
@@ -143,7 +168,7 @@ def _make_parts(fields: tuple[WireField, ...]) -> tuple[_Numbers | WireField, ..
     parts: list[_Numbers | WireField] = []
     run: list[WireField] = []
     for field in fields:
-        if field.code in "ps":
+        if field.code in _VARIABLE:
             if run:
                 parts.append(_Numbers(run))
                 run = []
@@ -159,6 +184,8 @@ def _encode_text(field: WireField, text: str) -> bytes:
     data = text.encode("latin-1", "replace")
     if field.code == "s":
         return data
+    if field.code == "t":
+        return struct.pack(">i", len(data)) + data
     if len(data) > 255:
         raise ValueError(f"{field.name} has {len(data)} characters, 255 fit")
     return bytes((len(data),)) + data
@@ -167,10 +194,11 @@ def _encode_text(field: WireField, text: str) -> bytes:
 def _decode_text(field: WireField, data: bytes, position: int) -> tuple[str, int]:
     if field.code == "s":
         return data[position:].decode("latin-1"), len(data)
-    end = position + 1 + data[position] if position < len(data) else len(data) + 1
-    if end > len(data):
+    begin = position + _PREFIX_SIZES[field.code]
+    length = int.from_bytes(data[position:begin], "big")
+    if begin + length > len(data):
         raise RemoteProtocolError(f"the text {field.name} is cut off by the end of its package")
-    return data[position + 1 : end].decode("latin-1"), end
+    return data[begin : begin + length].decode("latin-1"), begin + length
 
 
 _codecs: dict[Any, Codec[Any]] = {}
@@ -199,5 +227,5 @@ def codec_for(record: type[R], version: SoftwareVersion, present: tuple[str, ...
             for field in wire_fields(record)
             if field.since.covers(version) and (not field.only_if or field.only_if in present)
         )
-        codec = _codecs[key] = Codec(record, fields)
+        codec = _codecs[key] = Codec(record, fields, version)
     return codec

@@ -6,8 +6,9 @@
         tcp_offset: tuple[float, ...] = wire("d", count=6, since=since(3, 1))
 
 `wire_codec.codec_for(CartesianInfo, version)` makes the encoder and decoder; everything is big-endian.
-Field types are the letters of `struct`, and two for text: `p`, a byte with the length and then the text;
-`s`, text up to the end of the record (last field only). Text travels as Latin-1.
+Field types are the letters of `struct`, and four of ours. Text: `p`, a byte with the length, then the text;
+`t`, the same with a length of 32 bits; `s`, text up to the end of the record (last field only). Text travels
+as Latin-1. `*`: records of another table, as many as there are up to the end (last field only).
 
 This module only declares. The tables are in `primary_layout` and `primary_messages`.
 """
@@ -59,7 +60,7 @@ class WireField:
 
     Attributes:
         name: attribute of the record.
-        code: `struct` letter, or `p` or `s` for text.
+        code: `struct` letter, `p`, `t` or `s` for text, `*` for records.
         count: 1 for a scalar, else the value is a tuple of so many.
         interleaved: fields that follow one another with the same name here share their elements' places:
             first element of each, then second of each, and so on.
@@ -67,6 +68,7 @@ class WireField:
         since: first versions that have the field.
         unit: SI unit, "enum", or "".
         note: meaning.
+        record: table of the records of a `*`.
     """
 
     name: str
@@ -77,6 +79,7 @@ class WireField:
     since: Since
     unit: str
     note: str
+    record: type[Any] | None = None
 
 
 _METADATA_KEY = "wire"
@@ -92,9 +95,10 @@ def wire(
     interleaved: str = "",
     only_if: str = "",
     since: Since = ALWAYS,
+    record: type[Any] | None = None,
 ) -> Any:
     """Declare a field of a record; see `WireField`. The default of a vector is `count` times `default`."""
-    row = WireField("", code, count, interleaved, only_if, since, unit, note)
+    row = WireField("", code, count, interleaved, only_if, since, unit, note, record)
     value = (default,) * count if count > 1 else default
     return dataclasses.field(default=value, metadata={_METADATA_KEY: row})
 
