@@ -7,6 +7,7 @@ a program fail: an operation on ANY is checked when it runs.
 
 from __future__ import annotations
 
+from collections import deque
 from enum import Enum
 from typing import Any
 
@@ -37,6 +38,10 @@ SCALARS = _NUMBERS | {Type.BOOL, Type.STRING}
 """Types of variables that need no check when something is assigned to them."""
 
 
+_ELEMENT = {Type.NEVER: Type.NEVER, Type.POSE: Type.FLOAT, Type.NUMBERS: Type.NUMBER}
+"""Types of `x[i]` by that of x."""
+
+
 def is_number(kind: Type) -> bool:
     """Whether values of this type are numbers."""
     return kind in _NUMBERS
@@ -51,23 +56,29 @@ def join(a: Type, b: Type) -> Type:
     return Type.NUMBER if a in _NUMBERS and b in _NUMBERS else Type.ANY
 
 
+Goal = tuple[FunctionScope | None, str] | FunctionScope
+"""What has a type: a local of a function, a global (None) of the program, the result of a function."""
+
+Flow = tuple[Goal, Expression | None, FunctionScope]
+"""Where a value goes, the expression it comes from (None: the end of a function), the scope it is read in."""
+
+
 class StaticTypes:
     """The types of the variables, parameters and functions of one program."""
 
     def __init__(self, program: ResolvedProgram, catalogue: Catalogue) -> None:
         self._program = program
         self._catalogue = catalogue
-        self._known: dict[tuple[FunctionScope | None, str], Type] = {}
-        self._results: dict[FunctionScope, Type] = dict.fromkeys(program.functions, Type.NEVER)
+        self._types: dict[Goal, Type] = {}
         self._flows = _Flows(program)
         self._settle()
 
     def variable(self, name: str, scope: FunctionScope) -> Type:
         """The type of variable `name` as seen in `scope`."""
         if name in scope.locals:
-            return self._known.get((scope, name), Type.NEVER)
+            return self._types.get((scope, name), Type.NEVER)
         if name in self._program.globals:
-            return self._known.get((None, name), Type.NEVER)
+            return self._types.get((None, name), Type.NEVER)
         return Type.FLOAT
 
     def of(self, expression: Expression, scope: FunctionScope) -> Type:
@@ -84,19 +95,21 @@ class StaticTypes:
             case nodes.Call(function=name):
                 return self._call(name, scope)
             case nodes.Index(target=target, indices=(_,)):
-                on = self.of(target, scope)
-                return Type.FLOAT if on is Type.POSE else Type.NUMBER if on is Type.NUMBERS else Type.ANY
+                return _ELEMENT.get(self.of(target, scope), Type.ANY)
             case nodes.BoolLiteral() | nodes.Prefix(operator="not"):
                 return Type.BOOL
             case nodes.StringLiteral():
                 return Type.STRING
             case nodes.Prefix(operand=operand):
                 kind = self.of(operand, scope)
-                return kind if kind in _NUMBERS else Type.ANY
+                return kind if kind in _NUMBERS or kind is Type.NEVER else Type.ANY
             case nodes.PoseLiteral():
                 return Type.POSE
             case nodes.ListLiteral(items=items) if items:
-                if all(self.of(item, scope) in _NUMBERS for item in items):
+                kinds = {self.of(item, scope) for item in items}
+                if Type.NEVER in kinds:
+                    return Type.NEVER
+                if kinds <= _NUMBERS:
                     return Type.NUMBERS
             case nodes.NoneLiteral():
                 return Type.NONE
@@ -124,35 +137,54 @@ class StaticTypes:
     def _call(self, name: str, scope: FunctionScope) -> Type:
         callee = scope.find_function(name)
         if callee is not None:
-            return self._results[callee]
+            return self._types.get(callee, Type.NEVER)
         builtin = self._catalogue.lookup(name)
         return _declared_type(builtin.returns) if builtin is not None else Type.ANY
 
     def _settle(self) -> None:
-        """Repeat until nothing changes; types only ever widen, so it ends after a few rounds."""
-        changed = True
-        while changed:
-            changed = False
-            for key, expression, scope in self._flows.variables:
-                old = self._known.get(key, Type.NEVER)
-                new = join(old, self.of(expression, scope))
-                if new is not old:
-                    self._known[key] = new
-                    changed = True
-            for function, result, scope in self._flows.results:
-                old = self._results[function]
-                new = join(old, Type.NONE if result is None else self.of(result, scope))
-                if new is not old:
-                    self._results[function] = new
-                    changed = True
+        """Go through all flows, then again through those that read what has widened, until nothing does.
+
+        Types only ever widen, and in three steps at most, so each flow is looked at a few times for each
+        thing that it reads.
+        """
+        flows = self._flows.all
+        readers = self._readers(flows)
+        queued = [True] * len(flows)
+        todo = deque(range(len(flows)))
+        while todo:
+            number = todo.popleft()
+            queued[number] = False
+            goal, expression, scope = flows[number]
+            old = self._types.get(goal, Type.NEVER)
+            new = join(old, Type.NONE if expression is None else self.of(expression, scope))
+            if new is not old:
+                self._types[goal] = new
+                for reader in readers.get(goal, ()):
+                    if not queued[reader]:
+                        queued[reader] = True
+                        todo.append(reader)
+
+    def _readers(self, flows: list[Flow]) -> dict[Goal, list[int]]:
+        """The flows whose expressions read a variable or the result of a function, by that."""
+        readers: dict[Goal, list[int]] = {}
+        for number, (_, expression, scope) in enumerate(flows):
+            for part in all_expressions(expression) if expression is not None else ():
+                goal: Goal
+                if isinstance(part, nodes.Name):
+                    goal = (scope if part.name in scope.locals else None, part.name)
+                elif isinstance(part, nodes.Call) and (callee := scope.find_function(part.function)):
+                    goal = callee
+                else:
+                    continue
+                readers.setdefault(goal, []).append(number)
+        return readers
 
 
 class _Flows:
     """Which expressions end up in which variable, and which are results of which function."""
 
     def __init__(self, program: ResolvedProgram) -> None:
-        self.variables: list[tuple[tuple[FunctionScope | None, str], Expression, FunctionScope]] = []
-        self.results: list[tuple[FunctionScope, Expression | None, FunctionScope]] = []
+        self.all: list[Flow] = []
         for scope in program.scopes():
             self._statements(scope)
             if scope.node is not None and scope.parent is not None:
@@ -163,18 +195,18 @@ class _Flows:
             match statement:
                 case nodes.Assign(target=nodes.Name(name=name), value=value, scope=qualifier):
                     is_local = name in scope.locals and qualifier != "global"
-                    self.variables.append(((scope if is_local else None, name), value, scope))
+                    self.all.append(((scope if is_local else None, name), value, scope))
                 case nodes.Return(value=value) if scope.parent is not None:
-                    self.results.append((scope, value, scope))
+                    self.all.append((scope, value, scope))
             for expression in own_expressions(statement):
                 self._calls(expression, scope)
         if scope.parent is not None and falls_through(scope.body):
-            self.results.append((scope, None, scope))
+            self.all.append((scope, None, scope))
 
     def _defaults(self, scope: FunctionScope, node: nodes.Function, outside: FunctionScope) -> None:
         for parameter in node.parameters:
             if parameter.default is not None:
-                self.variables.append(((scope, parameter.name), parameter.default, outside))
+                self.all.append(((scope, parameter.name), parameter.default, outside))
                 self._calls(parameter.default, outside)
 
     def _calls(self, expression: Expression, scope: FunctionScope) -> None:
@@ -186,7 +218,7 @@ class _Flows:
                 continue
             for position, argument in enumerate(part.arguments):
                 name = argument.name or callee.node.parameters[position].name
-                self.variables.append(((callee, name), argument.value, scope))
+                self.all.append(((callee, name), argument.value, scope))
 
 
 _ARITHMETIC = frozenset("+-*/%")

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from urscript import nodes
 from urscript.assignment import find_unsure
+from urscript.call_graph import mark_recursion, spread_blocking
 from urscript.catalogue import Catalogue
 from urscript.dialect import Dialect
 from urscript.errors import (
@@ -71,8 +72,8 @@ class _Resolver:
             self._declare_locals(scope)
         for scope in program.scopes():
             self._look_up(scope)
-        _mark_recursion(program)
-        _spread_blocking(program)
+        mark_recursion(program)
+        spread_blocking(program)
         find_unsure(program)
         return program
 
@@ -294,25 +295,3 @@ def _shape(arguments: tuple[nodes.Argument, ...]) -> tuple[int, tuple[str, ...]]
     """Number of positional arguments, names of the named ones."""
     keywords = tuple(argument.name for argument in arguments if argument.name is not None)
     return len(arguments) - len(keywords), keywords
-
-
-def _spread_blocking(program: ResolvedProgram) -> None:
-    """A function that calls one that may block may block."""
-    changed = True
-    while changed:
-        changed = False
-        for scope in program.scopes():
-            if not scope.blocks and any(callee.blocks for callee in scope.callees):
-                scope.blocks = changed = True
-
-
-def _mark_recursion(program: ResolvedProgram) -> None:
-    for scope in program.functions:
-        reached: set[FunctionScope] = set()
-        todo = list(scope.callees)
-        while todo:
-            callee = todo.pop()
-            if callee not in reached:
-                reached.add(callee)
-                todo.extend(callee.callees)
-        scope.recursive = scope in reached
