@@ -27,6 +27,8 @@ class CommandPath:
     """
 
     def __init__(self, n_substeps: int, substep: float, dead_substeps: int, lag: float) -> None:
+        self._period = n_substeps * substep
+        self._delay = dead_substeps * substep + lag
         # A delayed cycle lies between targets that are up to this many cycles old.
         n_knots = 2 + -(-dead_substeps // n_substeps)
         n_inputs = N_SIGNALS * (1 + n_knots)
@@ -56,11 +58,21 @@ class CommandPath:
         self.q_final: NDArray[np.float64] = by_signal[0, -1]
         """Set-point position at the end of the cycle (6,) [rad]."""
 
-    def reset(self, q: NDArray[np.float64], tau: NDArray[np.float64]) -> None:
-        """Forget all motion: at rest at q (6,) [rad] under torque tau (6,) [Nm], and always has been."""
-        at_rest = np.array([q, np.zeros(6), tau])
-        self._inputs[:] = np.tile(at_rest, (len(self._inputs) // N_SIGNALS, 1))
-        self._outputs[:] = np.repeat(at_rest, len(self._outputs) // N_SIGNALS, axis=0)
+    def reset(
+        self, q: NDArray[np.float64], tau: NDArray[np.float64], qd: NDArray[np.float64] | None = None
+    ) -> None:
+        """Start anew, as if the present motion had always been so.
+
+        Args:
+            q: newest target (6,) [rad].
+            tau: torque (6,) [Nm].
+            qd: speed of the target (6,) [rad/s]; None for rest.
+        """
+        speed = np.zeros(6) if qd is None else qd
+        n_knots = len(self._targets) // N_SIGNALS
+        ages = [self._delay, *(k * self._period for k in range(n_knots))]
+        self._inputs[:] = np.concatenate([[q - age * speed, speed, tau] for age in ages])
+        self._outputs[:] = np.repeat(self._filtered, len(self._outputs) // N_SIGNALS, axis=0)
 
     def advance(self, target: NDArray[np.float64]) -> None:
         """Take the target (3, 6) for the end of this cycle (q, qd, tau) and fill q, qd, tau and q_final."""

@@ -7,6 +7,8 @@ adds up
 
 of which the terms in q and qd live in MuJoCo's actuators. `trim` is the slow outer loop: it integrates the
 error at the joint's own encoder, so that gear error, wrong masses and left-over friction vanish at rest.
+
+While the arm is guided by hand there is no set-point: see `HandGuiding`.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.friction import Friction
+from ur_emulator.plant.hand_guiding import HandGuiding
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
 from ur_emulator.plant.physics import ServoGains
 from ur_emulator.plant.plant_state import Target
@@ -61,7 +64,9 @@ class Drives:
     ) -> None:
         self._dynamics = InverseDynamics(robot, calibration)
         self._friction = Friction(robot, fidelity, seed)
+        self._guiding = HandGuiding(robot)
         self._path = path
+        self._period = period
         # One row a sub-step: broadcasting costs twice the arithmetic at this size.
         self._kp, self._kv = np.tile(gains.kp, (len(path.q), 1)), np.tile(gains.kv, (len(path.q), 1))
         self._torque_per_trim = gains.kp
@@ -86,6 +91,17 @@ class Drives:
         still = np.zeros(6)
         self._path.reset(q, self._dynamics.evaluate(q, still, still))
         np.subtract(q_motor, q, self._trim)
+
+    def take_over_moving(self, target: Target, q_motor: NDArray[np.float64]) -> None:
+        """Follow a target that begins now, the motors being at q_motor (6,) [rad].
+
+        The servo begins without a torque of its own: what the motors are away from the set-point is trimmed
+        away and then pulled in as fast as any other error.
+        """
+        q, qd = np.array(target.q), np.array(target.qd)
+        path = self._path
+        path.reset(q - self._period * qd, self._dynamics.evaluate(q, qd, np.zeros(6)), qd)
+        np.subtract(q_motor, path.q_final, self._trim)
 
     def release(self) -> None:
         """Carry nothing: the brakes do."""
@@ -121,6 +137,16 @@ class Drives:
         np.multiply(self._work, self._per_torque, self._work)
         self.target_current = six(self._work.tolist())
         return True
+
+    def guide(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> None:
+        """Fill `table` for an arm that is guided by hand, with joints at q (6,) [rad], qd (6,) [rad/s]."""
+        still = np.zeros(6)
+        gravity = self._dynamics.evaluate(q, still, still)
+        self._friction.evaluate(qd, qd, qd)
+        torque = self._guiding.torque(gravity, self._friction.dry_compensation, q, qd)
+        self.table[:] = torque
+        self.target_moment = six(gravity.tolist())
+        self.target_current = six((torque * self._per_torque).tolist())
 
     def integrate(self, error: NDArray[np.float64]) -> None:
         """Trim the servos by the joints' error (6,) [rad] of this cycle; not to be called in saturation."""

@@ -49,6 +49,12 @@ class Friction:
         self.coulomb: NDArray[np.float64] = self._sizes[0]
         self.expected: NDArray[np.float64] = self._beliefs[0]
         self.compensation: NDArray[np.float64] = self._beliefs[1]
+        self._set_viscous = self._viscous[1]
+
+    @property
+    def dry_compensation(self) -> NDArray[np.float64]:
+        """Return the part of `compensation` that does not grow with the speed (6,) [Nm]."""
+        return self.compensation - self._set_viscous
 
     def evaluate(
         self, qd_actual: NDArray[np.float64], qd_target: NDArray[np.float64], qd_set: NDArray[np.float64]

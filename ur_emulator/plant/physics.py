@@ -26,6 +26,9 @@ TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the t
 _FRICTION_SOLREF = (0.02, 1.0)
 _FRICTION_SOLIMP = (0.1, 0.1, 0.001, 0.5, 2.0)
 
+# What is guided by hand would creep under the softness above. There the friction holds, up to its size.
+_STICTION_SOLIMP = (0.999, 0.999, 0.001, 0.5, 2.0)
+
 # Contacts as hard as the step allows (two sub-steps): pressing with full torque sinks in by less than 0.1 mm.
 _CONTACT_SOLREF = (0.004, 1.0)
 
@@ -43,6 +46,23 @@ class ServoGains:
         omega = 2.0 * pi * robot.servo_frequency
         inertia = np.array(robot.servo_inertia)
         return cls(kp=omega**2 * inertia, kv=2.0 * robot.servo_damping * omega * inertia)
+
+
+class JointServos:
+    """Switches the joints of a compiled model between their servos and being free.
+
+    Free means: actuators give `ctrl` as it is, and friction holds what stands still.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._bias = model.actuator_biasprm
+        self._servo_bias = model.actuator_biasprm.copy()
+        self._solimp = model.dof_solimp
+
+    def set_free(self, free: bool) -> None:
+        """Free the joints, or give them back to their servos."""
+        self._bias[:] = 0.0 if free else self._servo_bias
+        self._solimp[:] = _STICTION_SOLIMP if free else _FRICTION_SOLIMP
 
 
 def build_physics(

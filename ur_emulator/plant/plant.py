@@ -5,6 +5,9 @@ and physics in sub-steps -> a record of true values -> sensors. The plant knows 
 safety; it does what it is told or raises `PlantError`. It reads no clock, and its only chance comes from the
 seed: equal seeds and equal targets give bit-identical states.
 
+The arm has three ways to be driven (`ControlMode`): by position; by position with the slow outer loop of the
+servos at rest, for the contacts of force mode; and guided by hand, where no joint holds a position.
+
 Angles: the physics' hinge is the motor side of the gear, which the drive holds; the joint is there plus the
 gear's transmission error. Links move with the hinge: collisions leave out that error of 0.1 mrad.
 """
@@ -19,18 +22,19 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
 from ur_emulator.models.calibration import calibrated_dh, draw_calibration
 from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.mjcf import FLANGE, GRAVITY, LINKS
+from ur_emulator.models.mjcf import FLANGE, GRAVITY
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_model import RobotModel, Vector3, six
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.contact import contact_wrench
 from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX, Drives
 from ur_emulator.plant.gear import GearRipple
-from ur_emulator.plant.payload import check_payload, set_payload_body
-from ur_emulator.plant.physics import ServoGains, build_physics
+from ur_emulator.plant.loads import Loads
+from ur_emulator.plant.physics import JointServos, ServoGains, build_physics
 from ur_emulator.plant.plant_state import PlantState, Target
 from ur_emulator.plant.sensors import (
     N_RECORD,
@@ -98,7 +102,6 @@ class Plant:
         self._raw: NDArray[np.float64] = data.sensordata
         self._force: NDArray[np.float64] = data.actuator_force
         self._frictionloss: NDArray[np.float64] = self._model.dof_frictionloss
-        self._flange_link: int = self._model.body(LINKS[5]).id
         site: int = self._model.site(FLANGE).id
         self._flange_position: NDArray[np.float64] = data.site_xpos[site]
         self._flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
@@ -116,11 +119,19 @@ class Plant:
         self._records: deque[NDArray[np.float64]] = deque(maxlen=1 + self._cycles_late)
 
         self._amperes_per_torque = [1.0 / constant for constant in robot.torque_constant]
+        self._servos = JointServos(self._model)
+        self._mode = ControlMode.POSITION
+        # In force mode and after it, until the arm is moved away: what is pressed against would be pressed
+        # harder and harder.
+        self._trim_rests = False
+        self._loads = Loads(self._model, data)
         self._error = np.zeros(6)
         self._ripple = np.zeros(6)
-        self._push: NDArray[np.float64] | None = None
-        self._push_point = np.zeros(3)
         self._braked = True
+        self._trim_rests = False
+        if self._mode is not ControlMode.POSITION:
+            self._mode = ControlMode.POSITION
+            self._servos.set_free(False)
         self._saturated = self._saturated_now = False
         self._control_current = NO_LOAD
         self._rest_record = np.zeros(N_RECORD)
@@ -146,6 +157,16 @@ class Plant:
         """Number of contact points of the arm with itself, its base or the table."""
         return int(self._data.ncon)
 
+    @property
+    def flange_position(self) -> NDArray[np.float64]:
+        """True position of the flange (3,) in the base frame [m], at the start of the last sub-step."""
+        return self._flange_position.copy()
+
+    @property
+    def contact_wrench(self) -> NDArray[np.float64]:
+        """What table and base press on the arm (6,), at the flange in base axes [N, Nm]: the truth."""
+        return contact_wrench(self._model, self._data, self._flange_position)
+
     def reset(self, q: Sequence[float]) -> None:
         """Put the arm at rest at q (6,) [rad], brakes on; payload, push and random streams stay.
 
@@ -164,7 +185,7 @@ class Plant:
         self._state = None
 
     def set_payload(self, mass: float, cog: Vector3) -> None:
-        """Hang a payload on the flange and declare it to the controller.
+        """Declare a payload to the controller; it hangs on the flange unless `hang` has put another there.
 
         Args:
             mass: [kg].
@@ -173,9 +194,22 @@ class Plant:
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
-        check_payload(mass, cog)
-        set_payload_body(self._model, mass, cog)
+        self._loads.declare(mass, cog)
         self._drives.set_payload(mass, cog)
+
+    def hang(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
+        """Hang a payload on the flange without a word to the controller: what it believes may be wrong.
+
+        From now on `set_payload` only declares.
+
+        Args:
+            mass: [kg].
+            cog: centre of gravity in the flange frame [m].
+
+        Raises:
+            PlantError: when the mass is negative or a number is not finite.
+        """
+        self._loads.hang(mass, cog)
 
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
         """Push the flange from now on; a zero force ends it.
@@ -187,24 +221,18 @@ class Plant:
         Raises:
             PlantError: when a number is not finite.
         """
-        force_base = np.array(force, dtype=np.float64)
-        at = np.zeros(3) if point is None else np.array(point, dtype=np.float64)
-        if force_base.shape != (3,) or at.shape != (3,) or not np.isfinite([force_base, at]).all():
-            raise PlantError(
-                f"push of {list(force)} N given: three finite numbers are needed, point likewise"
-            )
-        self._push = force_base if force_base.any() else None
-        self._push_point = at
-        self._data.xfrc_applied[self._flange_link] = 0.0
+        self._loads.push(force, point)
 
     # --- the cycle ---
 
-    def step(self, target: Target | None) -> None:
+    def step(self, target: Target | None, mode: ControlMode = ControlMode.POSITION) -> None:
         """Advance one control cycle.
 
         Args:
             target: set-point for the end of this cycle; the drives act on it from the beginning of the cycle
                 plus the dead time. None puts or keeps the brakes on: the joints stand still.
+            mode: how the arm is driven. TEACH leaves it to the hand that pushes it; the target does not
+                count then, but the first one afterwards should be where the arm is.
 
         Raises:
             PlantError: the target is not finite, or the simulation diverged and needs a reset.
@@ -218,14 +246,20 @@ class Plant:
             return
         if self._braked:
             self._release_brakes()
-        if not self._drives.command(target, self._qvel):
+        if mode is not self._mode:
+            self._switch(mode, target)
+        elif self._trim_rests and mode is ControlMode.POSITION and any(target.qd):
+            self._trim_rests = False
+        if mode is ControlMode.TEACH:
+            self._drives.guide(self._qpos, self._qvel)
+        elif not self._drives.command(target, self._qvel):
             raise PlantError(
                 f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
                 cycle=self.cycle,
             )
         self._frictionloss[:] = self._drives.coulomb
-        if self._push is not None:
-            self._apply_push(self._push)
+        if self._loads.is_felt:
+            self._loads.apply()
         self._run_substeps()
         self._look_after_saturation()
         self._record_cycle()
@@ -277,23 +311,28 @@ class Plant:
         np.multiply(gear.slope, record[REC_QD], ripple)
         record[REC_Q] += gear.error
         record[REC_QD] += ripple
-        if self._push is not None:
-            record[REC_WRENCH] = self._push_wrench
+        if self._loads.is_felt:
+            record[REC_WRENCH] = self._loads.wrench
         if self._data.ncon:
             record[REC_WRENCH] += contact_wrench(self._model, self._data, self._flange_position)
         self._records.append(record)
+        if self._mode is ControlMode.TEACH:
+            error[:] = 0.0
+            return
         np.subtract(self._path.q_final, self._qpos, error)
         np.subtract(error, gear.error, error)
-        if not self._saturated_now:
+        if not (self._saturated_now or self._trim_rests):
             self._drives.integrate(error)
 
-    def _apply_push(self, force: NDArray[np.float64]) -> None:
-        """Bring the push to the body that MuJoCo wants it at, for the pose at the start of this cycle."""
-        data = self._data
-        lever = self._flange_rotation @ self._push_point
-        self._push_wrench = np.concatenate([force, np.cross(lever, force)])
-        from_com = self._flange_position + lever - data.xipos[self._flange_link]
-        data.xfrc_applied[self._flange_link] = np.concatenate([force, np.cross(from_com, force)])
+    # --- ways to be driven ---
+
+    def _switch(self, mode: ControlMode, target: Target) -> None:
+        """Change the way that the arm is driven, without a jump of the torques."""
+        was_guided, self._mode = self._mode is ControlMode.TEACH, mode
+        self._servos.set_free(mode is ControlMode.TEACH)
+        if was_guided:
+            self._drives.take_over_moving(target, self._qpos)
+        self._trim_rests = mode is ControlMode.FORCE or (self._trim_rests and not was_guided)
 
     # --- brakes ---
 

@@ -1,0 +1,97 @@
+"""Loads: what pushes the flange and hangs on it, as the physics has it and as the controller believes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_emulator.errors import PlantError
+from ur_emulator.models.mjcf import FLANGE, GRAVITY, LINKS
+from ur_emulator.models.robot_model import Vector3
+from ur_emulator.plant.payload import check_payload, set_payload_body
+
+
+class Loads:
+    """The payload and the push on one arm.
+
+    Args:
+        model: the plant's model.
+        data: its state.
+
+    Attributes:
+        is_felt: something acts that the controller does not expect: see `wrench`.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self._model = model
+        self._data = data
+        self._flange_link: int = model.body(LINKS[5]).id
+        site: int = model.site(FLANGE).id
+        self._flange_position: NDArray[np.float64] = data.site_xpos[site]
+        self._flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
+        self._push: NDArray[np.float64] | None = None
+        self._push_point = np.zeros(3)
+        self._push_wrench = np.zeros(6)
+        self._hung: tuple[float, Vector3] | None = None
+        self._declared: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
+        self.is_felt = False
+
+    def declare(self, mass: float, cog: Vector3) -> None:
+        """Take what the controller is told: it hangs there too unless `hang` has put something else there.
+
+        Raises:
+            PlantError: when the mass [kg] is negative or a number is not finite.
+        """
+        check_payload(mass, cog)
+        self._declared = (mass, cog)
+        if self._hung is None:
+            set_payload_body(self._model, mass, cog)
+
+    def hang(self, mass: float, cog: Vector3) -> None:
+        """Hang a payload on the flange without a word to the controller; from now on it decides.
+
+        Raises:
+            PlantError: when the mass [kg] is negative or a number is not finite.
+        """
+        check_payload(mass, cog)
+        self._hung = (mass, cog)
+        set_payload_body(self._model, mass, cog)
+        self.is_felt = True
+
+    def push(self, force: Sequence[float], point: Sequence[float] | None) -> None:
+        """Push from now on; see `Plant.push`."""
+        force_base = np.array(force, dtype=np.float64)
+        at = np.zeros(3) if point is None else np.array(point, dtype=np.float64)
+        if force_base.shape != (3,) or at.shape != (3,) or not np.isfinite([force_base, at]).all():
+            raise PlantError(
+                f"push of {list(force)} N given: three finite numbers are needed, point likewise"
+            )
+        self._push = force_base if force_base.any() else None
+        self._push_point = at
+        self._data.xfrc_applied[self._flange_link] = 0.0
+        self.is_felt = self._push is not None or self._hung is not None
+
+    def apply(self) -> None:
+        """Bring the push to the body that MuJoCo wants it at, for the pose at the start of this cycle."""
+        force = self._push
+        if force is None:
+            return
+        data = self._data
+        lever = self._flange_rotation @ self._push_point
+        self._push_wrench = np.concatenate([force, np.cross(lever, force)])
+        from_com = self._flange_position + lever - data.xipos[self._flange_link]
+        data.xfrc_applied[self._flange_link] = np.concatenate([force, np.cross(from_com, force)])
+
+    @property
+    def wrench(self) -> NDArray[np.float64]:
+        """Wrench (6,) that the controller does not expect, at the flange in base axes [N, Nm]."""
+        wrench = np.zeros(6) if self._push is None else self._push_wrench.copy()
+        if self._hung is not None:
+            for sign, (mass, cog) in ((-GRAVITY, self._hung), (GRAVITY, self._declared)):
+                weight = np.array([0.0, 0.0, sign * mass])
+                wrench[:3] += weight
+                wrench[3:] += np.cross(self._flange_rotation @ cog, weight)
+        return wrench
