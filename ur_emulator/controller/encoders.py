@@ -49,12 +49,14 @@ class Encoder:
         is_fed: a program sets its count.
         count: present one [ticks].
         range_id: key of RANGES.
+        travel: ticks gone in all, without wraps; goes on when the counting is set up anew.
     """
 
     decoder: Decoder = Decoder.OFF
     is_fed: bool = False
     count: float = 0.0
     range_id: int = PULSE_RANGE
+    travel: float = 0.0
     _pins: tuple[int, int] = (0, 1)
     _last: tuple[bool, bool] = (False, False)
 
@@ -75,6 +77,11 @@ class Encoder:
         self.decoder, self.is_fed, self.range_id = Decoder.OFF, True, range_id
         self.count = 0.0
 
+    def set_count(self, count: float) -> None:
+        """Take a count that a program feeds; it has gone the shorter way round."""
+        self.travel += self.unwind(count - self.count)
+        self.count = count
+
     def step(self, digital_in: int) -> None:
         """Look at the inputs once."""
         now, before = self._read(digital_in), self._last
@@ -88,6 +95,7 @@ class Encoder:
                 step = now[0] and not before[0]
             case _:
                 step = before[0] and not now[0]
+        self.travel += step
         self.count = (self.count + step) % RANGES[self.range_id][1]
 
     def unwind(self, delta: float) -> float:

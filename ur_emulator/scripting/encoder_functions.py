@@ -43,7 +43,7 @@ def encoder_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]
             raise ScriptRuntimeError(
                 f"encoder count {count:g} is out of range, allowed are {low} to {low + size - 1}"
             )
-        encoder.count = float(count)
+        encoder.set_count(float(count))
 
     def unwind(thread: object, index: float, delta: float) -> float | None:
         encoder = encoders.encoders[int(index)]

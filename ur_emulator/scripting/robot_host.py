@@ -7,10 +7,12 @@ from typing import Any
 
 from ur_emulator.controller.events import TextPrinted
 from ur_emulator.controller.state import ControllerState
+from ur_emulator.scripting.conveyor_functions import ProgramConveyor
 from ur_emulator.scripting.encoder_functions import encoder_functions
 from ur_emulator.scripting.error_functions import error_functions
 from ur_emulator.scripting.io_configuration_functions import io_configuration_functions
 from ur_emulator.scripting.io_functions import io_functions, register_functions
+from ur_emulator.scripting.modbus_functions import modbus_functions
 from ur_emulator.scripting.motion_functions import motion_functions
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.operator_functions import operator_functions
@@ -38,6 +40,7 @@ class RobotHost:
         self._state = state
         self._sockets = ProgramSockets(state, network)
         self._remotes = ProgramRemotes(network)
+        self._conveyor = ProgramConveyor(state)
         self._builtins: Mapping[str, Callable[..., Any]] = {
             **motion_functions(state),
             **state_functions(state),
@@ -46,8 +49,10 @@ class RobotHost:
             **register_functions(state),
             **io_configuration_functions(state),
             **port_functions(state),
+            **modbus_functions(state, network),
             **watchdog_functions(state),
             **encoder_functions(state),
+            **self._conveyor.functions(),
             **operator_functions(state),
             **error_functions(state),
             **self._sockets.functions(),
@@ -68,6 +73,7 @@ class RobotHost:
         self._state.motion.release(thread)
 
     def program_ended(self) -> None:
-        """Close what the program opened."""
+        """Close what the program opened, and end the tracking of its conveyor."""
         self._sockets.close_all()
         self._remotes.close_all()
+        self._conveyor.end()

@@ -402,6 +402,8 @@ _CONVEYORS: tuple[Builtin, ...] = (
         ),
         "None",
         "let the following moves ride on a linear conveyor",
+        support=APPROXIMATE,
+        note="smoothing of the count and the way to catch up with the belt are chosen",
     ),
     _row(
         "track_conveyor_circular",
@@ -413,6 +415,8 @@ _CONVEYORS: tuple[Builtin, ...] = (
         ),
         "None",
         "let the following moves ride on a turning conveyor",
+        support=APPROXIMATE,
+        note="turns about the z axis of the centre; smoothing and the way to catch up are chosen",
     ),
     _row(
         "stop_conveyor_tracking",
@@ -420,13 +424,21 @@ _CONVEYORS: tuple[Builtin, ...] = (
         "None",
         "stop tracking and bring the joints to rest",
         time=MOTION,
+        support=EXACT,
     ),
-    _row("get_target_tcp_pose_along_path", (), "pose, m and rad", "target without conveyor and path offset"),
+    _row(
+        "get_target_tcp_pose_along_path",
+        (),
+        "pose, m and rad",
+        "target without conveyor and path offset",
+        support=EXACT,
+    ),
     _row(
         "get_target_tcp_speed_along_path",
         (),
         "pose, m/s and rad/s",
         "speed without conveyor and path offset",
+        support=EXACT,
     ),
     _row(
         "conveyor_pulse_decode",

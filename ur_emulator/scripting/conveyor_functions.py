@@ -1,0 +1,111 @@
+"""Builtins that let the moves of a program ride on a conveyor, and those that look at the path without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import hypot, isfinite
+from typing import Any
+
+from ur_emulator.controller.cycle import controller_time
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.motion.conveyor import CircularConveyor, Conveyor, LinearConveyor
+from ur_emulator.motion.generators import StopJ
+from ur_emulator.motion.tool import Tool
+from ur_emulator.scripting.arm_taking import Cycles, floats, require_positive, take_arm
+from urscript.errors import ScriptRuntimeError
+from urscript.values import Pose
+from urscript.waits import NEXT_CYCLE
+
+# Encoders beyond have a tick for an atom, or none for the whole robot.
+FEWEST_TICKS, MOST_TICKS = 1e-3, 1e9
+
+
+class ProgramConveyor:
+    """The conveyor that one program tracks."""
+
+    def __init__(self, state: ControllerState) -> None:
+        self._state = state
+        self._tracked: Conveyor | None = None
+
+    def end(self) -> None:
+        """Track no more; the arm ramps to rest."""
+        if self._tracked is not None:
+            self._state.motion.remove_overlay(self._tracked)
+            self._tracked = None
+
+    def functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Return the conveyor builtins."""
+        state = self._state
+        motion = state.motion
+
+        def tool() -> Tool:
+            return Tool(state.arm, state.tcp_offset)
+
+        def track(conveyor: Conveyor) -> None:
+            self.end()
+            self._tracked = conveyor
+            motion.add_overlay(conveyor)
+
+        def counter(index: float) -> Callable[[], float]:
+            encoder = state.encoders.encoders[int(index)]
+            return lambda: encoder.travel
+
+        def clock() -> float:
+            return controller_time(state.tick)
+
+        def track_linear(
+            thread: object, direction: Pose, ticks_per_meter: float, encoder_index: float
+        ) -> None:
+            _require_ticks("track_conveyor_linear", "ticks_per_meter", ticks_per_meter)
+            x, y, z = floats(tuple(direction))[:3]
+            if not 0.0 < hypot(x, y, z) < float("inf"):
+                raise ScriptRuntimeError(
+                    f"track_conveyor_linear: direction ({x:g}, {y:g}, {z:g}) leads nowhere, "
+                    "give its x, y, z in the base frame"
+                )
+            track(LinearConveyor((x, y, z), float(ticks_per_meter), tool(), counter(encoder_index), clock))
+
+        def track_circular(
+            thread: object, center: Pose, ticks_per_revolution: float, rotate_tool: bool, encoder_index: float
+        ) -> None:
+            _require_ticks("track_conveyor_circular", "ticks_per_revolution", ticks_per_revolution)
+            frame = floats(tuple(center))
+            if not all(map(isfinite, frame)):
+                raise ScriptRuntimeError("track_conveyor_circular: center must be six finite numbers")
+            track(
+                CircularConveyor(
+                    frame,
+                    float(ticks_per_revolution),
+                    tool(),
+                    counter(encoder_index),
+                    clock,
+                    rotate_tool=bool(rotate_tool),
+                )
+            )
+
+        def stop(thread: object, a: float) -> Cycles:
+            require_positive("stop_conveyor_tracking", a=a)
+            take_arm(state, thread, ramp := StopJ(a))
+            self.end()
+            while not ramp.done:
+                yield NEXT_CYCLE
+
+        def speed_along_path(thread: object) -> Pose:
+            path = motion.path
+            return Pose.of(tool().twist(path.q, path.qd))
+
+        return {
+            "track_conveyor_linear": track_linear,
+            "track_conveyor_circular": track_circular,
+            "stop_conveyor_tracking": stop,
+            "get_target_tcp_pose_along_path": lambda thread: Pose.of(tool().pose(motion.path.q)),
+            "get_target_tcp_speed_along_path": speed_along_path,
+        }
+
+
+def _require_ticks(function: str, name: str, value: float) -> None:
+    if not FEWEST_TICKS <= abs(value) <= MOST_TICKS:
+        raise ScriptRuntimeError(
+            f"{function}: {name} must be {FEWEST_TICKS:g} to {MOST_TICKS:g}, or as much below 0, "
+            f"got {value:g}"
+        )
