@@ -33,10 +33,14 @@ HISTORY_CYCLES = 125
 
 @dataclass(slots=True)
 class Payload:
-    """What the controller believes to hang at the flange: mass [kg], centre of gravity [m] in its frame."""
+    """What the controller believes to hang at the flange: mass [kg], centre of gravity [m] in its frame.
+
+    `at_tcp`: the centre of gravity was never given; it is the TCP, wherever that will be.
+    """
 
     mass: float = 0.0
     cog: Vector3 = (0.0, 0.0, 0.0)
+    at_tcp: bool = False
 
 
 @dataclass(slots=True)

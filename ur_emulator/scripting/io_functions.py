@@ -1,4 +1,7 @@
-"""Builtins for digital and analogue lines, flags and registers. They act at once, within the cycle."""
+"""Builtins for digital and analogue lines, flags and registers. They act at once, within the cycle.
+
+The catalogue has checked that a line or register exists; its number may be a float without fraction.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,6 @@ from ur_emulator.controller.io import (
     AnalogLine,
 )
 from ur_emulator.controller.state import ControllerState
-from urscript.errors import ScriptRuntimeError
 
 Function = Callable[..., Any]
 
@@ -28,13 +30,6 @@ _DIGITAL_GROUPS = (
 _DEPRECATED_BITS = (*range(N_STANDARD), TOOL_SHIFT, TOOL_SHIFT + 1)
 
 
-def _pick(what: str, index: float, size: int) -> int:
-    """Return the index of a line or register; the language lets a float without fraction through."""
-    if not 0 <= index < size:
-        raise ScriptRuntimeError(f"{what} {index:g} does not exist, allowed are 0 to {size - 1}")
-    return int(index)
-
-
 def io_functions(state: ControllerState) -> Mapping[str, Function]:
     """Return the builtins for lines and flags bound to one controller."""
     return {**_digital(state), **_analog(state), **_flags(state)}
@@ -43,46 +38,44 @@ def io_functions(state: ControllerState) -> Mapping[str, Function]:
 def _digital(state: ControllerState) -> dict[str, Function]:
     io = state.io
 
-    def reader(read: Callable[[int], bool], bits: tuple[int, ...], what: str) -> Function:
-        return lambda thread, n: read(bits[_pick(what, n, len(bits))])
+    def reader(read: Callable[[int], bool], bits: tuple[int, ...]) -> Function:
+        return lambda thread, n: read(bits[int(n)])
 
-    def writer(bits: tuple[int, ...], what: str) -> Function:
-        return lambda thread, n, b: io.write_digital_out(bits[_pick(what, n, len(bits))], b)
+    def writer(bits: tuple[int, ...]) -> Function:
+        return lambda thread, n, b: io.write_digital_out(bits[int(n)], b)
 
     functions: dict[str, Function] = {}
     for group, first, size in _DIGITAL_GROUPS:
         bits = tuple(range(first, first + size))
-        functions[f"get_{group}_digital_in"] = reader(io.read_digital_in, bits, f"{group} digital input")
-        functions[f"get_{group}_digital_out"] = reader(io.read_digital_out, bits, f"{group} digital output")
-        functions[f"set_{group}_digital_out"] = writer(bits, f"{group} digital output")
-    functions["get_digital_in"] = reader(io.read_digital_in, _DEPRECATED_BITS, "digital input")
-    functions["get_digital_out"] = reader(io.read_digital_out, _DEPRECATED_BITS, "digital output")
-    functions["set_digital_out"] = writer(_DEPRECATED_BITS, "digital output")
+        functions[f"get_{group}_digital_in"] = reader(io.read_digital_in, bits)
+        functions[f"get_{group}_digital_out"] = reader(io.read_digital_out, bits)
+        functions[f"set_{group}_digital_out"] = writer(bits)
+    functions["get_digital_in"] = reader(io.read_digital_in, _DEPRECATED_BITS)
+    functions["get_digital_out"] = reader(io.read_digital_out, _DEPRECATED_BITS)
+    functions["set_digital_out"] = writer(_DEPRECATED_BITS)
     return functions
 
 
 def _analog(state: ControllerState) -> dict[str, Function]:
     io = state.io
 
-    def reader(lines: list[AnalogLine], what: str) -> Function:
-        return lambda thread, n: lines[_pick(what, n, len(lines))].value
+    def reader(lines: list[AnalogLine]) -> Function:
+        return lambda thread, n: lines[int(n)].value
 
-    def writer(lines: list[AnalogLine], what: str) -> Function:
-        return lambda thread, n, f: lines[_pick(what, n, len(lines))].set_ratio(f)
+    def writer(lines: list[AnalogLine]) -> Function:
+        return lambda thread, n, f: lines[int(n)].set_ratio(f)
 
-    def set_tool_voltage(thread: object, voltage: int) -> None:
-        if voltage not in (0, 12, 24):
-            raise ScriptRuntimeError(f"set_tool_voltage: {voltage} V is not one of 0, 12, 24")
+    def set_tool_voltage(thread: object, voltage: float) -> None:
         io.tool_voltage = int(voltage)
 
     return {
-        "get_standard_analog_in": reader(io.analog_in, "standard analog input"),
-        "get_tool_analog_in": reader(io.tool_analog_in, "tool analog input"),
-        "get_standard_analog_out": reader(io.analog_out, "standard analog output"),
-        "set_standard_analog_out": writer(io.analog_out, "standard analog output"),
-        "get_analog_in": reader([*io.analog_in, *io.tool_analog_in], "analog input"),
-        "get_analog_out": reader(io.analog_out, "analog output"),
-        "set_analog_out": writer(io.analog_out, "analog output"),
+        "get_standard_analog_in": reader(io.analog_in),
+        "get_tool_analog_in": reader(io.tool_analog_in),
+        "get_standard_analog_out": reader(io.analog_out),
+        "set_standard_analog_out": writer(io.analog_out),
+        "get_analog_in": reader([*io.analog_in, *io.tool_analog_in]),
+        "get_analog_out": reader(io.analog_out),
+        "set_analog_out": writer(io.analog_out),
         "set_tool_voltage": set_tool_voltage,
     }
 
@@ -91,9 +84,9 @@ def _flags(state: ControllerState) -> dict[str, Function]:
     flags = state.io.flags
 
     def set_flag(thread: object, n: int, b: bool) -> None:
-        flags[_pick("flag", n, len(flags))] = b
+        flags[int(n)] = b
 
-    return {"get_flag": lambda thread, n: flags[_pick("flag", n, len(flags))], "set_flag": set_flag}
+    return {"get_flag": lambda thread, n: flags[int(n)], "set_flag": set_flag}
 
 
 def register_functions(state: ControllerState) -> Mapping[str, Function]:
@@ -104,20 +97,20 @@ def register_functions(state: ControllerState) -> Mapping[str, Function]:
         ("integer", state.registers.inputs.integers, state.registers.outputs.integers),
         ("float", state.registers.inputs.floats, state.registers.outputs.floats),
     ):
-        functions[f"read_input_{kind}_register"] = _register_reader(f"input {kind} register", inputs)
-        functions[f"read_output_{kind}_register"] = _register_reader(f"output {kind} register", outputs)
-        functions[f"write_output_{kind}_register"] = _register_writer(f"output {kind} register", outputs)
+        functions[f"read_input_{kind}_register"] = _register_reader(inputs)
+        functions[f"read_output_{kind}_register"] = _register_reader(outputs)
+        functions[f"write_output_{kind}_register"] = _register_writer(outputs)
     return functions
 
 
-def _register_reader(what: str, memory: MutableSequence[Any]) -> Function:
-    return lambda thread, address: memory[_pick(what, address, len(memory))]
+def _register_reader(memory: MutableSequence[Any]) -> Function:
+    return lambda thread, address: memory[int(address)]
 
 
-def _register_writer(what: str, memory: MutableSequence[Any]) -> Function:
+def _register_writer(memory: MutableSequence[Any]) -> Function:
     kind = type(memory[0])
 
     def write(thread: object, address: int, value: Any) -> None:
-        memory[_pick(what, address, len(memory))] = kind(value)
+        memory[int(address)] = kind(value)
 
     return write

@@ -47,7 +47,7 @@ class ProgramRemotes:
 class RemoteHandle:
     """A value whose methods are remote procedures (see urscript.host.Handle)."""
 
-    script_type: Final = "rpc handle"
+    script_type: Final = "remote procedure handle"
 
     def __init__(self, server: RemoteServer) -> None:
         self._server = server

@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from protocol.pose import pose_inv, pose_trans
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import six
 from urscript.errors import ScriptRuntimeError
@@ -56,7 +55,7 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
         return inverse(pose, qnear, tcp) is not None
 
     def get_actual_tool_flange_pose(thread: object) -> Pose:
-        return Pose.of(pose_trans(state.snapshot.actual_tcp_pose, pose_inv(state.tcp_offset)))
+        return Pose.of(arm.fk(state.snapshot.actual_q))
 
     def is_within_safety_limits(thread: object, pose: Any, qnear: Any) -> bool:
         q = inverse(pose, qnear, None) if isinstance(pose, Pose) else tuple(pose)
@@ -64,13 +63,8 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
             low <= x <= high for x, low, high in zip(q, state.robot.q_min, state.robot.q_max, strict=True)
         )
 
-    def get_joint_temp(thread: object, j: float) -> float:
-        if not 0 <= j <= 5:
-            raise ScriptRuntimeError(f"get_joint_temp: joint {j:g} does not exist, allowed are 0 to 5")
-        return state.snapshot.joint_temperatures[int(j)]
-
     def get_actual_joint_positions_history(thread: object, steps: float) -> list[float]:
-        if not 0 <= steps < len(state.q_history):
+        if not steps < len(state.q_history):
             raise ScriptRuntimeError(
                 f"get_actual_joint_positions_history: {steps:g} steps back, "
                 f"allowed are 0 to {len(state.q_history) - 1}"
@@ -95,7 +89,7 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
         "get_actual_joint_positions_history": get_actual_joint_positions_history,
         "get_target_waypoint": lambda thread: Pose.of(arm.fk(state.motion.goal, state.tcp_offset)),
         "get_joint_torques": get_joint_torques,
-        "get_joint_temp": get_joint_temp,
+        "get_joint_temp": lambda thread, j: state.snapshot.joint_temperatures[int(j)],
         "get_controller_temp": lambda thread: 30.0,
         "get_actual_tcp_pose": lambda thread: Pose.of(arm.fk(state.snapshot.actual_q, state.tcp_offset)),
         "get_target_tcp_pose": lambda thread: Pose.of(arm.fk(state.motion.target.q, state.tcp_offset)),
