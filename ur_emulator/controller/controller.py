@@ -13,7 +13,13 @@ from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.client_inputs import write_inputs
 from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US, controller_time
-from ur_emulator.controller.events import ErrorReported, Event, SafetyModeChanged, ScriptFailed
+from ur_emulator.controller.events import (
+    ErrorReported,
+    Event,
+    RobotModeChanged,
+    SafetyModeChanged,
+    ScriptFailed,
+)
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (
@@ -26,6 +32,7 @@ from ur_emulator.controller.safety import (
 )
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.watchdogs import WatchdogAction
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
@@ -70,6 +77,7 @@ class Controller:
         arm = ArmModel(robot, draw_calibration(fidelity, seed))
         q = six(robot.home_q)
         self.plant.reset(q)
+        self._mode = mode
         self._saturated_s = 0.0
         self._settle = 0
         self.state = ControllerState(
@@ -81,6 +89,7 @@ class Controller:
             mode=RobotModeMachine(mode, self.period_s),
             tick=BOOT_TICK,
         )
+        self.state.place_arm = self._place_arm
         self._payload = self.state.payload
         self.programs = ProgramSlot(self.state, network)
         # The first cycle only makes the first snapshot; nothing moves in it.
@@ -122,15 +131,19 @@ class Controller:
         """
         state = self.state
         state.tick += 1
+        n_events = len(state.events)
         for command in commands:
             self._apply(command)
         state.mode.step()
-        if state.watchdogs and (report := state.watchdogs.late(state.tick)) is not None:
-            state.events.append(report)
-            state.watchdogs.clear()
-            self.programs.stop()
+        if state.mode.mode is not self._mode:
+            self._mode = state.mode.mode
+            state.events.append(RobotModeChanged(int(self._mode)))
+        if state.watchdogs and not self.programs.is_paused:
+            self._check_watchdogs()
         if state.encoders.decoding:
             state.encoders.step(state.io.digital_in)
+        if state.modbus.signals:
+            state.modbus.step(state.tick)
         self.programs.step()
         if state.power_off_requested:
             state.power_off_requested = False
@@ -155,6 +168,9 @@ class Controller:
             if settings.warns_of_deviation and (warning := settings.deviation_warning(sensed.position_error)):
                 state.events.append(warning)
         state.stop_requested = False
+        settings = state.error_settings
+        if settings.pause_codes and settings.asks_for_pause(state.events[n_events:]):
+            self.programs.pause()
         state.steady_cycles = 0 if any(target.qd) else state.steady_cycles + 1
         self._settle = max(self._settle - 1, SETTLE_CYCLES if was_active else 0)
 
@@ -171,6 +187,10 @@ class Controller:
                 self._start(program)
             case cmd.StopProgram():
                 self.programs.stop()
+            case cmd.PauseProgram():
+                self.programs.pause()
+            case cmd.ResumeProgram():
+                self._resume()
             case cmd.PowerOn():
                 state.mode.command(ModeCommand.POWER_ON)
             case cmd.PowerOff():
@@ -196,16 +216,41 @@ class Controller:
 
     def _start(self, program: CompiledProgram) -> None:
         """Start a program if the box is in a state to run one; say so if it is not."""
-        state = self.state
-        if state.mode.mode is not RobotMode.RUNNING or state.safety.is_stopped:
-            why = state.mode.mode.name if not state.safety.is_stopped else state.safety.mode.name
-            state.events.append(
-                ScriptFailed(
-                    1, 1, f"program {program.name} not started: the robot is in {why}, it must be RUNNING"
-                )
-            )
+        obstacle = self._obstacle()
+        if obstacle:
+            text = f"program {program.name} not started: {obstacle}"
+            self.state.events.append(ScriptFailed(1, 1, text))
+        else:
+            self.programs.start(program)
+
+    def _resume(self) -> None:
+        """Let a paused program go on if the box is in a state to run one; say so if it is not."""
+        if not self.programs.is_paused:
             return
-        self.programs.start(program)
+        obstacle = self._obstacle()
+        if obstacle:
+            text = f"program {self.programs.name} stays paused: {obstacle}"
+            self.state.events.append(ErrorReported(0, 0, ReportLevel.INFO, text))
+        else:
+            self.programs.resume()
+
+    def _obstacle(self) -> str:
+        """Return why no program may move the arm now; "" if one may."""
+        state = self.state
+        if state.safety.is_stopped:
+            return f"the robot is in {state.safety.mode.name}, it must be RUNNING"
+        mode = state.mode.mode
+        return "" if mode is RobotMode.RUNNING else f"the robot is in {mode.name}, it must be RUNNING"
+
+    def _check_watchdogs(self) -> None:
+        late = self.state.watchdogs.late(self.state.tick)
+        if late is None:
+            return
+        self.state.events.append(late.report)
+        if late.action is WatchdogAction.PAUSE:
+            self.programs.pause()
+        else:
+            self.programs.stop()
 
     # --- stops
 
@@ -231,10 +276,16 @@ class Controller:
         self._settle = UNLOCK_CYCLES
         state.events.append(violation.error)
         state.events.append(SafetyModeChanged(int(state.safety.mode)))
-        self.programs.stop()
-        state.motion.stop(PROTECTIVE_STOP_DECELERATION)
+        self.programs.interrupt(PROTECTIVE_STOP_DECELERATION)
         if violation.blocked:
             state.motion.place(actual_q)
+
+    def _place_arm(self, q: Vector6) -> bool:
+        if self.plant.touches(q):
+            return False
+        self.plant.reset(q)
+        self.state.motion.place(q)
+        return True
 
     def _hold_here(self) -> None:
         """Drop the target: the brakes hold the arm where it is."""

@@ -6,6 +6,7 @@ The controller owns the one instance; the script functions of a running program 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +16,7 @@ from ur_emulator.controller.events import Event
 from ur_emulator.controller.external_sensor import ExternalSensor
 from ur_emulator.controller.io import InputOutput
 from ur_emulator.controller.io_configuration import IoConfiguration
+from ur_emulator.controller.modbus_signals import ModbusSignals
 from ur_emulator.controller.operator import Operator
 from ur_emulator.controller.port_memory import PortMemory
 from ur_emulator.controller.registers import Registers
@@ -65,14 +67,18 @@ class ControllerState:
         client_inputs: last values of RTDE inputs that are no registers, by name.
         wants_script_line: somebody reads the line that the program executes.
         steady_cycles: for how many cycles the target has stood still.
+        tick: number of the cycle.
+        program_tick: cycles that primary programs have had; it stands still while one is paused.
         io_configuration: which inputs act, which outputs follow the program.
         watchdogs: of the running program over RTDE inputs.
         external_sensor: takes the place of the estimated wrench while it is enabled.
         encoders: of conveyors.
         ports: own memory of the Modbus map.
+        modbus: signals of other units that programs have added.
         operator: what programs ask of the operator.
         error_settings: what programs have said about errors.
         power_off_requested: a script asked for it in this cycle.
+        place_arm: puts the resting arm at joint angles [rad]; False where it would touch something.
     """
 
     robot: RobotModel
@@ -93,11 +99,13 @@ class ControllerState:
     force_mode_gain_scaling: float = 1.0
     steady_cycles: int = 0
     tick: int = 0
+    program_tick: int = 0
     stop_requested: bool = False
     wants_script_line: bool = False
     client_inputs: dict[str, Any] = field(default_factory=dict)
     q_history: deque[Vector6] = field(default_factory=lambda: deque(maxlen=HISTORY_CYCLES))
     events: list[Event] = field(default_factory=list)
+    modbus: ModbusSignals = field(init=False)
     io_configuration: IoConfiguration = field(init=False)
     watchdogs: Watchdogs = field(init=False)
     external_sensor: ExternalSensor | None = None
@@ -106,7 +114,9 @@ class ControllerState:
     operator: Operator = field(default_factory=Operator)
     error_settings: ErrorSettings = field(default_factory=ErrorSettings)
     power_off_requested: bool = False
+    place_arm: Callable[[Vector6], bool] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.io_configuration = IoConfiguration(self.io, self.registers)
+        self.modbus = ModbusSignals(self.period_s)
+        self.io_configuration = IoConfiguration(self.io, self.registers, self.modbus)
         self.watchdogs = Watchdogs(self.period_s)

@@ -184,6 +184,14 @@ class Plant:
         self._records.extend([self._rest_record] * (1 + self._cycles_late))
         self._state = None
 
+    def touches(self, q: Sequence[float]) -> bool:
+        """Return whether the arm would touch itself, its base or the table at q (6,) [rad]."""
+        data = mujoco.MjData(self._model)
+        data.qpos[:] = q
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_collision(self._model, data)
+        return int(data.ncon) > 0
+
     def set_payload(self, mass: float, cog: Vector3) -> None:
         """Declare a payload to the controller; it hangs on the flange unless `hang` has put another there.
 

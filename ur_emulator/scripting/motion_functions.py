@@ -134,12 +134,27 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
             thread, lambda start: arc_through(start, via, goal, fixed=fixed), a, v, 0.0, r, process=True
         )
 
+    def set_pos(thread: object, q: Any) -> None:
+        angles = floats(q)
+        if motion.is_moving or motion.owner is not None:
+            raise ScriptRuntimeError("set_pos: the arm moves, stop it first")
+        for i, (x, low, high) in enumerate(zip(angles, state.robot.q_min, state.robot.q_max, strict=True)):
+            if not low <= x <= high:
+                raise ScriptRuntimeError(
+                    f"set_pos: joint {i} cannot be at {x:g} rad, allowed are {low:.4f} to {high:.4f}"
+                )
+        if not state.place_arm(angles):
+            raise ScriptRuntimeError(
+                "set_pos: the arm would touch itself or the table there, choose another place"
+            )
+
     return {
         "movej": movej,
         "movel": movel,
         "movep": movep,
         "movec": movec,
         "servoc": servoc,
+        "set_pos": set_pos,
         **speed_functions(state),
     }
 

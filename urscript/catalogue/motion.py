@@ -177,7 +177,14 @@ _MOVES: tuple[Builtin, ...] = (
         time=MOTION,
         support=EXACT,
     ),
-    _row("set_pos", (Param("q", JOINTS, unit="rad"),), "None", "put the simulated robot at q"),
+    _row(
+        "set_pos",
+        (Param("q", JOINTS, unit="rad"),),
+        "None",
+        "put the simulated robot at q",
+        support=APPROXIMATE,
+        note="refused while the arm moves, out of range, and where it would touch something",
+    ),
     _row(
         "reset_revolution_counter",
         (Param("qNear", JOINTS, None, "rad", shown="the present turns"),),
