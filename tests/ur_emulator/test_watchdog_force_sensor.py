@@ -81,7 +81,7 @@ def test_an_enabled_sensor_must_speak_ten_times_a_second():
         bench.tick(1, write(READING))
     assert bench.controller.programs.is_running
     bench.tick(14)
-    assert not bench.controller.programs.is_running
+    assert bench.controller.programs.is_paused
 
 
 def test_the_program_may_choose_another_watchdog():

@@ -3,7 +3,8 @@
 import pytest
 from box_support import Bench
 
-from ur_emulator.controller.commands import StopProgram, WriteInputs
+from protocol.ur_types import ProgramState
+from ur_emulator.controller.commands import ResumeProgram, StopProgram, WriteInputs
 
 REGISTER = "input_int_register_24"
 WRITE = WriteInputs(((REGISTER, 5),))
@@ -19,7 +20,7 @@ def reports(bench):
     return [event.text for event in bench.events if getattr(event, "code", None) == 207]
 
 
-@pytest.mark.parametrize("action", ["stop", "pause", "STOP", "Pause"])
+@pytest.mark.parametrize("action", ["stop", "STOP"])
 def test_a_variable_that_nobody_writes_ends_the_program(action):
     bench = watching(f'rtde_set_watchdog("{REGISTER}", 10, "{action}")')
     bench.tick(13)  # 0.1 s are 12.5 cycles
@@ -28,13 +29,43 @@ def test_a_variable_that_nobody_writes_ends_the_program(action):
     assert not bench.controller.programs.is_running
     (text,) = reports(bench)
     assert REGISTER in text
-    assert action.lower() in text
+    assert "watchdog action stop: the program is stopped" in text
 
 
-def test_the_default_action_is_pause():
+@pytest.mark.parametrize("action", [', "pause"', ', "PAUSE"', ""])
+def test_a_variable_that_nobody_writes_pauses_the_program(action):
+    bench = watching(f'rtde_set_watchdog("{REGISTER}", 10{action})')
+    bench.tick(13)
+    assert not bench.controller.programs.is_paused
+    bench.tick(2)
+    assert bench.now.runtime_state == ProgramState.PAUSED
+    (text,) = reports(bench)
+    assert REGISTER in text
+    assert "watchdog action pause: the program is paused" in text
+    bench.tick(100)
+    assert len(reports(bench)) == 1
+
+
+def test_a_paused_program_is_watched_again_when_it_goes_on():
     bench = watching(f'rtde_set_watchdog("{REGISTER}", 10)')
-    bench.tick(20)
-    assert "watchdog action pause" in reports(bench)[0]
+    bench.tick(50)
+    bench.tick(1, ResumeProgram())
+    for _ in range(30):
+        bench.tick(1, WRITE)
+    bench.tick(10)
+    assert bench.now.runtime_state == ProgramState.PLAYING
+    bench.tick(10)
+    assert bench.now.runtime_state == ProgramState.PAUSED
+    assert len(reports(bench)) == 2
+
+
+def test_of_two_late_variables_the_one_that_stops_counts():
+    bench = watching(
+        f'rtde_set_watchdog("{REGISTER}", 10, "pause")\n  rtde_set_watchdog("input_int_register_25", 10, "stop")'
+    )
+    bench.tick(14)
+    assert not bench.controller.programs.is_running
+    assert "input_int_register_25" in reports(bench)[0]
 
 
 @pytest.mark.parametrize(("frequency", "cycles"), [(125, 1), (62.5, 2), (25, 5), (10, 13), (200, 1)])

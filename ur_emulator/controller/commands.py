@@ -22,6 +22,16 @@ class StopProgram:
 
 
 @dataclass(frozen=True, slots=True)
+class PauseProgram:
+    """Let the running program stand still: the arm comes to rest on its path, threads wait."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResumeProgram:
+    """Let a paused program go on; refused while the robot may not move."""
+
+
+@dataclass(frozen=True, slots=True)
 class PowerOn:
     """Power the joints: POWER_OFF to IDLE; nothing happens when they are powered already."""
 
@@ -91,6 +101,8 @@ class ClosePopup:
 Command = (
     StartProgram
     | StopProgram
+    | PauseProgram
+    | ResumeProgram
     | PowerOn
     | PowerOff
     | ReleaseBrakes

@@ -1,15 +1,16 @@
-"""What programs have said about errors and limits. Most of it is only kept: this box has no use for it.
+"""What programs have said about errors and limits. Some of it is only kept: this box has no use for it.
 
 Source: URScript manual CB3 3.15, module motion.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from protocol.primary_messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES
-from ur_emulator.controller.events import ErrorReported
+from ur_emulator.controller.events import ErrorReported, Event
 from ur_emulator.controller.safety import MAX_POSITION_DEVIATION
 from ur_emulator.models.robot_model import Vector6
 
@@ -22,7 +23,7 @@ class ErrorSettings:
     """Settings of `pause_on_error_code` and its kin.
 
     Attributes:
-        pause_codes: (code, argument or None for any) at which the program should pause; kept only.
+        pause_codes: (code, argument or None for any) at which the program pauses.
         warns_of_deviation: whether joints that deviate from the path are reported.
         deviation_threshold: part of the deviation limit at which to warn.
         transition_hardness: 0 hard, 1 soft; kept only.
@@ -35,6 +36,14 @@ class ErrorSettings:
     transition_hardness: int = 0
     revolution_reference: Vector6 | None = None
     _has_warned: bool = False
+
+    def asks_for_pause(self, events: Iterable[Event]) -> bool:
+        """True when one of the events is an error code at which the program wants to be paused."""
+        return any(
+            isinstance(event, ErrorReported)
+            and not self.pause_codes.isdisjoint(((event.code, None), (event.code, event.argument)))
+            for event in events
+        )
 
     def deviation_warning(self, position_error: tuple[float, ...]) -> ErrorReported | None:
         """Return the log entry when a joint begins to deviate too far, once until it is back.

@@ -1,22 +1,43 @@
-"""What the controller has to say beside its state: frozen records that the ports turn into messages."""
+"""What the controller has to say beside its state: frozen records that ports and log turn into messages."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from protocol.primary_messages import ReportLevel, RequestedType
+from urscript import RunningProgram
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramStarted:
-    """A primary program began. `name`: of its `def`, or of the function called by a one-line program."""
+    """A primary program began.
+
+    Attributes:
+        name: of its `def`, or of the function called by a one-line program.
+        run: for those who want to look at its variables.
+    """
 
     name: str
+    run: RunningProgram | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramStopped:
     """A primary program ended, by itself or not."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramPaused:
+    """The primary program stands still, and so does the arm."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramResumed:
+    """A paused program goes on."""
 
     name: str
 
@@ -37,12 +58,14 @@ class ScriptFailed:
         column: 1-based column.
         text: as the controller words it on the wire.
         secondary: the program was a `sec`: only logged, the primary program goes on.
+        log_text: as its log words it; "" if it is the same.
     """
 
     line: int
     column: int
     text: str
     secondary: bool = False
+    log_text: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +83,26 @@ class SafetyModeChanged:
     """The safety mode changed, for the safety-mode message of the primary port."""
 
     safety_mode: int
+
+
+@dataclass(frozen=True, slots=True)
+class RobotModeChanged:
+    """The robot mode changed; only the log says so, the states show it anyway."""
+
+    robot_mode: int
+
+
+@dataclass(frozen=True, slots=True)
+class LogAdded:
+    """Somebody else wrote into the log.
+
+    Attributes:
+        source: who, as in `Dashboard`.
+        text: the line.
+    """
+
+    source: str
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +135,14 @@ class ValueRequested:
 Event = (
     ProgramStarted
     | ProgramStopped
+    | ProgramPaused
+    | ProgramResumed
     | TextPrinted
     | ScriptFailed
     | ErrorReported
     | SafetyModeChanged
+    | RobotModeChanged
+    | LogAdded
     | PopupShown
     | ValueRequested
 )

@@ -29,6 +29,9 @@ SPEED_TOLERANCE = 1.0 + 1e-6
 # UR3/CB3 manual 3.10.
 PROTECTIVE_STOP_DECELERATION = 20.0
 
+# Safety modes in which the arm may move.
+MOVING_MODES = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY})
+
 
 @dataclass(frozen=True, slots=True)
 class Violation:
@@ -117,7 +120,7 @@ class SafetyState:
     @property
     def is_stopped(self) -> bool:
         """True when the safety system does not let the arm move."""
-        return self.mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY)
+        return self.mode not in MOVING_MODES
 
     def protective_stop(self, now: float) -> None:
         """Enter the protective stop at controller time `now` [s]; a stop already entered keeps its time."""

@@ -6,6 +6,10 @@ from protocol.rtde_types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.controller.robot_mode import POWERED
 
+# A program counts as running until it stands still; paused it does not, nor when it has ended. Inferred from
+# a client that waits for both flags of the robot mode data to fall.
+RUNNING_STATES = frozenset({ProgramState.PLAYING, ProgramState.PAUSING, ProgramState.RESUMING})
+
 _EMERGENCY = SafetyStatusBits.EMERGENCY_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
 
 # Inferred from the names of the bits: every mode has one of its own, and what keeps the arm from moving also
@@ -30,7 +34,7 @@ SAFETY_BITS: dict[int, int] = {
 def robot_status_bits(robot_mode: int, runtime_state: int) -> int:
     """Return `robot_status_bits`; the buttons of the pendant are never pressed."""
     power = RobotStatusBits.POWER_ON if robot_mode in POWERED else RobotStatusBits(0)
-    running = RobotStatusBits.PROGRAM_RUNNING if runtime_state == ProgramState.PLAYING else RobotStatusBits(0)
+    running = RobotStatusBits.PROGRAM_RUNNING if runtime_state in RUNNING_STATES else RobotStatusBits(0)
     return int(power | running)
 
 

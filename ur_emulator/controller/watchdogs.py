@@ -1,7 +1,7 @@
-"""Watchdogs of programs over RTDE inputs: a variable that is not written often enough ends the program.
+"""Watchdogs of programs over RTDE inputs: a variable that is late pauses or ends the program.
 
-Source: URScript manual CB3 3.15, rtde_set_watchdog. Chosen: `pause` stops the program too, for programs here
-cannot be paused; a minimum frequency of 0 removes the watchdog; time is robot time.
+Source: URScript manual CB3 3.15, rtde_set_watchdog. Chosen: a minimum frequency of 0 removes the watchdog;
+time is robot time; a paused program is not watched, and its watchdogs begin anew when it goes on.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from protocol.primary_messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported
@@ -24,6 +25,22 @@ class WatchdogAction(Enum):
     IGNORE = "ignore"
     PAUSE = "pause"
     STOP = "stop"
+
+
+class LateInput(NamedTuple):
+    """A variable was not written in time.
+
+    Attributes:
+        report: the message about it.
+        action: what its watchdog asks for, PAUSE or STOP.
+    """
+
+    report: ErrorReported
+    action: WatchdogAction
+
+
+# What the message says about the program.
+_CONSEQUENCE = {WatchdogAction.PAUSE: "paused", WatchdogAction.STOP: "stopped"}
 
 
 @dataclass(slots=True)
@@ -65,19 +82,29 @@ class Watchdogs:
             if watch is not None:
                 watch.last_tick = tick
 
-    def late(self, tick: int) -> ErrorReported | None:
-        """Return what to report of the first variable that is late, or None."""
+    def restart(self, tick: int) -> None:
+        """Count from now on, as if every variable had just been written."""
+        for watch in self._watches.values():
+            watch.last_tick = tick
+
+    def late(self, tick: int) -> LateInput | None:
+        """Return the first variable that is late, those that stop the program before others, or None."""
+        found: LateInput | None = None
         for variable, watch in self._watches.items():
-            if tick - watch.last_tick > watch.cycles:
-                limit = watch.cycles * self._period_s
-                return ErrorReported(
-                    DISCONNECTED_CODE,
-                    0,
-                    ReportLevel.WARNING,
-                    f"Fieldbus input disconnected: RTDE input {variable} was not written for {limit:g} s, "
-                    f"watchdog action {watch.action.value}: the program is stopped",
-                )
-        return None
+            if tick - watch.last_tick <= watch.cycles or (found and watch.action is not WatchdogAction.STOP):
+                continue
+            limit = watch.cycles * self._period_s
+            report = ErrorReported(
+                DISCONNECTED_CODE,
+                0,
+                ReportLevel.WARNING,
+                f"Fieldbus input disconnected: RTDE input {variable} was not written for {limit:g} s, "
+                f"watchdog action {watch.action.value}: the program is {_CONSEQUENCE[watch.action]}",
+            )
+            found = LateInput(report, watch.action)
+            if watch.action is WatchdogAction.STOP:
+                break
+        return found
 
     def clear(self) -> None:
         """Forget all: the program has ended."""

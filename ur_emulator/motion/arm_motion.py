@@ -175,6 +175,11 @@ class ArmMotion:
         """True when a pause has brought the arm to rest."""
         return self._pace.paused and not any(self.target.qd)
 
+    @property
+    def is_returning(self) -> bool:
+        """True while the arm goes back to the path that an interruption led it away from."""
+        return isinstance(self._generator, Detour)
+
     def pause(self) -> None:
         """Ramp the arm to rest on its path; a stream ends like one that is not renewed any more.
 

@@ -3,16 +3,34 @@
 from __future__ import annotations
 
 from protocol.ur_types import ProgramState
-from ur_emulator.controller.events import ProgramStarted, ProgramStopped, ScriptFailed
+from ur_emulator.controller.events import (
+    ProgramPaused,
+    ProgramResumed,
+    ProgramStarted,
+    ProgramStopped,
+    ScriptFailed,
+)
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.robot_host import RobotHost
 from urscript import CompiledProgram, ProgramStatus, RunningProgram
 
+# States in which the threads of a program have their turn; while it resumes, see `ProgramSlot.step`.
+_STANDS_STILL = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
+
 
 class ProgramSlot:
-    """Runs programs on a controller."""
+    """Runs programs on a controller.
+
+    A primary program plays, or it is on its way to a pause (PAUSING, until the arm rests), in it (PAUSED), or
+    on its way out of it (RESUMING, for a cycle, and until the arm is back on a path that it had to leave).
+    Time that a paused program counts, in `sleep` and the time-outs of its sockets, stands still.
+
+    Attributes:
+        name: of the primary program, or of the last one.
+        latest: the primary program or the last one, whose variables can still be read; None before the first.
+    """
 
     def __init__(self, state: ControllerState, network: Network) -> None:
         self._state = state
@@ -20,17 +38,27 @@ class ProgramSlot:
         self._primary: RunningProgram | None = None
         self._secondaries: list[RunningProgram] = []
         self._ran = False
+        self._phase = ProgramState.PLAYING
+        self._phase_since = 0
         self.name = ""
+        self.latest: RunningProgram | None = None
 
     @property
     def is_running(self) -> bool:
-        """True while a primary program runs."""
+        """True while there is a primary program, paused or not."""
         return self._primary is not None
+
+    @property
+    def is_paused(self) -> bool:
+        """True while the primary program is paused, or about to be."""
+        return self._primary is not None and self._phase in _STANDS_STILL
 
     @property
     def has_work(self) -> bool:
         """True while any program wants cycles, and in the cycle in which one ended."""
-        return self._primary is not None or self._ran or bool(self._secondaries)
+        if self._primary is None:
+            return self._ran or bool(self._secondaries)
+        return self._phase is not ProgramState.PAUSED or bool(self._secondaries)
 
     @property
     def runtime_state(self) -> ProgramState:
@@ -39,7 +67,9 @@ class ProgramSlot:
         PLAYING also in the cycle in which a program ends, so that clients see even the shortest one run;
         STOPPING while the arm still ramps down after it.
         """
-        if self._primary is not None or self._ran:
+        if self._primary is not None:
+            return self._phase
+        if self._ran:
             return ProgramState.PLAYING
         return ProgramState.STOPPING if self._state.motion.is_moving else ProgramState.STOPPED
 
@@ -53,7 +83,11 @@ class ProgramSlot:
     @property
     def waits_outside(self) -> bool:
         """True when a program cannot go on before something comes from outside the box."""
-        return self._primary is not None and self._primary.waits_outside
+        return (
+            self._primary is not None and self._phase is ProgramState.PLAYING and self._primary.waits_outside
+        )
+
+    # --- commands
 
     def start(self, program: CompiledProgram) -> None:
         """Start a program; a primary one replaces the one that runs."""
@@ -62,9 +96,10 @@ class ProgramSlot:
             return
         self.stop()
         self.name = program.name
-        self._primary = program.start(RobotHost(self._state, self._network))
+        self.latest = self._primary = program.start(RobotHost(self._state, self._network))
+        self._phase = ProgramState.PLAYING
         self._state.io_configuration.program_started()
-        self._state.events.append(ProgramStarted(program.name))
+        self._state.events.append(ProgramStarted(program.name, self._primary))
 
     def stop(self) -> None:
         """End the primary program, if one runs, and stop the arm, also on its last way to a waypoint."""
@@ -72,6 +107,33 @@ class ProgramSlot:
             self._primary.kill()
             self._end()
         self._state.motion.stop(PROGRAM_END_DECELERATION)
+
+    def pause(self) -> None:
+        """Let the primary program stand still, and the arm come to rest on its path."""
+        if self._primary is not None and self._phase not in _STANDS_STILL:
+            self._state.motion.pause()
+            self._enter(ProgramState.PAUSING)
+
+    def interrupt(self, deceleration: float) -> None:
+        """Stop the arm without regard for its path [rad/s^2]; a program that runs is paused."""
+        if self._primary is None:
+            self._state.motion.stop(deceleration)
+            return
+        self._state.motion.interrupt(deceleration)
+        if self._phase not in _STANDS_STILL:
+            self._enter(ProgramState.PAUSING)
+
+    def resume(self) -> None:
+        """Let a paused program go on."""
+        if self.is_paused:
+            state = self._state
+            state.motion.resume()
+            state.watchdogs.restart(state.tick)
+            state.io_configuration.program_started()
+            state.events.append(ProgramResumed(self.name))
+            self._enter(ProgramState.RESUMING)
+
+    # --- cycle
 
     def step(self) -> None:
         """Run all programs for one cycle."""
@@ -83,17 +145,38 @@ class ProgramSlot:
                 else:
                     program.kill()  # a secondary program has one cycle
             self._secondaries.clear()
-        if self._primary is not None:
+        if self._primary is not None and (self._phase is ProgramState.PLAYING or self._may_run()):
+            self._state.program_tick += 1
             status = self._primary.step()
             if status is not ProgramStatus.RUNNING:
                 if status is ProgramStatus.FAILED:
                     self._report(self._primary)
                 self._end()
 
+    def _may_run(self) -> bool:
+        """Go on towards a pause or out of it; return whether the threads have their turn in this cycle."""
+        state = self._state
+        is_new = self._phase_since == state.tick
+        if self._phase is ProgramState.PAUSING and not is_new and state.motion.is_paused:
+            self._enter(ProgramState.PAUSED)
+            state.io_configuration.program_stopped()
+            state.events.append(ProgramPaused(self.name))
+        if self._phase in _STANDS_STILL or state.motion.is_returning:
+            return False
+        if not is_new:
+            self._enter(ProgramState.PLAYING)
+        return True
+
+    def _enter(self, phase: ProgramState) -> None:
+        self._phase = phase
+        self._phase_since = self._state.tick
+
     def _report(self, program: RunningProgram, *, secondary: bool = False) -> None:
         error = program.error
         assert error is not None
-        self._state.events.append(ScriptFailed(error.line, error.column, error.wire_text, secondary))
+        self._state.events.append(
+            ScriptFailed(error.line, error.column, error.wire_text, secondary, error.log_text)
+        )
 
     def _end(self) -> None:
         self._primary = None

@@ -106,12 +106,12 @@ class ProgramSockets:
     # --- reading
 
     def _timer(self, timeout: float) -> Callable[[], bool]:
-        """Return a function: have `timeout` seconds of robot time passed? Never, if it is not above 0."""
+        """Return a function: has the program run for `timeout` seconds? Never, if it is not above 0."""
         if not timeout > 0.0:
             return lambda: False
         state = self._state
-        end = state.tick + math.ceil(timeout / state.period_s)
-        return lambda: state.tick >= end
+        end = state.program_tick + math.ceil(timeout / state.period_s)
+        return lambda: state.program_tick >= end
 
     def _take(
         self, name: str, timeout: float, find: Callable[[bytearray], int]

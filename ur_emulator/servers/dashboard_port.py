@@ -11,8 +11,10 @@ from protocol.errors import ProtocolError
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus, SoftwareVersion
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import Event, PopupShown
+from ur_emulator.controller.events import Event, LogAdded, PopupShown
+from ur_emulator.controller.safety import MOVING_MODES
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.controller.status_bits import RUNNING_STATES
 from ur_emulator.servers.connection import Connection
 
 # Name that a simulator gives when nothing is loaded. Source: replies of URSim 3.14 as the public client
@@ -65,15 +67,13 @@ class DashboardPort:
             "safetystatus": lambda event: event.command.reply(
                 status=SafetyStatus(self._snapshot.safety_status).name
             ),
-            "programState": lambda event: event.command.reply(
-                state="PLAYING" if self._is_running() else "STOPPED", program=UNNAMED
-            ),
+            "programState": lambda event: event.command.reply(state=self._program_state(), program=UNNAMED),
             "isProgramSaved": lambda event: event.command.reply(saved="true", program=UNNAMED),
             "get loaded program": lambda event: event.command.reply("none"),
             "load": lambda event: event.command.reply("not_found", name=event.argument),
             "load installation": lambda event: event.command.reply("not_found", name=event.argument),
-            "play": lambda event: event.command.reply("failed"),
-            "pause": lambda event: event.command.reply("failed"),
+            "play": self._play,
+            "pause": self._pause,
             "stop": lambda event: self._after(event, cmd.StopProgram()),
             "power on": lambda event: self._after(event, cmd.PowerOn()),
             "power off": lambda event: self._after(event, cmd.PowerOff()),
@@ -82,7 +82,7 @@ class DashboardPort:
             "close safety popup": lambda event: event.command.reply(),
             "popup": self._popup,
             "close popup": lambda event: self._after(event, cmd.ClosePopup()),
-            "addToLog": lambda event: event.command.reply("ok" if event.argument else "empty"),
+            "addToLog": self._add_to_log,
             "setUserRole": self._set_user_role,
             "getUserRole": lambda event: event.command.reply(role=self._user_role),
             "PolyscopeVersion": lambda event: event.command.reply(
@@ -142,10 +142,37 @@ class DashboardPort:
     # --- commands
 
     def _is_running(self) -> bool:
-        return self._snapshot.runtime_state == ProgramState.PLAYING
+        return self._snapshot.runtime_state in RUNNING_STATES
+
+    def _program_state(self) -> str:
+        if self._snapshot.runtime_state == ProgramState.PAUSED:
+            return "PAUSED"
+        return "PLAYING" if self._is_running() else "STOPPED"
 
     def _after(self, event: CommandReceived, command: cmd.Command) -> str:
         self._submit(command)
+        return event.command.reply()
+
+    def _play(self, event: CommandReceived) -> str:
+        """Resume a paused program; program files cannot be loaded yet, so there is nothing else to play."""
+        snapshot = self._snapshot
+        if (
+            snapshot.runtime_state not in (ProgramState.PAUSING, ProgramState.PAUSED)
+            or snapshot.safety_mode not in MOVING_MODES
+            or snapshot.robot_mode != RobotMode.RUNNING
+        ):
+            return event.command.reply("failed")
+        return self._after(event, cmd.ResumeProgram())
+
+    def _pause(self, event: CommandReceived) -> str:
+        if not self._is_running():
+            return event.command.reply("failed")
+        return self._after(event, cmd.PauseProgram())
+
+    def _add_to_log(self, event: CommandReceived) -> str:
+        if not event.argument:
+            return event.command.reply("empty")
+        self._controller.state.events.append(LogAdded("Dashboard", event.argument))
         return event.command.reply()
 
     def _unlock(self, event: CommandReceived) -> str:

@@ -16,14 +16,16 @@ from protocol.primary_messages import (
 )
 from ur_emulator.controller import events
 
-# Titles of the key messages about a program's life. Source: captures quoted by the public client library.
+# Titles of the key messages about a program's life. Sources: captures quoted by the public client library;
+# PAUSED from Hirebotics/urscript-tools. None is known for a program that goes on after a pause.
 STARTED_TITLE = "PROGRAM_XXX_STARTED"
+PAUSED_TITLE = "PROGRAM_XXX_PAUSED"
 STOPPED_TITLE = "PROGRAM_XXX_STOPPED"
 SECONDARY_EXCEPTION_TITLE = "SECONDARY_PROGRAM_EXCEPTION_XXX"
 
 
-def message_for(event: events.Event, timestamp: int) -> RobotMessage:
-    """Return the message that tells clients of an event.
+def message_for(event: events.Event, timestamp: int) -> RobotMessage | None:
+    """Return the message that tells clients of an event; None for what only the log shows.
 
     Args:
         event: what happened.
@@ -34,6 +36,10 @@ def message_for(event: events.Event, timestamp: int) -> RobotMessage:
             return KeyMessage(timestamp=timestamp, title=STARTED_TITLE, text=name)
         case events.ProgramStopped(name):
             return KeyMessage(timestamp=timestamp, title=STOPPED_TITLE, text=name)
+        case events.ProgramPaused(name):
+            return KeyMessage(timestamp=timestamp, title=PAUSED_TITLE, text=name)
+        case events.ProgramResumed() | events.RobotModeChanged() | events.LogAdded():
+            return None  # no client knows a message for the first; the states show the second
         case events.TextPrinted(text):
             return TextMessage(timestamp=timestamp, text=text)
         case events.ScriptFailed(line, column, text, secondary):

@@ -95,8 +95,10 @@ class PrimaryPort:
 
     def say(self, event: Event) -> None:
         """Send a message for an event."""
-        if self._all_messages and self._channels:
-            message = message_for(event, self._controller.snapshot.tick * PERIOD_US)
+        if not (self._all_messages and self._channels):
+            return
+        message = message_for(event, self._controller.snapshot.tick * PERIOD_US)
+        if message is not None:
             package = encode_message_package(message, self._version)
             for connection in tuple(self._channels):
                 connection.send(package)

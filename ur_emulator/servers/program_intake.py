@@ -30,6 +30,8 @@ WORDS: dict[str, cmd.Command | None] = {
     "set robotmode run": cmd.ReleaseBrakes(),
     "set unlock protective stop": cmd.UnlockProtectiveStop(),
     "stop program": cmd.StopProgram(),
+    "pause program": cmd.PauseProgram(),
+    "resume program": cmd.ResumeProgram(),
     "set real": None,
     "set sim": None,
     "confirm user safety parameters": None,
@@ -110,7 +112,7 @@ class ProgramIntake:
                 try:
                     return cmd.StartProgram(compile_program(text, catalogue=self._catalogue))
                 except ScriptError as error:
-                    return ScriptFailed(error.line, error.column, error.wire_text)
+                    return ScriptFailed(error.line, error.column, error.wire_text, log_text=error.log_text)
             case ControlLine(text, word, argument):
                 if word == SPEED_WORD:
                     return _speed_command(text, argument)

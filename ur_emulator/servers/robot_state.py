@@ -21,6 +21,7 @@ from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersi
 from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.controller.status_bits import RUNNING_STATES
 from ur_emulator.models.robot_model import DhRow, RobotModel
 
 # Largest joint acceleration in the configuration data; the CB3 value is unknown, this is the one of a UR5e
@@ -39,7 +40,8 @@ def state_records(snapshot: Snapshot) -> tuple[SubPackage, ...]:
             is_real_robot_enabled=powered,
             is_robot_power_on=powered,
             is_protective_stopped=snap.safety_mode == SafetyMode.PROTECTIVE_STOP,
-            is_program_running=snap.runtime_state == ProgramState.PLAYING,
+            is_program_running=snap.runtime_state in RUNNING_STATES,
+            is_program_paused=snap.runtime_state == ProgramState.PAUSED,
             robot_mode=RobotMode(snap.robot_mode),
             target_speed_fraction=snap.target_speed_fraction,
             speed_scaling=snap.speed_scaling,
