@@ -51,6 +51,7 @@ class Dialect:
         short_circuit: `and` / `or` leave out the right side when the left decides (U; recommended reading).
         list_resize: What storing a list of another length into a list variable does. "error" since 3.14 /
             5.9.4 (O for 5.9.4-5.14.6, I for 3.14-3.15), "free" before (O).
+        array_arithmetic: The arithmetic operators work on lists and matrices: since 3.14 / 5.9 (O).
         has_pause: `pause` is a statement (e-Series 5.x, D); elsewhere it is an ordinary name.
         statement_budget: Statements a thread may run in one cycle.
         recursion_limit: Depth of calls of a recursive function.
@@ -58,6 +59,7 @@ class Dialect:
 
     short_circuit: bool = True
     list_resize: Literal["free", "error"] = "error"
+    array_arithmetic: bool = True
     has_pause: bool = False
     statement_budget: int = STATEMENT_BUDGET
     recursion_limit: int = RECURSION_LIMIT
@@ -67,8 +69,9 @@ def dialect_for(version: Sequence[int]) -> Dialect:
     """The dialect of a software version, e.g. (3, 15)."""
     major, minor = version[0], version[1]
     if major == 3:
-        return Dialect(list_resize="error" if minor >= 14 else "free")
+        recent = minor >= 14
+        return Dialect(list_resize="error" if recent else "free", array_arithmetic=recent)
     modern = major > 5 or minor >= 15
     # From 5.15 on a list has a capacity; until that is modelled, storing a longer list is allowed there.
     resize: Literal["free", "error"] = "error" if not modern and minor >= 9 else "free"
-    return Dialect(list_resize=resize, has_pause=True)
+    return Dialect(list_resize=resize, array_arithmetic=major > 5 or minor >= 9, has_pause=True)

@@ -109,8 +109,8 @@ class ScriptSyntaxError(ScriptCompileError):
 
     @property
     def wire_text(self) -> str:
-        """`syntax_error_on_line:<n>:<that line>:`. Source: capture of a missing bracket."""
-        text = self.source.line(self.line).strip() if self.source else ""
+        """`syntax_error_on_line:<n>:<that line, blanks included>:`. Source: captures of e-Series 5.x."""
+        text = self.source.line(self.line) if self.source else ""
         return f"syntax_error_on_line:{self.line}:{text}:"
 
 

@@ -219,10 +219,8 @@ class ExpressionCompiler:
         values = [self.compile(target, scope), *self._all(indices, scope)]
         if len(indices) == 2:
             return call("_cell", values, span)
-        if isinstance(indices[0], nodes.IntLiteral) and self._types.of(target, scope) in (
-            Type.NUMBERS,
-            Type.POSE,
-        ):
+        constant_index = isinstance(target, nodes.Name) and isinstance(indices[0], nodes.IntLiteral)
+        if constant_index and self._types.of(target, scope) in (Type.NUMBERS, Type.POSE):
             return ast.Subscript(values[0], values[1], ast.Load(), **place(span))
         return call("_item", values, span)
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
-from math import fmod
+from math import fmod, isfinite, nan
 from typing import Any
 
 from urscript import dialect
 from urscript.errors import ScriptRuntimeError
-from urscript.values import INT_MAX, INT_MIN, Matrix, a_type, is_number, type_name, wrap_int
+from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type, is_number, type_name, wrap_int
 from urscript.variables import same_kind
 
 # --- arithmetic ----------------------------------------------------------------------------------------
@@ -80,10 +80,8 @@ def mod(a: Any, b: Any) -> Any:
         if ta is int and tb is int:
             rest = abs(a) % abs(b)
             return -rest if a < 0 else rest
-        try:
-            return fmod(a, b)
-        except ValueError:
-            raise ScriptRuntimeError(f"cannot compute {a} % {b}") from None
+        # As in C; Python's fmod refuses an infinite dividend.
+        return fmod(a, b) if isfinite(a) else nan
     return _spread("%", mod, a, b)
 
 
@@ -100,13 +98,25 @@ def neg(a: Any) -> Any:
         return Matrix([neg(item) for item in row] for row in a.rows)
     if is_number(a):
         return neg(_plain(a))
-    raise ScriptRuntimeError(f"cannot negate {a_type(a)}")
+    raise ScriptRuntimeError(f"a sign needs a number, a list or a matrix of numbers, got {a_type(a)}")
 
 
 def pos(a: Any) -> Any:
     """`+a`: the value itself, for whatever can be negated."""
     neg(a)
     return a
+
+
+def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]:
+    """An arithmetic operator of software that knows it for numbers and strings only."""
+
+    def operate(*operands: Any) -> Any:
+        if any(type(operand) is list or type(operand) is Matrix for operand in operands):
+            names = " and ".join(map(type_name, operands))
+            raise ScriptRuntimeError(f"'{sign}' is not defined for {names} in this software version")
+        return compute(*operands)
+
+    return operate
 
 
 def _plain(value: Any) -> Any:
@@ -131,12 +141,19 @@ def _spread(sign: str, one: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
         return Matrix([one(x, b) for x in row] for row in a.rows)
     if is_number(a) and type(b) is Matrix:
         return Matrix([one(a, y) for y in row] for row in b.rows)
-    if sign in "+-" and type(a) is Matrix and type(b) is Matrix and a.shape == b.shape:
+    if sign in "+-" and type(a) is Matrix and type(b) is Matrix:
+        if a.shape != b.shape:
+            raise ScriptRuntimeError(f"'{sign}' needs matrices of equal shape, got {_size(a)} and {_size(b)}")
         pairs = zip(a.rows, b.rows, strict=True)
         return Matrix([one(x, y) for x, y in zip(left, right, strict=True)] for left, right in pairs)
     if is_number(a) and is_number(b):
         return one(_plain(a), _plain(b))
     raise ScriptRuntimeError(f"'{sign}' is not defined for {type_name(a)} and {type_name(b)}")
+
+
+def _size(matrix: Matrix) -> str:
+    rows, columns = matrix.shape
+    return f"{rows} x {columns}"
 
 
 def _matrix_product(a: Matrix, b: Matrix | list[Any]) -> Matrix | list[Any]:
@@ -164,6 +181,9 @@ def equal(a: Any, b: Any) -> bool:
     """`a == b`: one bool, also for lists and poses; different types are unequal."""
     ta, tb = type(a), type(b)
     if ta is tb:
+        if ta is list or ta is Pose:
+            # Not Python's own comparison: that takes True for 1, and a NaN for equal to itself.
+            return len(a) == len(b) and all(map(equal, a, b))
         return bool(a == b)
     if ta is bool or tb is bool:
         return False

@@ -72,7 +72,7 @@ def find_syntax_errors(source: Source, limit: int = 20) -> list[ScriptSyntaxErro
         pass
     except ScriptSyntaxError as error:
         error.source = source
-        errors.append(error)
+        note(error)
     return errors
 
 
@@ -85,7 +85,7 @@ def _drop_statement(error: UnexpectedToken) -> int:
     parser: Any = error.interactive_parser
     state = parser.parser_state
     lost = 0
-    while state.value_stack and not _STATEMENT_ENDS & parser.accepts():
+    while state.value_stack and not _is_between_statements(parser.accepts()):
         state.state_stack.pop()
         lost += getattr(state.value_stack.pop(), "type", "") in _BLOCK_OPENERS
     if error.token.type in parser.accepts():
@@ -93,7 +93,9 @@ def _drop_statement(error: UnexpectedToken) -> int:
     return lost
 
 
-_STATEMENT_ENDS = frozenset({"END", "$END"})
+def _is_between_statements(accepted: set[str]) -> bool:
+    """Whether a statement can start and its block can end: after a block only `end` or `else` can follow."""
+    return "NAME" in accepted and not accepted.isdisjoint({"END", "$END"})
 
 
 def prepare() -> None:
@@ -140,11 +142,10 @@ def _unexpected_token(error: UnexpectedToken, source: Source) -> ScriptSyntaxErr
     if "RUN" in accepted:
         wanted -= {"'('", "'['", "a name"}
         wanted.add("a value")
-    if "WHILE" in accepted:
-        # A new statement could start here, so the list of what may follow is too long to help.
-        message = f"unexpected '{token}'"
-    else:
-        message = f"unexpected '{token}', expected {' or '.join(sorted(wanted))}"
+    message = f"unexpected '{token}'"
+    # Where a new statement could start, the list of what may follow is too long to help.
+    if wanted and "WHILE" not in accepted:
+        message += f", expected {' or '.join(sorted(wanted))}"
     return ScriptSyntaxError(
         message, line=token.line or 1, column=token.column or 1, width=len(token), source=source
     )

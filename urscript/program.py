@@ -215,7 +215,7 @@ class RunningProgram:
         except ProgramHalted:
             self._finish(ProgramStatus.FINISHED)
         except Exception as error:
-            self._fail(runtime.script_error(error, self.program.file_name, self.program.function_names))
+            self._fail(self._script_error(error))
         else:
             if self._main.finished or self._kill_wanted:
                 self._finish(ProgramStatus.FINISHED)
@@ -247,6 +247,10 @@ class RunningProgram:
         """Line and column where a suspended thread stands."""
         return runtime.thread_position(thread, self.program.file_name)
 
+    def _script_error(self, error: Exception) -> ScriptRuntimeError:
+        program = self.program
+        return runtime.script_error(error, program.file_name, program.function_names, program.source)
+
     def _fail_secondary(self) -> None:
         line, column = self.position(self._main)
         error = ScriptRuntimeError("a secondary program must end within one control cycle")
@@ -265,7 +269,7 @@ class RunningProgram:
         fault = self._scheduler.kill_all()
         if fault is not None and self.error is None:
             self.status = ProgramStatus.FAILED
-            self.error = runtime.script_error(fault, self.program.file_name, self.program.function_names)
+            self.error = self._script_error(fault)
         # Functions and their globals refer to each other; a box that runs with its garbage collector frozen
         # would keep every program it ever ran. The variables stay readable.
         for name in [name for name in self._namespace if not name.startswith("g_")]:

@@ -11,10 +11,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Generator, Iterable, Mapping
 from itertools import islice
 from math import ceil
-from types import CodeType, TracebackType
+from types import CodeType, FrameType, TracebackType
 from typing import Any, Final
 
 from urscript import elements, ops, variables
@@ -23,6 +24,7 @@ from urscript.catalogue import Catalogue
 from urscript.dialect import Dialect
 from urscript.errors import ScriptBudgetError, ScriptRuntimeError, StackEntry
 from urscript.host import Handle, Host
+from urscript.source import Source
 from urscript.threads import ProgramHalted, Scheduler, ScriptThread, join
 from urscript.values import Pose, a_type, log_form, wrap_int
 from urscript.waits import NEXT_CYCLE, Wait
@@ -88,6 +90,17 @@ _COMMON: Final[dict[str, Any]] = {
 }
 
 
+_ARITHMETIC: Final = {
+    "_add": "+",
+    "_sub": "-",
+    "_mul": "*",
+    "_div": "/",
+    "_mod": "%",
+    "_neg": "-",
+    "_pos": "+",
+}
+
+
 def base_namespace(dialect: Dialect) -> dict[str, Any]:
     """The names that do not depend on the run: operators and values."""
 
@@ -101,7 +114,10 @@ def base_namespace(dialect: Dialect) -> dict[str, Any]:
         thread.depth -= 1
 
     assign = variables.assign if dialect.list_resize == "error" else variables.assign_resizing
-    return {**_COMMON, "_assign": assign, "_enter": enter, "_leave": leave}
+    names = {**_COMMON, "_assign": assign, "_enter": enter, "_leave": leave}
+    if not dialect.array_arithmetic:
+        names |= {name: ops.without_arrays(sign, _COMMON[name]) for name, sign in _ARITHMETIC.items()}
+    return names
 
 
 def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any]) -> dict[str, Any]:
@@ -186,18 +202,23 @@ _MEANING: Final[dict[type[Exception], str]] = {
 """What Python's own operators raise where static types let the compiler use them directly."""
 
 
-def script_error(error: Exception, file_name: str, names: Mapping[str, str]) -> ScriptRuntimeError:
+def script_error(
+    error: Exception, file_name: str, names: Mapping[str, str], source: Source
+) -> ScriptRuntimeError:
     """The run-time error that `error` is for the program, with place and calls.
 
     Args:
         error: What came out of a thread.
         file_name: The pseudo file name of the compiled program.
         names: Python function name -> name in the script.
+        source: The text of the program.
     """
-    stack, raised_in_script = _stack(error.__traceback__, file_name, names)
+    stack, innermost = _stack(error.__traceback__, file_name, names)
     if isinstance(error, ScriptRuntimeError):
         found = error
-    elif raised_in_script and type(error) in _MEANING:
+    elif innermost is not None and isinstance(error, IndexError):
+        found = ScriptRuntimeError(_bad_index(innermost, stack[-1], source))
+    elif innermost is not None and type(error) in _MEANING:
         found = ScriptRuntimeError(_MEANING[type(error)])
     elif isinstance(error, RecursionError):
         found = ScriptRuntimeError(_MEANING[RecursionError])
@@ -208,20 +229,34 @@ def script_error(error: Exception, file_name: str, names: Mapping[str, str]) -> 
     return found
 
 
+def _bad_index(frame: FrameType, place: StackEntry, source: Source) -> str:
+    """What a bare subscript went wrong with: the compiler emits it for a number after a variable only."""
+    form = re.match(r"(\w+)\s*\[\s*(\d+)", source.line(place.line)[place.column - 1 :])
+    if form is not None:
+        variable = frame.f_locals.get(f"v_{form[1]}", frame.f_globals.get(f"g_{form[1]}"))
+        try:
+            elements.item(variable, int(form[2]))
+        except ScriptRuntimeError as error:
+            return error.message
+    return "index is out of range"
+
+
 def _stack(
     traceback: TracebackType | None, file_name: str, names: Mapping[str, str]
-) -> tuple[list[StackEntry], bool]:
-    """The calls inside the script, outermost first, and whether the innermost frame is the script's own."""
+) -> tuple[list[StackEntry], FrameType | None]:
+    """The calls inside the script, outermost first, and the innermost frame if it is the script's own."""
     stack: list[StackEntry] = []
-    in_script = False
+    innermost = None
     while traceback is not None:
-        code = traceback.tb_frame.f_code
-        in_script = code.co_filename == file_name
-        if in_script:
+        innermost = traceback.tb_frame
+        code = innermost.f_code
+        if code.co_filename == file_name:
             line, column = _position(code, traceback.tb_lasti)
             stack.append(StackEntry(names.get(code.co_name, code.co_name), line, column))
+        else:
+            innermost = None
         traceback = traceback.tb_next
-    return stack, in_script
+    return stack, innermost
 
 
 def _position(code: CodeType, instruction: int) -> tuple[int, int]:

@@ -122,7 +122,9 @@ def type_name(value: Any) -> str:
 
 
 def a_type(value: Any) -> str:
-    """The type of `value` with its article: "a pose", "an int"."""
+    """The type of `value` with its article: "a pose", "an int"; None is None."""
+    if value is None:
+        return "None"
     name = type_name(value)
     return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
 

@@ -3,24 +3,35 @@
 Chunks stand apart by a line `---`. Expectations are comments, so a chunk is a program as it is:
 
     #> text            the next text that textmsg shows (all texts, in order)
-    #! 3:5 pattern     an error at line 3 of the chunk, column 5, whose message matches the pattern;
+    #! 3:5 text        an error at line 3 of the chunk, column 5, with exactly this text, `...` for anything;
                        several lines: all compile errors in order; at run time there is only one
     #~ wire text       what the first error puts into the runtime-exception message
+    #log text          what the first error writes into the controller's log
     #@ name name       the builtins with an effect that were called, in order
     #< 1 2 3           a frame of integers that the peer of socket "s" sends (also makes it accept)
     #software 5.11     the software version, 3.15 if not given
+    #ref 1.1 comment   the row of the language notes that the chunk shows (see `reference_rows`)
 
 A chunk without `#!` must compile and end by itself. Every chunk that parses must also print to a text that
-parses to the same tree.
+parses to the same tree. Every chunk runs twice: as compiled, and with every static type unknown, so that the
+shortcuts of the compiler cannot mean anything else than the operators they stand for.
+
+The words around a rule say what it rests on: D documented by the maker, O observed, I inferred, U unknown
+and chosen here.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from unittest import mock
 
 from urscript.catalogue import catalogue_for
+from urscript.errors import ScriptError
+from urscript.inference import StaticTypes, Type
 from urscript.parser import parse
 from urscript.printer import print_program
 from urscript.program import ProgramStatus, check_program, compile_program
@@ -40,6 +51,8 @@ class Chunk:
     messages: list[str] = field(default_factory=list)
     errors: list[tuple[int, int, str]] = field(default_factory=list)
     wire_text: str | None = None
+    log_text: str | None = None
+    rows: list[str] = field(default_factory=list)
     calls: list[str] | None = None
     frames: list[list[int]] | None = None
     software: str = "3.15"
@@ -69,8 +82,8 @@ def _split(file: Path) -> list[Chunk]:
 
 
 def _expectations(chunk: Chunk) -> Chunk:
-    for line in chunk.text.split("\n"):
-        mark = re.search(r"#(>|!|~|@|<|software)(?: (.*))?$", line)
+    for line in chunk.text.replace("\r\n", "\n").split("\n"):
+        mark = re.search(r"#(>|!|~|@|<|log|ref|software)(?: (.*))?$", line)
         if mark is None:
             continue
         kind, rest = mark[1], mark[2] or ""
@@ -78,10 +91,14 @@ def _expectations(chunk: Chunk) -> Chunk:
             chunk.messages.append(rest)
         elif kind == "!":
             place = re.match(r"(\d+):(\d+) (.+)", rest)
-            assert place, f"{chunk}: write '#! line:column pattern', not {line!r}"
+            assert place, f"{chunk}: write '#! line:column text', not {line!r}"
             chunk.errors.append((int(place[1]), int(place[2]), place[3]))
         elif kind == "~":
             chunk.wire_text = rest
+        elif kind == "log":
+            chunk.log_text = rest
+        elif kind == "ref":
+            chunk.rows.append(rest)
         elif kind == "@":
             chunk.calls = rest.split()
         elif kind == "<":
@@ -91,12 +108,12 @@ def _expectations(chunk: Chunk) -> Chunk:
     return chunk
 
 
-def run_chunk(chunk: Chunk) -> None:
-    """Compile and run a chunk; asserts everything it expects."""
+def run_chunk(chunk: Chunk) -> list[ScriptError]:
+    """Compile and run a chunk; asserts everything it expects and returns the errors it met."""
     catalogue = catalogue_for(chunk.software)
     sockets = {} if chunk.frames is None else {"s": FakeSocket(chunk.frames, closed=True)}
     host = RecordingHost(catalogue=catalogue, sockets=sockets)
-    errors = list(check_program(chunk.text, catalogue=catalogue)[0])
+    errors: list[ScriptError] = list(check_program(chunk.text, catalogue=catalogue)[0])
     if not errors:
         program = compile_program(chunk.text, catalogue=catalogue)
         running = host.run(program, MAX_CYCLES)
@@ -107,14 +124,32 @@ def run_chunk(chunk: Chunk) -> None:
         _assert_prints(chunk)
     found = [(error.line, error.column, error.message) for error in errors]
     assert len(found) == len(chunk.errors), f"{chunk}: expected {chunk.errors}, got {found}"
-    for (line, column, message), (want_line, want_column, pattern) in zip(found, chunk.errors, strict=True):
+    for (line, column, message), (want_line, want_column, text) in zip(found, chunk.errors, strict=True):
         assert (line, column) == (want_line, want_column), f"{chunk}: {message} at {line}:{column}"
-        assert re.search(pattern, message), f"{chunk}: {message!r} does not match {pattern!r}"
+        assert matches(text, message), f"{chunk}: got {message!r}, expected {text!r}"
     if chunk.wire_text is not None:
         assert errors[0].wire_text == chunk.wire_text
+    if chunk.log_text is not None:
+        assert errors[0].log_text == chunk.log_text
     assert host.messages == chunk.messages, f"{chunk}: {host.messages}"
     if chunk.calls is not None:
         assert host.names_called() == chunk.calls
+    return errors
+
+
+def matches(expected: str, text: str) -> bool:
+    """Whether `text` is what is expected, where `...` stands for anything."""
+    return re.fullmatch(".*".join(map(re.escape, expected.split("..."))), text, re.DOTALL) is not None
+
+
+@contextmanager
+def unknown_types() -> Iterator[None]:
+    """The compiler takes no static type for evident and leaves every operation to run time."""
+    with (
+        mock.patch.object(StaticTypes, "of", return_value=Type.ANY),
+        mock.patch.object(StaticTypes, "variable", return_value=Type.ANY),
+    ):
+        yield
 
 
 def _assert_prints(chunk: Chunk) -> None:

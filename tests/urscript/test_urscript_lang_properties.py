@@ -295,4 +295,4 @@ def test_a_syntax_error_in_the_middle_of_garbage_names_its_line():
     with pytest.raises(ScriptSyntaxError) as caught:
         compile_program("def f():\n  textmsg(1)\n  @@@\nend\n")
     assert (caught.value.line, caught.value.column) == (3, 3)
-    assert caught.value.wire_text == "syntax_error_on_line:3:@@@:"
+    assert caught.value.wire_text == "syntax_error_on_line:3:  @@@:"

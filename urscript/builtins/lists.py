@@ -15,7 +15,7 @@ from protocol.pose import pose_inv
 from urscript.catalogue.argument_checks import type_error
 from urscript.catalogue.types import ParamType
 from urscript.errors import ScriptRuntimeError
-from urscript.values import Matrix, Pose, is_number
+from urscript.values import Matrix, Pose, is_number, wrap_int
 
 from .arguments import integer, numbers
 
@@ -24,6 +24,8 @@ _WORD = 32
 
 def norm(a: Any) -> float:
     """Absolute value of a number (an int stays int), Euclidean length of a list or of all six of a pose."""
+    if type(a) is int:
+        return wrap_int(abs(a))
     if is_number(a):
         return abs(a)  # type: ignore[no-any-return]
     if type(a) is Pose or (type(a) is list and all(map(is_number, a))):
