@@ -62,16 +62,20 @@ def _run(
     movements: Sequence[str], robot: str, out: Path, repeat: int, controller: str, port_base: int, yes: bool
 ) -> None:
     from pc_client.control.controller_config import controller_config
+    from pc_client.driver.probe import read_info
+    from pc_client.driver.transport import TcpNetwork
     from pc_client.driver.ur_driver import UrDriver
     from pc_client.experiment.preflight import is_loopback
-    from pc_client.experiment.prepare import prepare_experiment
+    from pc_client.experiment.prepare import load_movements, prepare_experiment
     from pc_client.experiment.progress import Progress
     from pc_client.experiment.runner import ExperimentRunner
 
     config = controller_config(controller)
     ports = ports_of(port_base)
     with console.status("planning"):
-        planned = prepare_experiment(movements, repeat=repeat, out=out)
+        loaded = load_movements(movements)
+        arm = read_info(TcpNetwork(), robot, ports).model.lower()
+        planned = prepare_experiment(loaded, repeat=repeat, out=out, robot=arm)
     if not yes and not is_loopback(robot):
         _ask(planned, robot, ports)
     try:

@@ -1,7 +1,7 @@
 """Ports 30001 and 30002: the robot's messages come in, our programs go out.
 
-State packages are passed over: the realtime port tells more, and in time. Both connections must be read
-now and then, or the robot has to hold back what it wants to tell.
+State packages are passed over, but for the type of the arm in the first one: the realtime port tells more,
+and in time. Both connections must be read now and then, or the robot has to hold back what it wants to tell.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError, RobotStoppedError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
+from protocol.primary_layout import ConfigurationData
 from protocol.primary_messages import (
     ErrorCodeMessage,
     ReportLevel,
@@ -18,12 +19,14 @@ from protocol.primary_messages import (
     VersionMessage,
     decode_message,
 )
-from protocol.ur_types import SoftwareVersion
+from protocol.primary_state import decode_state
+from protocol.ur_types import RobotType, SoftwareVersion
 
 VERSION_TIMEOUT = 5.0
 """The version message is the first package of a connection; a box sends it at once."""
 
 _HEADER_SIZE = 5
+_ROBOT_STATE = 16
 _ROBOT_MESSAGE = 20
 _LONGEST_PACKAGE = 1 << 20
 _OLDEST = SoftwareVersion(3, 3)
@@ -40,9 +43,10 @@ class PackageStream:
 
     Attributes:
         version: software of the controller, once its version message came.
+        robot_type: the arm, once a state told it; the first state of a connection does.
     """
 
-    __slots__ = ("_buffer", "_early", "_name", "_network", "_transport", "version")
+    __slots__ = ("_buffer", "_early", "_name", "_network", "_transport", "robot_type", "version")
 
     def __init__(self, transport: Transport, network: Network, name: str) -> None:
         self._transport = transport
@@ -51,6 +55,7 @@ class PackageStream:
         self._buffer = FrameBuffer(_LONGEST_PACKAGE, _HEADER_SIZE)
         self._early: list[RobotMessage] = []
         self.version: SoftwareVersion | None = None
+        self.robot_type: RobotType | None = None
 
     def wait_for_version(self) -> SoftwareVersion:
         """Return the controller's software version from its greeting.
@@ -66,6 +71,13 @@ class PackageStream:
                 )
             self._early += self._read(0.1) or []
         return self.version
+
+    def wait_for_robot_type(self) -> RobotType | None:
+        """Return the type of the arm from the first state; None if the robot does not send it in time."""
+        deadline = self._network.now() + VERSION_TIMEOUT
+        while self.robot_type is None and self._network.now() <= deadline:
+            self._early += self._read(0.1) or []
+        return self.robot_type
 
     def poll(self) -> list[RobotMessage]:
         """Messages that have arrived, without waiting.
@@ -101,6 +113,8 @@ class PackageStream:
         try:
             self._buffer.feed(data)
             while (package := self._buffer.next_frame()) is not None:
+                if package[4] == _ROBOT_STATE and self.robot_type is None:
+                    self.robot_type = _robot_type(package)
                 if package[4] != _ROBOT_MESSAGE:
                     continue
                 message = decode_message(package[_HEADER_SIZE:], self.version or _OLDEST)
@@ -136,6 +150,14 @@ def raise_on_error(messages: list[RobotMessage], program: str = "") -> None:
             raise RobotStoppedError(
                 f"the robot reports C{message.code}A{message.argument} {message.text}".rstrip()
             )
+
+
+def _robot_type(package: bytes) -> RobotType | None:
+    configuration = decode_state(package[_HEADER_SIZE:]).find(ConfigurationData)
+    try:
+        return None if configuration is None else RobotType(configuration.robot_type)
+    except ValueError:  # an arm that was built after this was written
+        return None
 
 
 def _is_serious(level: int) -> bool:

@@ -85,7 +85,7 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
     info: RobotInfo | None = None
     rhythm: FrameRhythm | None = None
     try:
-        info = _read_info(network, host, ports)
+        info = read_info(network, host, ports)
     except DriverError as error:
         obstacles.append(str(error))
     try:
@@ -99,10 +99,15 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
     return Diagnosis(found, absent, info, rhythm, obstacles[0] if obstacles else "")
 
 
-def _read_info(network: Network, host: str, ports: Ports) -> RobotInfo:
+def read_info(network: Network, host: str, ports: Ports) -> RobotInfo:
+    """Ask a robot who it is, on connections of its own.
+
+    Raises:
+        DriverError: nothing answers on the primary port.
+    """
     primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
     try:
-        return read_robot_info(network, host, ports.dashboard, primary.wait_for_version())
+        return read_robot_info(network, host, ports.dashboard, primary)
     finally:
         primary.close()
 

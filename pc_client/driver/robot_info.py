@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pc_client.driver.dashboard_query import ask_dashboard
+from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.transport import Network
 from protocol.errors import RemoteProtocolError
 from protocol.ur_types import SerialNumber, SoftwareVersion, parse_serial
@@ -21,7 +22,7 @@ class RobotInfo:
 
     Attributes:
         version: controller software.
-        model: e.g. `UR3`, or "unknown" when the dashboard server does not tell.
+        model: e.g. `UR3`, or "unknown" when the robot does not tell.
         serial: serial number; its text is "unknown" when the dashboard server does not tell.
     """
 
@@ -39,19 +40,27 @@ class RobotInfo:
         return f"{self.model}, software {self.version}, {kind} {self.serial.text}"
 
 
-def read_robot_info(network: Network, host: str, dashboard_port: int, version: SoftwareVersion) -> RobotInfo:
-    """Ask the dashboard server who it is; what it does not answer stays "unknown".
+def read_robot_info(network: Network, host: str, dashboard_port: int, primary: PackageStream) -> RobotInfo:
+    """Ask the robot who it is; what it does not answer stays "unknown".
 
     Args:
         network: makes the connection.
         host: the robot.
         dashboard_port: its dashboard port.
-        version: software, from the primary port's greeting.
+        primary: a fresh connection to the primary port: its greeting tells the software, its first state the
+            arm when the dashboard server, before 3.12, does not.
+
+    Raises:
+        DriverError: the primary port does not tell its version.
     """
+    version = primary.wait_for_version()
     answers = ask_dashboard(network, host, dashboard_port, (_SERIAL, _MODEL))
     try:
         serial = parse_serial(answers.get(_SERIAL, ""))
     except RemoteProtocolError:  # software before 3.12 does not know the question
         serial = SerialNumber("unknown", simulated=False, seed=None)
     model = answers.get(_MODEL, "")
-    return RobotInfo(version, model if model.startswith("UR") else "unknown", serial)
+    if not model.startswith("UR"):
+        robot_type = primary.wait_for_robot_type()
+        model = "unknown" if robot_type is None else robot_type.name
+    return RobotInfo(version, model, serial)

@@ -253,14 +253,14 @@ class UrDriver:
 
     def _connect(self) -> None:
         self._primary = self._open_packages(self._ports.primary, "primary")
-        version = self._primary.wait_for_version()
         self._scripts = self._open_packages(self._ports.secondary, "secondary")
-        self.info = read_robot_info(self._network, self._host, self._ports.dashboard, version)
+        self.info = read_robot_info(self._network, self._host, self._ports.dashboard, self._primary)
         self._frames = self._open_frames()
         self.layout = self._frames.layout
         if missing := [name for name in _NEEDED_COLUMNS if name not in self.layout.slices]:
             raise DriverError(
-                f"software {version} does not report {', '.join(missing)}: streaming needs 3.2 or later"
+                f"software {self.info.version} does not report {', '.join(missing)}: "
+                "streaming needs 3.2 or later"
             )
 
     def _send(self, text: str) -> None:

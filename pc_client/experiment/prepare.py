@@ -55,37 +55,49 @@ class Experiment:
         return len(self.planned) * self.repeat
 
 
-def prepare_experiment(
-    movements: Sequence[str | Path], *, repeat: int, out: Path, robot: str = "ur3"
-) -> Experiment:
-    """Load and plan all movements.
+def load_movements(sources: Sequence[str | Path]) -> list[Movement]:
+    """Load movements of one experiment.
 
     Args:
-        movements: names of the library or movement files.
-        repeat: runs of each, at least 1.
-        out: folder of the recordings; need not exist.
-        robot: nominal arm.
+        sources: names of the library or movement files.
 
     Raises:
         MovementError: a movement is unknown or makes no sense.
-        PlanningError: a movement cannot be done by the arm.
-        ClientError: nothing to do, or two movements of the same name.
+        ClientError: none is given, or two have the same name.
     """
-    if repeat < 1 or not movements:
-        raise ClientError(
-            f"{len(movements)} movements {repeat} times is nothing to do; give at least one of each"
-        )
-    model = robot_model(robot)
-    loaded = [load_movement(movement) for movement in movements]
-    names = [movement.name for movement in loaded]
+    if not sources:
+        raise ClientError("no movement is given; name at least one")
+    movements = [load_movement(source) for source in sources]
+    names = [movement.name for movement in movements]
     for name in names:
         if names.count(name) > 1:
             raise ClientError(
                 f"two movements are called {name!r}; their recordings would overwrite each other"
             )
+    return movements
+
+
+def prepare_experiment(
+    movements: Sequence[Movement], *, repeat: int, out: Path, robot: str = "ur3"
+) -> Experiment:
+    """Plan all movements for an arm.
+
+    Args:
+        movements: from `load_movements`.
+        repeat: runs of each, at least 1.
+        out: folder of the recordings; need not exist.
+        robot: nominal arm.
+
+    Raises:
+        PlanningError: a movement cannot be done by the arm, or there is no model of it.
+        ClientError: nothing to repeat.
+    """
+    if repeat < 1:
+        raise ClientError(f"{repeat} runs of each movement is nothing to do; give at least one")
+    model = robot_model(robot)
     planned = tuple(
         PlannedMovement(movement, plan_movement(movement, model=model), _text_of(movement))
-        for movement in loaded
+        for movement in movements
     )
     return Experiment(model, planned, repeat, out)
 

@@ -98,6 +98,7 @@ class FakeRobot:
         self.q = [0.0] * 6
         self.qd = [0.0] * 6
         self.robot_mode, self.safety_mode = 7, 1
+        self.state = None  # what the primary port sends behind its greeting
         self.program = None  # None, "approach", "receiver", "stop"
         self.programs = []
         self.listener = None
@@ -124,6 +125,8 @@ class FakeRobot:
         pipe = self.pipes[kind] = Pipe(self, kind)
         if kind in ("primary", "secondary"):
             pipe.incoming.append(package(encode_message(version_message(VERSION), VERSION)))
+            if self.state is not None:
+                pipe.incoming.append(self.state)
         elif kind == "realtime":
             pipe.incoming.append(self.frame())
         elif kind == "dashboard":

@@ -16,8 +16,10 @@ from pc_client.driver.receiver_script import fill_template, receiver_script
 from pc_client.driver.reverse_server import ReverseServer
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
+from protocol.primary_layout import ConfigurationData
 from protocol.primary_messages import TextMessage
-from protocol.ur_types import SoftwareVersion
+from protocol.primary_state import encode_state
+from protocol.ur_types import RobotType, SoftwareVersion
 
 GOAL = [0.1, -1.5, -2.0, 0.2, 1.3, 1.8]
 
@@ -45,6 +47,13 @@ def test_session_without_dashboard_server():
         assert driver.info.model == "unknown"
         assert driver.info.serial.text == "unknown"
         assert not driver.info.serial.simulated
+
+
+def test_configuration_data_tell_the_arm_when_the_dashboard_does_not():
+    robot = FakeRobot(has_dashboard=False)
+    robot.state = encode_state([ConfigurationData(robot_type=RobotType.UR10)], SoftwareVersion(3, 4))
+    with UrDriver("robot", network=robot) as driver:
+        assert driver.info.model == "UR10"
 
 
 def test_software_that_does_not_tell_whether_a_program_runs_is_refused():

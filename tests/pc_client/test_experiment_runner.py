@@ -10,7 +10,7 @@ from pc_client.control.controller_config import CONTROLLERS
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import ClientError, DriverError, MovementError, RecordingError, RobotStoppedError
 from pc_client.experiment.preflight import experiment_text, is_loopback
-from pc_client.experiment.prepare import clear_folder, prepare_experiment
+from pc_client.experiment.prepare import clear_folder, load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import load_recording
@@ -39,7 +39,8 @@ class Notes(list):
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
-    return prepare_experiment(["uniform_4_1", "lognorm_4_1"], repeat=2, out=tmp_path_factory.mktemp("unused"))
+    movements = load_movements(["uniform_4_1", "lognorm_4_1"])
+    return prepare_experiment(movements, repeat=2, out=tmp_path_factory.mktemp("unused"))
 
 
 def with_folder(experiment, out):
@@ -163,15 +164,15 @@ def test_plans_for_a_ur3_do_not_run_on_another_arm(two, tmp_path):
     assert robot.programs == []
 
 
-def test_nothing_moves_when_a_movement_is_unknown(tmp_path):
+def test_nothing_moves_when_a_movement_is_unknown():
     with pytest.raises(MovementError, match="did you mean"):
-        prepare_experiment(["uniform_4_1", "lognorm_4_11"], repeat=1, out=tmp_path)
+        load_movements(["uniform_4_1", "lognorm_4_11"])
 
 
 @pytest.mark.parametrize(("movements", "repeat"), [([], 1), (["uniform_4_1"], 0), (["uniform_4_1"] * 2, 1)])
 def test_experiments_that_make_no_sense(movements, repeat, tmp_path):
     with pytest.raises(ClientError):
-        prepare_experiment(movements, repeat=repeat, out=tmp_path)
+        prepare_experiment(load_movements(movements), repeat=repeat, out=tmp_path)
 
 
 def test_folder_of_another_experiment_is_left_alone(two, tmp_path):
