@@ -112,14 +112,14 @@ ROBOTS = MappingProxyType(
             limits=JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _six_degrees(180, 180, 180, 360, 360, 360)),
             q_branch=_ELBOW_UP,
         ),
-        # UR5 manual CB3: all joints 180 deg/s.
+        # UR5 manual CB3 3.13: all joints 180 deg/s (= config/ur5/joint_limits.yaml).
         "ur5": RobotDescription(
             name="ur5",
             urdf="ur_description/urdf/ur5_robot.urdf",
             limits=JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _six_degrees(180, 180, 180, 180, 180, 180)),
             q_branch=_ELBOW_UP,
         ),
-        # UR10 manual CB3: base and shoulder 120 deg/s, the others 180 deg/s.
+        # UR10 manual CB3 3.13: base and shoulder 120 deg/s, the others 180 deg/s (= config/ur10/joint_limits.yaml).
         "ur10": RobotDescription(
             name="ur10",
             urdf="ur_description/urdf/ur10_robot.urdf",
