@@ -12,7 +12,7 @@ OURS = {"protocol", "urscript", "ur_emulator", "pc_client"}
 MAY_IMPORT = {
     "protocol": {"numpy"},
     "urscript": {"protocol", "lark", "numpy", "typer", "rich"},
-    "ur_emulator": {"urscript", "protocol", "mujoco", "numpy", "typer", "rich"},
+    "ur_emulator": {"urscript", "protocol", "mujoco", "numpy", "pymodbus", "typer", "rich"},
     "pc_client": {
         "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "pyarrow", "mpl_toolkits",
     },
@@ -67,7 +67,7 @@ def test_effects_stay_at_the_rim(package):
     [
         ("protocol", {"urscript", "ur_emulator", "pc_client", "mujoco", "scipy", "lark"}),
         ("urscript", {"ur_emulator", "pc_client", "mujoco", "scipy"}),
-        ("ur_emulator.emulator", {"pc_client", "scipy", "pinocchio", "matplotlib", "mcap"}),
+        ("ur_emulator.emulator", {"pc_client", "scipy", "pinocchio", "matplotlib", "mcap", "pymodbus", "asyncio"}),
         ("pc_client.experiment.runner", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),
     ],
 )

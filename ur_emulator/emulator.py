@@ -91,7 +91,8 @@ class ControlBox:
         self.serial_number = simulated_serial(model.robot_type, seed)
         self._free_ports = port_base is None
         self._loop = EventLoop(precise=named_pace is Pace.REALTIME)
-        controller = Controller(model, imperfections, seed, LoopNetwork(self._loop), mode=RobotMode.RUNNING)
+        self._network = LoopNetwork(self._loop)
+        controller = Controller(model, imperfections, seed, self._network, mode=RobotMode.RUNNING)
         controller.state.ports.version = (software.major, software.minor)
         self._box = ServedBox(
             controller, make_pacer(named_pace, controller.period_s, speed), self._loop.expect_soon
@@ -175,6 +176,7 @@ class ControlBox:
 
     def _close(self) -> None:
         self._intake.close()
+        self._network.close()
         for listener in self._listeners.values():
             listener.close()
         for port in self._port_objects.values():

@@ -36,18 +36,60 @@ class FakeSocket:
         self.is_open = False
 
 
+class FakeModbusUnit:
+    """A Modbus unit that does at once what it is asked for.
+
+    Attributes:
+        memory: (signal type, address) to a value, 0 where there is none; inputs and outputs are separate.
+        log: what it was asked, in order.
+        trouble: what it reports of every signal instead of answering.
+    """
+
+    def __init__(self):
+        self.memory = {}
+        self.log = []
+        self.trouble = ""
+        self.is_released = False
+
+    def want(self, signal):
+        where = (int(signal.type), signal.address)
+        signal.trouble = self.trouble
+        self.log.append((signal.name, "read" if signal.output is None else signal.output))
+        if self.trouble:
+            return
+        if signal.output is None:
+            signal.value = self.memory.get(where, 0)
+        else:
+            self.memory[where] = signal.output
+
+    def forget(self, signal):
+        self.log.append((signal.name, "forgotten"))
+
+    def send(self, slave, function_code, data):
+        self.log.append((slave, function_code, data))
+
+    def release(self):
+        self.is_released = True
+
+
 class FakeNetwork:
-    """Connects every script at once, or never if `refuse` is set."""
+    """Connects every script at once, or never if `refuse` is set; Modbus units by "host:port"."""
 
     def __init__(self, *, refuse=False):
         self.refuse = refuse
         self.sockets = []
+        self.modbus_units = {}
 
     def open(self, host, port):
         sock = FakeSocket()
         sock.is_open = not self.refuse
         self.sockets.append(sock)
         return sock
+
+    def modbus_unit(self, address):
+        unit = self.modbus_units.setdefault(str(address), FakeModbusUnit())
+        unit.is_released = False
+        return unit
 
 
 class Bench:

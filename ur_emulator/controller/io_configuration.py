@@ -1,7 +1,6 @@
 """How lines and registers are set up: what an input does, what an output does when programs start and stop.
 
-Actions of inputs are kept as configuration: nobody can press a freedrive input of a box without hands.
-Source: URScript manual CB3 3.15, module ioconfiguration; its codes of run states are those below.
+Source: URScript manual CB3 3.15, module ioconfiguration.
 """
 
 from __future__ import annotations
@@ -10,27 +9,11 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from ur_emulator.controller.io import CONFIGURABLE_SHIFT, TOOL_SHIFT, InputOutput
+from ur_emulator.controller.modbus_signals import ModbusSignals
 from ur_emulator.controller.registers import Registers
+from ur_emulator.controller.run_states import RunState, level
 
-
-class RunState(IntEnum):
-    """What an output does when programs start and stop."""
-
-    KEEP = 0
-    LOW_WHEN_STOPPED = 1
-    HIGH_WHEN_STOPPED = 2
-    HIGH_WHEN_RUNNING = 3  # and low when stopped
-
-
-# Value of an output (True is high) once a program runs, and once it runs no more; None leaves it alone.
-_WHEN_RUNNING = {RunState.HIGH_WHEN_RUNNING: True}
-_WHEN_STOPPED = {
-    RunState.LOW_WHEN_STOPPED: False,
-    RunState.HIGH_WHEN_STOPPED: True,
-    RunState.HIGH_WHEN_RUNNING: False,
-}
-
-DEFAULT_ACTION = "default"
+DEFAULT_ACTION, FREEDRIVE_ACTION = "default", "freedrive"
 
 
 class OutputKind(IntEnum):
@@ -50,6 +33,13 @@ class OutputKind(IntEnum):
 _SHIFT = {OutputKind.STANDARD: 0, OutputKind.CONFIGURABLE: CONFIGURABLE_SHIFT, OutputKind.TOOL: TOOL_SHIFT}
 
 
+_INPUT_SHIFT = {
+    "standard_digital": 0,
+    "configurable_digital": CONFIGURABLE_SHIFT,
+    "tool_digital": TOOL_SHIFT,
+}
+
+
 @dataclass(slots=True)
 class IoConfiguration:
     """What programs have set up; it stays when they end.
@@ -57,12 +47,14 @@ class IoConfiguration:
     Attributes:
         io: the lines.
         registers: the general purpose registers.
+        modbus: signals of other units, which have their actions and rules with them.
         input_actions: (group, index) to the action, where it is not the default.
         program_runs: a primary program runs.
     """
 
     io: InputOutput
     registers: Registers
+    modbus: ModbusSignals
     input_actions: dict[tuple[str, int], str] = field(default_factory=dict)
     program_runs: bool = False
     _rules: dict[tuple[OutputKind, int], RunState] = field(default_factory=dict)
@@ -73,6 +65,18 @@ class IoConfiguration:
             self.input_actions.pop((group, index), None)
         else:
             self.input_actions[group, index] = action
+
+    def asks_for_freedrive(self) -> bool:
+        """True while a line that is set up for it, or a signal of another unit, is high."""
+        for (group, index), action in self.input_actions.items():
+            if action == FREEDRIVE_ACTION and self._is_high(group, index):
+                return True
+        return any(signal.action == FREEDRIVE_ACTION and signal.value for signal in self.modbus.signals.values())
+
+    def _is_high(self, group: str, index: int) -> bool:
+        if group == "gp_boolean":
+            return self.registers.inputs.booleans[index]
+        return self.io.read_digital_in(_INPUT_SHIFT[group] + index)
 
     def rule(self, kind: OutputKind, index: int) -> RunState:
         """What an output does when programs start and stop."""
@@ -97,11 +101,12 @@ class IoConfiguration:
         self._apply_all()
 
     def _apply_all(self) -> None:
+        self.modbus.follow(self.program_runs)
         for (kind, index), rule in self._rules.items():
             self._apply(kind, index, rule)
 
     def _apply(self, kind: OutputKind, index: int, rule: RunState) -> None:
-        is_high = (_WHEN_RUNNING if self.program_runs else _WHEN_STOPPED).get(rule)
+        is_high = level(rule, self.program_runs)
         if is_high is None:
             return
         match kind:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+from ur_emulator.controller.modbus_signals import ModbusUnit, UnitAddress
+
 
 class ScriptSocket(Protocol):
     """One TCP connection opened by a script. All calls return at once."""
@@ -75,4 +77,8 @@ class Network(Protocol):
 
     def remote_server(self, url: str) -> RemoteServer:
         """Return a server of remote procedures; nothing is connected before its first call."""
+        ...
+
+    def modbus_unit(self, address: UnitAddress) -> ModbusUnit:
+        """Return the connection to a Modbus unit, shared by its signals; connected when it is needed."""
         ...

@@ -7,7 +7,11 @@ import selectors
 import socket
 import threading
 
+from ur_emulator.controller.modbus_signals import UnitAddress
 from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.servers.modbus_client import ModbusClient
+from ur_emulator.servers.modbus_link import ModbusLink
+from ur_emulator.servers.modbus_loading import CodecLoader
 from ur_emulator.servers.xmlrpc_client import XmlRpcServer
 
 _READ_SIZE = 64 * 1024
@@ -166,6 +170,7 @@ class LoopNetwork:
 
     def __init__(self, loop: EventLoop) -> None:
         self._loop = loop
+        self._modbus = ModbusClient(loop, CodecLoader(loop), self.open)
 
     def open(self, host: str, port: int) -> LoopSocket:
         """Begin to connect to `host`:`port`."""
@@ -174,3 +179,11 @@ class LoopNetwork:
     def remote_server(self, url: str) -> XmlRpcServer:
         """Return an XML-RPC server; nothing is connected before its first call."""
         return XmlRpcServer(self._loop, url)
+
+    def modbus_unit(self, address: UnitAddress) -> ModbusLink:
+        """Return the connection to a Modbus unit."""
+        return self._modbus.unit(address)
+
+    def close(self) -> None:
+        """Close what does not belong to one program."""
+        self._modbus.close()

@@ -121,6 +121,8 @@ _INPUTS_OUTPUTS: tuple[Builtin, ...] = (
         "None",
         "serial line of the tool connector",
         since=NOT_CB3,
+        support=APPROXIMATE,
+        note="checked and kept; the connector has no serial line here",
     ),
     _row(
         "set_tool_output_mode",
@@ -128,6 +130,8 @@ _INPUTS_OUTPUTS: tuple[Builtin, ...] = (
         "None",
         "how the tool outputs drive",
         since=NOT_CB3,
+        support=APPROXIMATE,
+        note="kept; outputs have a level only",
         undocumented=(Generation.E_SERIES,),
         source=POLYSCOPE_EXPORT,
     ),
@@ -137,6 +141,8 @@ _INPUTS_OUTPUTS: tuple[Builtin, ...] = (
         "None",
         "how one tool output drives",
         since=NOT_CB3,
+        support=APPROXIMATE,
+        note="kept; outputs have a level only",
         undocumented=(Generation.E_SERIES,),
         source=POLYSCOPE_EXPORT,
     ),
@@ -382,6 +388,8 @@ _MODBUS: tuple[Builtin, ...] = (
         "supervise a signal of a Modbus server",
         since=_FIRST,
         until=_UNTIL_LATE,
+        support=APPROXIMATE,
+        note="one connection a server; the IP may be a name and may have a :port",
     ),
     _row(
         "modbus_add_signal",
@@ -391,12 +399,22 @@ _MODBUS: tuple[Builtin, ...] = (
         since=LATE_E_SERIES,
         source=MANUAL_LATE,
     ),
-    _row("modbus_delete_signal", (_SIGNAL,), "None", "forget a signal"),
+    _row("modbus_delete_signal", (_SIGNAL,), "None", "forget a signal", support=EXACT),
     *(
-        _row(name, (_SIGNAL, *params, secondary), returns, summary, since=since, until=until, source=source)
-        for since, until, secondary, source, value in (
-            (_FIRST, _UNTIL_LATE, _SECONDARY, "", None),
-            (LATE_E_SERIES, releases(), _SECONDARY_OPTIONAL, MANUAL_LATE, ANY),
+        _row(
+            name,
+            (_SIGNAL, *params, secondary),
+            returns,
+            summary,
+            since=since,
+            until=until,
+            source=source,
+            support=support,
+            note="a run-time error once no valid answer has come for 2 s" if support is APPROXIMATE else "",
+        )
+        for since, until, secondary, source, value, support in (
+            (_FIRST, _UNTIL_LATE, _SECONDARY, "", None, APPROXIMATE),
+            (LATE_E_SERIES, releases(), _SECONDARY_OPTIONAL, MANUAL_LATE, ANY, Support.DECLARED_ONLY),
         )
         for name, params, returns, summary in (
             ("modbus_get_signal_status", (), "bool or int", "last value of a signal"),
@@ -416,15 +434,25 @@ _MODBUS: tuple[Builtin, ...] = (
     ),
     _row(
         "modbus_set_signal_update_frequency",
+        (_SIGNAL, Param("update_frequency", NUMBER, unit="Hz, 0 on demand", low=0, high=125)),
+        "None",
+        "how often a signal is refreshed",
+        since=CB3_ONLY,
+        support=EXACT,
+    ),
+    _row(
+        "modbus_set_signal_update_frequency",
         (_SIGNAL, Param("update_frequency", NUMBER, unit="Hz, 0 or -1 acyclic", low=-1, high=500)),
         "None",
         "how often a signal is refreshed",
+        since=NOT_CB3,
     ),
     _row(
         "modbus_set_digital_input_action",
         (_SIGNAL, Param("action", STRING, choices=("default", "freedrive"))),
         "None",
         "what an input does beside being read",
+        support=EXACT,
     ),
     _row(
         "modbus_send_custom_command",
@@ -436,6 +464,8 @@ _MODBUS: tuple[Builtin, ...] = (
         ),
         "None",
         "send a request whose answer is not read",
+        support=APPROXIMATE,
+        note="lost when the server cannot be reached",
     ),
     *(
         _row(name, params, returns, summary, time=time, since=LATE_E_SERIES, source=MANUAL_LATE)

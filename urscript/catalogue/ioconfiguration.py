@@ -117,6 +117,7 @@ def _runstate_rows(since: PerGeneration, last_choice: int) -> tuple[Builtin, ...
             "None",
             "what a Modbus output does when programs start and stop",
             since=since,
+            support=EXACT if since is CB3_ONLY else DECLARED,
         ),
     )
 

@@ -1,0 +1,520 @@
+"""The connection to a Modbus unit: a socket whose other end is the test, and a clock that the test moves."""
+
+import pytest
+from box_support import FakeSocket
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ur_emulator.controller.modbus_signals import ModbusSignal, SignalType, UnitAddress
+from ur_emulator.servers.modbus_codec import ModbusCodec
+from ur_emulator.servers.modbus_link import (
+    ANSWER_TIMEOUT,
+    CONNECT_TIMEOUT,
+    FIRST_RETRY,
+    LAST_RETRY,
+    MAX_OWN_REQUESTS,
+    MAX_STRAYS,
+    MAX_UNDER_WAY,
+    NEXT_REQUEST,
+    TOLERANCE,
+    ModbusLink,
+)
+
+UNIT = UnitAddress("10.0.0.2")
+
+
+class Wire:
+    """A link, the sockets that it has opened, and the time."""
+
+    def __init__(self, *, refuse=False, connecting=False):
+        self.link = ModbusLink(str(UNIT), self._connect)
+        self.sockets = []
+        self.refuse = refuse
+        self.connecting = connecting
+        self.now = 100.0
+        self.codec = ModbusCodec()
+        self.next_call = None
+
+    def _connect(self):
+        sock = FakeSocket()
+        sock.is_open = not self.refuse and not self.connecting
+        sock.is_connecting = self.connecting
+        self.sockets.append(sock)
+        return sock
+
+    @property
+    def sock(self):
+        return self.sockets[-1]
+
+    def advance(self, seconds=0.0):
+        self.now += seconds
+        self.next_call = self.link.advance(self.now, self.codec)
+
+    def want(self, *signals):
+        for signal in signals:
+            self.link.want(signal)
+        self.advance()
+
+    def asked(self):
+        """Return the requests that have been sent and not looked at yet, as (transaction, rest)."""
+        requests = []
+        data = self.sock.sent
+        while data:
+            size = 6 + int.from_bytes(data[4:6], "big")
+            requests.append((int.from_bytes(data[:2], "big"), bytes(data[6:size])))
+            del data[:size]
+        return requests
+
+    def answer(self, transaction, pdu, slave=255):
+        self.sock.inbox += (
+            transaction.to_bytes(2, "big")
+            + b"\0\0"
+            + (len(pdu) + 1).to_bytes(2, "big")
+            + bytes([slave])
+            + pdu
+        )
+        self.advance()
+
+
+def signal(kind=2, address=5, name="s", **kwargs):
+    return ModbusSignal(name, UNIT, kwargs.pop("slave", 255), address, SignalType(kind), **kwargs)
+
+
+@pytest.fixture
+def wire():
+    return Wire()
+
+
+def lose(wire, wanted):
+    """Let the tolerance pass; return what the signal says of it."""
+    wire.advance(TOLERANCE)
+    wire.advance(0.01)
+    return wanted.trouble
+
+
+# --- what is asked for, what the answers mean
+
+
+@pytest.mark.parametrize(
+    ("kind", "request_hex", "answer_hex", "value"),
+    [
+        (0, "ff0200050001", "020101", 1),
+        (0, "ff0200050001", "0201fe", 0),
+        (1, "ff0100050001", "010101", 1),
+        (2, "ff0400050001", "0402ffff", 65535),
+        (3, "ff0300050001", "030204d2", 1234),
+    ],
+)
+def test_each_type_is_read_with_its_function(wire, kind, request_hex, answer_hex, value):
+    s = signal(kind)
+    wire.want(s)
+    [(transaction, request)] = wire.asked()
+    assert request.hex() == request_hex
+    wire.answer(transaction, bytes.fromhex(answer_hex))
+    assert s.value == value
+
+
+@pytest.mark.parametrize(
+    ("kind", "output", "pdu"), [(1, 1, "050005ff00"), (1, 0, "0500050000"), (3, 513, "0600050201")]
+)
+def test_outputs_are_written_with_their_function(wire, kind, output, pdu):
+    s = signal(kind, output=output)
+    wire.want(s)
+    [(transaction, request)] = wire.asked()
+    assert request.hex() == "ff" + pdu
+    wire.answer(transaction, bytes.fromhex(pdu))
+    wire.advance(2 * TOLERANCE)
+    assert not s.trouble
+
+
+def test_the_slave_number_is_sent(wire):
+    wire.want(signal(slave=17))
+    assert wire.asked()[0][1][0] == 17
+
+
+def test_nothing_is_connected_before_something_is_wanted(wire):
+    wire.advance(10.0)
+    assert not wire.sockets
+
+
+def test_a_signal_is_asked_for_once_while_its_answer_is_awaited(wire):
+    s = signal()
+    wire.want(s)
+    wire.want(s)
+    wire.advance(3 * NEXT_REQUEST)
+    [(transaction, _)] = wire.asked()
+    wire.answer(transaction, bytes.fromhex("04020001"))
+    assert len(wire.asked()) == 1  # the second wish
+
+
+def test_an_output_that_changes_while_it_is_written_is_written_again(wire):
+    s = signal(3, output=1)
+    wire.want(s)
+    s.output = 2
+    wire.want(s)
+    [(transaction, _)] = wire.asked()
+    wire.answer(transaction, bytes.fromhex("0600050001"))
+    assert [request.hex() for _, request in wire.asked()] == ["ff0600050002"]
+
+
+def test_an_answer_to_a_read_does_not_undo_an_output_that_was_set_meanwhile(wire):
+    s = signal(3)
+    wire.want(s)
+    [(transaction, _)] = wire.asked()
+    s.output = s.value = 9
+    wire.answer(transaction, bytes.fromhex("03020001"))
+    assert s.value == 9
+
+
+def test_signals_of_a_unit_share_one_connection_and_are_served_in_order(wire):
+    signals = [signal(address=i, name=str(i)) for i in range(5)]
+    wire.want(*signals)
+    for i, s in enumerate(signals):
+        [(transaction, request)] = wire.asked()
+        assert request[3] == i
+        wire.answer(transaction, bytes([4, 2, 0, 40 + i]))
+        assert s.value == 40 + i
+    assert len(wire.sockets) == 1
+
+
+def test_a_slow_unit_gets_the_next_request_after_a_cycle_and_may_answer_in_any_order(wire):
+    a, b = signal(address=1, name="a"), signal(address=2, name="b")
+    wire.want(a, b)
+    wire.advance(NEXT_REQUEST)
+    first, second = (transaction for transaction, _ in wire.asked())
+    wire.answer(second, bytes([4, 2, 0, 22]))
+    wire.answer(first, bytes([4, 2, 0, 11]))
+    assert (a.value, b.value) == (11, 22)
+
+
+def test_in_sequential_mode_it_gets_one_request_at_a_time(wire):
+    a, b = signal(address=1, name="a"), signal(address=2, name="b", sequential=True)
+    wire.want(a, b)
+    wire.advance(0.9 * ANSWER_TIMEOUT)
+    assert len(wire.asked()) == 1
+
+
+def test_a_unit_that_is_not_in_a_hurry_never_has_more_than_a_few_requests(wire):
+    wire.want(*(signal(address=i, name=str(i)) for i in range(100)))
+    for _ in range(40):
+        wire.advance(NEXT_REQUEST)
+    assert len(wire.asked()) == MAX_UNDER_WAY
+
+
+def test_transactions_count_on_past_their_largest_number(wire):
+    s = signal()
+    wire.link._transaction = 0xFFFE
+    seen = []
+    for _ in range(3):
+        wire.want(s)
+        [(transaction, _)] = wire.asked()
+        seen.append(transaction)
+        wire.answer(transaction, bytes.fromhex("04020001"))
+    assert seen == [0xFFFF, 1, 2]
+
+
+def test_a_forgotten_signal_takes_no_answer(wire):
+    s, other = signal(), signal(name="other")
+    wire.want(s)
+    [(transaction, _)] = wire.asked()
+    wire.link.forget(s)
+    wire.answer(transaction, bytes.fromhex("04020009"))
+    assert s.value == 0
+    wire.want(other)
+    assert len(wire.asked()) == 1
+    assert len(wire.sockets) == 1
+
+
+# --- own requests
+
+
+def test_own_requests_are_sent_as_they_are_and_their_answer_is_dropped(wire):
+    wire.link.send(103, 6, bytes([17, 32, 2, 88]))
+    wire.link.release()
+    wire.advance()
+    [(transaction, request)] = wire.asked()
+    assert request == bytes([103, 6, 17, 32, 2, 88])
+    assert not wire.link.is_idle
+    wire.answer(transaction, bytes([0x86, 1]), slave=103)
+    assert wire.link.is_idle
+
+
+def test_own_requests_are_lost_when_nobody_is_there_and_bounded_before():
+    wire = Wire(refuse=True)
+    for i in range(MAX_OWN_REQUESTS + 5):
+        wire.link.send(1, 6, bytes([i]))
+    assert len(wire.link._own_requests) == MAX_OWN_REQUESTS
+    wire.link.release()
+    wire.advance()
+    assert wire.link.is_idle
+
+
+@given(function=st.integers(0, 255), data=st.binary(max_size=252), slave=st.integers(0, 255))
+def test_any_own_request_is_a_frame_that_can_be_read_back(function, data, slave):
+    codec = ModbusCodec()
+    inbox = bytearray(codec.own_request(function, slave, data, 7))
+    frame = codec.take_frame(inbox)
+    assert (frame.slave, frame.pdu, bytes(inbox)) == (slave, bytes([function]) + data, b"")
+
+
+# --- units that are not there, break off, or are silent
+
+
+def test_a_connection_that_is_refused_is_tried_again_and_again_more_and_more_rarely():
+    wire = Wire(refuse=True)
+    s = signal()
+    wire.want(s)
+    pauses = []
+    for _ in range(8):
+        assert wire.next_call > wire.now
+        pauses.append(wire.next_call - wire.now)
+        wire.advance(0.5 * pauses[-1])
+        n = len(wire.sockets)
+        wire.now = wire.next_call
+        wire.advance()
+        assert len(wire.sockets) == n + 1
+    assert pauses[0] == pytest.approx(FIRST_RETRY)
+    assert pauses == sorted(pauses)
+    assert pauses[-1] == pytest.approx(LAST_RETRY)
+    assert s.trouble == "10.0.0.2:502 refuses the connection"
+    wire.refuse = False
+    wire.advance(LAST_RETRY)
+    [(transaction, _)] = wire.asked()
+    wire.answer(transaction, bytes.fromhex("04020007"))
+    assert (s.value, s.trouble) == (7, "")
+
+
+def test_a_connection_that_nobody_takes_is_given_up():
+    wire = Wire(connecting=True)
+    s = signal()
+    wire.want(s)
+    wire.advance(CONNECT_TIMEOUT)
+    assert len(wire.sockets) == 1
+    wire.advance(LAST_RETRY)
+    assert len(wire.sockets) == 2
+    assert s.trouble == "10.0.0.2:502 cannot be connected within 2 s"
+
+
+def test_a_silent_unit_is_left_and_the_signal_is_lost_after_the_tolerance(wire):
+    s = signal()
+    wire.want(s)
+    assert wire.next_call <= wire.now + ANSWER_TIMEOUT
+    wire.advance(ANSWER_TIMEOUT)
+    assert not wire.sock.is_open
+    assert not s.trouble
+    assert lose(wire, s) == "10.0.0.2:502 does not answer"
+    assert len(wire.sockets) > 1
+
+
+def test_a_value_stays_while_its_unit_is_away(wire):
+    s = signal()
+    wire.want(s)
+    wire.answer(wire.asked()[0][0], bytes.fromhex("04020007"))
+    wire.sock.close()
+    wire.refuse = True
+    wire.want(s)
+    wire.advance(0.9 * TOLERANCE)
+    assert (s.value, s.trouble) == (7, "")
+    wire.advance(0.2 * TOLERANCE)
+    assert s.value == 7
+    assert s.trouble == "10.0.0.2:502 refuses the connection"
+
+
+def test_an_idle_connection_that_is_closed_is_nobodys_trouble(wire):
+    s = signal()
+    wire.want(s)
+    wire.answer(wire.asked()[0][0], bytes.fromhex("04020007"))
+    wire.sock.close()
+    wire.advance(10 * TOLERANCE)
+    assert not s.trouble
+    assert len(wire.sockets) == 1
+    wire.want(s)
+    wire.advance(LAST_RETRY)
+    assert len(wire.sockets) == 2
+
+
+def test_an_answer_counts_although_the_unit_has_closed_behind_it(wire):
+    s = signal()
+    wire.want(s)
+    [(transaction, _)] = wire.asked()
+    wire.sock.is_open = False
+    wire.answer(transaction, bytes.fromhex("04020007"))
+    assert s.value == 7
+
+
+def test_a_frame_cut_off_by_the_end_of_the_connection_is_no_answer(wire):
+    s = signal()
+    wire.want(s)
+    wire.sock.inbox += bytes.fromhex("000100000005ff04")
+    wire.sock.close()
+    wire.advance()
+    assert s.value == 0
+    wire.advance(FIRST_RETRY)
+    [(transaction, _)] = wire.asked()
+    wire.answer(transaction, bytes.fromhex("04020007"))
+    assert s.value == 7
+
+
+def test_an_answer_may_come_in_pieces(wire):
+    s = signal()
+    wire.want(s)
+    [(transaction, _)] = wire.asked()
+    for byte in transaction.to_bytes(2, "big") + bytes.fromhex("00000005ff0402002a"):
+        assert s.value == 0
+        wire.sock.inbox.append(byte)
+        wire.advance(0.05)
+    assert s.value == 42
+
+
+def test_one_lost_answer_does_not_cost_the_connection(wire):
+    a, b = signal(address=1, name="a"), signal(address=2, name="b")
+    wire.want(a, b)
+    wire.advance(NEXT_REQUEST)
+    (lost, _), (second, _) = wire.asked()
+    wire.answer(second, bytes([4, 2, 0, 22]))
+    wire.advance(ANSWER_TIMEOUT)
+    [(again, request)] = wire.asked()
+    assert request[3] == 1
+    wire.answer(lost, bytes([4, 2, 0, 99]))  # too late
+    assert a.value == 0
+    wire.answer(again, bytes([4, 2, 0, 11]))
+    assert (a.value, b.value) == (11, 22)
+    assert len(wire.sockets) == 1
+
+
+# --- units that say wrong things
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [
+        b"HTTP/1.1 400 Bad Request\r\n\r\n",
+        b"\0\1\0\1\0\5\xff\4\2\0\1",  # protocol id 1
+        b"\0\1\0\0\0\0",  # no unit id
+        b"\0\1\0\0\0\1\xff",  # no function code
+        b"\0\1\0\0\xff\xff\xff",  # longer than a frame can be
+        bytes(64),
+        b"\xff" * 64,
+    ],
+)
+def test_what_is_no_modbus_ends_the_connection(wire, garbage):
+    s = signal()
+    wire.want(s)
+    wire.sock.inbox += garbage
+    wire.advance()
+    assert not wire.sock.is_open
+    assert s.value == 0
+    wire.refuse = False
+    wire.advance(FIRST_RETRY)
+    [(transaction, _)] = wire.asked()
+    wire.answer(transaction, bytes.fromhex("04020007"))
+    assert s.value == 7
+
+
+def test_answers_with_wrong_transaction_numbers_are_dropped_then_end_the_connection(wire):
+    s = signal()
+    wire.want(s)
+    [(transaction, _)] = wire.asked()
+    for i in range(MAX_STRAYS):
+        wire.answer(transaction + 1 + i, bytes.fromhex("04020063"))
+    assert s.value == 0
+    assert wire.sock.is_open
+    wire.answer(transaction, bytes.fromhex("04020007"))
+    assert s.value == 7
+    for i in range(MAX_STRAYS + 1):
+        wire.answer(transaction + 1 + i, bytes.fromhex("04020063"))
+    assert not wire.sock.is_open
+    assert s.value == 7
+
+
+@pytest.mark.parametrize(
+    ("code", "name"),
+    [
+        (1, "illegal function"),
+        (2, "illegal data address"),
+        (3, "illegal data value"),
+        (4, "slave device failure"),
+        (5, "acknowledge"),
+        (6, "slave device busy"),
+        (99, "unknown"),
+    ],
+)
+def test_an_exception_is_named_once_the_tolerance_is_over_and_forgiven_by_an_answer(wire, code, name):
+    s = signal()
+    for _ in range(3):
+        wire.want(s)
+        wire.answer(wire.asked()[0][0], bytes([0x84, code]))
+        wire.advance(0.4 * TOLERANCE)
+    assert s.trouble == f"10.0.0.2:502 answers with exception E{code} ({name})"
+    assert len(wire.sockets) == 1
+    wire.want(s)
+    wire.answer(wire.asked()[0][0], bytes.fromhex("04020007"))
+    assert (s.value, s.trouble) == (7, "")
+
+
+@pytest.mark.parametrize(
+    "pdu",
+    [
+        "04",  # nothing behind the function code
+        "84",
+        "0400",
+        "0401aa",
+        "0402aa",
+        "040400010002",  # two registers
+        "03020001",  # another function
+        "0600050001",
+        "63020001",  # a function that does not exist
+        "00",
+        "83020001",
+    ],
+)
+def test_a_wrong_answer_spoils_one_answer_and_no_more(wire, pdu):
+    s = signal()
+    wire.want(s)
+    wire.answer(wire.asked()[0][0], bytes.fromhex(pdu))
+    assert s.value == 0
+    assert wire.sock.is_open
+    assert lose(wire, s) == "10.0.0.2:502 gives an answer that makes no sense"
+    wire.want(s)
+    wire.answer(wire.asked()[0][0], bytes.fromhex("04020007"))
+    assert (s.value, s.trouble) == (7, "")
+
+
+@pytest.mark.parametrize("echo", ["0600050002", "0600060001", "06", "0600", "8602", "050005ff00"])
+def test_an_output_that_is_not_confirmed_is_lost(wire, echo):
+    s = signal(3, output=1)
+    wire.want(s)
+    wire.answer(wire.asked()[0][0], bytes.fromhex(echo))
+    assert lose(wire, s).startswith("10.0.0.2:502 ")
+
+
+@given(st.lists(st.binary(max_size=40), max_size=12))
+def test_no_bytes_break_it_and_a_good_unit_is_heard_afterwards(pieces):
+    wire = Wire()
+    s = signal()
+    wire.want(s)
+    for piece in pieces:
+        wire.sock.inbox += piece
+        wire.want(s)
+        wire.advance(0.01)
+    wire.advance(ANSWER_TIMEOUT)
+    for _ in range(20):
+        wire.want(s)
+        wire.advance(LAST_RETRY)
+        wire.sock.inbox.clear()
+        for transaction, _ in wire.asked():
+            wire.answer(transaction, bytes.fromhex("040204d2"))
+    assert (s.value, s.trouble) == (1234, "")
+
+
+# --- without the library
+
+
+def test_without_the_library_signals_say_so():
+    wire = Wire()
+    s = signal()
+    wire.link.want(s)
+    assert wire.link.advance(0.0, None) == float("inf")
+    wire.link.advance(TOLERANCE + 0.1, None, "pymodbus cannot be loaded: pip install pymodbus")
+    assert not wire.sockets
+    assert s.trouble == "10.0.0.2:502 pymodbus cannot be loaded: pip install pymodbus"

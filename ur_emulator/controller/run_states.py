@@ -1,0 +1,30 @@
+"""What outputs do when programs start and stop: the codes, and the level that each asks for.
+
+Source: URScript manual CB3 3.15, module ioconfiguration.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class RunState(IntEnum):
+    """What an output does when programs start and stop."""
+
+    KEEP = 0
+    LOW_WHEN_STOPPED = 1
+    HIGH_WHEN_STOPPED = 2
+    HIGH_WHEN_RUNNING = 3  # and low when stopped
+
+
+_WHEN_RUNNING = {RunState.HIGH_WHEN_RUNNING: True}
+_WHEN_STOPPED = {
+    RunState.LOW_WHEN_STOPPED: False,
+    RunState.HIGH_WHEN_STOPPED: True,
+    RunState.HIGH_WHEN_RUNNING: False,
+}
+
+
+def level(rule: RunState, program_runs: bool) -> bool | None:
+    """Return the level that an output takes (True is high); None leaves it alone."""
+    return (_WHEN_RUNNING if program_runs else _WHEN_STOPPED).get(rule)

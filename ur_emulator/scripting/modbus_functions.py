@@ -1,0 +1,166 @@
+"""Modbus builtins: signals of other units that the controller supervises. They act at once and never wait.
+
+Reading or setting a signal whose unit has given no valid answer for too long is a run-time error, as with the
+watchdog of later controllers; before that a signal has its last value, at first 0.
+Source: URScript manual CB3 3.15, module interfaces.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ur_emulator.controller.modbus_signals import (
+    DEFAULT_ACTION,
+    DEFAULT_PORT,
+    MAX_SIGNALS,
+    ModbusSignal,
+    SignalType,
+    UnitAddress,
+)
+from ur_emulator.controller.run_states import RunState
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.scripting.network import Network
+from urscript.errors import ScriptRuntimeError
+
+Function = Callable[..., Any]
+
+# Source: URScript manual, modbus_add_signal.
+MAX_NAME = 20
+WORD_MAX = 0xFFFF
+BYTE_MAX = 0xFF
+# Function code and data of a request. Source: Modbus application protocol, section 4.1.
+MAX_DATA = 252
+
+_ADDRESS = re.compile(r"([A-Za-z0-9._-]{1,253})(?::(\d{1,5}))?")
+
+
+def modbus_functions(state: ControllerState, network: Network) -> Mapping[str, Function]:
+    """Return the Modbus builtins bound to one controller.
+
+    Args:
+        state: its signals.
+        network: connects to units.
+    """
+    return {**_definitions(state, network), **_values(state), **_settings(state)}
+
+
+def _definitions(state: ControllerState, network: Network) -> dict[str, Function]:
+    modbus = state.modbus
+
+    def add_signal(
+        thread: object, ip: str, slave: int, address: int, kind: int, name: str, sequential: bool
+    ) -> None:
+        builtin = "modbus_add_signal"
+        if not 0 < len(name) <= MAX_NAME:
+            raise ScriptRuntimeError(
+                f'{builtin}: "{name}" is no signal name, it must have 1 to {MAX_NAME} characters'
+            )
+        if name not in modbus.signals and len(modbus.signals) >= MAX_SIGNALS:
+            raise ScriptRuntimeError(f"{builtin}: there are {MAX_SIGNALS} signals already, delete one first")
+        unit = _unit_address(builtin, ip)
+        modbus.add(
+            ModbusSignal(name, unit, slave, address, SignalType(kind), sequential), network.modbus_unit
+        )
+
+    def send_custom_command(thread: object, ip: str, slave: int, code: int, data: list[Any]) -> None:
+        builtin = "modbus_send_custom_command"
+        if len(data) > MAX_DATA or not all(type(item) is int and 0 <= item <= BYTE_MAX for item in data):
+            raise ScriptRuntimeError(
+                f"{builtin}: data must be a list of up to {MAX_DATA} integers from 0 to {BYTE_MAX}"
+            )
+        modbus.send(_unit_address(builtin, ip), network.modbus_unit, slave, code, bytes(data))
+
+    return {
+        "modbus_add_signal": add_signal,
+        "modbus_delete_signal": lambda thread, name: modbus.delete(name),
+        "modbus_send_custom_command": send_custom_command,
+    }
+
+
+def _values(state: ControllerState) -> dict[str, Function]:
+    modbus = state.modbus
+
+    def get_signal_status(thread: object, name: str, is_secondary: bool) -> bool | int:
+        builtin = "modbus_get_signal_status"
+        signal = _signal(state, builtin, name)
+        if not signal.frequency:
+            modbus.refresh(signal)
+        _must_be_well(builtin, signal)
+        return bool(signal.value) if signal.type.is_digital else signal.value
+
+    def set_output_signal(thread: object, name: str, value: bool, is_secondary: bool) -> None:
+        builtin = "modbus_set_output_signal"
+        _set(builtin, _signal(state, builtin, name, SignalType.DIGITAL_OUTPUT), int(value))
+
+    def set_output_register(thread: object, name: str, value: int, is_secondary: bool) -> None:
+        builtin = "modbus_set_output_register"
+        if not 0 <= value <= WORD_MAX:
+            raise ScriptRuntimeError(
+                f"{builtin}: {value} does not fit into a register, allowed are 0 to {WORD_MAX}"
+            )
+        _set(builtin, _signal(state, builtin, name, SignalType.REGISTER_OUTPUT), value)
+
+    def _set(builtin: str, signal: ModbusSignal, value: int) -> None:
+        modbus.set_output(signal, value)
+        _must_be_well(builtin, signal)
+
+    return {
+        "modbus_get_signal_status": get_signal_status,
+        "modbus_set_output_signal": set_output_signal,
+        "modbus_set_output_register": set_output_register,
+    }
+
+
+def _settings(state: ControllerState) -> dict[str, Function]:
+    def set_update_frequency(thread: object, name: str, frequency: float) -> None:
+        signal = _signal(state, "modbus_set_signal_update_frequency", name)
+        signal.frequency = frequency
+        signal.due = state.tick
+
+    def set_input_action(thread: object, name: str, action: str) -> None:
+        builtin = "modbus_set_digital_input_action"
+        _signal(state, builtin, name, SignalType.DIGITAL_INPUT).action = action or DEFAULT_ACTION
+
+    def set_runstate_choice(thread: object, name: str, code: int) -> None:
+        builtin = "modbus_set_runstate_dependent_choice"
+        signal = _signal(state, builtin, name)
+        if not signal.type.is_output:
+            raise ScriptRuntimeError(f'{builtin}: signal "{name}" is a {signal.type.title}, not an output')
+        state.modbus.set_rule(signal, RunState(code), state.io_configuration.program_runs)
+
+    return {
+        "modbus_set_signal_update_frequency": set_update_frequency,
+        "modbus_set_digital_input_action": set_input_action,
+        "modbus_set_runstate_dependent_choice": set_runstate_choice,
+    }
+
+
+def _signal(
+    state: ControllerState, builtin: str, name: str, wanted: SignalType | None = None
+) -> ModbusSignal:
+    """Return a signal, which must be of the wanted type."""
+    signal = state.modbus.signals.get(name)
+    if signal is None:
+        raise ScriptRuntimeError(
+            f'{builtin}: there is no Modbus signal "{name}", add it with modbus_add_signal'
+        )
+    if wanted is not None and signal.type is not wanted:
+        raise ScriptRuntimeError(f'{builtin}: signal "{name}" is a {signal.type.title}, not a {wanted.title}')
+    return signal
+
+
+def _must_be_well(builtin: str, signal: ModbusSignal) -> None:
+    if signal.trouble:
+        raise ScriptRuntimeError(f'{builtin}: signal "{signal.name}" is lost: {signal.trouble}')
+
+
+def _unit_address(builtin: str, text: str) -> UnitAddress:
+    match = _ADDRESS.fullmatch(text)
+    port = int(match[2] or DEFAULT_PORT) if match else 0
+    if match is None or not 0 < port <= WORD_MAX:
+        raise ScriptRuntimeError(
+            f'{builtin}: "{text[:80]}" is no address, write "ip" or "ip:port", port 1 to 65535'
+        )
+    return UnitAddress(match[1], port)
