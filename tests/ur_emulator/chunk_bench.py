@@ -7,7 +7,7 @@ from box_support import Bench
 from chunk_actions import act
 from chunk_peers import ChunkNetwork
 
-from protocol.ur_types import SafetyMode
+from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.controller.commands import AnswerRequest, ClosePopup, StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
@@ -71,10 +71,10 @@ class ChunkRun:
         raise AssertionError(f"{self.chunk}: still running, texts so far: {self.messages}")
 
     def _is_over(self):
-        controller = self.bench.controller
-        if getattr(controller.programs, "is_paused", False):
-            return not controller.state.motion.is_moving or controller.state.motion.is_paused
-        return not (controller.programs.is_running or controller.state.motion.is_moving)
+        programs = self.bench.controller.programs
+        if programs.is_running:
+            return programs.runtime_state is ProgramState.PAUSED
+        return not self.bench.controller.state.motion.is_moving
 
     def _tick_if(self, commands):
         if commands:
@@ -149,9 +149,7 @@ def run_box_chunk(chunk):
         assert run.network.sent == chunk.sent, f"{chunk}: sent {run.network.sent}"
     assert run.network.called == chunk.called, f"{chunk}: called {run.network.called}"
     assert not any(socket.is_open for socket in run.network.sockets), f"{chunk}: left a socket open"
-    assert bool(getattr(run.bench.controller.programs, "is_paused", False)) == chunk.paused, (
-        f"{chunk}: paused"
-    )
+    assert run.bench.controller.programs.is_paused == chunk.paused, f"{chunk}: paused"
     for name, value, tolerance in chunk.states:
         _compare_value(chunk, name, getattr(run.bench.now, name), value, tolerance)
     return run
