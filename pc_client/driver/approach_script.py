@@ -11,6 +11,9 @@ APPROACH_NAME = "ur_client_approach"
 STOP_DECELERATION = 2.0
 """[rad/s2] of the stop program: firm, without jerking the base. Source: ur_rtde's default for stopJ."""
 
+STOP_WORD = "stop program\n"
+"""A controller's own word, no program: ends what runs or is paused. Source: public client library."""
+
 _FASTEST_APPROACH = 1.05
 """[rad/s], PolyScope's default speed of movej (60 deg/s): an approach is never faster."""
 

@@ -7,6 +7,7 @@ Works by the real protocol only. Every way out of a motion (done, refused, Ctrl-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.control.tracker import Tracker
-from pc_client.driver.approach_script import approach_script, stop_script
+from pc_client.driver.approach_script import STOP_WORD, approach_script, stop_script
 from pc_client.driver.package_stream import PackageStream, raise_on_error
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import receiver_script
@@ -222,11 +223,21 @@ class UrDriver:
         try:
             act()
             wait_until(has_ended, self._frames, self._network, REST_TIMEOUT, "the robot's program goes on")
-            wait_for_rest(self._frames, self._network)
+            if not is_stopped(wait_for_rest(self._frames, self._network)):
+                self._end_paused_program()
         except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
             return False
         self._in_motion = False
         return True
+
+    def _end_paused_program(self) -> None:
+        """End the program that a safety stop has paused, lest somebody lets it go on without us.
+
+        A robot that does not listen keeps it; nothing moves meanwhile, and the next run will say so.
+        """
+        with suppress(DriverError):
+            self._scripts.send_program(STOP_WORD)
+            wait_until(is_stopped, self._frames, self._network, REST_TIMEOUT, "the paused program stays")
 
     def _send_stop_program(self) -> None:
         """Replace whatever runs by a program that stops the arm.

@@ -13,6 +13,7 @@ from integration_support import HELLO_PROGRAM, Frames, Messages, VelocitySession
 import ur_emulator.realtime.pacing as pacing
 from protocol.primary_messages import (
     ErrorCodeMessage,
+    KeyMessage,
     RuntimeExceptionMessage,
     SafetyModeMessage,
     TextMessage,
@@ -52,6 +53,11 @@ class Judge:
     def until_rest(self):
         return self.until(lambda f: f.runtime_state == ProgramState.STOPPED and not f.target_qd.any())
 
+    def until_stopped_or_paused(self):
+        """A protective stop pauses the program, unless it ended before."""
+        ended = (ProgramState.STOPPED, ProgramState.PAUSED)
+        return self.until(lambda f: f.runtime_state in ended and not f.target_qd.any())
+
 
 def next_program_works(box, frames):
     with Messages(box) as primary:
@@ -82,16 +88,18 @@ def test_velocities_beyond_the_limits_end_in_a_protective_stop(lockstep_box, val
             frame = session.frames.new()
             judge.check(frame)
             stopped = frame.safety_mode == SafetyMode.PROTECTIVE_STOP
-        rest = judge.until_rest()
+        rest = judge.until_stopped_or_paused()
+        assert rest.runtime_state == ProgramState.PAUSED
         assert rest.safety_mode == SafetyMode.PROTECTIVE_STOP
         told = primary.message(ErrorCodeMessage)
         assert told.code == 204
         assert "rad/s, limit" in told.text
         assert primary.message(SafetyModeMessage).safety_mode == SafetyMode.PROTECTIVE_STOP
-        assert is_closed(session.reverse)
+        primary.message(KeyMessage, title="PROGRAM_XXX_PAUSED", text="velocity_receiver")
         send(lockstep_box, "secondary", "set unlock protective stop\n")
         judge.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
         next_program_works(lockstep_box, session.frames)
+        assert is_closed(session.reverse)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -102,7 +110,7 @@ def test_a_joint_that_is_driven_to_the_end_of_its_range_stops_within_it(lockstep
         while frame.safety_mode == SafetyMode.NORMAL:
             frame = session.velocity(sign * 3.0, sign * -0.4)
             judge.check(frame)
-        rest = judge.until_rest()
+        rest = judge.until_stopped_or_paused()
         assert abs(rest.target_q[0]) == pytest.approx(2 * math.pi, abs=0.05)
         send(lockstep_box, "secondary", "set unlock protective stop\n")
         judge.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
@@ -182,7 +190,7 @@ def test_random_messages_never_break_the_limits(lockstep_box):
                 frame = session.frames.new()
                 judge.check(frame)
             session.reverse.close()
-            judge.until_rest()
+            judge.until_stopped_or_paused()
             send(lockstep_box, "secondary", "set unlock protective stop\n")
             judge.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
 
@@ -203,7 +211,7 @@ def test_no_call_brings_the_target_beyond_the_limits(lockstep_box, call):
         judge.check(frames.next())
         send(lockstep_box, "secondary", f"def f():\n  {call}\nend\n")
         judge.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
-        rest = judge.until_rest()
+        rest = judge.until_stopped_or_paused()
         assert primary.message(ErrorCodeMessage).code == 204
         assert rest.safety_mode == SafetyMode.PROTECTIVE_STOP
 

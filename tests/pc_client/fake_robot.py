@@ -28,7 +28,7 @@ LAYOUT = layout_for_version(VERSION)
 _ENCODE = LAYOUT.encoder()
 _COUNTS = {column.attribute: column.count for column in LAYOUT.columns}
 _ALL_ZERO = {name: 0.0 if _COUNTS.get(name, 1) == 1 else (0.0,) * _COUNTS[name] for name in SNAPSHOT_FIELDS}
-STOPPED, PLAYING = 1, 2
+STOPPED, PLAYING, PAUSED = 1, 2, 4
 
 
 class Pipe:
@@ -113,6 +113,7 @@ class FakeRobot:
         self.refuses = False
         self.deaf_to_stop = False
         self.error_in = None
+        self.pauses = False  # a safety stop pauses the program, as on a real controller
 
     # ---- Network
     def now(self):
@@ -152,6 +153,9 @@ class FakeRobot:
                 pipe.incoming.append(answer.encode() + b"\n")
 
     def load(self, text):
+        if text == "stop program\n":
+            self.program = None
+            return
         assert text.endswith("end\n"), text
         self.programs.append(text)
         if self.refuses:
@@ -210,7 +214,9 @@ class FakeRobot:
         if self.on_tick is not None:
             self.on_tick(self)
         if self.safety_mode != 1:
-            self.qd, self.program = [0.0] * 6, None
+            self.qd = [0.0] * 6
+            if not self.pauses:
+                self.program = None
         elif self.program == "approach":
             self.remaining -= 1
             if not self.remaining:
@@ -244,7 +250,7 @@ class FakeRobot:
             actual_qd=tuple(self.qd),
             robot_mode=self.robot_mode,
             safety_mode=self.safety_mode,
-            runtime_state=STOPPED if self.program is None else PLAYING,
+            runtime_state=STOPPED if self.program is None else PAUSED if self.safety_mode != 1 else PLAYING,
         )
         return _ENCODE(SimpleNamespace(**values))
 

@@ -202,6 +202,17 @@ def test_what_goes_wrong_ends_the_run_with_one_line_and_a_stopped_arm(action, er
     assert "reverse" in robot.closed
 
 
+@pytest.mark.parametrize("lockstep", [False, True])
+def test_a_program_that_a_protective_stop_has_paused_is_not_left_behind(lockstep):
+    robot = FakeRobot(lockstep=lockstep, on_tick=spoil_at(1040, protective_stop))
+    robot.pauses = True
+    with pytest.raises(RobotStoppedError, match="PROTECTIVE_STOP") as caught:
+        stream(robot)
+    assert "\n" not in str(caught.value)
+    assert not getattr(caught.value, "__notes__", [])
+    assert robot.program is None
+
+
 class Spoilt:
     """A tracker whose answer goes wrong after some steps."""
 
