@@ -1,6 +1,6 @@
 """Modbus TCP frames by pymodbus without its I/O: bytes in, values out; no sockets, no clock.
 
-Importing pymodbus takes some 50 ms and 11 MB: only `modbus_loading` imports this module, in a thread.
+Importing pymodbus takes some 50 ms: only `modbus_loading` imports this module, in a thread.
 """
 
 from __future__ import annotations
