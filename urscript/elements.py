@@ -27,11 +27,16 @@ def make_list(items: list[Any]) -> Any:
     if first is Matrix:
         raise ScriptRuntimeError("a matrix has two dimensions, not three")
     for item in items:
-        if type(item) is not first:
+        if not _are_alike(items[0], item):
             raise ScriptRuntimeError(
                 f"all elements of a list have one type, got {type_name(items[0])} and {type_name(item)}"
             )
     return items
+
+
+def _are_alike(a: Any, b: Any) -> bool:
+    """Whether two values may be elements of one list."""
+    return type(a) is type(b) or (a is not None and b is not None and same_kind(type(a), b))
 
 
 def make_pose(*items: Any) -> Pose:
@@ -49,6 +54,8 @@ def _position(index: Any, length: int) -> int:
     if type(index) is not int:
         raise ScriptRuntimeError(f"an index must be an integer, got {a_type(index)}")
     if not 0 <= index < length:
+        if length == 0:
+            raise ScriptRuntimeError(f"index {index} is out of range, the list is empty")
         raise ScriptRuntimeError(f"index {index} is out of range, the valid ones are 0 to {length - 1}")
     return index
 
@@ -78,7 +85,7 @@ def store_item(value: Any, index: Any, target: Any) -> Any:
     kind = type(target)
     if kind is list:
         place = _position(index, len(target))
-        if not same_kind(type(target[place]), value):
+        if not _are_alike(target[place], value):
             raise ScriptRuntimeError(f"cannot store {a_type(value)} in a list of {type_name(target[place])}")
         changed = target.copy()
         changed[place] = value

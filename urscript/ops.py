@@ -206,6 +206,7 @@ def _ordering(sign: str, compare: Callable[[Any, Any], bool]) -> Callable[[Any, 
         ta, tb = type(a), type(b)
         if (ta is float or ta is int) and (tb is float or tb is int):
             return compare(a, b)
+        a, b = getattr(a, "thread_id", a), getattr(b, "thread_id", b)
         if is_number(a) and is_number(b):
             return bool(compare(a, b))
         raise ScriptRuntimeError(f"'{sign}' compares numbers, got {type_name(a)} and {type_name(b)}")

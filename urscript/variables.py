@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from urscript import dialect
 from urscript.errors import ScriptRuntimeError
-from urscript.values import a_type, type_name
+from urscript.values import Pose, a_type, is_number, type_name
 
 
 class _Undefined:
@@ -35,7 +35,7 @@ def same_kind(old: type, value: Any) -> bool:
     if new is old or (dialect.NONE_FITS_EVERY_VARIABLE and (value is None or old is type(None))):
         return True
     if old is int or old is float:
-        # A thread handle and the integer 0 stand for each other. Source: driver scripts.
+        # A thread handle and an integer stand for each other. Source: driver scripts preset handles to 0.
         return (new is not bool and isinstance(value, (int, float))) or hasattr(value, "thread_id")
     return hasattr(old, "thread_id") and new is int
 
@@ -45,20 +45,26 @@ def assign(value: Any, old: Any, name: str) -> Any:
 
     The first value fixes the type (D), and that of a list its length (see Dialect.list_resize).
     """
-    if type(value) is list and type(old) is list:
-        if len(value) != len(old):
-            raise ScriptRuntimeError("Resizing of 'List' is not supported")
-        if old and not same_kind(type(old[0]), value[0]):
-            raise _other_type(name, f"a list of {type_name(old[0])}", f"a list of {type_name(value[0])}")
-        return value
+    if type(value) is list and type(old) is list and len(value) != len(old):
+        raise ScriptRuntimeError("Resizing of 'List' is not supported")
     return assign_resizing(value, old, name)
 
 
 def assign_resizing(value: Any, old: Any, name: str) -> Any:
     """`assign` where a list may change its length."""
+    if type(value) is list and type(old) is list:
+        if old and value and not same_kind(type(old[0]), value[0]):
+            raise _other_type(name, f"a list of {type_name(old[0])}", f"a list of {type_name(value[0])}")
+        return value
     if old is UNDEFINED or same_kind(type(old), value):
         return value
+    if dialect.SIX_NUMBERS_FIT_A_POSE_VARIABLE and _is_six_numbers(old) and _is_six_numbers(value):
+        return value
     raise _other_type(name, a_type(old), a_type(value))
+
+
+def _is_six_numbers(value: Any) -> bool:
+    return type(value) is Pose or (type(value) is list and len(value) == 6 and all(map(is_number, value)))
 
 
 def _other_type(name: str, old: str, new: str) -> ScriptRuntimeError:
