@@ -8,7 +8,14 @@ from typing import Final
 from urscript import nodes
 from urscript.catalogue import Catalogue
 from urscript.lint_names import Variable, expressions_read, owner
-from urscript.lint_rules import BUSY_LOOP, DEAD_BRANCH, UNCHECKED_READ, UNREACHABLE, ScriptWarning
+from urscript.lint_rules import (
+    BUSY_LOOP,
+    CALL_OF_PROGRAM,
+    DEAD_BRANCH,
+    UNCHECKED_READ,
+    UNREACHABLE,
+    ScriptWarning,
+)
 from urscript.nodes import Block, Expression, Statement
 from urscript.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Span
@@ -32,6 +39,9 @@ def flow_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[Sc
             elif isinstance(statement, nodes.If):
                 yield from _dead_branches(statement, program)
     yield from _unchecked_reads(program)
+    for call in program.calls_after:
+        message = f"'{program.name}' runs when it is defined; this call is a program of its own and fails"
+        yield ScriptWarning(CALL_OF_PROGRAM, message, call.span, program.source, "leave it out")
 
 
 def constant_truth(expression: Expression) -> bool | None:

@@ -61,6 +61,11 @@ DEFINED_TWICE: Final = Rule(
 RUN_OF_DEF: Final = Rule(
     "W112", "a function is run as a thread", "a controller may refuse it; define it with thread"
 )
+CALL_OF_PROGRAM: Final = Rule(
+    "W113",
+    "the program is called below its definition",
+    "on a port, defining it runs it; the call is a program of its own that does not know the name",
+)
 
 RULES: Final = (
     UNUSED_GLOBAL,
@@ -75,6 +80,7 @@ RULES: Final = (
     DEAD_BRANCH,
     DEFINED_TWICE,
     RUN_OF_DEF,
+    CALL_OF_PROGRAM,
 )
 
 

@@ -56,6 +56,15 @@ def statement_name(block: Block) -> str:
     return "unnamed"
 
 
+def _definition_and_calls(block: Block) -> tuple[nodes.Function | None, tuple[Statement, ...]]:
+    """The one definition that is the whole program, and the calls of it that people write below."""
+    definition, *rest = [item for item in block if not isinstance(item, nodes.Label)] or [None]
+    if not isinstance(definition, nodes.Function) or definition.kind == "thread":
+        return None, ()
+    its_call = nodes.Evaluate(nodes.Call(definition.name, ()))
+    return (definition, tuple(rest)) if all(item == its_call for item in rest) else (None, ())  # type: ignore[arg-type]
+
+
 class _Resolver:
     """One pass that declares, one that looks up."""
 
@@ -78,17 +87,16 @@ class _Resolver:
         return program
 
     def _open(self, block: Block) -> ResolvedProgram:
-        """The frame of the program: a single definition is the program itself, other text is its body."""
-        labels_aside = [item for item in block if not isinstance(item, nodes.Label)]
-        if len(labels_aside) == 1 and isinstance(labels_aside[0], nodes.Function):
-            function = labels_aside[0]
-            if function.kind != "thread":
-                if function.parameters:
-                    self._error(
-                        ScriptContextError("a program takes no parameters"), function.parameters[0].span
-                    )
-                main = FunctionScope(function.name, function, None, function.body, "main")
-                return ResolvedProgram(self.source, function.kind, function.name, main)
+        """The frame of the program: a single definition is the program itself, other text is its body.
+
+        Calls of that program after its definition do not count: on a port it has run before they come.
+        """
+        function, calls = _definition_and_calls(block)
+        if function is not None:
+            if function.parameters:
+                self._error(ScriptContextError("a program takes no parameters"), function.parameters[0].span)
+            main = FunctionScope(function.name, function, None, function.body, "main")
+            return ResolvedProgram(self.source, function.kind, function.name, main, calls)
         name = statement_name(block)
         return ResolvedProgram(self.source, "statement", name, FunctionScope(name, None, None, block, "main"))
 
@@ -180,6 +188,8 @@ class _Resolver:
             case nodes.Index(target=nodes.Name(name=name), indices=indices) if self._is_array(name, scope):
                 array = self.catalogue.arrays[name]
                 self.program.builtins.update(filter(None, (array.getter, array.setter)))
+                if len(indices) > 1:
+                    self._error(ScriptTypeError(f"{name} takes one index, got 2"), expression.span)
                 for index in indices:
                     self._expression(index, scope, runs_in)
                 return

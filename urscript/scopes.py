@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from urscript.nodes import Block, Function
+from urscript.nodes import Block, Function, Statement
 from urscript.source import Source
 
 
@@ -76,6 +76,7 @@ class ResolvedProgram:
         kind: "def", "sec", or "statement" for text without a definition around it.
         name: The `def` name; for a statement the function it calls.
         main: The program body.
+        calls_after: Calls of the program itself below its definition; they are no part of it.
         functions: All functions and threads, in the order of the text.
         globals: All global variables.
         unsure_globals: Those that may be read before anything was assigned to them.
@@ -86,6 +87,7 @@ class ResolvedProgram:
     kind: str
     name: str
     main: FunctionScope
+    calls_after: tuple[Statement, ...] = ()
     functions: list[FunctionScope] = field(default_factory=list)
     globals: set[str] = field(default_factory=set)
     unsure_globals: set[str] = field(default_factory=set)

@@ -70,6 +70,7 @@ WARNED = {
     ],
     "W111": [(body("def f():", "end", "def f():", "end", "f()"), "2:7 'f' is defined twice here, the last definition counts")],
     "W112": [(body("def f():", "end", "run f()"), "4:3 'f' is run as a thread but defined with 'def'")],
+    "W113": [("def f():\n  sync()\nend\nf()\n", "4:1 'f' runs when it is defined; this call is a program of its own and fails")],
 }  # fmt: skip
 
 FINE = {
@@ -119,6 +120,7 @@ FINE = {
     ],
     "W111": [body("def f():", "def g():", "end", "g()", "end", "def h():", "def g():", "end", "g()", "end", "f()", "h()")],
     "W112": [body("thread t():", "end", "run t()")],
+    "W113": ["def f(a):\n  textmsg(a)\nend\nf(1)\n", "def f():\n  sync()\nend\n"],
 }  # fmt: skip
 
 

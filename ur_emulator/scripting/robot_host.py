@@ -7,7 +7,9 @@ from typing import Any
 
 from ur_emulator.controller.events import TextPrinted
 from ur_emulator.controller.state import ControllerState
+from ur_emulator.scripting.compliance_functions import compliance_functions
 from ur_emulator.scripting.conveyor_functions import ProgramConveyor
+from ur_emulator.scripting.e_series_functions import e_series_functions
 from ur_emulator.scripting.encoder_functions import encoder_functions
 from ur_emulator.scripting.error_functions import error_functions
 from ur_emulator.scripting.io_configuration_functions import io_configuration_functions
@@ -41,10 +43,13 @@ class RobotHost:
         self._sockets = ProgramSockets(state, network)
         self._remotes = ProgramRemotes(network)
         self._conveyor = ProgramConveyor(state)
+        settings = settings_functions(state)
         self._builtins: Mapping[str, Callable[..., Any]] = {
             **motion_functions(state),
             **state_functions(state),
-            **settings_functions(state),
+            **compliance_functions(state),
+            **settings,
+            **e_series_functions(state, settings["set_payload"]),
             **io_functions(state),
             **register_functions(state),
             **io_configuration_functions(state),

@@ -80,6 +80,9 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
             )
         ]
 
+    def get_actual_tcp_pose(thread: object) -> Pose:
+        return Pose.of(arm.fk(state.snapshot.actual_q, state.tcp_offset))
+
     return {
         "get_actual_joint_positions": lambda thread: list(state.snapshot.actual_q),
         "get_target_joint_positions": lambda thread: list(state.motion.target.q),
@@ -91,7 +94,8 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
         "get_joint_torques": get_joint_torques,
         "get_joint_temp": lambda thread, j: state.snapshot.joint_temperatures[int(j)],
         "get_controller_temp": lambda thread: 30.0,
-        "get_actual_tcp_pose": lambda thread: Pose.of(arm.fk(state.snapshot.actual_q, state.tcp_offset)),
+        "get_actual_tcp_pose": get_actual_tcp_pose,
+        "tool_pose": get_actual_tcp_pose,
         "get_target_tcp_pose": lambda thread: Pose.of(arm.fk(state.motion.target.q, state.tcp_offset)),
         "get_actual_tool_flange_pose": get_actual_tool_flange_pose,
         "get_actual_tcp_speed": lambda thread: Pose.of(state.snapshot.actual_tcp_speed),

@@ -266,6 +266,8 @@ _FORCE_SENSOR: tuple[Builtin, ...] = (
         "None",
         "take the present wrench as zero",
         since=releases("3.14", "5.0", "10.0"),
+        support=APPROXIMATE,
+        note="the mean of 0.2 s; what a CB3 makes of it is not documented",
         undocumented=(Generation.CB3,),
         source=f"{MANUAL_E}, module interfaces; CB3: {DRIVER_SCRIPT}",
     ),
