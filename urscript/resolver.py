@@ -14,6 +14,7 @@ from urscript import nodes
 from urscript.assignment import find_unsure
 from urscript.call_graph import mark_recursion, spread_blocking
 from urscript.catalogue import Catalogue
+from urscript.catalogue.binding import Shape
 from urscript.dialect import Dialect
 from urscript.errors import (
     ScriptCompileError,
@@ -246,30 +247,12 @@ class _Resolver:
     def _check_arguments(self, call: nodes.Call, callee: FunctionScope) -> None:
         """Count and names of the arguments of a user function."""
         assert callee.node is not None
-        parameters = callee.node.parameters
-        names = [parameter.name for parameter in parameters]
-        n_positional, keywords = _shape(call.arguments)
-        given = set(names[:n_positional])
-        for keyword in keywords:
-            if keyword not in names:
-                message = f"{call.function}() got an unexpected keyword argument '{keyword}'"
-                self._error(ScriptTypeError(message), call.span)
-                return
-            if keyword in given:
-                message = f"{call.function}() got multiple values for keyword argument '{keyword}'"
-                self._error(ScriptTypeError(message), call.span)
-                return
-            given.add(keyword)
-        missing = [item.name for item in parameters if item.default is None and item.name not in given]
-        if missing or n_positional > len(names):
-            required = sum(parameter.default is None for parameter in parameters)
-            if required == len(names):
-                allowed = f"exactly {required}"
-            else:
-                allowed = f"at least {required}" if missing else f"at most {len(names)}"
-            plural = "argument" if allowed.endswith(" 1") else "arguments"
-            message = f"{call.function} takes {allowed} {plural} ({len(call.arguments)} given)"
-            self._error(ScriptTypeError(message), call.span)
+        names = [parameter.name for parameter in callee.node.parameters]
+        optional = {parameter.name for parameter in callee.node.parameters if parameter.default is not None}
+        try:
+            Shape(call.function, names, optional).check(*_shape(call.arguments))
+        except ScriptTypeError as error:
+            self._error(error, call.span)
 
     def _argument_order(self, arguments: tuple[nodes.Argument, ...]) -> bool:
         """Positional arguments come before named ones."""

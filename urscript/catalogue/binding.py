@@ -8,7 +8,8 @@ seen from controllers; the words after "exact" and the other cases follow the sa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
+from dataclasses import dataclass
 from typing import Literal
 
 from urscript.errors import ScriptTypeError
@@ -19,29 +20,52 @@ Slot = tuple[Literal["arg"], int] | tuple[Literal["kw"], str] | tuple[Literal["d
 """Where a parameter's value comes from: positional argument i, keyword argument, or the default."""
 
 
-def _count(number: int) -> str:
-    return f"{number} argument" if number == 1 else f"{number} arguments"
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What a call of a function must look like; builtins and functions of a program alike.
 
+    Attributes:
+        function: name of the function.
+        names: of its parameters, in order.
+        optional: those that have a default.
+        hint: what to say to people beside the error.
+    """
 
-def _wrong_count(builtin: Builtin, given: int) -> ScriptTypeError:
-    total = len(builtin.params)
-    required = sum(param.is_required for param in builtin.params)
-    if required == total:
-        allowed = f"exactly {_count(total)}"
-    elif given < required:
-        allowed = f"at least {_count(required)}"
-    else:
-        allowed = f"at most {_count(total)}"
-    return ScriptTypeError(f"{builtin.name} takes {allowed} ({given} given)", hint=f"use {builtin.signature}")
+    function: str
+    names: Sequence[str]
+    optional: Set[str]
+    hint: str | None = None
 
+    def check(self, n_positional: int, keywords: Sequence[str]) -> None:
+        """Raise ScriptTypeError, without a place, if these arguments do not fit.
 
-def _missing(builtin: Builtin, given: int, name: str) -> ScriptTypeError:
-    """Too few arguments, or enough of them but not this one."""
-    if given < sum(param.is_required for param in builtin.params):
-        return _wrong_count(builtin, given)
-    return ScriptTypeError(
-        f"{builtin.name}() missing required argument '{name}'", hint=f"use {builtin.signature}"
-    )
+        Args:
+            n_positional: number of positional arguments.
+            keywords: names of the keyword arguments, in the order of the call.
+        """
+        seen = set(self.names[:n_positional])
+        for keyword in keywords:
+            if keyword not in self.names:
+                raise self._error(f"{self.function}() got an unexpected keyword argument '{keyword}'")
+            if keyword in seen:
+                raise self._error(f"{self.function}() got multiple values for keyword argument '{keyword}'")
+            seen.add(keyword)
+        given = n_positional + len(keywords)
+        if n_positional > len(self.names) or given < len(self.names) - len(self.optional):
+            raise self._wrong_count(given)
+        for name in self.names[n_positional:]:
+            if name not in seen and name not in self.optional:
+                raise self._error(f"{self.function}() missing required argument '{name}'")
+
+    def _wrong_count(self, given: int) -> ScriptTypeError:
+        most = len(self.names)
+        least = most - len(self.optional)
+        between = "" if least == most else f"{least} or " if least == most - 1 else f"{least} to "
+        arguments = "argument" if most == 1 else "arguments"
+        return self._error(f"{self.function} takes exactly {between}{most} {arguments} ({given} given)")
+
+    def _error(self, message: str) -> ScriptTypeError:
+        return ScriptTypeError(message, hint=self.hint)
 
 
 def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str] = ()) -> list[Slot]:
@@ -58,28 +82,15 @@ def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str
     Raises:
         ScriptTypeError: wrong count, unknown or repeated keyword; without a place, the caller adds it.
     """
-    given = n_positional + len(keyword_names)
     names = [param.name for param in builtin.params]
-    seen = set(names[:n_positional])
-    for keyword in keyword_names:
-        if keyword not in names:
-            raise ScriptTypeError(
-                f"{builtin.name}() got an unexpected keyword argument '{keyword}'",
-                hint=f"use {builtin.signature}",
-            )
-        if keyword in seen:
-            raise ScriptTypeError(f"{builtin.name}() got multiple values for keyword argument '{keyword}'")
-        seen.add(keyword)
-    if n_positional > len(names):
-        raise _wrong_count(builtin, given)
+    optional = {param.name for param in builtin.params if not param.is_required}
+    Shape(builtin.name, names, optional, f"use {builtin.signature}").check(n_positional, keyword_names)
     slots: list[Slot] = []
     for index, param in enumerate(builtin.params):
         if index < n_positional:
             slots.append(("arg", index))
-        elif param.name in seen:
+        elif param.name in keyword_names:
             slots.append(("kw", param.name))
-        elif param.is_required:
-            raise _missing(builtin, given, param.name)
         else:
             slots.append(("default", param.default))
     return slots
