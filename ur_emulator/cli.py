@@ -6,6 +6,7 @@ import dataclasses
 import json
 import signal
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ import typer
 from protocol.errors import ProtocolError
 
 if TYPE_CHECKING:
+    from ur_emulator.box_log import LogEntry
     from ur_emulator.emulator import ControlBox
 
 app = typer.Typer(
@@ -47,6 +49,10 @@ def serve(
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
+    log: Annotated[
+        bool,
+        typer.Option("--log", "-v", help="Show the log of the box on stderr: programs, errors, clients."),
+    ] = False,
 ) -> None:
     """Serve a control box, powered on with its brakes released, until Ctrl-C."""
     from ur_emulator.emulator import ControlBox
@@ -56,6 +62,8 @@ def serve(
         box = ControlBox(robot, version, host, pace, speed, seed, fidelity, port_base)
         for name in (signal.SIGINT, signal.SIGTERM):
             signal.signal(name, lambda number, frame: box.stop())
+        if log:
+            box.follow_log(_print_entry)
         box.listen()
         if ready_file is not None:
             _write_ready_file(ready_file, box)
@@ -74,6 +82,12 @@ def serve(
     except EmulatorError as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(1) from None
+
+
+def _print_entry(entry: LogEntry) -> None:
+    with suppress(OSError):  # nobody reads it any more
+        sys.stderr.write(f"{entry}\n")
+        sys.stderr.flush()
 
 
 def _write_ready_file(path: Path, box: ControlBox) -> None:

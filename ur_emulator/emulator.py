@@ -13,10 +13,13 @@ import dataclasses
 import math
 import sys
 import threading
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
 from protocol.ur_types import Ports, RobotMode, SoftwareVersion, simulated_serial
+from ur_emulator.box_log import LogEntry
+from ur_emulator.controller.commands import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.fidelity import fidelity_by_name
@@ -115,6 +118,28 @@ class ControlBox:
         self._thread: threading.Thread | None = None
         self._failure: BaseException | None = None
 
+    # --- what is going on, and what shall happen
+
+    @property
+    def log(self) -> tuple[LogEntry, ...]:
+        """The last entries of the log, the oldest first; may be asked from any thread."""
+        return self._box.log.entries
+
+    def follow_log(self, follower: Callable[[LogEntry], None]) -> None:
+        """Call `follower` with every entry of the log from now on, in the thread of the loop.
+
+        It must not block and must not raise. To be called before the box runs.
+        """
+        self._box.log.follow(follower)
+
+    def submit(self, command: Command) -> None:
+        """Ask for something as a client of the box would, from any thread; it acts in the next cycle.
+
+        Args:
+            command: one of `ur_emulator.controller.commands`, such as `ClosePopup()` or `AnswerRequest(5)`.
+        """
+        self._loop.call_soon_threadsafe(lambda: self._box.submit(command))
+
     # --- life
 
     def listen(self) -> None:
@@ -128,7 +153,9 @@ class ControlBox:
         try:
             for name, port in self._port_objects.items():
                 number = 0 if self._free_ports else getattr(self.ports, name)
-                self._listeners[name] = Listener(self._loop, self.host, number, port, self._box.backlog)
+                self._listeners[name] = Listener(
+                    self._loop, self.host, number, port, self._box.backlog, self._box.notice, name
+                )
         except EmulatorError:
             self._close()
             raise

@@ -20,6 +20,7 @@ from integration_support import (
     serving,
 )
 
+from protocol.primary_messages import RuntimeExceptionMessage
 from protocol.ur_types import Ports
 from ur_emulator import ControlBox
 from ur_emulator.errors import EmulatorError
@@ -142,3 +143,19 @@ def test_ports_are_free_again_at_once(tmp_path):
         frames.next()
     again = command("ur_emulator", "serve", "--port-base", box.base, "--ready-file", "/nowhere/ready.json")
     assert "cannot listen" not in again.complaint()
+
+
+def test_the_log_goes_to_stderr_if_asked_for(tmp_path):
+    with serving(tmp_path, "--log", "--pace", "lockstep") as box:
+        with Messages(box) as primary:
+            send(box, "secondary", 'def f():\n  textmsg("hello")\nend\ndef g():\n  x = nowhere\nend\n')
+            primary.message(RuntimeExceptionMessage)
+        box.process.send_signal(signal.SIGINT)
+        told = finish(box.process).err
+    lines = [line.split(" ", 1)[1] for line in told.splitlines() if "Client" not in line]
+    assert lines == [
+        "INFO Program: Starting program: f",
+        "INFO Program: hello",
+        "INFO Program: Program stopped: f",
+        "FAULT Program: Compile error: name 'nowhere' is not defined",
+    ]

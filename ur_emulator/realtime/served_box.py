@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Protocol
 
+from ur_emulator.box_log import BoxLog
 from ur_emulator.controller.commands import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
@@ -35,6 +36,7 @@ class ServedBox:
 
     Attributes:
         controller: the box without its ports.
+        log: of everything that was said.
         backlog: the connections that have not read all they were sent; they keep themselves up to date in it.
     """
 
@@ -48,6 +50,7 @@ class ServedBox:
         """
         self._expect_soon = expect_soon
         self.controller = controller
+        self.log = BoxLog()
         self._pacer = pacer
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._publishers: list[Publisher] = []
@@ -66,8 +69,13 @@ class ServedBox:
 
     def announce(self, event: Event) -> None:
         """Publish an event at once, outside of a cycle."""
+        self.log.note(event, self.controller.snapshot.tick)
         for publisher in self._publishers:
             publisher.say(event)
+
+    def notice(self, text: str) -> None:
+        """Write into the log that something happened to a client."""
+        self.log.write(self.controller.snapshot.tick, "Client", text)
 
     # --- what the pacer asks
 

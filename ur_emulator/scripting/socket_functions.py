@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
+from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.network import Network, ScriptSocket
 from urscript.builtins.text import wire_text
@@ -71,6 +72,10 @@ class ProgramSockets:
         if socket.is_connecting:
             yield Blocked(lambda: not socket.is_connecting or expired(), outside=True)
         if not socket.is_open or socket.is_connecting:
+            # Source: log of a real controller; "refused" is ours.
+            reason = "Connection timed out" if socket.is_connecting else "Connection refused"
+            text = f"Not able to open socket [{name}] to host: {address} at port: {port}: {reason}"
+            self._state.events.append(LogAdded("Program", text))
             socket.close()
             if self._sockets.get(name) is socket:
                 del self._sockets[name]

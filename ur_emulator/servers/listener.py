@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import selectors
 import socket
+from collections.abc import Callable
 from typing import Protocol
 
-from ur_emulator.errors import PortError
+from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.connection import Connection
 
@@ -32,7 +33,16 @@ class Port(Protocol):
 class Listener:
     """Accepts the clients of one port."""
 
-    def __init__(self, loop: EventLoop, host: str, number: int, port: Port, backlog: set[Connection]) -> None:
+    def __init__(
+        self,
+        loop: EventLoop,
+        host: str,
+        number: int,
+        port: Port,
+        backlog: set[Connection],
+        notice: Callable[[str], None],
+        name: str,
+    ) -> None:
         """Listen.
 
         Args:
@@ -41,19 +51,29 @@ class Listener:
             number: TCP port; 0 takes a free one.
             port: gets the clients.
             backlog: shared by all connections of a box, see Connection.
+            notice: told who comes and goes.
+            name: of the port, for notices.
 
         Raises:
+            PortPermissionError: this user may not open ports below 1024.
             PortError: the address cannot be bound.
         """
         self._loop = loop
         self._port = port
         self._backlog = backlog
+        self._notice = notice
+        self._name = name
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self._sock = socket.socket(family, socket.SOCK_STREAM)
         try:
             self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             self._sock.bind((host, number))
             self._sock.listen(_BACKLOG)
+        except PermissionError:
+            self._sock.close()
+            raise PortPermissionError(
+                f"port {number} on {host} needs privileges; move all ports with --port-base N if you need it"
+            ) from None
         except OSError as error:
             self._sock.close()
             raise PortError(
@@ -74,5 +94,10 @@ class Listener:
             client, _ = self._sock.accept()
         except OSError:
             return  # the client has gone again, or descriptors are out: the next one may have more luck
-        connection = Connection(self._loop, client, self._port.received, self._port.closed, self._backlog)
+        connection = Connection(self._loop, client, self._port.received, self._closed, self._backlog)
+        self._notice(f"{connection.peer} connected to {self._name} port {self.number}")
         self._port.opened(connection)
+
+    def _closed(self, connection: Connection) -> None:
+        self._port.closed(connection)
+        self._notice(f"{connection.peer} disconnected from {self._name} port {self.number}")

@@ -1,0 +1,204 @@
+"""The box's log, and commands to a box of one's own program."""
+
+import dataclasses
+import threading
+
+import pytest
+from box_support import TIMEOUT, FrameReader, MessageReader, connect
+
+from protocol.primary_messages import (
+    KeyMessage,
+    PopupMessage,
+    ReportLevel,
+    RuntimeExceptionMessage,
+    TextMessage,
+)
+from protocol.ur_types import ProgramState, SafetyMode
+from ur_emulator import ControlBox
+from ur_emulator.box_log import MAX_ENTRIES, MAX_TEXT, BoxLog, LogEntry
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller import events
+
+
+@pytest.fixture
+def box():
+    with ControlBox(pace="lockstep", port_base=None) as box:
+        yield box
+
+
+def texts(entries, source=None):
+    return [entry.text for entry in entries if source in (None, entry.source)]
+
+
+def run(box, program, title="PROGRAM_XXX_STOPPED"):
+    """Send a program and wait for its end (or another key message)."""
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.state()
+        sock.sendall(program.encode("latin-1"))
+        while reader.message(KeyMessage).title != title:
+            pass
+
+
+def test_the_life_of_a_program(box):
+    run(box, 'def hello():\n  textmsg("x = ", 5)\nend\n')
+    assert texts(box.log, "Program") == ["Starting program: hello", "x = 5", "Program stopped: hello"]
+    (started, *_) = [entry for entry in box.log if entry.source == "Program"]
+    assert started.level is ReportLevel.INFO
+    assert started.time == started.tick * 0.008 >= 60
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        started.text = "other"
+
+
+@pytest.mark.parametrize(
+    ("program", "line"),
+    [
+        ("def f():\n  x = 1\n  movej(p[10,0,0,0,0,0])\nend\n",
+         "Runtime error (3:3): The robot cannot reach the requested pose. "
+         "Script function movej is unable to find an inverse kinematics solution."),
+        ("def f():\n  y = nowhere(1)\nend\n", "Compile error: name 'nowhere' is not defined"),
+        ("def f():\n  x = (1\nend\n", "Syntax error"),
+        ("def f():\n  x = @\nend\n", "Lexer exception"),
+        ("def f():\n  break\nend\n", "Contextual error"),
+        ('def f():\n  str_sub()\nend\n', "Type error: str_sub takes"),
+        ("sec s():\n  x = [1][2]\nend\n", "Secondary program: Runtime error (2:7)"),
+    ],
+)  # fmt: skip
+def test_errors_have_the_words_of_a_log(box, program, line):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        sock.sendall(program.encode())
+        while not isinstance(
+            message := reader.message((KeyMessage, RuntimeExceptionMessage)), RuntimeExceptionMessage
+        ):
+            if message.title.startswith("SECONDARY"):
+                break
+    faults = [entry for entry in box.log if entry.level is ReportLevel.FAULT]
+    assert len(faults) == 1
+    assert faults[0].text.startswith(line)
+
+
+def test_a_protective_stop_and_what_follows(box):
+    with connect(box, "realtime") as frames:
+        reader = FrameReader(frames)
+        run(box, "def f():\n  protective_stop()\n  sleep(1)\nend\n", "PROGRAM_XXX_PAUSED")
+        box.submit(cmd.UnlockProtectiveStop())
+        reader.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
+        box.submit(cmd.ResumeProgram())
+        reader.until(lambda f: f.runtime_state == ProgramState.STOPPED)
+    found = [(e.source, e.code, e.text) for e in box.log if e.source != "Client"]
+    assert found == [
+        ("Program", "", "Starting program: f"),
+        ("Controller", "C209A0", "Protective stop requested"),
+        ("Safety", "", "Safety mode: PROTECTIVE_STOP"),
+        ("Program", "", "Program paused: f"),
+        ("Safety", "", "Safety mode: NORMAL"),
+        ("Program", "", "Program resumed: f"),
+        ("Program", "", "Program stopped: f"),
+    ]
+    assert [e.level for e in box.log if e.code] == [ReportLevel.WARNING]
+    ticks = [e.tick for e in box.log]
+    assert ticks == sorted(ticks)
+
+
+def test_modes_clients_and_notes_of_the_dashboard(box):
+    with connect(box, "dashboard") as sock:
+        lines = sock.makefile("rb")
+        lines.readline()
+        for line in (b"addToLog all is well\n", b"power off\n"):
+            sock.sendall(line)
+            lines.readline()
+        with connect(box, "realtime") as frames:
+            FrameReader(frames).until(lambda f: f.robot_mode == 3)
+    log = box.log
+    assert ("Dashboard", "all is well") in [(e.source, e.text) for e in log]
+    assert "Robot mode: POWER_OFF" in texts(log, "Controller")
+    (first, *_) = texts(log, "Client")
+    assert first.endswith(f"connected to dashboard port {box.ports.dashboard}")
+
+
+def test_who_leaves_is_noted(box):
+    with connect(box, "secondary") as sock:
+        mine = "{}:{}".format(*sock.getsockname())
+        MessageReader(sock).state()
+    run(box, "textmsg(1)\n")
+    notes = [text for text in texts(box.log, "Client") if text.startswith(mine)]
+    port = box.ports.secondary
+    assert notes == [
+        f"{mine} connected to secondary port {port}",
+        f"{mine} disconnected from secondary port {port}",
+    ]
+
+
+def test_a_socket_that_does_not_open_is_noted(box):
+    run(box, 'def f():\n  socket_open("127.0.0.1", 1, "peer")\nend\n')
+    assert "Not able to open socket [peer] to host: 127.0.0.1 at port: 1: Connection refused" in texts(
+        box.log, "Program"
+    )
+
+
+def test_a_client_of_ones_own_can_close_popups_and_answer(box):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        sock.sendall(
+            b'def f():\n  popup("go?", "Wait", blocking=True)\n'
+            b'  n = request_integer_from_primary_client("how many?")\n  textmsg("got ", n)\nend\n'
+        )
+        assert reader.message(PopupMessage).text == "go?"
+        box.submit(cmd.ClosePopup())
+        box.submit(cmd.AnswerRequest("not a number"))
+        while "Waiting for a value (integer): how many?" not in texts(box.log):
+            reader.state()
+        box.submit(cmd.AnswerRequest(7))
+        assert reader.message(TextMessage).text == "got 7"
+    assert "Popup: Wait: go?" in texts(box.log, "Program")
+
+
+def test_the_log_forgets_the_oldest_and_cuts_long_lines():
+    log = BoxLog()
+    for i in range(MAX_ENTRIES + 10):
+        log.note(events.TextPrinted(f"line {i}"), i)
+    assert len(log.entries) == MAX_ENTRIES
+    assert log.entries[0].text == "line 10"
+    log.note(events.TextPrinted("x" * 10**6), 1)
+    assert len(log.entries[-1].text) == MAX_TEXT
+    assert log.entries[-1].text.endswith("...")
+
+
+EVENTS = [
+    (
+        events.ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blends"),
+        "WARNING Controller: Overlapping Blends",
+    ),
+    (events.ErrorReported(153, 2, ReportLevel.WARNING, "deviates"), "WARNING Controller: C153A2 deviates"),
+    (events.PopupShown("T", "x", True, False, False), "WARNING Program: Popup: T: x"),
+    (events.PopupShown("T", "x", False, True, False), "FAULT Program: Popup: T: x"),
+    (events.PopupShown("T", "x", False, False, False), "INFO Program: Popup: T: x"),
+    (events.ScriptFailed(1, 2, "wire"), "FAULT Program: wire"),
+    (events.ScriptFailed(1, 2, "wire", True, "log"), "FAULT Program: Secondary program: log"),
+    (events.TextPrinted("a\nb\n"), "INFO Program: a\nb"),
+]
+
+
+@pytest.mark.parametrize(("event", "line"), EVENTS, ids=[line for _, line in EVENTS])
+def test_lines_of_events(event, line):
+    log = BoxLog()
+    heard = []
+    log.follow(heard.append)
+    log.note(event, 7500)
+    assert str(log.entries[0]) == f"60.000 {line}"
+    assert heard == list(log.entries)
+
+
+def test_followers_hear_what_happens(box):
+    heard, done = [], threading.Event()
+
+    def follower(entry: LogEntry):
+        heard.append(entry)
+        if entry.text.startswith("Program stopped"):
+            done.set()
+
+    box.follow_log(follower)
+    run(box, "textmsg(1)\n")
+    assert done.wait(TIMEOUT)
+    assert heard[-len(box.log) :][-1] in box.log
