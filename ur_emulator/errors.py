@@ -5,6 +5,7 @@ EmulatorError
 ├── KinematicsError   arguments of the controller's own kinematics make no sense
 ├── PlantError        the physics cannot go on: a target that is no number, or a diverged simulation
 └── PortError         a TCP port of the box cannot be opened
+    └── PortPermissionError   because this user may not
 
 Every message is one line: what was given, what is allowed, what to do. Errors of URScript programs are
 not here: they belong to the program (`urscript.errors`), not to the box.
@@ -39,3 +40,7 @@ class PlantError(EmulatorError):
 
 class PortError(EmulatorError):
     """A TCP port of the box cannot be opened."""
+
+
+class PortPermissionError(PortError):
+    """A TCP port of the box is one that this user may not open."""
