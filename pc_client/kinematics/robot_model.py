@@ -119,7 +119,7 @@ ROBOTS = MappingProxyType(
             limits=JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _six_degrees(180, 180, 180, 180, 180, 180)),
             q_branch=_ELBOW_UP,
         ),
-        # UR10 manual CB3 3.13: base and shoulder 120 deg/s, the others 180 deg/s (= config/ur10/joint_limits.yaml).
+        # UR10 manual CB3 3.13: base, shoulder 120 deg/s, others 180 deg/s (config/ur10/joint_limits.yaml).
         "ur10": RobotDescription(
             name="ur10",
             urdf="ur_description/urdf/ur10_robot.urdf",
