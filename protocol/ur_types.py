@@ -202,6 +202,7 @@ class SoftwareVersion(NamedTuple):
 class Ports:
     """TCP ports of one control box. Source: UR remote control overview; clients hard-code these numbers."""
 
+    modbus: int = 502
     dashboard: int = 29999
     primary: int = 30001
     secondary: int = 30002
@@ -215,6 +216,8 @@ class Ports:
     def standard(cls, offset: int = 0) -> Ports:
         """The vendor's ports, all moved by `offset` for machines where they are taken.
 
+        The Modbus port, far below the others, is 0 (none) where it would leave the TCP ports.
+
         Raises:
             LocalProtocolError: a moved port would leave 1..65535.
         """
@@ -222,6 +225,7 @@ class Ports:
         if not low <= offset <= high:
             raise LocalProtocolError(f"port offset {offset} leaves the TCP ports: use {low} to {high}")
         return cls(
+            modbus=max(0, 502 + offset),
             dashboard=29999 + offset,
             primary=30001 + offset,
             secondary=30002 + offset,

@@ -70,11 +70,14 @@ def serve(
     except (EmulatorError, ProtocolError, OSError) as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(1) from None
+    for notice in box.notices:
+        sys.stderr.write(f"ur-emulator: {notice}\n")
     print(
         f"{robot.upper()} CB3 {version} ready at {host}, {pace}, {fidelity}, "
         f"seed {seed}, serial {box.serial_number}: "
         f"dashboard {box.ports.dashboard}, primary {box.ports.primary}, secondary {box.ports.secondary}, "
-        f"realtime {box.ports.realtime}, rtde {box.ports.rtde}",
+        f"realtime {box.ports.realtime}, rtde {box.ports.rtde}"
+        + (f", modbus {box.ports.modbus}" if box.ports.modbus else ""),
         flush=True,
     )
     try:

@@ -21,7 +21,7 @@ from protocol.ur_types import Ports, RobotMode, SoftwareVersion, simulated_seria
 from ur_emulator.box_log import LogEntry
 from ur_emulator.controller.commands import Command
 from ur_emulator.controller.controller import Controller
-from ur_emulator.errors import EmulatorError
+from ur_emulator.errors import EmulatorError, PortPermissionError
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
@@ -29,6 +29,8 @@ from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.servers.dashboard_port import BUILD, BoxIdentity, DashboardPort
 from ur_emulator.servers.listener import Listener, Port
+from ur_emulator.servers.modbus_loading import CodecLoader
+from ur_emulator.servers.modbus_server import ModbusPort
 from ur_emulator.servers.primary_port import PrimaryPort
 from ur_emulator.servers.program_intake import ProgramIntake
 from ur_emulator.servers.realtime_port import RealtimePort
@@ -47,9 +49,10 @@ class ControlBox:
 
     Attributes:
         host: address that it listens on.
-        ports: numbers of its ports.
+        ports: numbers of its ports; that for Modbus is 0 if it is not open.
         port_base: what was added to the standard ones.
         serial_number: as the dashboard gives it; simulated boxes are recognisable by it.
+        notices: what a user should know although the box runs, one line each.
     """
 
     def __init__(
@@ -94,7 +97,8 @@ class ControlBox:
         self.serial_number = simulated_serial(model.robot_type, seed)
         self._free_ports = port_base is None
         self._loop = EventLoop(precise=named_pace is Pace.REALTIME)
-        self._network = LoopNetwork(self._loop)
+        modbus = CodecLoader(self._loop)
+        self._network = LoopNetwork(self._loop, modbus)
         controller = Controller(model, imperfections, seed, self._network, mode=RobotMode.RUNNING)
         controller.state.ports.version = (software.major, software.minor)
         self._box = ServedBox(
@@ -110,11 +114,13 @@ class ControlBox:
             "primary": PrimaryPort(software, controller, self._intake, states, all_messages=True),
             "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
             "dashboard": DashboardPort(identity, controller, self._box.submit),
+            "modbus": ModbusPort(controller, self._box.submit, modbus),
             "realtime_ro": RealtimePort(software, None),
             "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
             "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),
         }
         self._listeners: dict[str, Listener] = {}
+        self.notices: list[str] = []
         self._thread: threading.Thread | None = None
         self._failure: BaseException | None = None
 
@@ -152,19 +158,29 @@ class ControlBox:
             return
         try:
             for name, port in self._port_objects.items():
-                number = 0 if self._free_ports else getattr(self.ports, name)
-                self._listeners[name] = Listener(
-                    self._loop, self.host, number, port, self._box.backlog, self._box.notice, name
-                )
+                self._listen_on(name, port)
         except EmulatorError:
             self._close()
             raise
-        self.ports = dataclasses.replace(
-            self.ports, **{name: item.number for name, item in self._listeners.items()}
-        )
+        numbers = {name: item.number for name, item in self._listeners.items()}
+        self.ports = dataclasses.replace(self.ports, **{"modbus": 0, **numbers})
         for port in self._port_objects.values():
             self._box.attach(port)  # type: ignore[arg-type]
         self._loop.add(self._box)
+
+    def _listen_on(self, name: str, port: Port) -> None:
+        """Open one port; of all, only Modbus may be missing: its number is one that needs privileges."""
+        number = 0 if self._free_ports else getattr(self.ports, name)
+        if name == "modbus" and not (number or self._free_ports):
+            return
+        try:
+            self._listeners[name] = Listener(
+                self._loop, self.host, number, port, self._box.backlog, self._box.notice, name
+            )
+        except PortPermissionError as error:
+            if name != "modbus":
+                raise
+            self.notices.append(f"no Modbus server: {error}")
 
     def serve_forever(self) -> None:
         """Run in the calling thread until `stop`; the ports must be open."""

@@ -294,8 +294,11 @@ def port_base_of(box):
 
 
 def free_port_base():
-    """An offset at which all ports of a box are free, above the ports that the kernel gives to clients."""
-    bases = list(range(31_000, 35_500, 20))
+    """An offset at which all ports of a box are free.
+
+    They lie above the ports that the kernel gives to clients, that for Modbus below them.
+    """
+    bases = list(range(31_000, 32_260, 20))
     random.Random(os.getpid() + time.monotonic_ns()).shuffle(bases)
     for base in bases:
         ports = Ports.standard(base)

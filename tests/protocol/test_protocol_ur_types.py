@@ -52,6 +52,7 @@ def test_ports_move_together():
             Ports.standard(offset)
     assert Ports.standard(35522).realtime_ro == 65535
     assert Ports.standard(-29998).dashboard == 1
+    assert (Ports.standard(-501).modbus, Ports.standard(-502).modbus) == (1, 0)
 
 
 def test_simulated_serials_say_so_and_carry_the_seed():

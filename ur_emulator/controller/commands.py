@@ -79,6 +79,21 @@ class WriteInputs:
 
 
 @dataclass(frozen=True, slots=True)
+class WriteModbus:
+    """Write neighbouring addresses of the robot's Modbus map; what cannot be written is left out.
+
+    Attributes:
+        is_coils: coils, otherwise registers.
+        first: lowest address.
+        values: 0 or 1 for a coil, 0 to 65535 for a register.
+    """
+
+    is_coils: bool
+    first: int
+    values: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class AnswerRequest:
     """Answer a question of a program (`request_integer_from_primary_client` and its kin).
 
@@ -110,6 +125,7 @@ Command = (
     | SetSpeedSlider
     | TriggerProtectiveStop
     | WriteInputs
+    | WriteModbus
     | AnswerRequest
     | ClosePopup
 )

@@ -20,6 +20,7 @@ from ur_emulator.controller.events import (
     SafetyModeChanged,
     ScriptFailed,
 )
+from ur_emulator.controller.port_map import write_range
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (
@@ -209,6 +210,8 @@ class Controller:
                 state.stop_requested = True
             case cmd.WriteInputs(values):
                 write_inputs(state, values)
+            case cmd.WriteModbus():
+                write_range(state, command.is_coils, command.first, command.values)
             case cmd.AnswerRequest(value, request_id):
                 state.operator.answer(value, request_id)
             case cmd.ClosePopup():

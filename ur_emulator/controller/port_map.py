@@ -10,6 +10,7 @@ the range of their domain, and the clock as the time since the controller starte
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ur_emulator.controller.euromap import N_EUROMAP
@@ -214,6 +215,19 @@ def write_coil(state: ControllerState, address: int, value: bool) -> bool:
         PortAddressError: there is none at this address.
     """
     return _write(_row(_COIL_AT, "bit", address), state, address, value)
+
+
+def can_write(is_coil: bool, address: int) -> bool:
+    """Whether something can be written at an address; False also where there is nothing."""
+    row = (_COIL_AT if is_coil else _REGISTER_AT).get(address)
+    return row is not None and row.write is not None
+
+
+def write_range(state: ControllerState, is_coils: bool, first: int, values: Iterable[int]) -> None:
+    """Write neighbouring addresses; those that cannot be written are left out."""
+    for address, value in enumerate(values, first):
+        if can_write(is_coils, address):
+            _write((_COIL_AT if is_coils else _REGISTER_AT)[address], state, address, value & WORD_MAX)
 
 
 def _write(row: PortRow, state: ControllerState, address: int, value: int) -> bool:

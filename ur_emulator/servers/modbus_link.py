@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING
 from protocol.errors import RemoteProtocolError
 from ur_emulator.controller.modbus_signals import ModbusSignal
 from ur_emulator.scripting.network import ScriptSocket
+from ur_emulator.servers.modbus_messages import Frame
 from ur_emulator.servers.modbus_requests import Request, complaint, request_for, value_of_answer
 
 if TYPE_CHECKING:
-    from ur_emulator.servers.modbus_codec import Frame, ModbusCodec
+    from ur_emulator.servers.modbus_codec import ModbusCodec
 
 # A signal may be without a valid answer for this long [s].
 TOLERANCE = 2.0

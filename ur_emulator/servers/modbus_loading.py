@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -23,11 +24,18 @@ class CodecLoader:
     def __init__(self, loop: EventLoop) -> None:
         self._loop = loop
         self._is_asked_for = False
+        self._callers: list[Callable[[], None]] = []
         self.codec: ModbusCodec | None = None
         self.problem = ""
 
-    def start(self) -> None:
-        """Begin to load it; harmless if that has begun already."""
+    def start(self, then: Callable[[], None] | None = None) -> None:
+        """Begin to load it; harmless if that has begun already.
+
+        Args:
+            then: called in the loop's thread once it is loaded or cannot be; not if that is known already.
+        """
+        if then is not None and self.codec is None and not self.problem:
+            self._callers.append(then)
         if not self._is_asked_for:
             self._is_asked_for = True
             threading.Thread(target=self._load, name="modbus-library", daemon=True).start()
@@ -45,3 +53,6 @@ class CodecLoader:
 
     def _finish(self, codec: ModbusCodec | None, problem: str) -> None:
         self.codec, self.problem = codec, problem
+        callers, self._callers = self._callers, []
+        for call in callers:
+            call()

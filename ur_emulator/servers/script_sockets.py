@@ -168,9 +168,15 @@ def _is_numeric(host: str) -> bool:
 class LoopNetwork:
     """Opens script sockets in a loop."""
 
-    def __init__(self, loop: EventLoop) -> None:
+    def __init__(self, loop: EventLoop, loader: CodecLoader | None = None) -> None:
+        """Prepare; nothing is opened or loaded.
+
+        Args:
+            loop: watches the sockets.
+            loader: of the Modbus library, if it is shared with others.
+        """
         self._loop = loop
-        self._modbus = ModbusClient(loop, CodecLoader(loop), self.open)
+        self._modbus = ModbusClient(loop, loader or CodecLoader(loop), self.open)
 
     def open(self, host: str, port: int) -> LoopSocket:
         """Begin to connect to `host`:`port`."""

@@ -1,0 +1,381 @@
+"""Port 502: pymodbus's client, raw bytes, and hostile clients on a whole box."""
+
+import socket
+import struct
+
+import pytest
+from box_support import TIMEOUT, MessageReader, connect
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymodbus.client import ModbusTcpClient
+from typer.testing import CliRunner
+
+from protocol.primary_messages import TextMessage
+from ur_emulator import ControlBox, cli, emulator
+from ur_emulator.controller.port_map import COILS, REGISTERS, read_coil, read_register
+from ur_emulator.errors import PortError, PortPermissionError
+from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.servers import listener
+from ur_emulator.servers.listener import Listener
+from ur_emulator.servers.modbus_server import MAX_AT_ONCE, MAX_INBOX
+
+ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
+
+
+@pytest.fixture(scope="module", params=["lockstep", "realtime"])
+def box(request):
+    with ControlBox(pace=request.param, port_base=None, seed=7) as running:
+        yield running
+
+
+@pytest.fixture
+def client(box):
+    with ModbusTcpClient(box.host, port=box.ports.modbus, timeout=TIMEOUT, retries=0) as client:
+        yield client
+
+
+@pytest.fixture
+def still():
+    """A box in which time stands still once nothing goes on."""
+    with ControlBox(pace="lockstep", port_base=None, seed=7) as running:
+        yield running
+
+
+def run(box, *lines):
+    body = "".join(f"  {line}\n" for line in lines)
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        sock.sendall(f"def p():\n{body}end\n".encode())
+        return reader.message(TextMessage).text
+
+
+# --- reading
+
+
+@pytest.mark.parametrize("rows", [REGISTERS, COILS], ids=["registers", "coils"])
+def test_every_address_of_the_map_can_be_read_and_gives_what_scripts_read(still, rows):
+    state = still._box.controller.state
+    is_registers = rows is REGISTERS
+    with ModbusTcpClient(still.host, port=still.ports.modbus, timeout=TIMEOUT, retries=0) as client:
+        reads = (
+            (client.read_holding_registers, client.read_input_registers)
+            if is_registers
+            else (client.read_coils, client.read_discrete_inputs)
+        )
+        read_one = read_register if is_registers else read_coil
+        parts = (
+            (row.first + offset, min(125, row.count - offset))
+            for row in rows
+            for offset in range(0, row.count, 125)
+        )
+        for first, count in parts:
+            for read in reads:
+                answer = read(first, count=count)
+                assert not answer.isError()
+                values = answer.registers if is_registers else answer.bits[:count]
+                assert values == [read_one(state, first + i) for i in range(count)]
+
+
+def test_the_unit_number_does_not_matter_and_is_sent_back(box, client):
+    for unit in (1, 17, 255):
+        answer = client.read_holding_registers(256, count=2, device_id=unit)
+        assert (answer.registers, answer.dev_id) == ([3, 15], unit)
+
+
+def test_the_state_of_the_robot(client):
+    assert client.read_holding_registers(258).registers == [7]  # robot mode RUNNING
+    assert client.read_coils(260, count=6).bits[:6] == [True, False, False, False, False, False]
+    q = client.read_input_registers(270, count=6).registers
+    assert all(0 <= value < 6284 for value in q)
+    assert any(q)
+
+
+# --- writing
+
+
+def test_what_was_written_is_read_back_at_once(client):
+    for value in (0, 1, 65535):
+        assert client.write_register(128, value).registers == [value]
+        assert client.read_holding_registers(128).registers == [value]
+    assert client.write_registers(130, [1, 2, 65535]).count == 3
+    assert client.read_holding_registers(129, count=5).registers == [0, 1, 2, 65535, 0]
+
+
+def test_outputs_by_coils_and_words(client):
+    client.write_register(1, 0)
+    assert client.write_coil(17, True).bits[0]
+    assert client.read_holding_registers(1).registers == [0b10]
+    assert client.write_coils(20, [True, False, True]).count == 3
+    assert client.read_holding_registers(1).registers == [0b1010010]
+    client.write_coil(49, True)  # clear output 1
+    client.write_register(2, 0b1)  # set output 0
+    assert client.read_coils(16, count=8).bits == [True, False, False, False, True, False, True, False]
+    client.write_register(1, 0)
+
+
+def test_scripts_and_clients_share_the_general_purpose_words(box, client):
+    client.write_register(140, 4711)
+    lines = ("x = read_port_register(140)", "write_port_register(141, x + 1)", "sync()", "textmsg(x)")
+    assert run(box, *lines) == "4711"
+    assert client.read_holding_registers(141).registers == [4712]
+
+
+def test_input_booleans_are_those_of_scripts(box, client):
+    client.write_coils(364, [True, False, True])
+    lines = [f"textmsg(read_input_boolean_register({i}))" for i in (64,)]
+    assert run(box, *lines) == "True"
+    client.write_coils(364, [False] * 3)
+
+
+def test_a_script_can_be_the_client_of_its_own_box(box, client):
+    client.write_register(150, 99)
+    lines = (
+        f'modbus_add_signal("127.0.0.1:{box.ports.modbus}", 255, 150, 3, "own")',
+        'while modbus_get_signal_status("own", False) != 99: sync() end',
+        'modbus_set_output_register("own", 100, False)',
+        "while read_port_register(150) != 100: sync() end",
+        'modbus_delete_signal("own")',
+        'textmsg("round")',
+    )
+    assert run(box, *lines) == "round"
+
+
+# --- refusals
+
+
+@pytest.mark.parametrize(
+    ("pdu", "code"),
+    [
+        ("0300030001", None),
+        ("0301030001", ILLEGAL_ADDRESS),  # 259: a hole
+        ("0301020002", ILLEGAL_ADDRESS),  # 258 and the hole
+        ("03ffff0001", ILLEGAL_ADDRESS),
+        ("03ffff0002", ILLEGAL_ADDRESS),  # beyond the end of all addresses
+        ("0300000000", ILLEGAL_VALUE),
+        ("030000007e", ILLEGAL_VALUE),  # 126 registers
+        ("0100a00001", ILLEGAL_ADDRESS),
+        ("01000007d1", ILLEGAL_VALUE),  # 2001 coils
+        ("0600000001", ILLEGAL_ADDRESS),  # digital inputs
+        ("0601020001", ILLEGAL_ADDRESS),  # robot mode
+        ("050000ff00", ILLEGAL_ADDRESS),
+        ("0501f4ff00", ILLEGAL_ADDRESS),  # general purpose outputs belong to scripts
+        ("0500101234", ILLEGAL_VALUE),  # neither on nor off
+        ("05001000ff", ILLEGAL_VALUE),
+        ("10008000010400010002", ILLEGAL_VALUE),  # sizes that do not match
+        ("1000800002020001", ILLEGAL_VALUE),
+        ("100080000000", ILLEGAL_VALUE),
+        ("1000ff00020400010002", ILLEGAL_ADDRESS),  # 255 and, read only, 256
+        ("0f0010000a01ff", ILLEGAL_VALUE),
+        ("0f00100009020000", None),
+        ("03", ILLEGAL_VALUE),
+        ("0300", ILLEGAL_VALUE),
+        ("030000000100", ILLEGAL_VALUE),
+        ("07", ILLEGAL_FUNCTION),
+        ("0800001234", ILLEGAL_FUNCTION),
+        ("1600800000ffff", ILLEGAL_FUNCTION),
+        ("170080000100800001020001", ILLEGAL_FUNCTION),
+        ("2b0e0100", ILLEGAL_FUNCTION),
+        ("00", ILLEGAL_FUNCTION),
+        ("7f", ILLEGAL_FUNCTION),
+        ("83", ILLEGAL_FUNCTION),
+        ("ff", ILLEGAL_FUNCTION),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_the_right_exception(box, pdu, code):
+    pdu = bytes.fromhex(pdu)
+    with connect(box, "modbus") as sock:
+        answer = ask(sock, pdu)
+    if code is None:
+        assert answer[0] == pdu[0]
+    else:
+        assert answer == bytes([pdu[0] | 0x80, code])
+
+
+def test_a_refused_write_writes_nothing(client):
+    client.write_register(255, 7)
+    assert client.write_registers(255, [8, 9]).exception_code == ILLEGAL_ADDRESS
+    assert client.read_holding_registers(255).registers == [7]
+
+
+# --- raw and hostile clients
+
+
+def frame(pdu, transaction=1, unit=255):
+    return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
+
+
+def read_exactly(sock, size):
+    data = b""
+    while len(data) < size:
+        piece = sock.recv(size - len(data))
+        if not piece:
+            raise EOFError
+        data += piece
+    return data
+
+
+def read_answer(sock):
+    transaction, _, length, _ = struct.unpack(">HHHB", read_exactly(sock, 7))
+    return transaction, read_exactly(sock, length - 1)
+
+
+def ask(sock, pdu):
+    sock.sendall(frame(pdu))
+    return read_answer(sock)[1]
+
+
+READ_VERSION = bytes.fromhex("0301000002")
+VERSION = bytes.fromhex("03040003000f")
+
+
+def test_bytes_may_come_one_by_one(box):
+    with connect(box, "modbus") as sock:
+        for byte in frame(READ_VERSION, transaction=513):
+            sock.sendall(bytes([byte]))
+        assert read_answer(sock) == (513, VERSION)
+
+
+def test_requests_that_come_together_are_answered_in_order(box):
+    n = 5 * MAX_AT_ONCE
+    with connect(box, "modbus") as sock:
+        requests = [
+            frame(b"\x06\x00\xa0" + struct.pack(">H", i), i) if i % 10 == 0 else frame(b"\3\0\xa0\0\1", i)
+            for i in range(n)
+        ]
+        sock.sendall(b"".join(requests))
+        for i in range(n):
+            transaction, pdu = read_answer(sock)
+            assert transaction == i
+            assert int.from_bytes(pdu[-2:], "big") == i - i % 10  # reads see the write before them
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"\0\1\0\0\0\1\xff",
+        b"\0\1\0\0\0\xff" + bytes(255),
+        b"\xff" * 100,
+        bytes(64),
+        frame(READ_VERSION) * (MAX_INBOX // 12 + 2),
+    ],
+    ids=["http", "no function", "too long", "ff", "zeros", "requests without end"],
+)
+def test_a_client_that_makes_no_sense_is_cut_off_alone(box, client, data):
+    with connect(box, "modbus") as sock:
+        try:
+            for _ in range(50):
+                sock.sendall(data)
+            while sock.recv(65536):
+                pass
+        except (ConnectionError, EOFError):
+            pass  # cut off with bytes on the way
+    assert client.read_holding_registers(256).registers == [3]
+
+
+def test_a_client_that_never_reads_is_cut_off_alone(box, client):
+    request = frame(b"\3\0\x80\0\x7d")
+    with socket.socket() as sock:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        sock.settimeout(TIMEOUT)
+        sock.connect((box.host, box.ports.modbus))
+        try:
+            for _ in range(100_000):
+                sock.sendall(request)
+        except ConnectionError:
+            pass
+        else:
+            raise AssertionError("it was never cut off")
+    assert client.read_holding_registers(256).registers == [3]
+
+
+def test_a_client_that_goes_while_its_write_waits_harms_nobody(box, client):
+    for _ in range(20):
+        with connect(box, "modbus") as sock:
+            sock.sendall(frame(b"\6\0\x80\0\1"))
+    assert client.read_holding_registers(256).registers == [3]
+
+
+def test_many_clients_at_once(box):
+    clients = [connect(box, "modbus") for _ in range(30)]
+    for i, sock in enumerate(clients):
+        sock.sendall(
+            frame(b"\6" + struct.pack(">HH", 160 + i, i)) + frame(b"\3" + struct.pack(">HH", 160 + i, 1))
+        )
+    for i, sock in enumerate(clients):
+        with sock:
+            assert read_answer(sock)[1] == b"\6" + struct.pack(">HH", 160 + i, i)
+            assert read_answer(sock)[1] == b"\3\2" + struct.pack(">H", i)
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.binary(min_size=1, max_size=30), min_size=1, max_size=5))
+def test_any_request_gets_an_answer(pdus):
+    with connect(_any_box(), "modbus") as sock:
+        for pdu in pdus:
+            answer = ask(sock, pdu)
+            assert answer[0] & 0x7F == pdu[0] & 0x7F
+
+
+def _any_box():
+    if not _BOXES:
+        box = ControlBox(pace="lockstep", port_base=None)
+        box.__enter__()
+        _BOXES.append(box)
+    return _BOXES[0]
+
+
+_BOXES = []
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _end_boxes():
+    yield
+    for box in _BOXES:
+        box.__exit__(None, None, None)
+
+
+# --- a port that this user may not open
+
+
+def forbid_low_ports(monkeypatch):
+    class Socket(socket.socket):
+        def bind(self, address):
+            if 0 < address[1] < 1024:
+                raise PermissionError(13, "Permission denied")
+            super().bind(("127.0.0.1", 0))
+
+    monkeypatch.setattr(listener.socket, "socket", Socket)
+
+
+def test_a_forbidden_port_is_told_from_a_taken_one(monkeypatch):
+    loop = EventLoop()
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(PortError) as error:
+        Listener(loop, "127.0.0.1", taken.getsockname()[1], None, set(), print, "modbus")
+    assert not isinstance(error.value, PortPermissionError)
+    forbid_low_ports(monkeypatch)
+    with pytest.raises(PortPermissionError, match=r"port 502 on 127\.0\.0\.1 needs privileges"):
+        Listener(loop, "127.0.0.1", 502, None, set(), print, "modbus")
+    loop.close()
+
+
+def test_a_box_without_its_modbus_port_serves_all_others_and_says_so(monkeypatch):
+    forbid_low_ports(monkeypatch)
+    with ControlBox(pace="lockstep") as box:
+        assert box.ports.modbus == 0
+        assert box.ports.dashboard > 0
+        assert run(box, 'textmsg("up")') == "up"
+        assert len(box.notices) == 1
+        assert "502" in box.notices[0]
+        assert "--port-base" in box.notices[0]
+
+
+def test_the_command_says_so_in_one_line(monkeypatch):
+    forbid_low_ports(monkeypatch)
+    monkeypatch.setattr(emulator.ControlBox, "serve_forever", emulator.ControlBox._close)
+    result = CliRunner().invoke(cli.app, ["serve", "--pace", "lockstep"])
+    assert result.exit_code == 0
+    assert result.stderr.startswith("ur-emulator: no Modbus server: port 502 on 127.0.0.1 needs privileges")
+    assert result.stderr.count("\n") == 1
+    assert "modbus" not in result.stdout
+    assert "ready at" in result.stdout
