@@ -114,6 +114,8 @@ class _Resolver:
                 name = _declared_name(statement)
                 if name is not None:
                     self.program.globals.add(name)
+                    if statement.scope == "global":
+                        self.program.declared_globals[name] = None
 
     def _declare_function(self, function: nodes.Function, scope: FunctionScope) -> None:
         if function.kind == "sec":
@@ -237,12 +239,8 @@ class _Resolver:
         callee = scope.find_function(run.thread)
         if callee is None:
             self._unknown(run.thread, run.span, list(scope.visible_functions()))
-        elif not callee.is_thread:
-            assert callee.node is not None
-            if any(parameter.default is None for parameter in callee.node.parameters):
-                self._error(
-                    ScriptTypeError(f"cannot run {run.thread}: a thread takes no parameters"), run.span
-                )
+        elif callee.node is not None and callee.node.parameters:
+            self._error(ScriptTypeError(f"cannot run {run.thread}: a thread takes no parameters"), run.span)
 
     def _check_arguments(self, call: nodes.Call, callee: FunctionScope) -> None:
         """Count and names of the arguments of a user function."""

@@ -86,7 +86,7 @@ def test_examples(name: str, args: tuple[Any, ...], result: object) -> None:
             "to_str",
             (None,),
             "to_str: operand must be a string, bool, int, float or pose, or a list of bools, ints, "
-            "floats or poses, got a none",
+            "floats or poses, got None",
         ),
         (
             "str_cat",

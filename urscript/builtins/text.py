@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from urscript.errors import ScriptRuntimeError
-from urscript.values import TEXT_LIMIT, Pose, is_number, log_form, str_form, type_name
+from urscript.values import TEXT_LIMIT, Pose, a_type, is_number, log_form, str_form
 
 _ALLOWED = "a string, bool, int, float or pose, or a list of bools, ints, floats or poses"
 
@@ -28,11 +28,11 @@ def operand_text(function: str, value: Any) -> str:
     """
     if not isinstance(value, str) and not _is_scalar(value):
         if not isinstance(value, list):
-            raise ScriptRuntimeError(f"{function}: operand must be {_ALLOWED}, got a {type_name(value)}")
+            raise ScriptRuntimeError(f"{function}: operand must be {_ALLOWED}, got {a_type(value)}")
         odd = [item for item in value if not _is_scalar(item)]
         if odd:
             raise ScriptRuntimeError(
-                f"{function}: operand must be {_ALLOWED}, got a list with a {type_name(odd[0])} in it"
+                f"{function}: operand must be {_ALLOWED}, got a list with {a_type(odd[0])} in it"
             )
     return str_form(value)
 
