@@ -58,6 +58,13 @@ def act(bench, catalogue, action):
             bench.network.sockets[-1].receive(bytes(map(int, rest.split())))
         case "hang":
             bench.network.sockets[-1].close()
+        case "modbus" if rest.startswith("lost"):
+            bench.network.modbus_trouble = rest.removeprefix("lost ")
+        case "modbus" if rest == "back":
+            bench.network.modbus_trouble = ""
+        case "modbus":
+            kind, address, value = map(int, rest.split())
+            bench.network.modbus_memory[kind, address] = value
         case "run":
             return [cmd.StartProgram(compile_program(rest, catalogue=catalogue))]
         case "answer":

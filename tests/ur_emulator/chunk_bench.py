@@ -148,6 +148,10 @@ def run_box_chunk(chunk):
     if chunk.sent is not None:
         assert run.network.sent == chunk.sent, f"{chunk}: sent {run.network.sent}"
     assert run.network.called == chunk.called, f"{chunk}: called {run.network.called}"
+    assert run.network.custom == chunk.custom, f"{chunk}: sent {run.network.custom}"
+    for kind, address, value in chunk.modbus:
+        found = run.network.modbus_memory.get((kind, address))
+        assert found == value, f"{chunk}: {found} at {kind} {address}"
     assert not any(socket.is_open for socket in run.network.sockets), f"{chunk}: left a socket open"
     assert run.bench.controller.programs.is_paused == chunk.paused, f"{chunk}: paused"
     for name, value, tolerance in chunk.states:

@@ -17,6 +17,8 @@ Chunks stand apart by a line `---`; lines count from the first of the chunk. A l
     #state name value   a value of the last snapshot, optionally with a tolerance
     #sent "text"        all that the program sent, through all sockets, in order
     #called f [1, 2]    the next remote procedure called, with its arguments (all, in order)
+    #modbus 3 6 100     what stands in a Modbus unit at the end: type of signal, address, value
+    #custom 255 6 [0]   the next request sent to a unit as it is: its number, function code, data (all)
 
     what the box is and what is done to it
     #fidelity typical   ideal, if not given
@@ -41,7 +43,7 @@ from ast import literal_eval
 from dataclasses import dataclass, field
 
 _MARK = re.compile(
-    r"#(\d*>|!|sec!|~|event|life|cycles|paused|state|sent|called|fidelity|seed|do|at|then|answer|peer|reply"
+    r"#(\d*>|!|sec!|~|event|life|cycles|paused|state|sent|called|modbus|custom|fidelity|seed|do|at|then|answer|peer|reply"
     r"|rpc|software)(?: (.*))?$"
 )
 
@@ -63,6 +65,8 @@ class BoxChunk:
     states: list[tuple[str, object, float]] = field(default_factory=list)
     sent: bytes | None = None
     called: list[str] = field(default_factory=list)
+    modbus: list[tuple[int, int, int]] = field(default_factory=list)
+    custom: list[str] = field(default_factory=list)
     fidelity: str = "ideal"
     seed: int = 7
     actions: list[tuple[int, str]] = field(default_factory=list)
@@ -131,6 +135,10 @@ def _take(chunk, kind, rest):
             chunk.sent = (chunk.sent or b"") + latin(rest)
         case "called":
             chunk.called.append(rest)
+        case "modbus":
+            chunk.modbus.append(tuple(map(int, rest.split())))
+        case "custom":
+            chunk.custom.append(rest)
         case "fidelity":
             chunk.fidelity = rest
         case "seed":

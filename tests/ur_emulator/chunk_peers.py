@@ -1,10 +1,11 @@
-"""The network of a chunk: peers of sockets and remote procedures, as its marks describe them.
+"""The network of a chunk: peers of sockets, remote procedures, Modbus units, as its marks describe them.
 
 Nothing comes within the cycle in which it is asked for: `deliver` is called between cycles.
 """
 
 from ast import literal_eval
 
+from box_support import FakeModbusUnit
 from chunk_marks import latin
 
 from ur_emulator.scripting.network import RemoteCallError
@@ -76,7 +77,28 @@ class _Server:
 
     def close(self):
         self._calls = []
-        self._network.closed_servers += 1
+
+
+class _ModbusUnit(FakeModbusUnit):
+    """A unit that answers between cycles."""
+
+    def __init__(self, network):
+        super().__init__()
+        self._network = network
+        self.memory = network.modbus_memory
+        self._wanted = []
+
+    def want(self, signal):
+        self._wanted.append(signal)
+
+    def deliver(self):
+        self.trouble = self._network.modbus_trouble
+        wanted, self._wanted = self._wanted, []
+        for signal in wanted:
+            super().want(signal)
+
+    def send(self, slave, function_code, data):
+        self._network.custom.append(f"{slave} {function_code} {list(data)}")
 
 
 class ChunkNetwork:
@@ -89,7 +111,10 @@ class ChunkNetwork:
         self.sockets = []
         self.servers = []
         self.called = []
-        self.closed_servers = 0
+        self.modbus_units = []
+        self.modbus_memory = {}
+        self.modbus_trouble = ""
+        self.custom = []
 
     def open(self, host, port):
         peer = self._peers.pop(0) if self._peers else '""'
@@ -100,8 +125,12 @@ class ChunkNetwork:
         self.servers.append(_Server(self))
         return self.servers[-1]
 
+    def modbus_unit(self, address):
+        self.modbus_units.append(_ModbusUnit(self))
+        return self.modbus_units[-1]
+
     def deliver(self):
-        for end in (*self.sockets, *self.servers):
+        for end in (*self.sockets, *self.servers, *self.modbus_units):
             end.deliver()
 
     @property

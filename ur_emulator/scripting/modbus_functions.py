@@ -50,7 +50,7 @@ def _definitions(state: ControllerState, network: Network) -> dict[str, Function
     modbus = state.modbus
 
     def add_signal(
-        thread: object, ip: str, slave: int, address: int, kind: int, name: str, sequential: bool
+        thread: object, ip: str, slave: float, address: float, kind: float, name: str, sequential: bool
     ) -> None:
         builtin = "modbus_add_signal"
         if not 0 < len(name) <= MAX_NAME:
@@ -61,16 +61,17 @@ def _definitions(state: ControllerState, network: Network) -> dict[str, Function
             raise ScriptRuntimeError(f"{builtin}: there are {MAX_SIGNALS} signals already, delete one first")
         unit = _unit_address(builtin, ip)
         modbus.add(
-            ModbusSignal(name, unit, slave, address, SignalType(kind), sequential), network.modbus_unit
+            ModbusSignal(name, unit, int(slave), int(address), SignalType(int(kind)), sequential),
+            network.modbus_unit,
         )
 
-    def send_custom_command(thread: object, ip: str, slave: int, code: int, data: list[Any]) -> None:
+    def send_custom_command(thread: object, ip: str, slave: float, code: float, data: list[Any]) -> None:
         builtin = "modbus_send_custom_command"
         if len(data) > MAX_DATA or not all(type(item) is int and 0 <= item <= BYTE_MAX for item in data):
             raise ScriptRuntimeError(
                 f"{builtin}: data must be a list of up to {MAX_DATA} integers from 0 to {BYTE_MAX}"
             )
-        modbus.send(_unit_address(builtin, ip), network.modbus_unit, slave, code, bytes(data))
+        modbus.send(_unit_address(builtin, ip), network.modbus_unit, int(slave), int(code), bytes(data))
 
     return {
         "modbus_add_signal": add_signal,
@@ -94,13 +95,13 @@ def _values(state: ControllerState) -> dict[str, Function]:
         builtin = "modbus_set_output_signal"
         _set(builtin, _signal(state, builtin, name, SignalType.DIGITAL_OUTPUT), int(value))
 
-    def set_output_register(thread: object, name: str, value: int, is_secondary: bool) -> None:
+    def set_output_register(thread: object, name: str, value: float, is_secondary: bool) -> None:
         builtin = "modbus_set_output_register"
         if not 0 <= value <= WORD_MAX:
             raise ScriptRuntimeError(
                 f"{builtin}: {value} does not fit into a register, allowed are 0 to {WORD_MAX}"
             )
-        _set(builtin, _signal(state, builtin, name, SignalType.REGISTER_OUTPUT), value)
+        _set(builtin, _signal(state, builtin, name, SignalType.REGISTER_OUTPUT), int(value))
 
     def _set(builtin: str, signal: ModbusSignal, value: int) -> None:
         modbus.set_output(signal, value)
@@ -116,19 +117,19 @@ def _values(state: ControllerState) -> dict[str, Function]:
 def _settings(state: ControllerState) -> dict[str, Function]:
     def set_update_frequency(thread: object, name: str, frequency: float) -> None:
         signal = _signal(state, "modbus_set_signal_update_frequency", name)
-        signal.frequency = frequency
+        signal.frequency = float(frequency)
         signal.due = state.tick
 
     def set_input_action(thread: object, name: str, action: str) -> None:
         builtin = "modbus_set_digital_input_action"
         _signal(state, builtin, name, SignalType.DIGITAL_INPUT).action = action or DEFAULT_ACTION
 
-    def set_runstate_choice(thread: object, name: str, code: int) -> None:
+    def set_runstate_choice(thread: object, name: str, code: float) -> None:
         builtin = "modbus_set_runstate_dependent_choice"
         signal = _signal(state, builtin, name)
         if not signal.type.is_output:
             raise ScriptRuntimeError(f'{builtin}: signal "{name}" is a {signal.type.title}, not an output')
-        state.modbus.set_rule(signal, RunState(code), state.io_configuration.program_runs)
+        state.modbus.set_rule(signal, RunState(int(code)), state.io_configuration.program_runs)
 
     return {
         "modbus_set_signal_update_frequency": set_update_frequency,

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from protocol.pose import pose_inv
 from urscript.catalogue.argument_checks import type_error
 from urscript.catalogue.types import ParamType
 from urscript.errors import ScriptRuntimeError
 from urscript.values import Matrix, Pose, is_number, wrap_int
 
 from .arguments import integer, numbers
+from .poses import pose_inv
 
 _WORD = 32
 
@@ -82,7 +82,7 @@ def transpose(m: Any) -> Matrix | list[Any]:
 def inv(m: Any) -> Matrix | Pose:
     """Inverse of a pose or of a square, non-singular matrix."""
     if type(m) is Pose:
-        return Pose.of(pose_inv(m))
+        return pose_inv(m, "inv")
     if not isinstance(m, Matrix):
         raise type_error("inv", "m", ParamType.POSE_OR_MATRIX, m)
     rows, columns = m.shape

@@ -39,9 +39,9 @@ pose_sub = _of_two("pose_sub", "p_to", "p_from", algebra.pose_sub)
 pose_trans = _of_two("pose_trans", "p_from", "p_from_to", algebra.pose_trans)
 
 
-def pose_inv(p_from: Any) -> Pose:
-    """The inverse transformation."""
-    return Pose.of(_computed("pose_inv", algebra.pose_inv, pose("pose_inv", "p_from", p_from)))
+def pose_inv(p_from: Any, function: str = "pose_inv") -> Pose:
+    """The inverse transformation; `function` is the builtin that errors name."""
+    return Pose.of(_computed(function, algebra.pose_inv, pose(function, "p_from", p_from)))
 
 
 def interpolate_pose(p_from: Any, p_to: Any, alpha: Any) -> Pose:

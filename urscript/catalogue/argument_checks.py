@@ -22,6 +22,8 @@ from .types import Builtin, Param, ParamType
 Predicate = Callable[[Any], bool]
 
 _SHOWN_TEXT = 40
+# Numbers beyond this are no length, time or angle of a robot; their products would leave the floats.
+_MOST = 1e15
 
 
 def _is_int(value: Any) -> bool:
@@ -115,9 +117,17 @@ def type_error(function: str, parameter: str, kind: ParamType, value: Any) -> Sc
 
 def _is_finite(value: Any) -> bool:
     """For a number, a list of numbers or a pose."""
-    if isinstance(value, float):
-        return isfinite(value)
-    return all(map(isfinite, value)) if isinstance(value, (list, Pose)) else True
+    return all(map(isfinite, value)) if isinstance(value, (list, Pose)) else isfinite(value)
+
+
+def _is_moderate(value: Any) -> bool:
+    """Like `_is_finite`, and not absurd either."""
+    if isinstance(value, (list, Pose)):
+        for item in value:
+            if not -_MOST <= item <= _MOST:
+                return False
+        return True
+    return bool(-_MOST <= value <= _MOST)
 
 
 def _must_be_finite(builtin: Builtin, param: Param) -> bool:
@@ -136,11 +146,9 @@ def explain(builtin: Builtin, param: Param, value: Any) -> ScriptRuntimeError:
     """The error for an argument that a check refused."""
     if not fits(param.type, value):
         return type_error(builtin.name, param.name, param.type, value)
-    if _must_be_finite(builtin, param) and not _is_finite(value):
-        return ScriptRuntimeError(
-            f"{builtin.name}: Parameter '{param.name}' must be finite, got {_show(value)}"
-        )
-    if param.choices:
+    if _must_be_finite(builtin, param) and not _is_moderate(value):
+        allowed = f"in the range {-_MOST:g} to {_MOST:g}" if _is_finite(value) else "finite"
+    elif param.choices:
         allowed = "one of " + ", ".join(map(str, param.choices))
     elif param.low is not None and param.high is not None:
         allowed = f"in the range {param.low:g} to {param.high:g}"
@@ -171,7 +179,7 @@ def _accepts(builtin: Builtin, param: Param) -> Predicate | None:
             return may_be_left_out
         if not of_type(value):
             return False
-        if needs_finite and not _is_finite(value):
+        if needs_finite and not _is_moderate(value):
             return False
         return not is_ranged or _is_in_range(param, value)
 

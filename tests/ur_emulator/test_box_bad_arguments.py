@@ -1,0 +1,110 @@
+"""Every builtin with odd arguments: the box answers with a result or a run-time error, and lives on."""
+
+import math
+
+import pytest
+from chunk_bench import ChunkBench
+from chunk_marks import BoxChunk
+
+from ur_emulator.controller.commands import ReleaseBrakes, StartProgram, StopProgram, UnlockProtectiveStop
+from urscript import compile_program
+from urscript.catalogue import CB3_3_15
+from urscript.catalogue.types import ParamType
+
+POSE = "p[0.3, 0.1, 0.25, 0, 3, 0]"
+JOINTS = "[0.4, -1.7, -2.0, -0.1, 1.3, 1.9]"
+# An argument that fits, by type; integers are written as floats, which the language lets through.
+USUAL = {
+    ParamType.ANY: "1.0",
+    ParamType.BOOL: "True",
+    ParamType.INT: "1.0",
+    ParamType.NUMBER: "1.0",
+    ParamType.STRING: '"a"',
+    ParamType.POSE: POSE,
+    ParamType.JOINTS: JOINTS,
+    ParamType.POSE_OR_JOINTS: JOINTS,
+    ParamType.VECTOR3: "[0.0, 0.1, 0.2]",
+    ParamType.VECTOR6: "[0.01, 0, 0, 0, 0, 0.01]",
+    ParamType.NUMBERS: "[1.0, 2]",
+    ParamType.LIST: "[1.0, 2.0]",
+    ParamType.BOOLS: "[True, False]",
+    ParamType.MATRIX: "[[1, 2], [3, 5]]",
+    ParamType.ARRAY: "[1, 2]",
+    ParamType.SIZED: "[1, 2]",
+    ParamType.SHAPED: "[[1, 2], [3, 5]]",
+    ParamType.LIST_OR_MATRIX: "[[1, 2], [3, 5]]",
+    ParamType.POSE_OR_MATRIX: POSE,
+    ParamType.NORMED: "[1, 2]",
+}
+HUGE, NAN, INF = "1.0E308", 'to_num("nan")', 'to_num("inf")'
+# Arguments that nobody should give, whatever the type.
+ODD = (
+    "0",
+    "-1",
+    "2147483647",
+    "-2147483648",
+    HUGE,
+    "-" + HUGE,
+    "9.0E14",
+    "1.0E-300",
+    NAN,
+    INF,
+    "None",
+    "True",
+    '""',
+    '"' + "x" * 2000 + '"',
+    "[]",
+    "[0, 0, 0]",
+    "[0, 0, 0, 0, 0, 0]",
+    f"[{HUGE}, {HUGE}, {HUGE}]",
+    ", ".join([f"[{HUGE}"] + [HUGE] * 4 + [f"{HUGE}]"]),
+    "[9.0E14, -9.0E14, 9.0E14, 9.0E14, 9.0E14, 9.0E14]",
+    "p[9.0E14, -9.0E14, 9.0E14, 9.0E14, 9.0E14, 9.0E14]",
+    f"[{NAN}, 0, 0, 0, 0, 0]",
+    '["a", "b"]',
+    "[[1, 2], [3, 4]]",
+    "p[0, 0, 0, 0, 0, 0]",
+    ", ".join([f"p[{HUGE}"] + [HUGE] * 4 + [f"{HUGE}]"]),
+    f"p[{INF}, 0, 0, 0, 0, 0]",
+)
+CYCLES = 6
+
+
+def usual(param):
+    if param.choices:
+        choice = param.choices[0]
+        return f'"{choice}"' if isinstance(choice, str) else f"{float(choice)}"
+    if param.type in (ParamType.INT, ParamType.NUMBER) and param.low is not None:
+        return f"{float(param.low)}"
+    return USUAL[param.type]
+
+
+def calls(row):
+    """The usual call, and each with one odd argument."""
+    arguments = [usual(param) for param in row.params]
+    yield arguments
+    for i in range(len(arguments)):
+        for odd in ODD:
+            yield [*arguments[:i], odd, *arguments[i + 1 :]]
+
+
+@pytest.mark.parametrize("row", list(CB3_3_15), ids=lambda row: row.name)
+def test_odd_arguments_do_no_harm(row):
+    bench = ChunkBench(BoxChunk("", 1, ""))
+    start = bench.now.actual_q
+    for arguments in calls(row):
+        text = f"def p():\n  x = {row.name}({', '.join(arguments)})\n  sync()\n  sync()\nend\n"
+        bench.events.clear()
+        bench.snapshots.clear()
+        bench.tick(1, StopProgram(), UnlockProtectiveStop(), ReleaseBrakes())
+        if bench.controller.state.mode.is_changing:
+            bench.tick(400)
+        bench.tick(1, StartProgram(compile_program(text)))
+        bench.tick(CYCLES)
+        for event in bench.events:
+            assert "internal error" not in getattr(event, "text", ""), f"{arguments}: {event.text}"
+        assert all(math.isfinite(x) for x in bench.now.actual_q), arguments
+    bench.tick(1, StopProgram(), UnlockProtectiveStop())
+    bench.tick(50)
+    moved = max(abs(a - b) for a, b in zip(bench.now.actual_q, start, strict=True))
+    assert row.name == "set_pos" or moved < 1.0
