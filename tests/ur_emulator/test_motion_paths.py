@@ -104,6 +104,6 @@ def test_a_blend_stays_within_r_of_the_waypoint_and_is_tangent_to_both_moves(one
     assert pose_sub(start, first.path.path.at(found.leave)[0]) == pytest.approx([0] * 6, abs=1e-9)
     assert pose_sub(end, second.path.path.at(found.enter)[0]) == pytest.approx([0] * 6, abs=1e-9)
     assert slope == pytest.approx(first.path.path.at(found.leave)[1], abs=1e-7)
-    ratio = found.ratio
+    ratio = 1.0 / found.scale
     assert end_slope == pytest.approx([ratio * x for x in second.path.path.at(found.enter)[1]], abs=1e-7)
     check_derivatives(curve)

@@ -23,7 +23,7 @@ from ur_emulator.motion.move import Move
 from ur_emulator.motion.overlay import Overlay, OverlayChain
 from ur_emulator.motion.pause import Detour, Pace, Suspended
 from ur_emulator.motion.speed_l import StopL
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.target import ZERO6, JointTarget
 
 # Deceleration of the leading axis when a program ends, is replaced or killed while the arm moves. Users
 # call the real one "abrupt"; the number is not published. Chosen: the mean of UR's stop category 0 tests on
@@ -130,10 +130,11 @@ class ArmMotion:
         self._brake(deceleration)
         self._pace.reset()
 
-    def place(self, q: Vector6) -> None:
-        """Set the target to `q` at rest, without a path: the joints were moved by something else.
+    def place(self, q: Vector6, qd: Vector6 = ZERO6) -> None:
+        """Set the target to `q` [rad], without a path: the joints were moved by something else.
 
-        In a pause, what was under way goes on from there.
+        If they still move, with `qd` [rad/s], they are ramped to rest. In a pause, what was under way goes on
+        from there.
         """
         if self._pace.paused:
             self._suspend()
@@ -142,7 +143,9 @@ class ArmMotion:
         self._owner = None
         self._generator = _HOLD
         self._chain.clear()
-        self.path = self.target = JointTarget(q)
+        self.path = self.target = JointTarget(q, qd)
+        if any(qd):
+            self._generator = StopJ(PROGRAM_END_DECELERATION)
 
     def retract(self, target: JointTarget) -> None:
         """Take back the last step: `target` is the one from before it."""
@@ -231,6 +234,10 @@ class ArmMotion:
         """Let an overlay displace the tool from the next cycle on, after those that are active already."""
         self._chain.add(overlay, self.target)
         self._is_special = True
+
+    def has_overlay(self, overlay: Overlay) -> bool:
+        """True while an overlay is active."""
+        return overlay in self._overlays
 
     def remove_overlay(self, overlay: Overlay) -> None:
         """End an overlay, if it is active; the arm stays where it has led it.

@@ -2,7 +2,7 @@
 
 Three shapes. Two moves of the tool: a cubic in position and orientation relative to the waypoint; between
 straight lines that is the parabola of a constant acceleration. Two straight process moves (movep): a circular
-arc, so that the speed stays. As soon as a joint move takes part: the same cubic in joint space.
+arc, so that the speed may stay. As soon as a joint move takes part: the same cubic in joint space.
 Source: URScript manual CB3 3.15, `r` of the moves, "circular blends" of movep; the other shapes are chosen.
 """
 
@@ -10,38 +10,45 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import acos, cos, hypot, inf, pi, sin, sqrt, tan
+from math import acos, cos, hypot, pi, sin, sqrt, tan
 
 from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.cubic import Cubic, Vector
 from ur_emulator.motion.joint_path import JointCurve, JointLine, JointPath, ToolPath
 from ur_emulator.motion.leg import Leg
-from ur_emulator.motion.path import PoseLine
+from ur_emulator.motion.path import PoseLine, PosePath, measure
+from ur_emulator.motion.survey import Sample, survey
 
 # Beyond this turn the circular blend of a movep gets so narrow that the cubic takes its place.
 SHARPEST_ARC = 0.9 * pi
 _STRAIGHT = 1e-6  # m/m
 _SAMPLES = 8  # points of a blend at which its speed is looked at
+# Ways before and behind the waypoint that differ by more make a curve that no longer turns one way.
+_LOPSIDED = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class Blend:
-    """A blend, ready to be travelled at a constant rate.
+    """A blend; it begins and ends with the speeds of the moves that it joins.
 
     Attributes:
         path: the curve, in units of the move that it leaves.
         leave: where on the first move it begins.
         enter: where on the second move it ends.
-        ratio: speed on entering the second move for a speed of 1 on leaving the first [unit 2 / unit 1].
-        top_speed: greatest speed that keeps the accelerations of both moves, in units of the first.
+        scale: units of the first move that one unit of the second counts [unit 1 / unit 2].
+        v: greatest speed, in units of the first move.
+        a: what `path.rate` and `path.bend` may not exceed in acceleration.
+        samples: of a path of the tool.
     """
 
     path: JointPath
     leave: float
     enter: float
-    ratio: float
-    top_speed: float
+    scale: float
+    v: float
+    a: float
+    samples: tuple[Sample, ...] = ()
 
 
 def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
@@ -63,39 +70,51 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     leave = first.path.length - before
     a, b = first.path, second.path
     if isinstance(a, ToolPath) and isinstance(b, ToolPath):
-        if (
-            first.process
-            and second.process
-            and isinstance(a.path, PoseLine)
-            and isinstance(b.path, PoseLine)
-            and (corner := _corner(a.path, b.path, first, leave, after)) is not None
-        ):
-            return Blend(ToolPath(corner, first.tool), leave, after, 1.0, inf)
-        start, slope = a.path.at(leave)
-        end, end_slope = b.path.at(after)
-        waypoint = first.goal_pose
-        cubic = Cubic.between(
-            pose_sub(start, waypoint),
-            _times(2.0 * before, slope),
-            pose_sub(end, waypoint),
-            _times(2.0 * after, end_slope),
+        curve = _tool_curve(first, second, a, b, leave, after)
+        v = max(first.v, second.v)
+        samples = survey(curve, first.tool, first.near(leave), v)
+        if not samples or samples[-1].s < curve.length:
+            return None
+        return Blend(
+            ToolPath(curve, first.tool), leave, after, 1.0, v / curve.rate, min(first.a, second.a), samples
         )
-        bend = max(hypot(*bend[:3]) for bend in cubic.bends())
-        rate = max(hypot(*cubic.at(k / _SAMPLES)[1][:3]) for k in range(_SAMPLES + 1))
-        curve: JointPath = ToolPath(PoseCurve(cubic, waypoint, 2.0 * before), first.tool)
-        limit = min(first.a, second.a)
+    start_q, slope = a.at(leave, first.near(leave))
+    end_q, end_slope = b.at(after, second.near(after))
+    if isinstance(a, ToolPath) or isinstance(b, ToolPath):
+        scale, length, end_length = before / after, 2.0 * before, 2.0 * after
     else:
-        start_q, slope = a.at(leave, first.goal)
-        end_q, end_slope = b.at(after, first.goal)
-        cubic = Cubic.between(start_q, _times(2.0 * before, slope), end_q, _times(2.0 * after, end_slope))
-        bend = max(abs(x) for bend in cubic.bends() for x in bend)
-        rate = max(abs(x) for k in range(_SAMPLES + 1) for x in cubic.at(k / _SAMPLES)[1])
-        curve = JointCurve(cubic, 2.0 * before)
-        limit = min(leg.a for leg in (first, second) if isinstance(leg.path, JointLine))
-    top = 2.0 * before * sqrt(limit / bend) if bend > 0.0 else inf
-    if isinstance(a, ToolPath) == isinstance(b, ToolPath) and rate > 0.0:
-        top = min(top, 2.0 * before * max(first.v, second.v) / rate)
-    return Blend(curve, leave, after, after / before, top)
+        scale, length = 1.0, _length(before, after)
+        end_length = length
+    cubic = Cubic.between(start_q, _times(length, slope), end_q, _times(end_length, end_slope))
+    joint_curve = JointCurve(cubic, length)
+    v = max(first.v, scale * second.v)
+    if scale == 1.0 and isinstance(a, JointLine):
+        v /= joint_curve.rate
+    limit = min(leg.a for leg in (first, second) if isinstance(leg.path, JointLine))
+    return Blend(joint_curve, leave, after, scale, v, limit)
+
+
+def _length(before: float, after: float) -> float:
+    """Return the length of a blend whose speed is that of both moves at its ends."""
+    return min(before + after, _LOPSIDED * min(before, after))
+
+
+def _tool_curve(
+    first: Leg, second: Leg, a: ToolPath, b: ToolPath, leave: float, enter: float
+) -> PoseCurve | PoseCorner:
+    lines = isinstance(a.path, PoseLine) and isinstance(b.path, PoseLine)
+    if lines and first.process and second.process:
+        corner = _corner(a.path, b.path, first, leave, enter)
+        if corner is not None:
+            return corner
+    start, slope = a.path.at(leave)
+    end, end_slope = b.path.at(enter)
+    waypoint = first.goal_pose
+    length = _length(first.path.length - leave, enter)
+    cubic = Cubic.between(
+        pose_sub(start, waypoint), _times(length, slope), pose_sub(end, waypoint), _times(length, end_slope)
+    )
+    return PoseCurve(cubic, waypoint, length)
 
 
 class PoseCurve:
@@ -105,6 +124,8 @@ class PoseCurve:
         self._cubic = cubic
         self._waypoint = waypoint
         self.length = length
+        self.rate = _fastest(self)
+        self.bend = max(map(measure, cubic.bends())) / length**2
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
         """See PosePath."""
@@ -125,6 +146,9 @@ class PoseCorner:
         self._turn = turn
         self._waypoint = waypoint
         self.length = radius * angle
+        self.rate = _fastest(self)
+        turning = max(measure((0.0, 0.0, 0.0, *bend)) for bend in turn.bends())
+        self.bend = max(1.0 / radius, turning / self.length**2)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
         """See PosePath."""
@@ -138,7 +162,12 @@ class PoseCorner:
         return (x, y, z, turned[3], turned[4], turned[5]), (vx, vy, vz, rx, ry, rz)
 
 
-def _corner(first: PoseLine, second: PoseLine, leg: Leg, leave: float, enter: float) -> PoseCorner | None:
+def _fastest(path: PosePath) -> float:
+    """Return the greatest speed of the pose on a path when s moves at 1."""
+    return max(measure(path.at(path.length * k / _SAMPLES)[1]) for k in range(_SAMPLES + 1))
+
+
+def _corner(first: PosePath, second: PosePath, leg: Leg, leave: float, enter: float) -> PoseCorner | None:
     """Return the arc tangent to two lines; None where it would be too narrow, or the lines are turns only."""
     start, slope = first.at(leave)
     end, end_slope = second.at(enter)

@@ -38,6 +38,16 @@ class Cubic:
             tuple(b + u * (2.0 * c + u * 3.0 * d) for _, b, c, d in rows),
         )
 
+    def fastest(self) -> Vector:
+        """Return for each coordinate the greatest absolute value of the derivative."""
+        found = []
+        for b, c, d in zip(self.c1, self.c2, self.c3, strict=True):
+            values = [b, b + 2.0 * c + 3.0 * d]
+            if d != 0.0 and 0.0 < -c / (3.0 * d) < 1.0:
+                values.append(b - c * c / (3.0 * d))
+            found.append(max(map(abs, values)))
+        return tuple(found)
+
     def bends(self) -> tuple[Vector, Vector]:
         """Return the second derivatives at both ends; in between it is a mixture of them."""
         return (

@@ -22,6 +22,16 @@ class JointPath(Protocol):
         """Greatest s."""
         ...
 
+    @property
+    def rate(self) -> float:
+        """Greatest speed when s moves at 1: of the leading axis, or of the tool."""
+        ...
+
+    @property
+    def bend(self) -> float:
+        """Greatest acceleration when s moves at a constant 1: of the leading axis, or of the tool."""
+        ...
+
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
         """Return joint angles [rad] and their derivative [rad per unit of s].
 
@@ -38,6 +48,9 @@ class JointPath(Protocol):
 class JointLine:
     """Straight line in joint space; s is the angle of the leading axis."""
 
+    rate = 1.0
+    bend = 0.0
+
     def __init__(self, start: Sequence[float], goal: Sequence[float]) -> None:
         self._start = six(start)
         self._goal = six(goal)
@@ -53,11 +66,18 @@ class JointLine:
 
 
 class JointCurve:
-    """A cubic in joint space, in the units of the move that it leaves."""
+    """A cubic in joint space, in the units of the move that it leaves.
+
+    Attributes:
+        speeds: greatest speed of each joint when s moves at 1, (6,).
+    """
 
     def __init__(self, cubic: Cubic, length: float) -> None:
         self._cubic = cubic
         self.length = length
+        self.speeds = six([x / length for x in cubic.fastest()])
+        self.rate = max(self.speeds)
+        self.bend = max(abs(x) for bend in cubic.bends() for x in bend) / length**2
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
         """See JointPath."""
@@ -72,6 +92,8 @@ class ToolPath:
         self.path = path
         self.tool = tool
         self.length = path.length
+        self.rate = path.rate
+        self.bend = path.bend
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
         """See JointPath."""

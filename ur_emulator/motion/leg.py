@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import dist
@@ -9,12 +10,15 @@ from math import dist
 from protocol.pose import Pose
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.joint_path import JointLine, JointPath, ToolPath
-from ur_emulator.motion.path import PosePath
+from ur_emulator.motion.path import PoseLine, PosePath
 from ur_emulator.motion.profile import Trapezoid
+from ur_emulator.motion.survey import Sample, survey
 from ur_emulator.motion.tool import Tool
 
 # A move stretched more than this does not move in any lifetime; keeps its numbers within those of floats.
 _STANDSTILL = 1e12
+# Faster than anything that turns, and still far from the largest floats.
+_FASTEST, _STRONGEST = 1e6, 1e9
 # Points tried on the way out of a blend zone, and halvings to find its border.
 _SAMPLES, _HALVINGS = 16, 30
 
@@ -33,6 +37,7 @@ class Leg:
         t: duration [s]; above 0 it has priority over `a` and `v`.
         r: blend radius at the waypoint [m]; 0 to end at rest.
         process: the speed stays constant through blends (movep).
+        samples: of a path of the tool, as far as the arm can follow it.
     """
 
     path: JointPath
@@ -44,6 +49,14 @@ class Leg:
     t: float = 0.0
     r: float = 0.0
     process: bool = False
+    samples: tuple[Sample, ...] = ()
+
+    def near(self, s: float) -> Vector6:
+        """Return joint angles close to those after the way s [rad], for the inverse kinematics."""
+        if not self.samples:
+            return self.path.at(s, ())[0]
+        sample = self.samples[max(0, bisect_right(self.samples, s, key=_way) - 1)]
+        return six([q + (s - sample.s) * k for q, k in zip(sample.q, sample.slope, strict=True)])
 
     def position(self, s: float) -> tuple[float, float, float]:
         """Return where the tool is after the way s [m]."""
@@ -74,15 +87,25 @@ class Leg:
             rolling, leave = min(rolling, top), min(leave, top)
             natural = Trapezoid.from_limits(way, top, self.a, rolling, leave).duration
         stretch = min(self.t / natural, _STANDSTILL)
-        return replace(self, v=self.v / stretch, a=self.a / stretch**2)
+        return replace(self, v=min(self.v / stretch, _FASTEST), a=min(self.a / stretch**2, _STRONGEST))
+
+    @property
+    def _way_rate(self) -> float | None:
+        """Way of the tool per unit of s, where it is the same all along the path and straight."""
+        path = self.path
+        return path.path.way_rate if isinstance(path, ToolPath) and isinstance(path.path, PoseLine) else None
 
     def last_part(self, r: float, most: float) -> float:
         """Return how much of the path's end lies within `r` of the waypoint, at most `most` [unit of s]."""
         end = self.path.length
+        if (rate := self._way_rate) is not None:
+            return min(most, r / rate) if rate > 0.0 else most
         return _inside(lambda d: dist(self.position(end - d), self.goal_pose[:3]) <= r, most)
 
     def first_part(self, r: float, most: float) -> float:
         """Return how much of the path's beginning lies within `r` of its start, at most `most`."""
+        if (rate := self._way_rate) is not None:
+            return min(most, r / rate) if rate > 0.0 else most
         start = self.position(0.0)
         return _inside(lambda d: dist(self.position(d), start) <= r, most)
 
@@ -110,12 +133,13 @@ def move_j(
         t: duration [s]; above 0 it has priority over `a` and `v`.
         r: blend radius [m].
     """
+    a, v = min(a, _STRONGEST), min(v, _FASTEST)
     return Leg(JointLine(start, goal), tool, six(goal), tool.pose(goal), v, a, t, r)
 
 
 def move_tool(
     path: PosePath,
-    near: Sequence[float],
+    near: Vector6,
     tool: Tool,
     *,
     a: float,
@@ -136,8 +160,18 @@ def move_tool(
         r: blend radius [m].
         process: keep the speed through blends.
     """
-    goal_pose = path.at(path.length)[0] if path.length > 0.0 else tool.pose(near)
-    return Leg(ToolPath(path, tool), tool, tool.joints(goal_pose, near), goal_pose, v, a, t, r, process)
+    a, v = min(a, _STRONGEST), min(v, _FASTEST)
+    length = path.length
+    if length <= 0.0:
+        return Leg(ToolPath(path, tool), tool, near, tool.pose(near), v, a, t, r, process)
+    samples = survey(path, tool, near, max(v, 2.0 * length / t) if t > 0.0 else v)
+    goal = samples[-1].q if samples and samples[-1].s >= length else None
+    goal_pose = path.at(length)[0]
+    return Leg(ToolPath(path, tool), tool, goal, goal_pose, v, a, t, r, process, samples)
+
+
+def _way(sample: Sample) -> float:
+    return sample.s
 
 
 def _inside(holds: Callable[[float], bool], most: float) -> float:

@@ -1,25 +1,31 @@
 """A move under way, and the moves that blend out of it: one generator for the whole chain.
 
 Blending needs to know the next move before the blend begins, and the arm must be able to stop if none comes.
-So an instruction with a blend radius gives way to the script (`open`) while the arm can still brake before
-the blend; a move that is commanded then joins it (`follow`). If none comes the arm stops at the waypoint.
+So an instruction with a blend radius gives way to the script (`open`) as soon as the arm could not go on at
+its speed and still come to rest before the blend; a move that is commanded then joins the chain (`follow`),
+and the speed of all that is known is planned anew. Where waypoints lie close together the script so runs
+several of them ahead. If no further move comes the arm stops at the last waypoint.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from bisect import bisect_right
 from enum import Enum
-from math import dist, sqrt
+from itertools import accumulate
+from math import dist
 
+from protocol.pose import Pose
 from ur_emulator.models.robot_model import Vector6, six
-from ur_emulator.motion.blend import Blend, blend
-from ur_emulator.motion.joint_path import JointPath
+from ur_emulator.motion.blend import blend
 from ur_emulator.motion.leg import Leg
-from ur_emulator.motion.profile import Trapezoid
+from ur_emulator.motion.piece import Piece, piece_of_blend, piece_of_leg
+from ur_emulator.motion.speed_plan import SpeedPlan, StoppingCurve, plan, stopping_curve
 from ur_emulator.motion.target import JointTarget
 
 # A blend that the arm is too fast for is made smaller by this factor, so many times, and then given up.
 _SHRINK, _ATTEMPTS = 0.7, 16
+# A script has this many cycles to command the next move after it was given way.
+_LEAD_CYCLES = 2
 
 
 class Follow(Enum):
@@ -30,50 +36,38 @@ class Follow(Enum):
     REFUSED = "refused"
 
 
-@dataclass(frozen=True, slots=True)
-class _Stage:
-    """A part of a path with its profile: from `begin` on."""
-
-    path: JointPath
-    begin: float
-    profile: Trapezoid
-    last: bool
-
-
 class Move:
     """Travels legs, one into the next.
 
     Attributes:
         done: at rest at the last waypoint.
         left: the instruction has given way: another one may follow, or the arm stops at the waypoint.
+        taken: moves that joined since the last cycle.
     """
 
     def __init__(self, leg: Leg) -> None:
         """Plan a leg from rest to rest."""
         self._leg = leg = leg.in_time()
-        length = leg.path.length
-        self._zone = leg.last_part(leg.r, 0.5 * length) if leg.r > 0.0 else 0.0
-        profile = Trapezoid.from_limits(length, leg.v, leg.a)
-        if length <= 0.0 < leg.t:
-            profile = Trapezoid.from_duration(length, leg.t, profile)
-        self._stages = [_Stage(leg.path, 0.0, profile, last=True)]
         self._time = self._time_before = 0.0
-        self._step = 0.0
-        self.done = profile.duration <= 0.0
+        self._cycle = 0.0
+        self._zone = _zone(leg, 0.0)
+        self._pieces: list[Piece] = [piece_of_leg(leg, 0.0, 1.0)]
+        self._ends: list[float] = []
+        self._plan: SpeedPlan
+        self._stopping: StoppingCurve | None = None
+        rest = plan(self._pieces[0].intervals(), 0.0)
+        assert rest is not None
+        self._use(rest)
+        # A move to where the arm is has no way, but may have a duration.
+        self._wait = leg.t if leg.path.length <= 0.0 else 0.0
+        self.done = self._plan.duration <= 0.0 and self._wait <= 0.0
         self.left = False
-
-    def take_back(self) -> None:
-        """Undo the last step: its target was not accepted."""
-        self._time = self._time_before
-
-    def abandon(self) -> None:
-        """Give the move up: whoever waits for its end need not wait longer."""
-        self.done = True
+        self.taken = 0
 
     @property
     def goal(self) -> Vector6 | None:
-        """Joint angles at the waypoint of the move under way [rad]; None if the arm cannot be there."""
-        return self._leg.goal
+        """Joint angles at the waypoint that the arm is on its way to [rad]; None if it cannot be there."""
+        return self._pieces[self._at(self._plan.at(self._time)[0])].leg.goal
 
     @property
     def leg(self) -> Leg:
@@ -83,43 +77,54 @@ class Move:
     @property
     def duration(self) -> float:
         """Time that is still planned, at full speed [s]."""
-        return sum(stage.profile.duration for stage in self._stages) - self._time
+        return max(self._plan.duration, self._wait) - self._time
 
     @property
     def open(self) -> bool:
         """True from the cycle on in which it must be known whether a move follows."""
         if self.done:
             return True
-        if self._leg.r <= 0.0 or not self._stages[0].last:
+        if self._leg.r <= 0.0 or self._stopping is None:
             return False
-        s, speed = self._state()
-        leg = self._leg
-        faster = min(leg.v, speed + leg.a * self._step)
-        braking = faster * self._step + faster * faster / (2.0 * leg.a)
-        return s + braking >= leg.path.length - self._zone
+        s, speed = self._plan.at(self._time + _LEAD_CYCLES * self._cycle)
+        return not self._stopping.can_stop(s, speed)
+
+    def overlaps(self, pose: Pose, r: float) -> bool:
+        """Return whether the blend at a next waypoint would overlap with the one at the last.
+
+        Source: URScript manual CB3 3.15, movej: "if the blend region of this move overlaps with the blend
+        radius of previous or following waypoints, this move will be skipped".
+        """
+        return r > 0.0 and self._leg.r + r > dist(self._leg.goal_pose[:3], pose[:3])
 
     def follow(self, leg: Leg) -> Follow:
-        """Let another leg follow, if this one still may.
-
-        Its path begins at this one's waypoint. Source for the skipping: URScript manual CB3 3.15, movej:
-        "if the blend region of this move overlaps with the blend radius of previous or following waypoints,
-        this move will be skipped".
-        """
-        if self.done or not self._stages[0].last or self._leg.r <= 0.0:
+        """Let another leg follow, if this one still may; its path begins at this one's waypoint."""
+        if self.done or self._wait > 0.0 or self._leg.r <= 0.0:
             return Follow.REFUSED
-        if leg.r > 0.0 and self._leg.r + leg.r > dist(self._leg.goal_pose[:3], leg.goal_pose[:3]):
+        if self.overlaps(leg.goal_pose, leg.r):
             return Follow.SKIPPED
-        s, speed = self._state()
-        first, radius = self._leg, self._leg.r
+        s, speed = self._plan.at(self._time)
+        ahead = self._ahead(s)
+        last, radius = ahead[-1], self._leg.r
         for _ in range(_ATTEMPTS):
-            found = blend(first, leg, radius, min(self._zone, first.path.length - s))
-            if found is None:
-                return Follow.REFUSED
-            second = leg.in_time(found.enter)
-            passing = _passing_speed(first, second, found, s, speed)
-            if passing is not None:
-                self._plan(second, found, s, speed, passing)
-                return Follow.BLENDED
+            found = blend(self._leg, leg, radius, min(self._zone, last.end - last.begin))
+            if found is not None:
+                second = leg.in_time(found.enter)
+                pieces = [
+                    *ahead[:-1],
+                    last.cut(end=found.leave),
+                    piece_of_blend(found, second, last.scale),
+                    piece_of_leg(second, found.enter, last.scale * found.scale),
+                ]
+                planned = plan([part for piece in pieces for part in piece.intervals()], speed)
+                if planned is not None:
+                    self._leg = second
+                    self._zone = _zone(second, found.enter)
+                    self._pieces = pieces
+                    self._use(planned)
+                    self.left = False
+                    self.taken += 1
+                    return Follow.BLENDED
             radius *= _SHRINK
         return Follow.REFUSED
 
@@ -129,72 +134,57 @@ class Move:
         Raises:
             UnreachableError: the path leads where the arm cannot be.
         """
-        self._step = dt
+        self._cycle = dt
+        self.taken = 0
         time = self._time + scale * dt
         near = [p + dt * v for p, v in zip(target.q, target.qd, strict=True)]
-        while time >= self._stages[0].profile.duration and len(self._stages) > 1:
-            time -= self._stages.pop(0).profile.duration
-        stage = self._stages[0]
-        if time >= stage.profile.duration:
-            q, _ = stage.path.at(stage.path.length, near)
+        self._time_before, self._time = self._time, time
+        if time >= max(self._plan.duration, self._wait):
+            q, _ = self._leg.path.at(self._leg.path.length, near)
             self.done = True
             return JointTarget(q)
-        s, speed, _ = stage.profile.at(time)
-        q, slope = stage.path.at(stage.begin + s, near)
-        self._time_before, self._time = self._time, time
-        qd = six([scale * speed * k for k in slope])
+        s, speed = self._plan.at(time)
+        k = self._at(s)
+        piece = self._pieces[k]
+        begin = self._ends[k - 1] if k > 0 else 0.0
+        q, slope = piece.path.at(min(piece.begin + (s - begin) / piece.scale, piece.end), near)
+        rate = scale * speed / piece.scale
+        qd = six([rate * x for x in slope])
         return JointTarget(q, qd, six([(b - a) / dt for a, b in zip(target.qd, qd, strict=True)]))
 
-    def _state(self) -> tuple[float, float]:
-        """Return where the move is on the path under way, and how fast."""
-        stage = self._stages[0]
-        s, speed, _ = stage.profile.at(self._time)
-        return stage.begin + s, speed
+    def take_back(self) -> None:
+        """Undo the last step: its target was not accepted."""
+        self._time = self._time_before
 
-    def _plan(self, second: Leg, found: Blend, s: float, speed: float, passing: float) -> None:
-        first = self._leg
-        entry = passing * found.ratio
-        rest = second.path.length - found.enter
-        self._stages = [
-            _Stage(
-                first.path,
-                s,
-                Trapezoid.from_limits(found.leave - s, first.v, first.a, speed, passing),
-                last=False,
-            ),
-            _Stage(
-                found.path,
-                0.0,
-                Trapezoid.from_limits(found.path.length, passing, first.a, passing, passing),
-                last=False,
-            ),
-            _Stage(
-                second.path,
-                found.enter,
-                Trapezoid.from_limits(rest, second.v, second.a, entry),
-                last=True,
-            ),
-        ]
-        self._time = 0.0
-        self._leg = second
-        self._zone = second.last_part(second.r, 0.5 * second.path.length) if second.r > 0.0 else 0.0
-        self.left = False
+    def abandon(self) -> None:
+        """Give the move up: whoever waits for its end need not wait longer."""
+        self.done = True
+
+    def _use(self, found: SpeedPlan) -> None:
+        """Begin a plan for the pieces now."""
+        self._plan = found
+        self._time = self._time_before = 0.0
+        self._ends = list(accumulate(piece.length for piece in self._pieces))
+        self._stopping = None
+        if self._zone > 0.0:
+            last = self._pieces[-1]
+            intervals = [part for piece in self._pieces for part in piece.intervals()]
+            self._stopping = stopping_curve(intervals, self._ends[-1] - self._zone * last.scale)
+
+    def _at(self, s: float) -> int:
+        """Return which piece a way leads to."""
+        return min(bisect_right(self._ends, s), len(self._pieces) - 1)
+
+    def _ahead(self, s: float) -> list[Piece]:
+        """Return what is left of the pieces after a way."""
+        k = self._at(s)
+        piece = self._pieces[k]
+        begin = piece.begin + (s - (self._ends[k - 1] if k > 0 else 0.0)) / piece.scale
+        return [piece.cut(begin=min(begin, piece.end)), *self._pieces[k + 1 :]]
 
 
-def _passing_speed(first: Leg, second: Leg, found: Blend, s: float, speed: float) -> float | None:
-    """Return the speed through the blend in units of the first move; None if the arm is too fast for it.
-
-    The arm must have braked or accelerated to it before the blend, and must be able to stop at the next
-    waypoint behind it.
-    """
-    way = max(0.0, found.leave - s)
-    rest = second.path.length - found.enter
-    fastest = min(
-        found.top_speed,
-        first.v,
-        second.v / found.ratio,
-        sqrt(2.0 * second.a * rest) / found.ratio,
-        sqrt(speed * speed + 2.0 * first.a * way),
-    )
-    slowest = sqrt(max(0.0, speed * speed - 2.0 * first.a * way))
-    return fastest if fastest >= slowest and fastest > 0.0 else None
+def _zone(leg: Leg, begin: float) -> float:
+    """Return how much of a leg's end its blend may take; at most half of it, and what is left of it."""
+    if leg.r <= 0.0:
+        return 0.0
+    return min(leg.last_part(leg.r, 0.5 * leg.path.length), leg.path.length - begin)

@@ -22,11 +22,24 @@ _FLAT = 1e-6
 
 
 class PosePath(Protocol):
-    """A path in the space of poses."""
+    """A path in the space of poses.
+
+    Speeds and accelerations of a pose count as `measure` says.
+    """
 
     @property
     def length(self) -> float:
         """Greatest s [m]."""
+        ...
+
+    @property
+    def rate(self) -> float:
+        """Greatest speed of the pose when s moves at 1; 1 where s is the way itself."""
+        ...
+
+    @property
+    def bend(self) -> float:
+        """Greatest acceleration of the pose when s moves at a constant 1 [1/m]."""
         ...
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
@@ -34,16 +47,29 @@ class PosePath(Protocol):
         ...
 
 
+def measure(twist: Sequence[float]) -> float:
+    """Return how much a twist counts, linear first: the way, or the turn of the lever if that is longer."""
+    x, y, z, rx, ry, rz = twist
+    return max(sqrt(x * x + y * y + z * z), TURN_LEVER * sqrt(rx * rx + ry * ry + rz * rz))
+
+
 class PoseLine:
     """Straight line from one pose to another."""
+
+    rate = 1.0
+    bend = 0.0
 
     def __init__(self, start: Sequence[float], goal: Sequence[float]) -> None:
         self._start = start
         self._goal = _pose(goal)
         self._change = pose_sub(goal, start)
-        x, y, z, rx, ry, rz = self._change
-        self.length = max(sqrt(x * x + y * y + z * z), TURN_LEVER * sqrt(rx * rx + ry * ry + rz * rz))
+        self.length = measure(self._change)
         self._twist = _scaled(self._change, 1.0 / self.length if self.length > 0.0 else 0.0)
+
+    @property
+    def way_rate(self) -> float:
+        """Way of the tool for s moved by 1; below 1 where the line is rather a turn."""
+        return _norm(self._twist)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
         """See PosePath; the end is the goal to the last bit."""
@@ -54,6 +80,8 @@ class PoseLine:
 
 class PoseArc:
     """Part of a circle, from a pose through a point to a pose."""
+
+    rate = 1.0
 
     def __init__(
         self, start: Sequence[float], centre: Vector3, axis: Vector3, angle: float, goal: Pose, *, fixed: bool
@@ -77,6 +105,7 @@ class PoseArc:
         turn = (axis[0] * angle, axis[1] * angle, axis[2] * angle) if fixed else pose_sub(goal, start)[3:]
         self._turn = turn
         self.length = max(angle * _norm(self._u), 0.0 if fixed else TURN_LEVER * _norm(turn))
+        self.bend = _norm(self._u) * (angle / self.length) ** 2
         self._goal = self._pose(1.0) if fixed else goal
 
     def at(self, s: float) -> tuple[Pose, Vector6]:

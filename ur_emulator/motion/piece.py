@@ -1,0 +1,122 @@
+"""Pieces of a chain of moves: parts of moves and the blends between them, with the limits of their speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil, inf, sqrt
+from typing import NamedTuple
+
+from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.motion.blend import Blend
+from ur_emulator.motion.joint_path import JointCurve, JointPath
+from ur_emulator.motion.leg import Leg
+from ur_emulator.motion.speed_plan import Interval
+from ur_emulator.motion.survey import JOINT_SPEED_SHARE, Sample, joint_limits
+
+# Longest way on a bend that is planned at a constant acceleration, in units of 1 / bend; most such ways.
+_SHORT, _MOST = 0.25, 32
+
+Bounds = tuple[tuple[float, float], ...]
+
+
+class Part(NamedTuple):
+    """Constant limits on a part of a path, in units of the path.
+
+    Attributes:
+        end: where the part ends; it begins where the one before it ends.
+        speed: greatest one.
+        bounds: pairs (a, b): the acceleration along the path is at most a - b v^2.
+    """
+
+    end: float
+    speed: float
+    bounds: Bounds
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A part of a path to be travelled.
+
+    Attributes:
+        path: in its own unit.
+        begin, end: of the part [unit].
+        scale: units of the chain that one unit of the path counts.
+        leg: the move whose waypoint it leads to.
+        parts: limits, of the whole path.
+    """
+
+    path: JointPath
+    begin: float
+    end: float
+    scale: float
+    leg: Leg
+    parts: tuple[Part, ...]
+
+    @property
+    def length(self) -> float:
+        """Way in units of the chain."""
+        return (self.end - self.begin) * self.scale
+
+    def cut(self, *, begin: float | None = None, end: float | None = None) -> Piece:
+        """Return a shorter piece."""
+        return replace(
+            self, begin=self.begin if begin is None else begin, end=self.end if end is None else end
+        )
+
+    def intervals(self) -> list[Interval]:
+        """Return the limits in units of the chain."""
+        found: list[Interval] = []
+        k, s = self.scale, self.begin
+        for part in self.parts:
+            way = min(part.end, self.end) - s
+            if way > 0.0:
+                bounds = part.bounds if k == 1.0 else tuple((k * a, b / k) for a, b in part.bounds)
+                # What a bend leaves of the acceleration changes with the speed, so not over long ways.
+                n = min(_MOST, max(1, ceil(way / _SHORT * max(b for _, b in part.bounds))))
+                found += n * [Interval(way * k / n, (k * part.speed) ** 2, bounds)]
+                s = part.end
+        return found
+
+
+def piece_of_leg(leg: Leg, begin: float, scale: float) -> Piece:
+    """Return a move from a point of its path on."""
+    path = leg.path
+    return Piece(path, begin, path.length, scale, leg, _parts(path, leg.v, leg.a, leg.samples, _robot(leg)))
+
+
+def piece_of_blend(blend: Blend, to: Leg, scale: float) -> Piece:
+    """Return a blend that leads into a move."""
+    path = blend.path
+    v = blend.v
+    if isinstance(path, JointCurve):
+        for speed, most in zip(path.speeds, _robot(to).qd_max, strict=True):
+            v = min(v, JOINT_SPEED_SHARE * most / speed) if speed > 0.0 else v
+    return Piece(path, 0.0, path.length, scale, to, _parts(path, v, blend.a, blend.samples, _robot(to)))
+
+
+def _robot(leg: Leg) -> RobotModel:
+    return leg.tool.arm.robot
+
+
+def _parts(
+    path: JointPath, v: float, a: float, samples: tuple[Sample, ...], robot: RobotModel
+) -> tuple[Part, ...]:
+    """Return the limits of a path for a speed, an acceleration and the joints."""
+    bound = (a / path.rate, path.bend / path.rate)
+    speed = min(v, sqrt(a / path.bend) if path.bend > 0.0 else inf)
+    found: list[Part] = []
+    for limit in joint_limits(samples, robot):
+        slower = min(speed, limit.speed)
+        bounds = (bound,) if _is_weaker(limit.bound, bound, slower) else (bound, limit.bound)
+        if found and found[-1][1:] == (slower, bounds):
+            found.pop()
+        found.append(Part(limit.end, slower, bounds))
+    if not found or found[-1].end < path.length:
+        found.append(Part(path.length, speed, (bound,)))
+    return tuple(found)
+
+
+def _is_weaker(one: tuple[float, float], other: tuple[float, float], speed: float) -> bool:
+    """Return whether a bound allows more than another at any speed up to a given one."""
+    z = speed * speed
+    return one[0] >= other[0] and one[0] - one[1] * z >= other[0] - other[1] * z

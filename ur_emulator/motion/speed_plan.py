@@ -1,0 +1,184 @@
+"""How fast a path is travelled: the fastest speed that keeps the limits of every part of it.
+
+The square z of the speed is what a plan is made of, for at a constant acceleration it is a straight line over
+the way: z' = 2 a. From the end a curve runs backwards, the speed from which the end can still be reached;
+from the beginning one runs forwards below it. The lower of both and of the limits is the plan.
+
+Where a path bends, a part of the acceleration goes into the bend: what is left along the path is
+a - b z, with the bend b per unit of way. Units are those of the path.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, sqrt
+from typing import NamedTuple
+
+# A speed may lie above the curve that reaches the end by rounding, not by more.
+_ROUNDING = 1.0 + 1e-9
+
+# Corners of a plan closer together than this share of an interval differ by rounding only.
+_NOTHING = 1e-12
+
+
+class Interval(NamedTuple):
+    """Part of a path with constant limits.
+
+    Attributes:
+        length: of the part, above 0.
+        cap: greatest square of the speed, above 0.
+        bounds: pairs (a, b): the acceleration along the path is at most a - b z, for all of them.
+    """
+
+    length: float
+    cap: float
+    bounds: tuple[tuple[float, float], ...]
+
+    def slope(self, z: float) -> float:
+        """Return the greatest constant change of z per way, away from an end where it is `z`.
+
+        The bounds hold up to the other end, or up to the cap where that comes first.
+        """
+        way = 2.0 * self.length
+        least = inf
+        for a, b in self.bounds:
+            # Where z is largest, the bound is tightest.
+            slope = 2.0 * a
+            if b > 0.0:
+                slope = max(2.0 * (a - b * self.cap), 2.0 * (a - b * z) / (1.0 + way * b))
+            least = min(least, slope)
+        return max(0.0, least)
+
+
+class Segment(NamedTuple):
+    """Part of a plan at constant acceleration: it begins at `s` with speed `v`."""
+
+    s: float
+    v: float
+    a: float
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedPlan:
+    """Way and speed over time.
+
+    Attributes:
+        segments: in order.
+        times: when each begins; the first at 0.
+        duration: when the end is reached.
+        length: way in all.
+    """
+
+    segments: tuple[Segment, ...]
+    times: tuple[float, ...]
+    duration: float
+    length: float
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Return way and speed at a time; at rest at the end from the end on."""
+        if t >= self.duration:
+            return self.length, 0.0
+        k = max(0, bisect_right(self.times, t) - 1)
+        s, v, a = self.segments[k]
+        dt = t - self.times[k]
+        return s + (v + 0.5 * a * dt) * dt, max(0.0, v + a * dt)
+
+
+class StoppingCurve(NamedTuple):
+    """The greatest squares of the speed from which the path can still come to rest at a point.
+
+    Attributes:
+        knots: ways, rising; the last is the point.
+        z: squares at them, straight lines between.
+    """
+
+    knots: tuple[float, ...]
+    z: tuple[float, ...]
+
+    def can_stop(self, s: float, speed: float) -> bool:
+        """Return whether an arm that is at `s` with a speed can come to rest at the point."""
+        if s >= self.knots[-1]:
+            return False
+        k = max(1, bisect_right(self.knots, s))
+        s0, s1, z0, z1 = self.knots[k - 1], self.knots[k], self.z[k - 1], self.z[k]
+        return speed * speed <= (z0 + (z1 - z0) * (s - s0) / (s1 - s0)) * _ROUNDING
+
+
+def plan(intervals: Sequence[Interval], entry: float) -> SpeedPlan | None:
+    """Return the fastest plan that comes to rest at the end.
+
+    Args:
+        intervals: of the path, in order; none for a path without length.
+        entry: speed at the beginning.
+
+    Returns:
+        None when the speed at the beginning is too high for what follows.
+    """
+    backward = _backward(intervals)
+    z = entry * entry
+    if z > backward[0] * _ROUNDING:
+        return None
+    z = min(z, backward[0])
+    segments: list[Segment] = []
+    times: list[float] = []
+    time = begin = 0.0
+    for interval, z_end in zip(intervals, backward[1:], strict=True):
+        done = 0.0
+        for end, z_next in _shape(interval, z, z_end):
+            way = end - done
+            if way > _NOTHING * interval.length:
+                v = sqrt(z)
+                segments.append(Segment(begin + done, v, 0.5 * (z_next - z) / way))
+                times.append(time)
+                time += 2.0 * way / (v + sqrt(z_next))
+                done = end
+            z = z_next
+        begin += interval.length
+    return SpeedPlan(tuple(segments), tuple(times), time, begin)
+
+
+def stopping_curve(intervals: Sequence[Interval], stop: float) -> StoppingCurve:
+    """Return from which speeds a path can come to rest at a point of it, before its end."""
+    cut: list[Interval] = []
+    knots = [0.0]
+    for interval in intervals:
+        length = min(interval.length, stop - knots[-1])
+        if length <= 0.0:
+            break
+        cut.append(interval._replace(length=length))
+        knots.append(knots[-1] + length)
+    return StoppingCurve(tuple(knots), tuple(_backward(cut)))
+
+
+def _backward(intervals: Sequence[Interval]) -> list[float]:
+    """Return the greatest z at every border from which the end can be reached at rest."""
+    found = [0.0]
+    for k in range(len(intervals) - 1, -1, -1):
+        interval = intervals[k]
+        z = min(found[-1] + interval.slope(found[-1]) * interval.length, interval.cap)
+        found.append(min(z, intervals[k - 1].cap) if k > 0 else z)
+    found.reverse()
+    return found
+
+
+def _shape(interval: Interval, z: float, z_end: float) -> list[tuple[float, float]]:
+    """Return the corners (way, z) of a plan within one interval: up, along the cap, down.
+
+    Args:
+        interval: in question.
+        z: at its beginning.
+        z_end: greatest z at its end.
+    """
+    length, cap, _ = interval
+    up, down = interval.slope(z), interval.slope(z_end)
+    peak = length
+    if up + down > 0.0:
+        peak = min(length, max(0.0, (z_end + down * length - z) / (up + down)))
+    z_peak = z + up * peak
+    if z_peak > cap:
+        first = (cap - z) / up
+        last = length - (cap - z_end) / down if cap > z_end else length
+        return [(first, cap), (last, cap), (length, z_end)]
+    return [(peak, z_peak), (length, z_end)] if peak < length else [(length, min(z_peak, z_end))]

@@ -1,0 +1,150 @@
+"""What a path of the tool asks of the joints, looked at before the tool sets out.
+
+Near a singularity a slow tool needs fast joints. So the path is sampled, closer where the joint speeds change
+much, and every part of it gets the greatest speed that keeps the joints within theirs: the tool slows down in
+time. Through the singularity itself it would have to stand still; there it keeps a least speed, and the
+safety system stops it, as a real one does.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import ceil
+from typing import NamedTuple
+
+from ur_emulator.models.robot_model import RobotModel, Vector6
+from ur_emulator.motion.path import PosePath
+from ur_emulator.motion.tool import Tool
+
+# Distance of samples [m], the most of them on a straight stretch, and how often the way between is halved.
+_SPACING, _MOST, _HALVINGS = 0.025, 40, 6
+# No path gets more samples than this, however wild it is.
+_LIMIT = 200
+# The way between samples is halved where a joint is faster than this share of its limit, and its speed in the
+# middle differs from the mean of the ends by more than this share of the fastest.
+_FAST, _ROUGH = 0.4, 0.2
+# A prediction for the inverse kinematics reaches no further than this [rad].
+_FARTHEST = 0.5
+
+# Share of the joints' rated speed that a move of the tool may use; the rest is for what lies between samples.
+JOINT_SPEED_SHARE = 0.97
+# What a bent path may ask of a joint [rad/s^2]. Chosen: twice what stops the arm in an emergency.
+JOINT_ACCELERATION = 40.0
+# Chosen: the tool does not slow down further for the joints than to this [m/s].
+LEAST_SPEED = 0.001
+
+
+class Sample(NamedTuple):
+    """A point of a path in joints.
+
+    Attributes:
+        s: way of the tool [m].
+        q: joint angles [rad].
+        slope: their derivative with respect to s [rad/m].
+    """
+
+    s: float
+    q: Vector6
+    slope: Vector6
+
+
+class JointLimit(NamedTuple):
+    """What the joints allow between two samples.
+
+    Attributes:
+        end: where the part ends [m].
+        speed: greatest speed of the tool [m/s].
+        bound: pair (a, b): its acceleration is at most a - b v^2 [m/s^2].
+    """
+
+    end: float
+    speed: float
+    bound: tuple[float, float]
+
+
+def survey(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tuple[Sample, ...]:
+    """Sample a path; what the arm cannot reach, and all behind it, is left out.
+
+    Args:
+        path: of the tool.
+        tool: its kinematics.
+        near: joint angles at the beginning [rad].
+        speed: at which the tool is to travel [m/s].
+    """
+    samples: list[Sample] = []
+    if path.length > 0.0 and _take(samples, path, tool, 0.0, near):
+        parts = min(_MOST, max(1, ceil(path.length / _SPACING)))
+        for k in range(1, parts + 1):
+            end = path.length if k == parts else path.length * k / parts
+            if not _extend(samples, path, tool, end, speed, _HALVINGS):
+                break
+    return tuple(samples)
+
+
+def joint_limits(samples: tuple[Sample, ...], robot: RobotModel) -> tuple[JointLimit, ...]:
+    """Return what the joints allow between the samples of a path."""
+    found: list[JointLimit] = []
+    for a, b in pairwise(samples):
+        way = b.s - a.s
+        speed, fastest, bend = float("inf"), 0.0, 0.0
+        for k, most in enumerate(robot.qd_max):
+            u, w = a.slope[k], b.slope[k]
+            rate = max(abs(u), abs(w), abs(_middle(a, b, k, way)))
+            if rate > 0.0:
+                speed = min(speed, JOINT_SPEED_SHARE * most / rate)
+            fastest = max(fastest, rate)
+            bend = max(bend, abs(w - u) / way)
+        if bend > 0.0:
+            speed = min(speed, (JOINT_ACCELERATION / bend) ** 0.5)
+        speed = max(speed, LEAST_SPEED)
+        # Where the least speed is too fast, some acceleration must remain.
+        bend = min(bend, 0.9 * JOINT_ACCELERATION / speed**2)
+        scale = 1.0 / max(fastest, 1e-6)
+        found.append(JointLimit(b.s, speed, (JOINT_ACCELERATION * scale, bend * scale)))
+    return tuple(found)
+
+
+def _extend(
+    samples: list[Sample], path: PosePath, tool: Tool, end: float, speed: float, halvings: int
+) -> bool:
+    """Sample up to `end`; False where the arm cannot go on."""
+    last = samples[-1]
+    if not _take(samples, path, tool, end, last.q):
+        return False
+    if halvings > 0 and len(samples) < _LIMIT and _is_rough(last, samples[-1], tool.arm.robot, speed):
+        samples.pop()
+        middle = 0.5 * (last.s + end)
+        return _extend(samples, path, tool, middle, speed, halvings - 1) and _extend(
+            samples, path, tool, end, speed, halvings - 1
+        )
+    return True
+
+
+def _take(samples: list[Sample], path: PosePath, tool: Tool, s: float, near: Vector6) -> bool:
+    pose, twist = path.at(s)
+    if samples:
+        last = samples[-1]
+        way = s - last.s
+        if max(map(abs, last.slope)) * way <= _FARTHEST:
+            x, y, z, i, j, k = (q + way * slope for q, slope in zip(last.q, last.slope, strict=True))
+            near = (x, y, z, i, j, k)
+    q = tool.joints(pose, near)
+    if q is None:
+        return False
+    samples.append(Sample(s, q, tool.rates(q, twist)))
+    return True
+
+
+def _is_rough(a: Sample, b: Sample, robot: RobotModel, speed: float) -> bool:
+    way = b.s - a.s
+    for k, most in enumerate(robot.qd_max):
+        u, w, middle = a.slope[k], b.slope[k], _middle(a, b, k, way)
+        rate = max(abs(u), abs(w), abs(middle))
+        if speed * rate > _FAST * most and abs(middle - 0.5 * (u + w)) > _ROUGH * rate:
+            return True
+    return False
+
+
+def _middle(a: Sample, b: Sample, joint: int, way: float) -> float:
+    """Return the slope half-way between two samples, if the joint follows a cubic."""
+    return 1.5 * (b.q[joint] - a.q[joint]) / way - 0.25 * (a.slope[joint] + b.slope[joint])
