@@ -9,6 +9,7 @@ from urscript.errors import (
     ScriptError,
     ScriptLexerError,
     ScriptNameError,
+    ScriptRuntimeError,
     ScriptSyntaxError,
     ScriptTypeError,
 )
@@ -21,6 +22,7 @@ ERROR_CODES: Final[dict[type[ScriptError], str]] = {
     ScriptNameError: "E103",
     ScriptTypeError: "E104",
     ScriptContextError: "E105",
+    ScriptRuntimeError: "E201",
 }
 """The stable codes of errors; those of warnings are in `lint_rules`."""
 

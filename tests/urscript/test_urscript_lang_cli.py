@@ -44,7 +44,7 @@ def test_check_shows_warnings_without_failing(call):
 
 
 def test_run_prints_texts_and_calls(call):
-    result = call("run", good=GOOD)
+    result = call("run", "--robot", "none", good=GOOD)
     assert result.exit_code == 0
     assert "    0.000 s  good: movej([0, 0, 0, 0, 0, 0], 1.4, 1.05, 0, 0)\n" in result.output
     assert "gr\u00fc\u00dfe\n" in result.output

@@ -82,7 +82,7 @@ def test_the_tracing_of_others_is_as_before_whatever_happens(text):
 def test_run_trace_mixes_lines_and_effects_in_their_order(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a.script").write_text('textmsg("\u00e4")\nset_flag(0, True)\n', encoding="utf-8")
-    result = CliRunner().invoke(app, ["run", "--trace", "a.script"])
+    result = CliRunner().invoke(app, ["run", "--robot", "none", "--trace", "a.script"])
     assert result.stdout == (
         '     0  textmsg:1: textmsg("\u00e4")\n\u00e4\n'
         "     0  textmsg:2: set_flag(0, True)\n    0.000 s  textmsg: set_flag(0, True)\n"
@@ -93,7 +93,7 @@ def test_run_ends_quietly_when_nobody_reads_on(tmp_path):
     (tmp_path / "a.script").write_text("while True:\n  sync()\nend\n")
     start = [sys.executable, "-c", "from urscript.cli import main; main()"]
     # Far more than a pipe holds: it cannot end before its reader does.
-    words = ["run", "--trace", "--trace-lines", "100000", str(tmp_path / "a.script")]
+    words = ["run", "--robot", "none", "--trace", "--trace-lines", "100000", str(tmp_path / "a.script")]
     with subprocess.Popen(
         [*start, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:

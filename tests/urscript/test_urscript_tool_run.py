@@ -1,0 +1,290 @@
+"""`urscript run` on the emulated arm: what it tells, how it ends, and that it finds its robots."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import urscript.run_command
+from ur_emulator.models.robots import ROBOTS
+from ur_emulator.script_robots import MAKER
+from urscript.cli import app
+from urscript.robot import find_makers
+
+ROOT = Path(__file__).parents[2]
+HOME = "[0, -1.5708, 0, -1.5708, 0, 0]"
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(text, *words):
+        Path("a.script").write_text(text, encoding="utf-8")
+        return CliRunner().invoke(app, ["run", *words, "a.script"])
+
+    return call
+
+
+def body(*lines):
+    return "def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n"
+
+
+# --- what it tells ---------------------------------------------------------------------------------------
+
+
+def test_moves_are_told_with_start_place_goal_and_duration(run):
+    # 0.3 rad at 1 rad/s and 2 rad/s2 are a triangle: 2 * sqrt(0.3 / 2) = 0.775 s, 97 cycles.
+    text = body(
+        f"movej({HOME})",
+        "t0 = 0",
+        "movej([0.3, -1.5708, 0, -1.5708, 0, 0], a=2, v=1)",
+        'textmsg("there")',
+        "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.1)",
+        "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.1)",
+        "stopj(2)",
+    )
+    result = run(text, "--fidelity", "ideal")
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    first = re.fullmatch(rf" +0\.000 s  line 2: movej {re.escape(HOME)}, ([\d.]+) s", lines[0])
+    assert first
+    start = float(first[1])
+    assert lines[1] == f"{start:9.3f} s  line 4: movej [0.3, -1.5708, 0, -1.5708, 0, 0], 0.776 s"
+    assert lines[2] == "there"
+    start += 0.776
+    assert lines[3] == f"{start:9.3f} s  line 6: speedj [0.1, 0, 0, 0, 0, 0], 0.208 s in 2 calls"
+    assert re.fullmatch(rf"{start + 0.208:9.3f} s  line 8: stopj, 0\.0\d+ s", lines[4])
+    assert re.fullmatch(r"joints \[0\.3\d+, -1\.5708, 0, -1\.5708, 0, 0\] rad, \[.*\] deg", lines[5])
+    assert lines[6].startswith("TCP    p[")
+    assert len(lines) == 7
+    assert re.fullmatch(
+        r"finished after [\d.]+ s of robot time, [\d.]+ s of real time \(UR3, fidelity ideal, seed 0\)\n",
+        result.stderr,
+    )
+
+
+def test_the_final_pose_is_that_of_the_last_move(run):
+    lower = "pose_add(get_target_tcp_pose(), p[0, 0, -0.05, 0, 0, 0])"
+    text = body("movej([0, -1.2, 1.2, -1.57, -1.57, 0])", f"movel({lower}, a=0.5, v=0.2)")
+    document = json.loads(run(text, "--json", "--fidelity", "ideal").stdout)
+    assert document["status"] == "finished"
+    assert len(document["joints"]) == 6
+    move = document["events"][-1]
+    assert (move["kind"], move["name"], move["line"], move["calls"]) == ("move", "movel", 3, 1)
+    assert document["tcp_pose"] == pytest.approx(move["arguments"]["pose"], abs=2e-4)
+    assert move["time"] + move["duration"] == pytest.approx(document["robot_time"])
+
+
+def test_a_stream_ends_where_the_program_stops_calling(run):
+    text = body(
+        "i = 0",
+        "while i < 4:",
+        "speedj([0, 0, 0, 0, 0, 0.1], 1, 0.008)",
+        "i = i + 1",
+        "end",
+        "sleep(0.4)",
+        "speedj([0, 0, 0, 0, 0, 0.1], 1, 0.008)",
+        "speedl([0, 0, 0.01, 0, 0, 0], 1, 0.008)",
+    )
+    events = json.loads(run(text, "--json").stdout)["events"]
+    assert [(event["name"], event["calls"]) for event in events] == [
+        ("speedj", 4),
+        ("speedj", 1),
+        ("speedl", 1),
+    ]
+    assert [event["duration"] for event in events] == [0.032, 0.008, 0.008]
+
+
+def test_threads_beside_the_moving_one_are_told_in_between(run):
+    text = "def p():\n  thread t():\n    sleep(0.1)\n    textmsg(1)\n  end\n  run t()\n"
+    lines = run(f"{text}  movej({HOME})\n  textmsg(2)\nend\n").stdout.splitlines()
+    assert [lines[0], lines[1][13:27], lines[2]] == ["1", "line 7: movej ", "2"]
+
+
+def test_popups_are_closed_and_questions_answered(run):
+    text = body(
+        'popup("mind", "Caution", True, blocking=True)',
+        'n = request_integer_from_primary_client("how many")',
+        'b = request_boolean_from_primary_client("sure")',
+        "textmsg(n + 1, b)",
+    )
+    result = run(text, "--answer", "41", "--answer", "yes")
+    assert result.exit_code == 0
+    assert "s  popup Caution: mind (closed)\n" in result.stdout
+    assert "s  question how many 41\n" in result.stdout
+    assert "42True\n" in result.stdout
+
+
+def test_a_question_that_nobody_answers_ends_the_run_with_its_place(run):
+    result = run(body('n = request_integer_from_primary_client("how many")'), "--answer", "no idea")
+    assert result.exit_code == 1
+    assert (
+        "a.script:2:7: Runtime error: the program asks for an integer: 'how many', 'no idea' is none (--answer)\n"
+        '      n = request_integer_from_primary_client("how many")\n          ^\n'
+    ) in result.stderr
+
+
+# --- how it ends -----------------------------------------------------------------------------------------
+
+
+def test_a_failing_program_shows_where(run):
+    result = run(body("x = [1]", "i = 7", "textmsg(x[i])"))
+    assert result.exit_code == 1
+    assert "a.script:4:11: Runtime error: index 7 is out of range" in result.stderr
+    assert "      textmsg(x[i])\n              ^\n" in result.stderr
+
+
+def test_a_protective_stop_shows_its_code_and_the_move_that_led_to_it(run):
+    result = run(body(f"movej({HOME})", "sync()", "movel(p[-0.3, -0.12, 3, 0, 2.2, -2.2])", "textmsg(1)"))
+    assert result.exit_code == 1
+    assert "a.script:4:3: Robot: C204A0: Protective Stop" in result.stderr
+    assert "      movel(p[-0.3, -0.12, 3, 0, 2.2, -2.2])\n      ^\n" in result.stderr
+    assert "stopped by the robot after" in result.stderr
+    assert "\n1\n" not in result.stdout
+
+
+def test_an_endless_program_ends_at_the_limit_and_says_so(run):
+    result = run("while True:\n  sync()\nend\n", "--limit", "0.8")
+    assert result.exit_code == 0
+    assert "stopped: still running after 0.8 s of robot time (--limit)" in result.stderr
+
+
+def test_a_wrong_program_is_not_run(run):
+    result = run(body("movj(1)"), "--json")
+    assert result.exit_code == 1
+    document = json.loads(result.stdout)
+    assert (document["status"], document["events"]) == ("failed", [])
+    assert document["diagnostics"][0]["hint"] == "did you mean 'movej'?"
+
+
+def test_a_failure_is_a_diagnostic_for_editors(run):
+    result = run(body("x = [1]", "i = 7", "textmsg(x[i])"), "--json")
+    assert result.exit_code == 1
+    found = json.loads(result.stdout)["diagnostics"]
+    assert [(item["line"], item["column"], item["code"]) for item in found] == [(4, 11, "E201")]
+
+
+def test_a_secondary_program_has_one_cycle(run):
+    result = run("sec s():\n  set_standard_digital_out(3, True)\n  textmsg(1)\nend\n")
+    assert (result.exit_code, result.stdout.splitlines()[0]) == (0, "1")
+
+
+def test_quiet_shows_the_texts_alone(run):
+    result = run(body(f"movej({HOME})", "textmsg(1)"), "--quiet")
+    assert (result.exit_code, result.output) == (0, "1\n")
+
+
+def test_the_same_seed_is_the_same_run(run):
+    text = body(f"movej({HOME})", "textmsg(get_actual_joint_positions())")
+
+    def told(*words):
+        document = json.loads(run(text, "--json", *words).stdout)
+        return document["joints"], document["events"]
+
+    assert told("--seed", "1") == told("--seed", "1")
+    assert told("--seed", "1") != told("--seed", "2")
+
+
+def test_tracing_shows_the_lines_between_the_moves(run):
+    result = run(body("x = 1", f"movej({HOME})", "textmsg(x)"), "--trace")
+    assert [line[:10] for line in result.stdout.splitlines()[:3]] == [
+        "     0  p:",
+        "     0  p:",
+        "     0  p:",
+    ]
+    last = [line for line in result.stdout.splitlines() if "p:4: textmsg(x)" in line]
+    assert int(last[0].split()[0]) > 100
+
+
+def test_ctrl_c_ends_it_with_a_line_and_without_a_traceback(tmp_path):
+    (tmp_path / "a.script").write_text(
+        'textmsg("on")\nwhile True:\n  speedj([0,0,0,0,0,0.1], 1, 0.1)\n  speedj([0,0,0,0,0,-0.1], 1, 0.1)\nend\n'
+    )
+    start = [sys.executable, "-c", "from urscript.cli import main; main()"]
+    words = ["run", "--limit", "1e9", str(tmp_path / "a.script")]
+    with subprocess.Popen(
+        [*start, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "on\n"
+        process.send_signal(signal.SIGINT)
+        output, error = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert re.match(r"interrupted after [\d.]+ s of robot time", error)
+    assert error.count("\n") == 1
+    assert "\njoints [" in f"\n{output}"
+
+
+# --- the outside -----------------------------------------------------------------------------------------
+
+
+def test_sockets_reach_real_peers(run):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def peer():
+            connection, _ = server.accept()
+            with connection:
+                connection.sendall(b"(1.5, 2.5)\n")
+                assert connection.recv(100) == b"4"
+
+        thread = threading.Thread(target=peer)
+        thread.start()
+        text = body(
+            f'socket_open("127.0.0.1", {server.getsockname()[1]})',
+            "r = socket_read_ascii_float(2)",
+            "socket_send_string(r[1] + r[2])",
+            "textmsg(r)",
+        )
+        result = run(text)
+        thread.join()
+    assert (result.exit_code, result.stdout.splitlines()[0]) == (0, "[2,1.5,2.5]")
+
+
+def test_nobody_answers_is_no_error(run):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    assert run(f'textmsg(socket_open("127.0.0.1", {port}))\n').stdout.splitlines()[0] == "False"
+
+
+# --- robots ----------------------------------------------------------------------------------------------
+
+
+def test_the_package_offers_its_arms():
+    assert [maker for maker in find_makers() if maker is MAKER] == [MAKER]
+    assert MAKER.names == tuple(ROBOTS)
+
+
+@pytest.mark.parametrize("name", list(ROBOTS))
+def test_every_arm_can_be_chosen(run, name):
+    document = json.loads(run("sync()", "--robot", name.upper(), "--json").stdout)
+    assert document["robot"].startswith(ROBOTS[name].title)
+
+
+@pytest.mark.parametrize(
+    ("words", "allowed"),
+    [
+        (("--robot", "kuka"), "there are ur3, "),
+        (("--fidelity", "perfect"), "there are typical, "),
+        (("--seed", "-1"), "greater than or equal to 0"),
+        (("--trace", "--json"), "choose one"),
+    ],
+)
+def test_wrong_options_say_what_is_allowed(run, words, allowed):
+    result = run("sync()", *words)
+    assert result.exit_code == 2
+    assert allowed in " ".join(result.stderr.replace("│", " ").split())
+
+
+def test_without_a_robot_it_only_writes_down(run, monkeypatch):
+    monkeypatch.setattr(urscript.run_command, "find_makers", list)
+    result = run(body(f"movej({HOME})"))
+    assert result.stdout == "    0.000 s  p: movej([0, -1.5708, 0, -1.5708, 0, 0], 1.4, 1.05, 0, 0)\n"
+    assert result.stderr == "finished after 0.024 s of robot time (no robot)\n"
+    assert result.stdout == run(body(f"movej({HOME})"), "--robot", "none").stdout

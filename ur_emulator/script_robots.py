@@ -1,0 +1,30 @@
+"""The arms that `urscript run` can run programs on: the entry point `urscript.robots` of this package."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+from ur_emulator.models.fidelity import FIDELITIES
+from ur_emulator.models.robots import ROBOTS
+
+if TYPE_CHECKING:
+    from ur_emulator.script_run import ScriptBox
+
+
+class BoxMaker:
+    """Makes boxes (see urscript.robot.RobotMaker); the physics is loaded when the first one is made."""
+
+    names: Sequence[str] = tuple(ROBOTS)
+    fidelities: Sequence[str] = ("typical", *(name for name in FIDELITIES if name != "typical"))
+
+    def make(
+        self, name: str, *, fidelity: str, seed: int, software: Sequence[int], answers: Sequence[str]
+    ) -> ScriptBox:
+        """Return a box whose arm is powered and at rest."""
+        from ur_emulator.script_run import ScriptBox
+
+        return ScriptBox(name, fidelity, seed, software, answers)
+
+
+MAKER: Final = BoxMaker()

@@ -1,0 +1,252 @@
+"""A whole box to try one program on, without ports: what `urscript run` runs programs on.
+
+The box advances in the event loop as fast as the processor allows. While a program waits for something
+outside (bytes of a peer, a connection being made) it advances at real pace instead, as a real one would: so
+peers have time to answer and time-outs pass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from protocol.primary_messages import RequestedType
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller import events as ev
+from ur_emulator.controller.controller import Controller
+from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robots import robot_by_name
+from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.servers.script_sockets import LoopNetwork
+from urscript.robot import Report, ReportKind, RunEnd, RunStatus
+
+if TYPE_CHECKING:
+    from ur_emulator.controller.operator import Answer
+    from urscript import CompiledProgram
+
+# After the program the arm gets this many cycles to come to rest (2 s): the longest ramp and its echo.
+REST_CYCLES = 250
+# A wait for the outside is worth a word when it has lasted this long [s].
+PATIENCE = 1.0
+_KINDS = {
+    RequestedType.BOOLEAN: "yes or no",
+    RequestedType.INTEGER: "an integer",
+    RequestedType.FLOAT: "a number",
+    RequestedType.STRING: "a text",
+}
+_TRUE, _FALSE = frozenset({"true", "yes", "1"}), frozenset({"false", "no", "0"})
+
+
+class ScriptBox:
+    """A box for one program (see urscript.robot.ScriptRobot).
+
+    Attributes:
+        title: what it is, in words.
+        step_time: control cycle [s].
+    """
+
+    def __init__(
+        self, robot: str, fidelity: str, seed: int, software: Sequence[int], answers: Sequence[str]
+    ) -> None:
+        """Assemble the box.
+
+        Args:
+            robot: name of the arm.
+            fidelity: how far it is from a perfect one.
+            seed: of everything random in it.
+            software: version that it runs, (major, minor).
+            answers: what the operator answers, in order.
+
+        Raises:
+            EmulatorError: there is no such arm or fidelity.
+        """
+        model = robot_by_name(robot)
+        self._loop = EventLoop()
+        self._controller = Controller(model, fidelity_by_name(fidelity), seed, LoopNetwork(self._loop))
+        self._controller.state.ports.version = (software[0], software[1])
+        self._answers = deque(answers)
+        self._start_tick = self._controller.snapshot.tick
+        self.title = f"{model.title}, fidelity {fidelity}, seed {seed}"
+        self.step_time = self._controller.period_s
+
+    @property
+    def time(self) -> float:
+        """Robot time since the program began [s]: at the start of the cycle under way."""
+        return (self._controller.snapshot.tick - self._start_tick) * self.step_time
+
+    def run(self, program: CompiledProgram, limit: float, report: Callable[[Report], None]) -> RunEnd:
+        """Run a program to its end and the arm to rest; see urscript.robot.ScriptRobot."""
+        run = _Run(self._controller, self._loop, self._answers, limit, report)
+        run.submit(cmd.StartProgram(program))
+        self._loop.add(run)
+        try:
+            self._loop.run()
+        except KeyboardInterrupt:
+            run.interrupt()
+        finally:
+            self._loop.close()
+        now = self._controller.snapshot
+        return RunEnd(run.status, run.robot_time, run.real_time, now.actual_q, now.actual_tcp_pose)
+
+
+class _Run:
+    """One run as a service of the loop: ticks, answers for the operator, knows when it is over.
+
+    Attributes:
+        status: how it stands.
+        robot_time: from the start to the end of the program [s].
+        real_time: from the first cycle to the last [s].
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        loop: EventLoop,
+        answers: deque[str],
+        limit: float,
+        report: Callable[[Report], None],
+    ) -> None:
+        self.status = RunStatus.RUNNING
+        self.robot_time = self.real_time = 0.0
+        self._controller = controller
+        self._loop = loop
+        self._answers = answers
+        self._limit_cycles = round(min(limit / controller.period_s, 1e15))
+        self._send = report
+        self._commands: list[cmd.Command] = []
+        self._first_tick = controller.snapshot.tick
+        self._began = math.nan
+        self._due = -math.inf
+        self._waits_since = math.inf
+        self._is_over = False
+        self._rest = REST_CYCLES
+
+    def submit(self, command: cmd.Command) -> None:
+        """Take a command for the next cycle."""
+        self._commands.append(command)
+
+    def interrupt(self) -> None:
+        """End the program at once, because somebody pressed Ctrl-C."""
+        if not self._is_over:
+            self._end(RunStatus.INTERRUPTED)
+        self._controller.tick((*self._commands, cmd.StopProgram()))
+
+    # --- the loop
+
+    def advance(self, now: float) -> float:
+        """Tick, unless it is not time to; return when to be called next at the latest."""
+        if math.isnan(self._began):
+            self._began = now
+        self.real_time = now - self._began
+        if not self._commands and not self._is_over and self._controller.waits_outside:
+            if now < self._due:
+                return self._due
+            self._wait(now)
+        else:
+            self._waits_since = math.inf
+        commands, self._commands = self._commands, []
+        self._controller.tick(commands)
+        self._due = now + self._controller.period_s
+        for event in self._controller.take_events():
+            self._take(event)
+        if self._is_at_rest():
+            self._loop.stop()
+        return now
+
+    def _wait(self, now: float) -> None:
+        if self._waits_since == math.inf:
+            self._waits_since = now
+        elif now - self._waits_since >= PATIENCE:
+            self._waits_since = math.nan  # said once a wait
+            text = "the program waits for something outside, at real pace"
+            self._report(ReportKind.NOTICE, text, *self._place())
+
+    def _is_at_rest(self) -> bool:
+        """Look where the run stands; True once nothing more is to come."""
+        controller, cycles = self._controller, self._cycles
+        if not self._is_over:
+            if not controller.programs.is_running:
+                self._end(RunStatus.FINISHED)
+            elif controller.state.safety.is_stopped and not controller.state.motion.is_moving:
+                self._end(RunStatus.STOPPED)
+            elif cycles >= self._limit_cycles:
+                self._end(RunStatus.RUNNING)
+            return False
+        self._rest -= 1
+        return self._rest <= 0 or not controller.is_active or controller.state.safety.is_stopped
+
+    @property
+    def _cycles(self) -> int:
+        return self._controller.snapshot.tick - self._first_tick
+
+    def _end(self, status: RunStatus) -> None:
+        """The program is over, or has to be; from now on only the arm matters."""
+        self._is_over = True
+        if self.status is RunStatus.RUNNING:
+            self.status = status
+        # Up to the beginning of its last cycle, as for all that is reported; a program cut off had all of it.
+        cycles = self._cycles - (status is not RunStatus.RUNNING)
+        self.robot_time = max(0, cycles) * self._controller.period_s
+        self._commands.append(cmd.StopProgram())
+
+    # --- what is said
+
+    def _take(self, event: ev.Event) -> None:
+        match event:
+            case ev.TextPrinted(text):
+                self._report(ReportKind.TEXT, text)
+            case ev.ScriptFailed(line, column, text):
+                self.status = RunStatus.FAILED
+                self._report(ReportKind.FAILURE, text, line, column)
+            case ev.ErrorReported(code, argument, _, text):
+                self._report(ReportKind.CODE, f"C{code}A{argument}: {text}" if code else text, *self._place())
+            case ev.PopupShown(title, text, blocking=blocking):
+                closed = " (closed)" if blocking else ""
+                self._report(ReportKind.POPUP, f"{title}: {text}{closed}")
+                if blocking:
+                    self._commands.append(cmd.ClosePopup())
+            case ev.ValueRequested(request_id, kind, text):
+                self._answer(request_id, kind, text)
+
+    def _answer(self, request_id: int, kind: RequestedType, question: str) -> None:
+        """Answer for the operator; a program whose question nobody answers has failed."""
+        text = self._answers.popleft() if self._answers else None
+        answer = None if text is None else _parsed(text, kind)
+        if answer is not None:
+            self._report(ReportKind.QUESTION, f"{question} {text}", *self._place())
+            self._commands.append(cmd.AnswerRequest(answer, request_id))
+            return
+        given = "and nobody answers" if text is None else f"'{text}' is none"
+        self.status = RunStatus.FAILED
+        message = f"the program asks for {_KINDS[kind]}: '{question}', {given} (--answer)"
+        self._report(ReportKind.FAILURE, message, *self._place())
+        self._commands.append(cmd.StopProgram())
+
+    def _place(self) -> tuple[int, int]:
+        """Return line and column of the thread that has the arm, or of the main one; 0, 0 if none is left."""
+        run = self._controller.programs.latest
+        if run is None or not run.threads:
+            return 0, 0
+        owner = self._controller.state.motion.owner
+        return run.position(next((it for it in run.threads if it is owner), run.threads[0]))
+
+    def _report(self, kind: ReportKind, text: str, line: int = 0, column: int = 0) -> None:
+        time = max(0, self._cycles - 1) * self._controller.period_s
+        self._send(Report(time, kind, text, line, column))
+
+
+def _parsed(text: str, kind: RequestedType) -> Answer | None:
+    """Return an answer as the type asked for; None if it is none."""
+    try:
+        if kind is RequestedType.INTEGER:
+            return int(text)
+        if kind is RequestedType.FLOAT:
+            return float(text)
+    except ValueError:
+        return None
+    if kind is RequestedType.BOOLEAN:
+        word = text.lower()
+        return True if word in _TRUE else False if word in _FALSE else None
+    return text

@@ -1,0 +1,59 @@
+"""What the commands of `urscript` share: their options, reading programs, showing lines."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+from urscript.catalogue import Catalogue, catalogue_for
+from urscript.source import as_utf8
+
+STANDARD_INPUT: Final = Path("-")
+
+Software = Annotated[
+    str, typer.Option("--software", help="Software version of the robot, e.g. 3.15 or 5.11.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="One JSON document instead of text, for editors.")]
+
+
+def catalogue_of(software: str) -> Catalogue:
+    """The builtins of a software version named on the command line."""
+    try:
+        return catalogue_for(software)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def shown_name(file: Path) -> str:
+    """What people know a program by."""
+    return "<stdin>" if file == STANDARD_INPUT else str(file)
+
+
+def read_program(file: Path) -> str:
+    """A program as bytes are on the wire; a byte order mark is dropped."""
+    try:
+        text = sys.stdin.buffer.read() if file == STANDARD_INPUT else file.read_bytes()
+    except OSError as error:
+        typer.echo(f"cannot read {file}: {error.strerror}", err=True)
+        raise typer.Exit(2) from None
+    return text.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
+
+
+def echo_json(**document: Any) -> None:
+    """One document on standard output."""
+    typer.echo(json.dumps(document, indent=2, ensure_ascii=False))
+
+
+def show(text: str, *, error: bool = False) -> None:
+    """A line of a running program; whoever has read enough of them (`| head`) ends the run."""
+    try:
+        typer.echo(as_utf8(text), err=error)
+    except BrokenPipeError:
+        # Python would complain again when it closes the stream at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(1) from None
