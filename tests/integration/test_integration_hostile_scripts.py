@@ -191,11 +191,13 @@ def test_a_script_that_sends_to_a_peer_that_never_reads_is_told(lockstep_box):
             assert primary.message(TextMessage, limit=50_000).text == "full"
 
 
-@pytest.mark.parametrize("target", ["full backlog", "refused", "unknown name", "no address"])
+@pytest.mark.parametrize("target", ["full backlog", "refused", "unknown name", "no address", "zero byte"])
 def test_an_open_that_cannot_succeed_returns_false(box, monkeypatch, target):
     monkeypatch.setattr(pacing, "HANG_LIMIT", 0.1)  # s, instead of ten
     with ExitStack() as stack:
-        host = {"unknown name": "robot.invalid", "no address": "a..b"}.get(target, "127.0.0.1")
+        host = {"unknown name": "robot.invalid", "no address": "a..b", "zero byte": "a\0b"}.get(
+            target, "127.0.0.1"
+        )
         server, port = stack.enter_context(listening(0))
         if target == "refused":
             server.close()

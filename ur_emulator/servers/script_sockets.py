@@ -83,7 +83,7 @@ class LoopSocket:
         """Find the address of a name; in its own thread, touching nothing but the loop's call queue."""
         try:
             address = str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
-        except (OSError, UnicodeError, OverflowError):
+        except (OSError, ValueError, OverflowError):
             self._loop.call_soon_threadsafe(self.close)
         else:
             self._loop.call_soon_threadsafe(lambda: self._connect(address, port))
@@ -160,7 +160,7 @@ class LoopSocket:
 def _is_numeric(host: str) -> bool:
     try:
         socket.inet_aton(host)
-    except (OSError, UnicodeError):
+    except (OSError, ValueError):  # no address, or no text that could be one
         return False
     return True
 
