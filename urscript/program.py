@@ -113,6 +113,7 @@ def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -
         constants=compiled.constants,
         builtins=frozenset(program.builtins),
         globals=frozenset(program.globals),
+        declared_globals=tuple(program.declared_globals),
         function_names=compiled.function_names,
         file_name=file_name,
     )
@@ -140,6 +141,7 @@ class CompiledProgram:
         kind: "def" (primary), "sec" (secondary), or "statement".
         builtins: Builtin functions it uses.
         globals: Its global variables.
+        declared_globals: Those of them that the word `global` makes, in the order of the text.
     """
 
     name: str
@@ -151,6 +153,7 @@ class CompiledProgram:
     constants: dict[str, Any]
     builtins: frozenset[str]
     globals: frozenset[str]
+    declared_globals: tuple[str, ...]
     function_names: dict[str, str]
     file_name: str
 

@@ -79,6 +79,7 @@ class ResolvedProgram:
         calls_after: Calls of the program itself below its definition; they are no part of it.
         functions: All functions and threads, in the order of the text.
         globals: All global variables.
+        declared_globals: Those that the word `global` makes (the keys), in the order of the text.
         unsure_globals: Those that may be read before anything was assigned to them.
         builtins: Builtin functions the program uses.
     """
@@ -90,6 +91,7 @@ class ResolvedProgram:
     calls_after: tuple[Statement, ...] = ()
     functions: list[FunctionScope] = field(default_factory=list)
     globals: set[str] = field(default_factory=set)
+    declared_globals: dict[str, None] = field(default_factory=dict)
     unsure_globals: set[str] = field(default_factory=set)
     builtins: set[str] = field(default_factory=set)
 

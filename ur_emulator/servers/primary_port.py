@@ -1,22 +1,29 @@
-"""Ports 30001, 30002 and their read-only twins: greeting, states at 10 Hz, messages; script text comes in."""
+"""Ports 30001, 30002 and their read-only twins: greeting, states at 10 Hz, messages; script text comes in.
+
+The primary port also tells of the running program: its global variables at the rate of the states, and where
+its threads stand in PolyScope's tree.
+"""
 
 from __future__ import annotations
 
 import zlib
 
-from protocol.primary_messages import StartupMessage, version_message
+from protocol.primary_messages import RobotMessage, StartupMessage, version_message
 from protocol.primary_packages import encode_message_package, encode_safety_tolerances, encode_state
 from protocol.script_channel import ScriptChannel
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.cycle import PERIOD_US
-from ur_emulator.controller.events import Event
+from ur_emulator.controller.events import Event, ProgramStarted, ProgramStopped
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.servers.connection import Connection
 from ur_emulator.servers.event_messages import message_for
+from ur_emulator.servers.label_reporter import LabelReporter
 from ur_emulator.servers.program_intake import ProgramIntake
 from ur_emulator.servers.robot_state import StateEncoder, setup_records, state_records
+from ur_emulator.servers.variable_reporter import VariableReporter
+from urscript import RunningProgram
 
 STATE_RATE = 10  # states per second
 _CYCLE_RATE = 1_000_000 // PERIOD_US
@@ -52,6 +59,8 @@ class PrimaryPort:
         self._all_messages = all_messages
         self._channels: dict[Connection, ScriptChannel] = {}
         self._phase = 0
+        self._variables = VariableReporter(version)
+        self._labels = LabelReporter(version)
         arm = controller.state.arm
         dh = calibrated_dh(arm.robot, arm.calibration)
         self._setup = setup_records(arm.robot, dh, zlib.crc32(repr(dh).encode()))
@@ -66,12 +75,19 @@ class PrimaryPort:
         return tuple(self._channels)
 
     def opened(self, connection: Connection) -> None:
-        """Greet: the version message in a segment of its own, then the first, long state."""
-        self._channels[connection] = ScriptChannel()
+        """Greet: the version message in a segment of its own, the first, long state, then variables."""
         connection.send(self._greeting)
         connection.send(self._second_greeting)
         records = (*state_records(self._controller.snapshot), *self._setup)
         connection.send(encode_state(records, self._version))
+        if self._all_messages:
+            programs = self._controller.programs
+            if not self._channels:  # nobody has listened: what was told before is of no use
+                self._begin_report(programs.latest if programs.is_running else None)
+                self._variables.changes(self._now, at_once=True)
+            for package in (*self._variables.names(self._now), *self._variables.values(self._now)):
+                connection.send(package)
+        self._channels[connection] = ScriptChannel()
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Take script text."""
@@ -83,22 +99,50 @@ class PrimaryPort:
         self._channels.pop(connection, None)
 
     def publish(self, snapshot: Snapshot) -> None:
-        """Send a state if one is due in this cycle."""
+        """Send a state and what has changed of the variables if they are due in this cycle."""
+        if self._labels.is_watching and self._channels:
+            message = self._labels.message(self._now)
+            if message is not None:
+                self._send(self._package(message))
         self._phase += STATE_RATE
         if self._phase < _CYCLE_RATE:
             return
         self._phase -= _CYCLE_RATE
         if self._channels:
-            package = self._states.encode(snapshot)
-            for connection in tuple(self._channels):
-                connection.send(package)
+            self._send(self._states.encode(snapshot), *self._variables.changes(self._now))
 
     def say(self, event: Event) -> None:
         """Send a message for an event."""
         if not (self._all_messages and self._channels):
             return
-        message = message_for(event, self._controller.snapshot.tick * PERIOD_US)
+        if isinstance(event, ProgramStopped):
+            self._send(*self._variables.changes(self._now, at_once=True))
+            self._begin_report(None)
+        message = message_for(event, self._now)
         if message is not None:
-            package = encode_message_package(message, self._version)
-            for connection in tuple(self._channels):
+            self._send(self._package(message))
+        if isinstance(event, ProgramStarted):
+            self._begin_report(event.run)
+            self._send(*self._variables.names(self._now))
+
+    @property
+    def _now(self) -> int:
+        """Time stamp of the present cycle."""
+        return self._controller.snapshot.tick * PERIOD_US
+
+    def _package(self, message: RobotMessage) -> bytes:
+        return encode_message_package(message, self._version)
+
+    def _send(self, *packages: bytes) -> None:
+        for connection in tuple(self._channels):
+            for package in packages:
                 connection.send(package)
+
+    def _begin_report(self, run: RunningProgram | None) -> None:
+        """Turn to the variables and labels of a run, or to none."""
+        if run is None:
+            self._variables.end()
+            self._labels.end()
+        else:
+            self._variables.begin(run)
+            self._labels.begin(run)

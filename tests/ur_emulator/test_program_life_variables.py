@@ -1,0 +1,385 @@
+"""Global variables and labels of programs on port 30001."""
+
+import pytest
+from box_support import VERSION, Bench, MessageReader, connect
+
+from protocol.frame_buffer import FrameBuffer
+from protocol.primary_messages import (
+    KeyMessage,
+    ProgramLabelMessage,
+    ProgramThreadsMessage,
+    TextMessage,
+    ThreadLabel,
+)
+from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
+from protocol.primary_program import GlobalVariablesSetup, GlobalVariablesUpdate
+from protocol.primary_values import TypedValue, ValueType
+from protocol.ur_types import SoftwareVersion
+from ur_emulator import ControlBox
+from ur_emulator.controller.commands import StopProgram
+from ur_emulator.servers.label_reporter import LabelReporter, parse_label
+from ur_emulator.servers.primary_port import PrimaryPort
+from ur_emulator.servers.robot_state import StateEncoder
+from ur_emulator.servers.variable_reporter import MAX_BODY, MAX_VALUE, PER_UPDATE, typed_value
+from urscript import Matrix, Pose
+
+FOREVER = "  while True:\n    sync()\n  end\nend\n"
+
+
+class Client:
+    """A connection that keeps what it is sent."""
+
+    def __init__(self):
+        self.sent = []
+
+    def send(self, package):
+        self.sent.append(package)
+
+    def packages(self, version=VERSION):
+        """What has come since the last call, without states and the greeting."""
+        buffer = FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
+        found = []
+        for package in self.sent:
+            buffer.feed(package)
+            while (frame := buffer.next_frame()) is not None:
+                found.append(decode_package(frame, version))
+        self.sent.clear()
+        wanted = (
+            GlobalVariablesSetup,
+            GlobalVariablesUpdate,
+            ProgramThreadsMessage,
+            ProgramLabelMessage,
+            KeyMessage,
+        )
+        return [package for package in found if isinstance(package, wanted)]
+
+
+class PortBench(Bench):
+    """A bench with a primary port, published as a served box does."""
+
+    def __init__(self, version=VERSION, *, all_messages=True):
+        super().__init__(fidelity="ideal")
+        self.port = PrimaryPort(
+            version, self.controller, None, StateEncoder(version), all_messages=all_messages
+        )
+
+    def tick(self, n=1, *commands):
+        for _ in range(n):
+            n_before = len(self.events)
+            super().tick(1, *commands)
+            commands = ()
+            for event in self.events[n_before:]:
+                self.port.say(event)
+            self.port.publish(self.now)
+        return self.now
+
+    def client(self):
+        client = Client()
+        self.port.opened(client)
+        return client
+
+
+def values_of(packages):
+    """Index to value, as a client would know them."""
+    known = {}
+    for package in packages:
+        if isinstance(package, GlobalVariablesUpdate):
+            for i, value in enumerate(package.values, package.start_index):
+                known[i] = value.value
+    return known
+
+
+def names_of(packages):
+    names = {}
+    for package in packages:
+        if isinstance(package, GlobalVariablesSetup):
+            names.update(enumerate(package.names, package.start_index))
+    return names
+
+
+def test_without_a_program_a_client_gets_the_empty_update():
+    bench = PortBench()
+    client = bench.client()
+    assert [p.hex() for p in client.sent if p[4] == 25] == ["0000001019" + "ff" * 8 + "010000"]
+    bench.tick(50)
+    assert client.packages() == [GlobalVariablesUpdate()]
+
+
+def test_names_once_and_values_when_they_change():
+    bench = PortBench()
+    client = bench.client()
+    client.packages()
+    bench.start(
+        "def p():\n  global a = 1\n  global b = 2\n  local c = 3\n  d = 4\n  sleep(1)\n  b = 5\n" + FOREVER
+    )
+    bench.tick(20)
+    started, names, first = client.packages()
+    assert started.title == "PROGRAM_XXX_STARTED"
+    assert names == GlobalVariablesSetup(timestamp=bench.snapshots[0].tick * 8000, names=("a", "b"))
+    assert values_of([first]) == {0: 1, 1: 2}
+    assert first.start_index == 0
+    bench.tick(80)
+    assert client.packages() == []
+    bench.tick(50)
+    (second,) = client.packages()
+    assert (second.start_index, values_of([second])) == (1, {1: 5})
+    bench.tick(100)
+    assert client.packages() == []
+
+
+def test_neighbours_share_a_package_and_others_do_not():
+    bench = PortBench()
+    client = bench.client()
+    declarations = "".join(f"  global v{i} = 0\n" for i in range(6))
+    bench.start(f"def p():\n{declarations}  sleep(0.4)\n  v0 = 1\n  v1 = 1\n  v3 = 1\n  v5 = 1\n" + FOREVER)
+    bench.tick(30)
+    client.packages()
+    bench.tick(50)
+    assert [(p.start_index, len(p.values)) for p in client.packages()] == [(0, 2), (3, 1), (5, 1)]
+
+
+def test_the_last_values_come_before_the_program_is_reported_as_stopped():
+    bench = PortBench()
+    client = bench.client()
+    bench.start("def p():\n  global n = 0\n  while n < 7:\n    n = n + 1\n  end\nend\n")
+    bench.tick(2)
+    *_, update, stopped = client.packages()
+    assert values_of([update]) == {0: 7}
+    assert stopped.title == "PROGRAM_XXX_STOPPED"
+    bench.tick(50)
+    assert client.packages() == []
+
+
+def test_a_client_that_comes_later_gets_everything():
+    bench = PortBench()
+    bench.start("def p():\n  global a = 1\n  global b = True\n  global c\n  sleep(2)\n  a = 2\n" + FOREVER)
+    bench.tick(30)
+    client = bench.client()
+    names, update = client.packages()
+    assert names_of([names]) == {0: "a", 1: "b", 2: "c"}
+    assert [value.type for value in update.values] == [ValueType.INT, ValueType.BOOL, ValueType.NONE]
+    bench.tick(30)
+    second = bench.client()
+    assert values_of(second.packages()) == {0: 1, 1: True, 2: None}
+    bench.tick(250)
+    assert values_of(client.packages()) == values_of(second.packages()) == {0: 2}
+    bench.tick(1, StopProgram())
+    third = bench.client()
+    assert third.packages() == [GlobalVariablesUpdate()]
+
+
+def test_programs_that_follow_each_other_within_a_cycle_are_told_apart():
+    bench = PortBench()
+    client = bench.client()
+    client.packages()
+    bench.start("def one():\n  global a = 1\n" + FOREVER)
+    bench.start("def two():\n  global b = 2\n" + FOREVER)
+    bench.tick(20)
+    told = [(type(p).__name__, getattr(p, "text", None) or getattr(p, "names", None) or p.values[0].value)
+            for p in client.packages()]  # fmt: skip
+    assert told == [
+        ("KeyMessage", "one"),
+        ("GlobalVariablesSetup", ("a",)),
+        ("GlobalVariablesUpdate", 1),
+        ("KeyMessage", "one"),
+        ("KeyMessage", "two"),
+        ("GlobalVariablesSetup", ("b",)),
+        ("GlobalVariablesUpdate", 2),
+    ]
+
+
+def test_only_the_primary_port_tells_of_variables_and_labels():
+    bench = PortBench(all_messages=False)
+    client = bench.client()
+    bench.start('def p():\n  $ 1 "Robot Program"\n  global a = 1\n' + FOREVER)
+    bench.tick(50)
+    assert client.packages() == []
+
+
+def test_while_nobody_listens_nobody_looks(monkeypatch):
+    def look(*_):
+        raise AssertionError("somebody looks at the variables")
+
+    bench = PortBench()
+    bench.start('def p():\n  $ 1 "Robot Program"\n  global a = 1\n' + FOREVER)
+    monkeypatch.setattr("urscript.RunningProgram.read_global", look)
+    monkeypatch.setattr(LabelReporter, "message", look)
+    bench.tick(50)
+
+
+VALUES = [
+    ("None", ValueType.NONE, None),
+    ("True", ValueType.BOOL, True),
+    ("-5", ValueType.INT, -5),
+    ("0.5", ValueType.FLOAT, 0.5),
+    ('"a b"', ValueType.CONST_STRING, "a b"),
+    ('str_cat("a", "b")', ValueType.CONST_STRING, "ab"),
+    ("p[1,2,3,0.5,0.25,0]", ValueType.POSE, (1.0, 2.0, 3.0, 0.5, 0.25, 0.0)),
+    ("run t()", ValueType.INT, 2),
+]
+
+
+@pytest.mark.parametrize(("text", "kind", "value"), VALUES)
+@pytest.mark.parametrize("version", ["3.2.0", "3.4.5", "3.13.0", "3.15.8"])
+def test_values_of_all_types(text, kind, value, version):
+    version = SoftwareVersion.parse(version)
+    bench = PortBench(version)
+    client = bench.client()
+    bench.start(f"def p():\n  thread t():\n    sleep(9)\n  end\n  global x = {text}\n" + FOREVER)
+    bench.tick(20)
+    found = [p.values for p in client.packages(version) if isinstance(p, GlobalVariablesUpdate)]
+    expected = [()] if kind is ValueType.NONE else [(), (TypedValue(kind, value),)]
+    assert found == expected
+
+
+def test_lists_and_matrices():
+    def integer(number):
+        return TypedValue(ValueType.INT, number)
+
+    assert typed_value([1, 2]) == TypedValue(ValueType.LIST, (integer(1), integer(2)))
+    matrix = Matrix([[1, 2], [3, 4]])
+    rows = ((integer(1), integer(2)), (integer(3), integer(4)))
+    assert typed_value(matrix) == TypedValue(ValueType.MATRIX, rows)
+    assert typed_value([Pose(1, 2, 3, 4, 5, 6)]).value[0].type is ValueType.POSE
+    nested = [1]
+    for _ in range(50):
+        nested = [nested]
+    value = typed_value(nested)
+    depth = 0
+    while value.type is ValueType.LIST:
+        value, depth = value.value[0], depth + 1
+    assert (value.type, depth) == (ValueType.NONE, 32)
+    assert typed_value(object()).type is ValueType.NONE
+
+
+def test_a_matrix_is_none_for_software_without_matrices():
+    version = SoftwareVersion(3, 4)
+    bench = PortBench(version)
+    client = bench.client()
+    bench.start("def p():\n  global m = [[1,2],[3,4]]\n  global n = 1\n" + FOREVER)
+    bench.tick(20)
+    assert values_of(client.packages(version)) == {1: 1}
+
+
+def test_no_package_is_longer_than_clients_can_hold():
+    bench = PortBench()
+    client = bench.client()
+    long_text = "x" * 700
+    names = [f"a_variable_with_a_rather_long_name_{i}" for i in range(300)]
+    text = "".join(f'  global {name} = "{long_text}"\n' for name in names)
+    bench.start(f"def p():\n{text}" + FOREVER)
+    bench.tick(20)
+    sizes = [len(p) for p in client.sent if p[4] == 25]
+    assert max(sizes) <= MAX_BODY + 20
+    packages = client.packages()
+    assert list(names_of(packages).values()) == names
+    assert values_of(packages) == dict.fromkeys(range(300), long_text)
+
+
+def test_a_value_too_large_for_a_client_goes_as_none():
+    bench = PortBench()
+    client = bench.client()
+    bench.start(
+        'def p():\n  global s = "abcdefghij"\n  while str_len(s) < 10000:\n    s = s + s\n  end\n  global n = 1\n'
+        + FOREVER
+    )
+    bench.tick(20)
+    assert max(len(p) for p in client.sent if p[4] == 25) < MAX_VALUE
+    assert values_of(client.packages()) == {1: 1}
+
+
+def test_thousands_of_variables_take_turns_and_all_come():
+    bench = PortBench()
+    client = bench.client()
+    n = 3 * PER_UPDATE + 7
+    text = "".join(f"  global v{i} = {i}\n" for i in range(n))
+    bench.start(f"def p():\n{text}" + FOREVER)
+    bench.tick(14)
+    assert 0 < len(values_of(client.packages())) <= PER_UPDATE
+    bench.tick(60)
+    rest = values_of(client.packages())
+    assert rest[n - 1] == n - 1
+    assert len(rest) >= n - PER_UPDATE
+
+
+# --- labels
+
+LABELLED = (
+    'def p():\n  thread t():\n    $ 9 "Thread 1" "noBreak"\n    sleep(0.1)\n    $ 10 "Wait: 0.1"\n    sleep(9)\n  end\n  run t()\n'
+    '  $ 1 "Robot Program"\n  $ 2 "MoveJ" "breakAfter"\n  sleep(0.2)\n  $ 3 "Wayp\xc3\xb6int"\n' + FOREVER
+)
+
+
+def test_labels_of_all_threads():
+    bench = PortBench()
+    client = bench.client()
+    bench.start(LABELLED)
+    bench.tick(60)
+    told = [p.threads for p in client.packages() if isinstance(p, ProgramThreadsMessage)]
+    main, other = [(2, "MoveJ"), (3, "Wayp\xc3\xb6int")], [(9, "Thread 1"), (10, "Wait: 0.1")]
+    assert [[(t.label_id, t.text, t.thread_name) for t in threads] for threads in told] == [
+        [(*main[0], "p"), (*other[0], "t")],
+        [(*main[0], "p"), (*other[1], "t")],
+        [(*main[1], "p"), (*other[1], "t")],
+    ]
+
+
+def test_labels_of_software_up_to_3_2():
+    version = SoftwareVersion(3, 2)
+    bench = PortBench(version)
+    client = bench.client()
+    bench.start(LABELLED)
+    bench.tick(60)
+    told = [(p.label_id, p.text) for p in client.packages(version) if isinstance(p, ProgramLabelMessage)]
+    assert told == [(2, "MoveJ"), (3, "Wayp\xc3\xb6int")]
+
+
+def test_a_program_without_labels_is_not_watched():
+    bench = PortBench()
+    bench.client()
+    bench.start("def p():\n" + FOREVER)
+    assert not bench.port._labels.is_watching
+    bench.start(LABELLED)
+    assert bench.port._labels.is_watching
+    bench.tick(1, StopProgram())
+    assert not bench.port._labels.is_watching
+
+
+@pytest.mark.parametrize(
+    ("line", "label"),
+    [
+        (' 12 "Move"', (12, "Move")),
+        (' 12 "Move" "breakAfter"', (12, "Move")),
+        ('3"a"', (3, "a")),
+        (' -1 ""', (-1, "")),
+        (" 12", None),
+        (' "Move"', None),
+        ("", None),
+        (' 99999999999999999999 "x"', None),
+    ],
+)
+def test_lines_of_labels(line, label):
+    assert parse_label(line) == label
+
+
+def test_a_label_that_is_none_is_not_told():
+    bench = PortBench()
+    client = bench.client()
+    bench.start("def p():\n  $ nonsense\n" + FOREVER)
+    bench.tick(20)
+    assert not [p for p in client.packages() if isinstance(p, ProgramThreadsMessage)]
+
+
+def test_on_the_wire():
+    with ControlBox(pace="lockstep", port_base=None) as box, connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        sock.sendall(
+            b'def p():\n  $ 1 "Robot Program"\n  global speed = 0.5\n  speed = speed * 2\n  textmsg("done")\n  sleep(0.5)\nend\n'
+        )
+        assert reader.message(GlobalVariablesSetup).names == ("speed",)
+        assert reader.message(TextMessage).text == "done"
+        assert reader.message(ProgramThreadsMessage).threads == (
+            ThreadLabel(label_id=1, text="Robot Program", thread_name="p"),
+        )
+        assert reader.message(GlobalVariablesUpdate).values == (TypedValue(ValueType.FLOAT, 1.0),)
+        assert isinstance(reader.message(RobotState), RobotState)
