@@ -41,6 +41,7 @@ format: $(STAMP) ## put the code into its canonical layout
 
 docs: $(STAMP) ## rewrite the generated pages
 	$(BIN)/python -m urscript.catalogue.coverage > docs/urscript-coverage.md
+	$(BIN)/python -m ur_emulator.controller.port_map_page > docs/protocol/modbus.md
 
 clean: ## remove what the targets made
 	rm -rf $(VENV) out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
