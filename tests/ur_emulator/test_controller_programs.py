@@ -10,6 +10,8 @@ from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
 from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION
+from urscript import compile_program
+from urscript.catalogue import catalogue_for
 
 SPIN = "def spin():\n  while True:\n    speedj([0.2,0,0,0,0,0], 2.0, get_steptime())\n  end\nend\n"
 
@@ -257,7 +259,10 @@ def test_speed_slider_slows_a_move(bench):
 
 
 def test_a_name_that_is_only_declared_says_so_when_it_is_called(bench):
-    bench.run("def f():\n  freedrive_mode()\nend\n")
+    bench.tick(
+        1, cmd.StartProgram(compile_program("screw_driving(10, 0.1)", catalogue=catalogue_for("5.11")))
+    )
+    bench.tick(2)
     assert "declared only" in texts(bench.events)[0]
 
 

@@ -43,7 +43,7 @@ def press_down(plant, n):
 
 def test_the_table_stops_the_arm_and_is_felt():
     plant = Plant(UR3, IDEAL, 0)
-    states = press_down(plant, 250)
+    states = press_down(plant, 260)
     assert plant.n_contacts > 0
     assert plant.q_true[1] < 0.7
     last = states[-1]

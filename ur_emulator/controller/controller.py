@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from protocol.primary_messages import ReportLevel
-from protocol.ur_types import RobotMode, SafetyMode
+from protocol.ur_types import ControlMode, RobotMode, SafetyMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.client_inputs import write_inputs
 from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US, controller_time
@@ -155,12 +155,21 @@ class Controller:
             # What a program declares is taken to be really there: the arm carries it from now on.
             self._payload = state.payload
             self.plant.set_payload(state.payload.mass, state.payload.cog)
+        compliance = state.compliance
+        mode = _BY_POSITION
+        if compliance.is_on or state.io_configuration.input_actions or state.modbus.signals:
+            mode = compliance.step(state)
         target = self._next_target() if running else state.motion.step(self.period_s, state.speed_slider)
-        self.plant.step(target if running else None)
+        if mode is _BY_HAND:
+            target = compliance.follow_hand(state)
+            was_active = was_active or any(target.qd)
+        self.plant.step(target if running else None, mode)
         sensed = self.plant.sense()
         self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
         if running and not state.safety.is_stopped:
             violation = find_violation(sensed.position_error, self._saturated_s)
+            if mode and violation is None:
+                violation = compliance.find_violation(state.robot, sensed)
             if violation is None and state.stop_requested:
                 violation = _REQUESTED_STOP
             if violation is not None:
@@ -172,7 +181,7 @@ class Controller:
         settings = state.error_settings
         if settings.pause_codes and settings.asks_for_pause(state.events[n_events:]):
             self.programs.pause()
-        state.steady_cycles = 0 if any(target.qd) else state.steady_cycles + 1
+        state.steady_cycles = 0 if mode or any(target.qd) else state.steady_cycles + 1
         self._settle = max(self._settle - 1, SETTLE_CYCLES if was_active else 0)
 
         state.snapshot = make_snapshot(state, self.programs, target, sensed)
@@ -296,4 +305,5 @@ class Controller:
         self.state.motion.place(self.state.snapshot.actual_q)
 
 
+_BY_POSITION, _BY_HAND = ControlMode.POSITION, ControlMode.TEACH
 _REQUESTED_STOP = Violation(ErrorReported(209, 0, ReportLevel.WARNING, "Protective stop requested"))

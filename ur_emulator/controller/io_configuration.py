@@ -71,7 +71,7 @@ class IoConfiguration:
         for (group, index), action in self.input_actions.items():
             if action == FREEDRIVE_ACTION and self._is_high(group, index):
                 return True
-        return any(signal.action == FREEDRIVE_ACTION and signal.value for signal in self.modbus.signals.values())
+        return self.modbus.wants_freedrive
 
     def _is_high(self, group: str, index: int) -> bool:
         if group == "gp_boolean":

@@ -6,11 +6,10 @@ from collections.abc import Iterable
 
 from ur_emulator.controller.cycle import controller_time
 from ur_emulator.controller.external_sensor import VARIABLE
+from ur_emulator.controller.force_sense import moved_wrench
 from ur_emulator.controller.robot_mode import JOINT_MODE, POWERED
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.target import ZERO6, JointTarget
 from ur_emulator.plant.plant_state import PlantState
 from ur_emulator.scripting.program_slot import ProgramSlot
@@ -38,6 +37,7 @@ def make_snapshot(
     sensor, wrench = state.external_sensor, sensed.tcp_force
     if sensor is not None:
         wrench = sensor.wrench_at_flange(state.client_inputs.get(VARIABLE, ZERO6), arm.fk(sensed.actual_q))
+    wrench = state.force_sense.take(wrench)
     mode = state.mode.mode
     powered = mode in POWERED
     return Snapshot(
@@ -54,7 +54,7 @@ def make_snapshot(
         joint_control_output=sensed.joint_control_output,
         actual_tcp_pose=pose,
         actual_tcp_speed=speed,
-        actual_tcp_force=_wrench_at_tcp(wrench, pose, arm, sensed.actual_q, tcp),
+        actual_tcp_force=wrench if tcp is None else moved_wrench(wrench, arm.fk(sensed.actual_q), pose),
         target_tcp_pose=target_pose,
         target_tcp_speed=target_speed,
         actual_digital_input_bits=state.io.digital_in,
@@ -85,6 +85,7 @@ def make_snapshot(
         analog_domains=state.io.analog.domains,
         tool_output_voltage=state.io.tool_voltage,
         registers=state.registers.values(),
+        control_mode=int(state.compliance.mode),
         script_control_line=programs.line if state.wants_script_line else 0,
     )
 
@@ -92,15 +93,3 @@ def make_snapshot(
 def _bus_current(currents: Iterable[float]) -> float:
     """Return a plausible current on the 48 V bus for joint currents [A]: the drives chop, a tenth shows."""
     return 0.1 * sum(map(abs, currents))
-
-
-def _wrench_at_tcp(
-    wrench: Vector6, tcp_pose: Vector6, arm: ArmModel, q: Vector6, tcp: Vector6 | None
-) -> Vector6:
-    """Move a wrench at the flange (base axes, N and Nm) to the TCP: the moment loses lever times force."""
-    if tcp is None:
-        return wrench
-    flange = arm.fk(q)
-    rx, ry, rz = (a - b for a, b in zip(tcp_pose[:3], flange[:3], strict=True))
-    fx, fy, fz, mx, my, mz = wrench
-    return (fx, fy, fz, mx - ry * fz + rz * fy, my - rz * fx + rx * fz, mz - rx * fy + ry * fx)

@@ -59,6 +59,7 @@ class Snapshot(NamedTuple):
     target_speed_fraction: float
     tcp_offset: Vector6
     program_name: str
+    control_mode: int
     # --- what only RTDE needs; lines in the order standard inputs, standard outputs, tool inputs
     analog_values: tuple[float, ...]
     analog_domains: tuple[int, ...]

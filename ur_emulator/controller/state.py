@@ -10,10 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from ur_emulator.controller.compliance import Compliance
 from ur_emulator.controller.encoders import Encoders
 from ur_emulator.controller.error_settings import ErrorSettings
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.external_sensor import ExternalSensor
+from ur_emulator.controller.force_sense import ForceSense
 from ur_emulator.controller.io import InputOutput
 from ur_emulator.controller.io_configuration import IoConfiguration
 from ur_emulator.controller.modbus_signals import ModbusSignals
@@ -78,6 +80,8 @@ class ControllerState:
         operator: what programs ask of the operator.
         error_settings: what programs have said about errors.
         power_off_requested: a script asked for it in this cycle.
+        compliance: force mode, and who guides the arm by hand.
+        force_sense: zero and recent past of the wrench.
         place_arm: puts the resting arm at joint angles [rad]; False where it would touch something.
     """
 
@@ -114,6 +118,8 @@ class ControllerState:
     operator: Operator = field(default_factory=Operator)
     error_settings: ErrorSettings = field(default_factory=ErrorSettings)
     power_off_requested: bool = False
+    compliance: Compliance = field(default_factory=Compliance)
+    force_sense: ForceSense = field(default_factory=lambda: ForceSense(HISTORY_CYCLES))
     place_arm: Callable[[Vector6], bool] = field(init=False)
 
     def __post_init__(self) -> None:

@@ -54,7 +54,7 @@ class Friction:
     @property
     def dry_compensation(self) -> NDArray[np.float64]:
         """Return the part of `compensation` that does not grow with the speed (6,) [Nm]."""
-        return self.compensation - self._set_viscous
+        return np.subtract(self.compensation, self._set_viscous)
 
     def evaluate(
         self, qd_actual: NDArray[np.float64], qd_target: NDArray[np.float64], qd_set: NDArray[np.float64]

@@ -180,6 +180,7 @@ class ProgramSlot:
 
     def _end(self) -> None:
         self._primary = None
+        self._state.compliance.end_of_program(self._state)
         self._state.io_configuration.program_stopped()
         self._state.watchdogs.clear()
         self._state.error_settings.pause_codes.clear()

@@ -61,12 +61,6 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
         x, y, z = d
         state.gravity = (float(x), float(y), float(z))
 
-    def force_mode_set_damping(thread: object, damping: float) -> None:
-        state.force_mode_damping = min(1.0, max(0.0, float(damping)))
-
-    def force_mode_set_gain_scaling(thread: object, scaling: float) -> None:
-        state.force_mode_gain_scaling = min(2.0, max(0.0, float(scaling)))
-
     def protective_stop(thread: object) -> None:
         state.stop_requested = True
 
@@ -76,7 +70,5 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
         "set_payload_mass": set_payload_mass,
         "set_payload_cog": set_payload_cog,
         "set_gravity": set_gravity,
-        "force_mode_set_damping": force_mode_set_damping,
-        "force_mode_set_gain_scaling": force_mode_set_gain_scaling,
         "protective_stop": protective_stop,
     }

@@ -17,7 +17,7 @@ from protocol.primary_layout import (
     ToolData,
 )
 from protocol.primary_packages import encode_state
-from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
+from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.snapshot import Snapshot
@@ -43,6 +43,7 @@ def state_records(snapshot: Snapshot) -> tuple[SubPackage, ...]:
             is_program_running=snap.runtime_state in RUNNING_STATES,
             is_program_paused=snap.runtime_state == ProgramState.PAUSED,
             robot_mode=RobotMode(snap.robot_mode),
+            control_mode=ControlMode(snap.control_mode),
             target_speed_fraction=snap.target_speed_fraction,
             speed_scaling=snap.speed_scaling,
         ),

@@ -280,7 +280,8 @@ _SETTINGS: tuple[Builtin, ...] = (
         (Param("d", VECTOR3, unit="m/s^2"),),
         "None",
         "acceleration of the base against gravity",
-        support=EXACT,
+        support=APPROXIMATE,
+        note="kept only; the arm always stands upright",
     ),
 )
 

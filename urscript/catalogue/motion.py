@@ -222,6 +222,8 @@ _MOVES: tuple[Builtin, ...] = (
     ),
 )
 
+_GUIDED = "joints are free on the physics; friction compensation and push back at limits are chosen"
+
 _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
     _row(
         "force_mode",
@@ -235,8 +237,18 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "None",
         "regulate the compliant axes of the task frame to a wrench",
         time=SWITCH,
+        support=APPROXIMATE,
+        note="on the contact physics; the control law and the zero of the wrench are ours (docs/contact.md)",
     ),
-    _row("end_force_mode", (), "None", "back to position control", time=SWITCH),
+    _row(
+        "end_force_mode",
+        (),
+        "None",
+        "back to position control",
+        time=SWITCH,
+        support=APPROXIMATE,
+        note="see force_mode",
+    ),
     _row(
         "force_mode_set_damping",
         (Param("damping", NUMBER, unit="0 to 1", low=0, high=1),),
@@ -244,7 +256,7 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "how fast force mode brakes when no force acts; 0 none",
         since=releases("3.5", "5.0", "10.0"),
         support=APPROXIMATE,
-        note="the value is kept; force mode itself is only declared",
+        note="part of the speed that is lost within a delay of the loop, about 50 ms",
     ),
     _row(
         "force_mode_set_gain_scaling",
@@ -253,7 +265,7 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "scale the gain of the force loop",
         since=releases("3.14", "5.0", "10.0"),
         support=APPROXIMATE,
-        note="the value is kept; force mode itself is only declared",
+        note="1 is our gain: the force comes near with 8 1/s",
         undocumented=(Generation.CB3,),
         source=f"Script Manual e-Series 5.11, module motion; CB3: {DRIVER_SCRIPT}",
     ),
@@ -265,6 +277,8 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         time=SWITCH,
         since=releases("3.0", "5.0"),
         until=releases(None, "5.10"),
+        support=APPROXIMATE,
+        note=_GUIDED,
     ),
     _row(
         "freedrive_mode",
@@ -284,9 +298,19 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "hand guiding without the check of the payload",
         time=SWITCH,
         since=releases("3.0", "5.21", "10.0"),
+        support=APPROXIMATE,
+        note=_GUIDED,
         source="URScript API Reference CB3 3.15.4, module motion; later e-Series directories",
     ),
-    _row("end_freedrive_mode", (), "None", "back to position control", time=SWITCH),
+    _row(
+        "end_freedrive_mode",
+        (),
+        "None",
+        "back to position control",
+        time=SWITCH,
+        support=APPROXIMATE,
+        note=_GUIDED,
+    ),
     _row(
         "get_freedrive_status",
         (),
@@ -294,8 +318,26 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "0 normal, 1 near, 2 too close to a singularity",
         since=releases(None, "5.10", "10.0"),
     ),
-    _row("teach_mode", (), "None", "old name of freedrive_mode", time=SWITCH, deprecated=True),
-    _row("end_teach_mode", (), "None", "old name of end_freedrive_mode", time=SWITCH, deprecated=True),
+    _row(
+        "teach_mode",
+        (),
+        "None",
+        "old name of freedrive_mode",
+        time=SWITCH,
+        deprecated=True,
+        support=APPROXIMATE,
+        note=_GUIDED,
+    ),
+    _row(
+        "end_teach_mode",
+        (),
+        "None",
+        "old name of end_freedrive_mode",
+        time=SWITCH,
+        deprecated=True,
+        support=APPROXIMATE,
+        note=_GUIDED,
+    ),
     _row(
         "screw_driving",
         (Param("f", NUMBER, unit="N"), Param("v_limit", NUMBER, unit="m/s")),

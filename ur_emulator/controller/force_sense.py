@@ -1,0 +1,130 @@
+"""ForceSense: what the box makes of the wrench that it feels: its zero, its recent past, contacts in it.
+
+A CB3 arm has no force sensor; what it feels comes from motor currents (see `plant/force_estimate.py`).
+Source: maker's script manual for e-Series 5.x, zero_ftsensor and tool_contact; on a CB3 both are known to
+the compiler and undocumented. Thresholds are chosen for what the estimate is worth.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from itertools import islice
+from math import hypot
+
+from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.motion.target import ZERO6
+
+# Least and most cycles that are averaged to tell a zero from noise: 0.2 s leave 0.6 N of 3 N, 1 s 0.3 N.
+ZERO_CYCLES = (25, 125)
+# What the maker says of the estimate: it is no better than this [N, Nm]. Source: UR3/CB3 manual.
+PRECISION: Vector6 = (10.0, 10.0, 10.0, 5.0, 5.0, 5.0)
+
+# A contact is a force that has risen by this within the time remembered [N]. The friction offset of the
+# estimate turns round with the motion, by 8 N for a poor arm, and noise leaves 2 N of the mean below.
+CONTACT_FORCE = 15.0
+# Cycles that are averaged at the end and, as the force before, at the beginning of what is remembered.
+_RECENT_CYCLES, _EARLY_CYCLES = 5, 25
+# It began when the force had risen by this part of what it has come to.
+_ONSET_SHARE = 0.2
+
+
+class ForceSense:
+    """The wrench at the flange, in base axes [N, Nm], as measured from cycle to cycle.
+
+    Attributes:
+        zero: what counts as no wrench; None until a program has said so.
+    """
+
+    def __init__(self, n_cycles: int) -> None:
+        """Remember so many cycles."""
+        self._history: deque[Vector6] = deque(maxlen=n_cycles)
+        self.zero: Vector6 | None = None
+
+    def take(self, wrench: Vector6) -> Vector6:
+        """Take the measurement of this cycle; returns it less the zero."""
+        self._history.appendleft(wrench)
+        zero = self.zero
+        return wrench if zero is None else six([w - z for w, z in zip(wrench, zero, strict=True)])
+
+    def forget(self) -> None:
+        """Forget the past: what measures is another one from now on."""
+        self._history.clear()
+        self.zero = None
+
+    def set_zero(self, still_cycles: int) -> None:
+        """Take the present wrench for no wrench. Source: zero_ftsensor.
+
+        Args:
+            still_cycles: for how long the arm has stood still; what was felt before counts less.
+        """
+        self.zero = self._present(still_cycles)
+
+    def unexplained(self, still_cycles: int) -> Vector6:
+        """Return the present wrench, noise averaged out, zero subtracted; argument as in `set_zero`."""
+        zero = ZERO6 if self.zero is None else self.zero
+        return six([w - z for w, z in zip(self._present(still_cycles), zero, strict=True)])
+
+    def offset(self, still_cycles: int) -> Vector6:
+        """Return what of the present wrench may be the error of the estimate: see PRECISION.
+
+        Once a program has set the zero, nothing is. Argument as in `set_zero`.
+        """
+        if self.zero is not None:
+            return ZERO6
+        present = self.unexplained(still_cycles)
+        return six([w if abs(w) <= bound else 0.0 for w, bound in zip(present, PRECISION, strict=True)])
+
+    def steps_since_contact(self, direction: Sequence[float]) -> int:
+        """Return how many cycles ago a contact began; 0 if there is none in what is remembered.
+
+        Args:
+            direction: in which the tool meets something, base axes (3,); zero for any.
+        """
+        forces = [wrench[:3] for wrench in self._history]
+        if len(forces) < _RECENT_CYCLES + _EARLY_CYCLES:
+            return 0
+        before = _mean(forces[-_EARLY_CYCLES:])
+        change = [now - then for now, then in zip(_mean(forces[:_RECENT_CYCLES]), before, strict=True)]
+        size = hypot(*direction)
+        # What is met pushes back against the direction.
+        against = (
+            [-x / size for x in direction] if size > 0.0 else [x / (hypot(*change) or 1.0) for x in change]
+        )
+        risen = _along(change, against)
+        if risen < CONTACT_FORCE:
+            return 0
+        onset = _along(before, against) + _ONSET_SHARE * risen
+        felt = [_along(force, against) for force in forces]
+        # Two cycles in a row below it: one alone may be noise.
+        for steps in range(1, len(felt) - 1):
+            if felt[steps] < onset and felt[steps + 1] < onset:
+                return steps
+        return len(felt) - 1
+
+    def _present(self, still_cycles: int) -> Vector6:
+        least, most = ZERO_CYCLES
+        # The arm comes to rest a little after its target.
+        latest = list(islice(self._history, min(max(still_cycles - least, least), most)))
+        return six(_mean(latest)) if latest else ZERO6
+
+
+def moved_wrench(wrench: Vector6, of: Sequence[float], to: Sequence[float]) -> Vector6:
+    """Return a wrench at another point, in the same axes: the moment loses lever times force.
+
+    Args:
+        wrench: [N, Nm].
+        of: point that its moment refers to, (3,) or the pose of it [m].
+        to: the other point.
+    """
+    rx, ry, rz = (b - a for a, b in zip(of[:3], to[:3], strict=True))
+    fx, fy, fz, mx, my, mz = wrench
+    return (fx, fy, fz, mx - ry * fz + rz * fy, my - rz * fx + rx * fz, mz - rx * fy + ry * fx)
+
+
+def _mean(vectors: Sequence[Sequence[float]]) -> list[float]:
+    return [sum(column) / len(vectors) for column in zip(*vectors, strict=True)]
+
+
+def _along(vector: Sequence[float], direction: Sequence[float]) -> float:
+    return sum(v * d for v, d in zip(vector, direction, strict=True))
