@@ -22,6 +22,9 @@ from urscript.errors import ScriptRuntimeError
 from urscript.values import Pose
 from urscript.waits import NEXT_CYCLE
 
+# Acceleration and speed of moves that give none. Source: URScript manual, module variables of motion.
+JOINT_DEFAULTS = (1.4, 1.05)  # rad/s^2, rad/s
+TOOL_DEFAULTS = (1.2, 0.25)  # m/s^2, m/s
 # The controller's number of the warning "Overlapping Blends" is not known: it goes out with the text alone.
 OVERLAPPING_BLENDS = ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blends")
 
@@ -91,7 +94,7 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         return _pose(target) if isinstance(target, Pose) else state.arm.fk(floats(target), state.tcp_offset)
 
     def movej(thread: object, q: Any, a: float, v: float, t: float, r: float) -> Cycles:
-        _require_limits("movej", a, v, t, r)
+        a, v = _limits("movej", a, v, t, r, JOINT_DEFAULTS)
 
         def make(start: Vector6, _: ToolPose) -> Leg:
             return move_j(start, joints_of(q, start), tool(), a=a, v=v, t=t, r=r)
@@ -126,7 +129,7 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         return travel(thread, goal, r, make)
 
     def movel(thread: object, pose: Any, a: float, v: float, t: float, r: float) -> Cycles:
-        _require_limits("movel", a, v, t, r)
+        a, v = _limits("movel", a, v, t, r, TOOL_DEFAULTS)
         goal = pose_of(pose)
         return along(thread, goal, lambda start: PoseLine(start, goal), a, v, t, r, process=False)
 
@@ -177,6 +180,16 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         "set_pos": set_pos,
         **speed_functions(state),
     }
+
+
+def _limits(
+    function: str, a: float, v: float, t: float, r: float, defaults: tuple[float, float]
+) -> tuple[float, float]:
+    """Acceleration and speed to use: a time counts before them, so that 0 is allowed beside it."""
+    if t > 0.0:
+        a, v = a or defaults[0], v or defaults[1]
+    _require_limits(function, a, v, t, r)
+    return a, v
 
 
 def _require_limits(function: str, a: float, v: float, t: float, r: float) -> None:

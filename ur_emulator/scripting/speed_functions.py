@@ -11,7 +11,7 @@ from ur_emulator.motion.generators import SpeedJ, StopJ, Streamed
 from ur_emulator.motion.servo_j import ServoJ
 from ur_emulator.motion.speed_l import SpeedL, StopL
 from ur_emulator.motion.tool import Tool
-from ur_emulator.scripting.arm_taking import Cycles, floats, require_positive, take_arm
+from ur_emulator.scripting.arm_taking import LEAST_LIMIT, Cycles, floats, require_positive, take_arm
 from urscript.waits import NEXT_CYCLE
 
 
@@ -38,12 +38,11 @@ def speed_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
             yield NEXT_CYCLE
 
     def speedj(thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
-        require_positive("speedj", a=a)
-        return stream(thread, SpeedJ(floats(qd), a), t)
+        return stream(thread, SpeedJ(floats(qd), _limit("speedj", t, a=a)), t)
 
     def speedl(thread: object, xd: Any, a: float, t: float | None, aRot: float | None) -> Cycles:
-        a_rot = a if aRot is None else aRot
-        require_positive("speedl", a=a, aRot=a_rot)
+        a_rot = _limit("speedl", t, aRot=a if aRot is None else aRot)
+        a = _limit("speedl", t, a=a)
         twist = floats(tuple(xd))
         return stream(thread, SpeedL(twist, a, a_rot, Tool(state.arm, state.tcp_offset)), t)
 
@@ -63,3 +62,16 @@ def speed_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
         return stop(thread, StopL(a, a_rot, Tool(state.arm, state.tcp_offset)))
 
     return {"speedj": speedj, "speedl": speedl, "servoj": servoj, "stopj": stopj, "stopl": stopl}
+
+
+def _limit(function: str, t: float | None, **limit: float) -> float:
+    """The acceleration to use.
+
+    A stream whose speed does not change asks for none at all, or for what rounding has left of it. Source:
+    splines of the maker's driver script. Without a time such a command would never be done.
+    """
+    ((_, value),) = limit.items()
+    if t is not None and t > 0.0 and 0.0 <= value < LEAST_LIMIT:
+        return LEAST_LIMIT
+    require_positive(function, **limit)
+    return value
