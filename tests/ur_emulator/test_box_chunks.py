@@ -1,11 +1,20 @@
 """The conformance corpus of the box: every builtin that needs a robot, and every error text of the box."""
 
+import ast
+import re
 from pathlib import Path
 
 import pytest
 from chunk_bench import run_box_chunk
 from chunk_marks import load_box_chunks
 
+import ur_emulator.scripting
+from urscript import compile_program
+from urscript.builtins import PURE
+from urscript.catalogue import CB3_3_15, catalogue_for
+from urscript.program import check_program
+
+SCRIPTING = Path(ur_emulator.scripting.__file__).parent
 FILES = sorted(Path(__file__).parent.glob("chunks/*.script"))
 CHUNKS = load_box_chunks(*FILES)
 
@@ -13,3 +22,53 @@ CHUNKS = load_box_chunks(*FILES)
 @pytest.mark.parametrize("chunk", CHUNKS, ids=str)
 def test_box_chunk(chunk):
     run_box_chunk(chunk)
+
+
+def test_corpus_is_there():
+    assert len(CHUNKS) >= 130
+
+
+def test_every_builtin_that_needs_a_robot_is_called():
+    called = set().union(*map(builtins_called, CHUNKS))
+    missing = {row.name for row in CB3_3_15} - set(PURE) - called
+    assert not missing
+
+
+def test_every_error_text_of_the_box_occurs():
+    texts = [text for chunk in CHUNKS for _, _, _, text in chunk.errors]
+    missing = [
+        f"{path.name}: {pattern}"
+        for path in sorted(SCRIPTING.glob("*.py"))
+        for pattern in error_patterns(path)
+        if not any(re.search(pattern, text) for text in texts)
+    ]
+    assert not missing
+
+
+def builtins_called(chunk):
+    """The builtins that the programs of a chunk name."""
+    programs = [chunk.text, *chunk.then]
+    programs += [action.removeprefix("run ") for _, action in chunk.actions if action.startswith("run ")]
+    catalogue = catalogue_for(chunk.software)
+    return {
+        name
+        for text in programs
+        if not check_program(text, catalogue=catalogue)[0]
+        for name in compile_program(text, catalogue=catalogue).builtins
+    }
+
+
+def error_patterns(path):
+    """What the errors that a module raises look like, with anything where values are filled in."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in (
+            "ScriptRuntimeError",
+            "RemoteCallError",
+        ):
+            match node.args[0]:
+                case ast.Constant(str(text)):
+                    yield re.escape(text)
+                case ast.JoinedStr(parts):
+                    yield "".join(
+                        re.escape(part.value) if isinstance(part, ast.Constant) else ".+" for part in parts
+                    )

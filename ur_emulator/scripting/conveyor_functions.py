@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import hypot, isfinite
+from math import hypot
 from typing import Any
 
 from ur_emulator.controller.cycle import controller_time
@@ -58,7 +58,7 @@ class ProgramConveyor:
         ) -> None:
             _require_ticks("track_conveyor_linear", "ticks_per_meter", ticks_per_meter)
             x, y, z = floats(tuple(direction))[:3]
-            if not 0.0 < hypot(x, y, z) < float("inf"):
+            if not hypot(x, y, z) > 0.0:
                 raise ScriptRuntimeError(
                     f"track_conveyor_linear: direction ({x:g}, {y:g}, {z:g}) leads nowhere, "
                     "give its x, y, z in the base frame"
@@ -69,12 +69,9 @@ class ProgramConveyor:
             thread: object, center: Pose, ticks_per_revolution: float, rotate_tool: bool, encoder_index: float
         ) -> None:
             _require_ticks("track_conveyor_circular", "ticks_per_revolution", ticks_per_revolution)
-            frame = floats(tuple(center))
-            if not all(map(isfinite, frame)):
-                raise ScriptRuntimeError("track_conveyor_circular: center must be six finite numbers")
             track(
                 CircularConveyor(
-                    frame,
+                    floats(tuple(center)),
                     float(ticks_per_revolution),
                     tool(),
                     counter(encoder_index),

@@ -197,6 +197,8 @@ def _require_limits(function: str, a: float, v: float, t: float, r: float) -> No
     for name, value in (("t", t), ("r", r)):
         if not value >= 0.0:
             raise ScriptRuntimeError(f"{function}: {name} must not be below 0, got {value:g}")
+    if t:
+        require_positive(function, t=t)
 
 
 def _pose(value: Sequence[float]) -> ToolPose:
