@@ -4,7 +4,7 @@ import socket
 import struct
 
 import pytest
-from box_support import TIMEOUT, MessageReader, connect
+from box_support import TIMEOUT, Bench, MessageReader, connect
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
@@ -17,7 +17,8 @@ from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers import listener
 from ur_emulator.servers.listener import Listener
-from ur_emulator.servers.modbus_server import MAX_AT_ONCE, MAX_INBOX
+from ur_emulator.servers.modbus_codec import ModbusCodec
+from ur_emulator.servers.modbus_server import MAX_AT_ONCE, MAX_INBOX, ModbusPort
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 
@@ -333,6 +334,73 @@ def _end_boxes():
     yield
     for box in _BOXES:
         box.__exit__(None, None, None)
+
+
+# --- the port itself, with connections that the test holds
+
+
+class FakeConnection:
+    """Takes answers until it is full."""
+
+    def __init__(self, *, full=False):
+        self.full = full
+        self.is_open = True
+        self.answers = []
+
+    def send(self, answer):
+        if not self.full:
+            self.answers.append(answer)
+        return not self.full
+
+    def close(self):
+        self.is_open = False
+
+
+class LoadedLibrary:
+    codec = ModbusCodec()
+    problem = ""
+
+    def start(self, then=None):
+        pass
+
+
+def bare_port():
+    bench = Bench()
+    commands = []
+    return bench, ModbusPort(bench.controller, commands.append, LoadedLibrary()), commands
+
+
+def test_a_write_is_answered_after_a_cycle_and_not_when_the_last_one_is_shown_again():
+    bench, port, commands = bare_port()
+    connection = FakeConnection()
+    port.opened(connection)
+    port.received(connection, frame(b"\6\0\x80\0\7") + frame(b"\3\0\x80\0\1"))
+    for _ in range(3):
+        port.publish(bench.now)
+    assert connection.answers == []
+    port.publish(bench.tick(1, *commands))
+    assert [answer[7:] for answer in connection.answers] == [b"\6\0\x80\0\7", b"\3\2\0\7"]
+
+
+def test_a_client_whose_answers_find_no_room_is_cut_off():
+    _, port, _ = bare_port()
+    connection = FakeConnection(full=True)
+    port.opened(connection)
+    port.received(connection, frame(READ_VERSION))
+    assert not connection.is_open
+
+
+def test_writes_of_several_clients_act_in_the_order_in_which_they_came():
+    bench, port, commands = bare_port()
+    connections = [FakeConnection() for _ in range(20)]
+    for i, connection in enumerate(connections):
+        port.opened(connection)
+        port.received(connection, frame(b"\6\0\x80" + struct.pack(">H", i)) * 2)
+    for _ in range(2):
+        assert [command.values for command in commands] == [(i,) for i in range(20)]
+        first, commands[:] = tuple(commands), ()
+        port.publish(bench.tick(1, *first))
+    assert all(len(connection.answers) == 2 for connection in connections)
 
 
 # --- a port that this user may not open
