@@ -26,7 +26,7 @@ from urscript.errors import ScriptBudgetError, ScriptRuntimeError, StackEntry
 from urscript.host import Handle, Host
 from urscript.source import Source
 from urscript.threads import ProgramHalted, Scheduler, ScriptThread, join
-from urscript.values import Pose, a_type, log_form, wrap_int
+from urscript.values import Pose, a_type, log_form, type_name, wrap_int
 from urscript.waits import NEXT_CYCLE, Wait
 
 
@@ -137,6 +137,8 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host) ->
     offered = host.builtins()
     flow = _flow_builtins(host)
     bound: dict[str, Any] = {}
+    if catalogue.methods:
+        bound["_method"] = _declared_methods(catalogue.methods)
     for name in names:
         function = flow.get(name) or offered.get(name)
         if function is not None:
@@ -182,11 +184,26 @@ def _without_thread(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
+def _declared_methods(methods: Mapping[str, frozenset[str]]) -> Callable[..., Any]:
+    def call(
+        thread: ScriptThread, target: Any, method: str, arguments: list[Any], named: dict[str, Any]
+    ) -> Generator[Wait, None, Any]:
+        if method in methods.get(type_name(target), ()):
+            raise _not_modelled(f"{method} of {a_type(target)}")
+        return (yield from _method(thread, target, method, arguments, named))
+
+    return call
+
+
+def _not_modelled(what: str) -> ScriptRuntimeError:
+    return ScriptRuntimeError(
+        f"{what} is declared only: this box does not model it yet (docs/urscript-coverage.md)"
+    )
+
+
 def _declared_only(name: str) -> Callable[..., Any]:
     def call(thread: ScriptThread, *arguments: Any) -> Any:
-        raise ScriptRuntimeError(
-            f"{name} is declared only: this box does not model it yet (docs/urscript-coverage.md)"
-        )
+        raise _not_modelled(name)
 
     return call
 

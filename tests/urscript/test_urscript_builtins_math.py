@@ -131,8 +131,8 @@ def test_pow(args: tuple[float, float], result: float) -> None:
 @pytest.mark.parametrize(
     ("args", "text"),
     [
-        ((-1, 2), "log: Parameter 'b' must be positive and not 1, got -1"),
-        ((1, 2), "log: Parameter 'b' must be positive and not 1, got 1"),
+        ((-1, 2), "log: Parameter 'b' must be neither negative nor 1, got -1"),
+        ((1, 2), "log: Parameter 'b' must be neither negative nor 1, got 1"),
         ((10, -0.1), "log: Parameter 'f' must not be negative, got -0.1"),
     ],
 )

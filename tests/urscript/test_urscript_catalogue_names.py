@@ -107,7 +107,7 @@ LATER = """
     get_tool_temp get_gravity get_base_acceleration set_base_acceleration get_jacobian
     get_jacobian_time_derivative get_mass_matrix get_coriolis_and_centrifugal_torques estimate_payload
     time high_holding_torque_disable high_holding_torque_enable set_baselight_off set_baselight_iec
-    set_baselight_solid make_list get_rtde_value eip_writer_factory eip_reader_factory
+    set_baselight_solid make_list struct get_rtde_value eip_writer_factory eip_reader_factory
     modbus_add_rw_signal modbus_get_error modbus_get_time_since_signal_invalid
     modbus_request_update_signal_value modbus_reset_connection modbus_set_signal_watchdog add_frame
     attach_frame delete_frame delete_all_frames move_frame get_pose convert_pose reset_world_model

@@ -26,7 +26,7 @@ def integer(function: str, parameter: str, value: Any) -> int:
     """The argument as an int; a float without fraction will do (see dialect: INDEX_TAKES_WHOLE_FLOATS)."""
     if type(value) is int:
         return value
-    if isinstance(value, float) and value.is_integer():
+    if isinstance(value, float) and value.is_integer() and INT_MIN <= value <= INT_MAX:
         return int(value)
     raise type_error(function, parameter, ParamType.INT, value)
 

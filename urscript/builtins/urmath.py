@@ -113,7 +113,7 @@ def log(b: Any, f: Any) -> float:
     """
     base, value = number("log", "b", b), number("log", "f", f)
     if base < 0 or base == 1:
-        raise ScriptRuntimeError(f"log: Parameter 'b' must be positive and not 1, got {base}")
+        raise ScriptRuntimeError(f"log: Parameter 'b' must be neither negative nor 1, got {base}")
     if value < 0:
         raise ScriptRuntimeError(f"log: Parameter 'f' must not be negative, got {value}")
     return _ln(value) / _ln(base)

@@ -82,6 +82,8 @@ def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str
     Raises:
         ScriptTypeError: wrong count, unknown or repeated keyword; without a place, the caller adds it.
     """
+    if builtin.any_names and not n_positional:
+        return []
     names = [param.name for param in builtin.params]
     optional = {param.name for param in builtin.params if not param.is_required}
     Shape(builtin.name, names, optional, f"use {builtin.signature}").check(n_positional, keyword_names)

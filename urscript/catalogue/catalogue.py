@@ -19,6 +19,7 @@ from .interfaces import ROWS as INTERFACES
 from .internals import ROWS as INTERNALS
 from .interpreter_mode import ROWS as INTERPRETER_MODE
 from .ioconfiguration import ROWS as IOCONFIGURATION
+from .methods import methods_of
 from .motion import ROWS as MOTION
 from .motion import VARIABLES
 from .processpath import ROWS as PROCESSPATH
@@ -64,6 +65,7 @@ class Catalogue:
             self._by_name.setdefault(name, forms[-1])
         self.variables: Mapping[str, ModuleVariable] = {item.name: item for item in VARIABLES}
         self.arrays: Mapping[str, BuiltinArray] = {item.name: item for item in ARRAYS}
+        self.methods: Mapping[str, frozenset[str]] = methods_of(version)
         self._checks = {name: compile_check(row) for name, row in self._by_name.items()}
 
     def lookup(self, name: str) -> Builtin | None:

@@ -39,6 +39,7 @@ class Chapter:
         undocumented: Iterable[Generation] = (),
         deprecated: bool = False,
         nan_ok: bool | None = None,
+        any_names: bool = False,
         note: str = "",
         source: str = "",
     ) -> Builtin:
@@ -62,5 +63,6 @@ class Chapter:
             undocumented=hidden,
             deprecated=deprecated,
             nan_ok=self.nan_ok if nan_ok is None else nan_ok,
+            any_names=any_names,
             note=note,
         )

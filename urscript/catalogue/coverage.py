@@ -31,7 +31,8 @@ tables in `urscript/catalogue/`; do not edit it, run
 _LATER_HEAD = """\
 Functions, or forms of functions, that CB3 3.15 does not have. A program compiled for a version that has
 them passes the compiler; the calls are declared only. 5.0 and 10.0 stand for "as far back as the documents
-go": the first release is not known."""
+go": the first release is not known. The methods of lists and matrices that came with 5.15 are declared only
+as well."""
 
 
 def _summary(rows: Iterable[Builtin]) -> list[str]:

@@ -358,8 +358,9 @@ _FLOW: tuple[Builtin, ...] = (
 )
 
 _STRINGS: tuple[Builtin, ...] = tuple(
-    _row(name, params, returns, summary, support=EXACT, nan_ok=True)
+    _row(name, params, returns, summary, since=releases("3.8", "5.0", "10.0"), support=EXACT, nan_ok=True)
     for name, params, returns, summary in (
+        # A maintainer of the ROS 2 driver (issue 952) names 3.8.0 as the first release.
         ("str_at", (Param("src", STRING), Param("index", INT)), "string", "one byte of a string"),
         ("str_cat", (Param("op1", ANY), Param("op2", ANY)), "string", "the texts of two values, joined"),
         ("str_empty", (_STRING,), "bool", "whether a string has no bytes"),

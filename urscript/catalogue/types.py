@@ -133,6 +133,7 @@ class Builtin:
         undocumented: generations whose controllers know the name although their manual does not list it.
         deprecated: the manual advises a successor.
         nan_ok: NaN and infinity do no harm as arguments (sums, texts, registers); else they are errors.
+        any_names: takes named arguments of any name, and no others.
         note: why the support is not exact.
     """
 
@@ -149,12 +150,14 @@ class Builtin:
     undocumented: frozenset[Generation] = frozenset()
     deprecated: bool = False
     nan_ok: bool = False
+    any_names: bool = False
     note: str = ""
 
     @property
     def signature(self) -> str:
         """As the manual heads its section, e.g. `movej(q, a=1.4, v=1.05, t=0, r=0)`."""
-        return f"{self.name}({', '.join(map(str, self.params))})"
+        arguments = "name=value, ..." if self.any_names else ", ".join(map(str, self.params))
+        return f"{self.name}({arguments})"
 
     @property
     def may_wait(self) -> bool:

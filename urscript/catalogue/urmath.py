@@ -96,4 +96,14 @@ ROWS: tuple[Builtin, ...] = (
         support=Support.DECLARED_ONLY,
         source=MANUAL_LATE,
     ),
+    _row(
+        "struct",
+        (),
+        "value, a struct",
+        "a value with named members",
+        since=releases(None, "5.15", "10.0"),
+        support=Support.DECLARED_ONLY,
+        any_names=True,
+        source=MANUAL_LATE,
+    ),
 )
