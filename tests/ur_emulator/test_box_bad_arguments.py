@@ -8,6 +8,7 @@ from chunk_marks import BoxChunk
 
 from ur_emulator.controller.commands import ReleaseBrakes, StartProgram, StopProgram, UnlockProtectiveStop
 from urscript import compile_program
+from urscript.builtins import PURE
 from urscript.catalogue import CB3_3_15
 from urscript.catalogue.types import ParamType
 
@@ -37,11 +38,11 @@ USUAL = {
     ParamType.NORMED: "[1, 2]",
 }
 HUGE, NAN, INF = "1.0E308", 'to_num("nan")', 'to_num("inf")'
+SIX_HUGE, SIX_LARGE = ", ".join([HUGE] * 6), ", ".join(["9.0E14", "-9.0E14"] * 3)
 # Arguments that nobody should give, whatever the type.
 ODD = (
     "0",
     "-1",
-    "2147483647",
     "-2147483648",
     HUGE,
     "-" + HUGE,
@@ -54,20 +55,18 @@ ODD = (
     '""',
     '"' + "x" * 2000 + '"',
     "[]",
-    "[0, 0, 0]",
     "[0, 0, 0, 0, 0, 0]",
     f"[{HUGE}, {HUGE}, {HUGE}]",
-    ", ".join([f"[{HUGE}"] + [HUGE] * 4 + [f"{HUGE}]"]),
-    "[9.0E14, -9.0E14, 9.0E14, 9.0E14, 9.0E14, 9.0E14]",
-    "p[9.0E14, -9.0E14, 9.0E14, 9.0E14, 9.0E14, 9.0E14]",
+    f"[{SIX_HUGE}]",
+    f"[{SIX_LARGE}]",
+    f"p[{SIX_LARGE}]",
     f"[{NAN}, 0, 0, 0, 0, 0]",
-    '["a", "b"]',
-    "[[1, 2], [3, 4]]",
     "p[0, 0, 0, 0, 0, 0]",
-    ", ".join([f"p[{HUGE}"] + [HUGE] * 4 + [f"{HUGE}]"]),
+    f"p[{SIX_HUGE}]",
     f"p[{INF}, 0, 0, 0, 0, 0]",
 )
-CYCLES = 6
+CYCLES = 3
+ROWS = [row for row in CB3_3_15 if row.name not in PURE and row.params]
 
 
 def usual(param):
@@ -88,12 +87,13 @@ def calls(row):
             yield [*arguments[:i], odd, *arguments[i + 1 :]]
 
 
-@pytest.mark.parametrize("row", list(CB3_3_15), ids=lambda row: row.name)
+@pytest.mark.slow
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
 def test_odd_arguments_do_no_harm(row):
     bench = ChunkBench(BoxChunk("", 1, ""))
     start = bench.now.actual_q
     for arguments in calls(row):
-        text = f"def p():\n  x = {row.name}({', '.join(arguments)})\n  sync()\n  sync()\nend\n"
+        text = f"def p():\n  x = {row.name}({', '.join(arguments)})\n  sync()\nend\n"
         bench.events.clear()
         bench.snapshots.clear()
         bench.tick(1, StopProgram(), UnlockProtectiveStop(), ReleaseBrakes())
