@@ -107,6 +107,8 @@ class ChunkRun:
             case "ValueRequested":
                 self.events.append(f"asks {event.kind.name.lower()}: {event.text}")
                 self._answer()
+            case "LogAdded":
+                self.events.append(f"log {event.source}: {event.text}")
             case name if name.startswith("Program"):
                 self.life.append(f"{name.removeprefix('Program').lower()} {event.name}")
 

@@ -10,7 +10,8 @@ Chunks stand apart by a line `---`; lines count from the first of the chunk. A l
     #sec! 1:5 text      the same of a secondary program
     #~ wire text        what the first error puts into the runtime-exception message
     #event text         the next thing the box reports beside texts: `C204A0 Protective Stop: ...`,
-                        `safety PROTECTIVE_STOP`, `popup title: text`, `asks integer: text` (all, in order)
+                        `safety PROTECTIVE_STOP`, `popup title: text`, `asks integer: text`,
+                        `log source: text` (all, in order)
     #life text          the next thing that happens to the program: `started p`, `stopped p` (all, if any)
     #cycles 25          how many cycles the program runs
     #paused             the program is left paused at the end

@@ -24,6 +24,50 @@ def test_box_chunk(chunk):
     run_box_chunk(chunk)
 
 
+RIGHT = """def p():
+  textmsg("a")      #0> a
+  sync()
+  protective_stop()
+  x = get_flag(1)
+end
+#event C209A0 ...
+#event safety PROTECTIVE_STOP
+#cycles 2
+#state robot_mode 7
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("#0> a", "#0> b"),
+        ("#0> a", "#1> a"),
+        ("#0> a", ""),
+        ("#event safety PROTECTIVE_STOP", ""),
+        ("#event C209A0 ...", "#event C20A0 ..."),
+        ("#cycles 2", "#cycles 3"),
+        ("#state robot_mode 7", "#state robot_mode 6"),
+        ("#cycles 2", "#! 3:3 something"),
+        ("#cycles 2", "#paused"),
+        ("#cycles 2", '#sent "x"'),
+        ("#cycles 2", "#called f []"),
+        ("#cycles 2", "#life started q"),
+        ("#cycles 2", "#modbus 1 1 1"),
+        ("#cycles 2", "#custom 1 1 []"),
+        ("get_flag(1)", "get_flag(99)"),
+        ("get_flag(1)", "get_flag()"),
+    ],
+)
+def test_a_wrong_expectation_is_noticed(tmp_path, old, new):
+    file = tmp_path / "wrong.script"
+    file.write_text(RIGHT)
+    run_box_chunk(*load_box_chunks(file))
+    assert old in RIGHT
+    file.write_text(RIGHT.replace(old, new))
+    with pytest.raises(AssertionError):
+        run_box_chunk(*load_box_chunks(file))
+
+
 def test_corpus_is_there():
     assert len(CHUNKS) >= 130
 
