@@ -16,10 +16,11 @@ from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptIt
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
+from ur_emulator.controller.hands import GuideByHand
 from ur_emulator.realtime.event_loop import EventLoop
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
-from urscript.errors import ScriptError
+from urscript.errors import ScriptError, ScriptTypeError
 from urscript.parser import prepare
 
 # The controller's own words and the command each stands for; words that change nothing here map to None.
@@ -28,6 +29,7 @@ WORDS: dict[str, cmd.Command | None] = {
     "power on": cmd.PowerOn(),
     "power off": cmd.PowerOff(),
     "set robotmode run": cmd.ReleaseBrakes(),
+    "set robotmode freedrive": GuideByHand(),
     "set unlock protective stop": cmd.UnlockProtectiveStop(),
     "stop program": cmd.StopProgram(),
     "pause program": cmd.PauseProgram(),
@@ -108,11 +110,13 @@ class ProgramIntake:
 
     def _translate(self, item: ScriptItem) -> cmd.Command | Event | None:
         match item:
-            case ProgramText(text):
+            case ProgramText(text, _, kind):
                 try:
                     return cmd.StartProgram(compile_program(text, catalogue=self._catalogue))
                 except ScriptError as error:
-                    return ScriptFailed(error.line, error.column, error.wire_text, log_text=error.log_text)
+                    # Arguments are counted when the call runs, so that of a `sec` is one of its exceptions.
+                    secondary = kind == "sec" and isinstance(error, ScriptTypeError)
+                    return ScriptFailed(error.line, error.column, error.wire_text, secondary, error.log_text)
             case ControlLine(text, word, argument):
                 if word == SPEED_WORD:
                     return _speed_command(text, argument)

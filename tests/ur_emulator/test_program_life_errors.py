@@ -1,0 +1,322 @@
+"""How errors of programs surface: texts, places, levels and order on port 30001; silence on 30002."""
+
+import pytest
+from box_support import VERSION, Bench, MessageReader, connect
+
+from protocol.primary_messages import (
+    ErrorCodeMessage,
+    KeyMessage,
+    ReportLevel,
+    RobotMessage,
+    RuntimeExceptionMessage,
+    StartupMessage,
+    TextMessage,
+    VersionMessage,
+)
+from protocol.primary_packages import RobotState, decode_package
+from protocol.ur_types import ProgramState
+from ur_emulator import ControlBox
+from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
+from ur_emulator.servers.primary_port import PrimaryPort
+from ur_emulator.servers.robot_state import StateEncoder
+
+BUDGET = (
+    "The program used too much time without instructing the robot what to do. "
+    "Consider using a Wait or sync() to split long program sequences that do not move the robot."
+)
+NO_SOLUTION = (
+    "The robot cannot reach the requested pose. "
+    "Script function movej is unable to find an inverse kinematics solution."
+)
+SECOND_MOVER = (
+    "def f():\n  thread t():\n    while True:\n      speedj([0.1,0,0,0,0,0], 1, 0.008)\n    end\n  end\n"
+    "  run t()\n  sleep(0.1)\n  stopj(1)\nend\n"
+)
+
+# program, line, column, text. Sources: urscript.md section 5; None where only a part of the text is known.
+PRIMARY = {
+    "missing bracket": ("def f():\n  x = (1\nend\n", 3, 1, "syntax_error_on_line:3:end:"),
+    "blanks stay": ("def f():\n  x = 1\n  y = 2 3 )\nend\n", 3, None, "syntax_error_on_line:3:  y = 2 3 ):"),
+    "bad character": ("def f():\n  x = 1 @ 2\nend\n", 2, None, "syntax_error_on_line:2:  x = 1 @ 2:"),
+    "unknown function": ("def f():\n  nowhere()\nend\n", 2, 3, "compile_error_name_not_found:nowhere:"),
+    "unknown variable": ("def f():\n  x = y\nend\n", 2, 7, "compile_error_name_not_found:y:"),
+    "unreachable": ("def f():\n  movej(p[10,0,0,0,0,0])\nend\n", 2, 3, NO_SOLUTION),
+    "list size": ("def f():\n  x = [1,2]\n  x = [1]\nend\n", 3, 3, "Resizing of 'List' is not supported"),
+    "second mover": (SECOND_MOVER, 9, 3, "Another thread is already controlling the robot"),
+    "no sync": ("def f():\n  while True:\n  end\nend\n", 2, None, BUDGET),
+    "no pose": (
+        "def f():\n  x = get_inverse_kin([0,0,0,0,0,0])\nend\n", 2, 7,
+        "get_inverse_kin: Parameter must be a Pose on the form p[x,y,z,a,b,c]",
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def box():
+    with ControlBox(pace="lockstep", port_base=None) as box:
+        yield box
+
+
+def told(box, program, last=None):
+    """Send a program; all messages of 30001 up to its end, or up to one for which `last` is true, and any behind it."""
+
+    def is_last(message):
+        if last is not None:
+            return last(message)
+        if isinstance(message, KeyMessage):
+            return message.title == "PROGRAM_XXX_STOPPED"
+        return isinstance(message, RuntimeExceptionMessage) and not messages
+
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.state()
+        sock.sendall(program.encode())
+        messages = []
+        while not is_last(message := reader.message(RobotMessage)):
+            messages.append(message)
+        messages.append(message)
+        sock.sendall(b'sec marker():\n  textmsg("marker")\nend\n')
+        while not (
+            isinstance(message := reader.message(RobotMessage), TextMessage) and message.text == "marker"
+        ):
+            messages.append(message)
+    return messages
+
+
+@pytest.mark.parametrize(("program", "line", "column", "text"), PRIMARY.values(), ids=PRIMARY.keys())
+def test_errors_of_primary_programs(box, program, line, column, text):
+    messages = told(
+        box, program.replace("\nend\n", "\n  sleep(9)\nend\n") if "thread" in program else program
+    )
+    (error,) = [m for m in messages if isinstance(m, RuntimeExceptionMessage)]
+    assert (error.line, error.text) == (line, text)
+    assert column in (None, error.column)
+    assert error.source == -3
+    if messages[0] is not error:  # it ran: the error comes before the news of the end
+        kinds = [(m.title if isinstance(m, KeyMessage) else type(m).__name__) for m in messages]
+        assert kinds == ["PROGRAM_XXX_STARTED", "RuntimeExceptionMessage", "PROGRAM_XXX_STOPPED"]
+
+
+@pytest.mark.parametrize(
+    ("body", "text"),
+    [
+        ("x = 1 / 0", "division by zero"),
+        ("movej([0,0,0,0,0,1])", "a secondary program must end within one control cycle"),
+        ("sleep(0.1)", "a secondary program must end within one control cycle"),
+        ('x = str_sub("a")', "Type error: str_sub takes"),
+    ],
+)
+def test_errors_of_secondary_programs_are_key_messages_and_the_primary_goes_on(box, body, text):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.state()
+        sock.sendall(b"def main():\n  while True:\n    sync()\n  end\nend\n")
+        assert reader.message(KeyMessage).title == "PROGRAM_XXX_STARTED"
+        sock.sendall(f"sec s():\n  {body}\nend\n".encode())
+        message = reader.message((KeyMessage, RuntimeExceptionMessage))
+        assert isinstance(message, KeyMessage)
+        assert (message.title, message.code, message.argument) == ("SECONDARY_PROGRAM_EXCEPTION_XXX", 0, 0)
+        assert message.text.startswith(text)
+        sock.sendall(b'sec t():\n  textmsg("still here")\nend\n')
+        assert reader.message(TextMessage).text == "still here"
+        sock.sendall(b"stop program\n")
+        assert (message := reader.message(KeyMessage)).title == "PROGRAM_XXX_STOPPED"
+        assert message.text == "main"
+
+
+def test_a_secondary_program_has_no_news_of_its_life(box):
+    messages = told(box, 'sec quiet():\n  textmsg("x")\nend\n', lambda m: isinstance(m, TextMessage))
+    assert [type(m) for m in messages] == [TextMessage]
+
+
+def test_the_name_of_a_one_line_program_is_that_of_the_called_function(box):
+    messages = told(box, "set_standard_digital_out(0, True)\n")
+    assert [(m.title, m.text) for m in messages] == [
+        ("PROGRAM_XXX_STARTED", "set_standard_digital_out"),
+        ("PROGRAM_XXX_STOPPED", "set_standard_digital_out"),
+    ]
+
+
+def test_a_call_of_the_program_below_it_is_another_program(box):
+    """A column-1 line behind the body: its name is unknown, the body runs all the same."""
+    program = 'def prog():\n  sleep(0.1)\n  textmsg("ran")\nend\nprog()\n'
+    messages = told(box, program, lambda m: isinstance(m, TextMessage))
+    (error,) = [m for m in messages if isinstance(m, RuntimeExceptionMessage)]
+    assert (error.line, error.column, error.text) == (1, 1, "compile_error_name_not_found:prog:")
+
+
+def test_the_secondary_port_tells_of_nothing():
+    class Client:
+        sent = ()
+
+        def send(self, package):
+            self.sent = (*self.sent, package)
+
+    bench, client = Bench(), Client()
+    port = PrimaryPort(VERSION, bench.controller, None, StateEncoder(VERSION), all_messages=False)
+    port.opened(client)
+    greeting = [
+        type(decode_package(package[: int.from_bytes(package[:4], "big")], VERSION))
+        for package in client.sent
+    ]
+    assert greeting == [VersionMessage, StartupMessage, RobotState]
+    client.sent = ()
+    bench.start(
+        'def f():\n  $ 1 "x"\n  global a = 1\n  textmsg(a)\n  popup("x")\n  protective_stop()\n  x = 1 / 0\nend\n'
+    )
+    bench.tick(5)
+    kinds = {type(event).__name__ for event in bench.events}
+    assert {"ScriptFailed", "TextPrinted", "PopupShown", "ErrorReported", "SafetyModeChanged"} <= kinds
+    for event in bench.events:
+        port.say(event)
+    assert client.sent == ()
+
+
+@pytest.mark.parametrize(
+    ("program", "code", "level"),
+    [
+        ("protective_stop()\n", 209, ReportLevel.WARNING),
+        ("def f():\n  movel(p[10,0,0,0,0,0])\nend\n", 204, ReportLevel.WARNING),
+        ("def f():\n  speedj([50,0,0,0,0,0], 40, 1)\nend\n", 204, ReportLevel.WARNING),
+        (
+            'def f():\n  rtde_set_watchdog("input_int_register_24", 50)\n  sleep(1)\nend\n',
+            207,
+            ReportLevel.WARNING,
+        ),
+    ],
+)
+def test_codes_and_levels(program, code, level):
+    bench = Bench(fidelity="ideal")
+    bench.start(program)
+    bench.tick(400)
+    (report,) = [e for e in bench.events if isinstance(e, ErrorReported)]
+    assert (report.code, report.level) == (code, level)
+
+
+def test_overlapping_blends_are_a_warning_and_the_program_goes_on():
+    bench = Bench(fidelity="ideal")
+    said = bench.run(
+        "def f():\n  movej([0.5,-1.5,-1.8,0,1.2,1.5])\n  p1 = get_target_tcp_pose()\n"
+        "  movel(pose_add(p1, p[0.05,0,0,0,0,0]), r=0.04)\n  movel(pose_add(p1, p[0.06,0,0,0,0,0]), r=0.04)\n"
+        '  movel(pose_add(p1, p[0.06,0.05,0,0,0,0]))\n  textmsg("end")\nend\n'
+    )
+    assert said == ["end"]
+    (report,) = [e for e in bench.events if isinstance(e, ErrorReported)]
+    assert (report.text, report.level) == ("Overlapping Blends", ReportLevel.WARNING)
+
+
+def test_on_the_wire_a_code_has_its_argument(box):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.state()
+        sock.sendall(b"def f():\n  speedj([0,0,0,50,0,0], 40, 1)\nend\n")
+        report = reader.message(ErrorCodeMessage)
+        assert (report.code, report.argument, report.report_level) == (204, 3, ReportLevel.WARNING)
+        assert report.source == 7
+        sock.sendall(b"stop program\nset unlock protective stop\n")
+        while (state := reader.state().sub_packages[0]).is_protective_stopped or state.is_program_paused:
+            pass
+
+
+# --- how programs end (urscript.md sections 1.2 and 4)
+
+THREADS = (
+    "def f():\n  thread t():\n    while True:\n      write_output_integer_register(0, read_output_integer_register(0) + 1)\n"
+    '      sync()\n    end\n  end\n  socket_open("10.0.0.1", 1)\n  force = 1\n  run t()\n  sleep(0.04)\n  {end}\nend\n'
+)
+
+
+@pytest.mark.parametrize(
+    ("end", "error"),
+    [
+        ("x = 0", None),
+        ("halt", None),
+        ("return False", None),
+        ("x = 1 / 0", "division by zero"),
+        ("while True:\n  end", BUDGET),
+    ],
+)
+def test_with_the_main_thread_everything_ends(end, error):
+    bench = Bench(fidelity="ideal")
+    bench.start(THREADS.replace("{end}", end))
+    bench.tick(10)
+    count = bench.controller.state.registers.outputs.integers[0]
+    assert count in (5, 6)
+    bench.tick(20)
+    assert bench.controller.state.registers.outputs.integers[0] == count
+    assert bench.now.runtime_state == ProgramState.STOPPED
+    assert not bench.network.sockets[0].is_open
+    kinds = [type(e) for e in bench.events]
+    assert kinds == [ProgramStarted, *([ScriptFailed] if error else []), ProgramStopped]
+    if error:
+        assert next(e for e in bench.events if isinstance(e, ScriptFailed)).text == error
+
+
+@pytest.mark.parametrize("halted_in", ["thread", "function"])
+def test_halt_ends_the_program_wherever_it_stands(halted_in):
+    body = (
+        "  thread t():\n    sleep(0.04)\n    halt\n  end\n  run t()\n"
+        if halted_in == "thread"
+        else "  def g():\n    sleep(0.04)\n    halt\n  end\n  g()\n"
+    )
+    bench = Bench(fidelity="ideal")
+    bench.start(f'def f():\n{body}  sleep(1)\n  textmsg("never")\nend\n')
+    bench.tick(20)
+    assert [type(e) for e in bench.events] == [ProgramStarted, ProgramStopped]
+
+
+def test_an_error_in_a_thread_ends_the_whole_program():
+    bench = Bench(fidelity="ideal")
+    bench.start("def f():\n  thread t():\n    sync()\n    x = 1 / 0\n  end\n  run t()\n  sleep(5)\nend\n")
+    bench.tick(10)
+    assert bench.now.runtime_state == ProgramState.STOPPED
+    (error,) = [e for e in bench.events if isinstance(e, ScriptFailed)]
+    assert (error.line, error.column) == (4, 9)
+
+
+def test_killing_a_thread_kills_its_children_and_join_goes_on():
+    bench = Bench(fidelity="ideal")
+    bench.start(
+        "def f():\n  thread child():\n    while True:\n      write_output_integer_register(0, read_output_integer_register(0) + 1)\n"
+        "      sync()\n    end\n  end\n  thread parent():\n    run child()\n    sleep(9)\n  end\n"
+        '  h = run parent()\n  sleep(0.04)\n  kill h\n  join h\n  textmsg("joined")\n  sleep(0.1)\nend\n'
+    )
+    bench.tick(40)
+    assert [e.text for e in bench.events if type(e).__name__ == "TextPrinted"] == ["joined"]
+    assert bench.controller.state.registers.outputs.integers[0] <= 6
+
+
+def test_what_a_program_leaves_and_what_it_does_not():
+    """Flags, TCP, payload and registers stay; watchdogs, sockets and pause codes go."""
+    bench = Bench(fidelity="ideal")
+    bench.run(
+        "def f():\n  set_flag(3, True)\n  set_tcp(p[0,0,0.1,0,0,0])\n  set_payload(1.5, [0,0,0.1])\n"
+        "  write_output_float_register(2, 0.5)\n  pause_on_error_code(153)\n"
+        '  rtde_set_watchdog("input_int_register_24", 1)\n  socket_open("10.0.0.1", 1)\nend\n'
+    )
+    state = bench.controller.state
+    assert not state.watchdogs
+    assert not state.error_settings.pause_codes
+    assert not bench.network.sockets[0].is_open
+    assert bench.run("def g():\n  textmsg(get_flag(3), read_output_float_register(2))\nend\n") == ["True0.5"]
+    assert bench.now.tcp_offset[2] == 0.1
+    assert bench.now.payload == 1.5
+
+
+def test_a_primary_program_replaces_the_running_one_at_once():
+    bench = Bench(fidelity="ideal")
+    bench.start("def one():\n  while True:\n    speedj([0.5,0,0,0,0,0], 5, 0.008)\n  end\nend\n")
+    bench.tick(50)
+    bench.start('def two():\n  textmsg("here")\nend\n')
+    lives = [
+        (type(e).__name__, getattr(e, "name", e.text if hasattr(e, "text") else "")) for e in bench.events
+    ]
+    assert lives == [
+        ("ProgramStarted", "one"),
+        ("ProgramStopped", "one"),
+        ("ProgramStarted", "two"),
+        ("TextPrinted", "here"),
+        ("ProgramStopped", "two"),
+    ]
+    bench.tick(40)
+    assert bench.now.target_qd == (0.0,) * 6
