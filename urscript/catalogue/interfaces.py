@@ -226,7 +226,7 @@ _REGISTERS: tuple[Builtin, ...] = (
         "None",
         "pause or stop when an RTDE input is not refreshed often enough; cleared at program stop",
         support=APPROXIMATE,
-        note="pause stops the program, for programs cannot be paused",
+        note="robot time; a paused program is not watched",
     ),
     _row(
         "get_rtde_value",

@@ -199,7 +199,7 @@ _MOVES: tuple[Builtin, ...] = (
         "None",
         "pause the program when that error occurs; forgotten at program stop",
         support=APPROXIMATE,
-        note="kept only; programs cannot be paused",
+        note="at the codes that this box reports",
     ),
     _row(
         "position_deviation_warning",
