@@ -59,11 +59,12 @@ def statement_name(block: Block) -> str:
 
 def _definition_and_calls(block: Block) -> tuple[nodes.Function | None, tuple[Statement, ...]]:
     """The one definition that is the whole program, and the calls of it that people write below."""
-    definition, *rest = [item for item in block if not isinstance(item, nodes.Label)] or [None]
-    if not isinstance(definition, nodes.Function) or definition.kind == "thread":
+    items = tuple(item for item in block if not isinstance(item, nodes.Label))
+    if not items or not isinstance(items[0], nodes.Function) or items[0].kind == "thread":
         return None, ()
+    definition, calls = items[0], items[1:]
     its_call = nodes.Evaluate(nodes.Call(definition.name, ()))
-    return (definition, tuple(rest)) if all(item == its_call for item in rest) else (None, ())  # type: ignore[arg-type]
+    return (definition, calls) if all(item == its_call for item in calls) else (None, ())
 
 
 class _Resolver:

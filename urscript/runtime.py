@@ -210,19 +210,13 @@ def _declared_only(name: str) -> Callable[..., Any]:
 
 # --- from Python's exceptions back to the script ---------------------------------------------------------
 
-_MEANING: Final[dict[type[Exception], str]] = {
-    ZeroDivisionError: "division by zero",
-    IndexError: "index is out of range",
-    RecursionError: "calls are nested too deeply",
-    OverflowError: "the result is too large",
-}
-"""What Python's own operators raise where static types let the compiler use them directly."""
-
 
 def script_error(
     error: Exception, file_name: str, names: Mapping[str, str], source: Source
 ) -> ScriptRuntimeError:
     """The run-time error that `error` is for the program, with place and calls.
+
+    Where static types are evident the compiler uses Python's own operators; what those raise is translated.
 
     Args:
         error: What came out of a thread.
@@ -235,10 +229,10 @@ def script_error(
         found = error
     elif innermost is not None and isinstance(error, IndexError):
         found = ScriptRuntimeError(_bad_index(innermost, stack[-1], source))
-    elif innermost is not None and type(error) in _MEANING:
-        found = ScriptRuntimeError(_MEANING[type(error)])
+    elif innermost is not None and isinstance(error, ZeroDivisionError):
+        found = ScriptRuntimeError("division by zero")
     elif isinstance(error, RecursionError):
-        found = ScriptRuntimeError(_MEANING[RecursionError])
+        found = ScriptRuntimeError("calls are nested too deeply")
     else:
         found = ScriptRuntimeError(f"internal error of this box: {type(error).__name__}: {error}")
         found.__cause__ = error

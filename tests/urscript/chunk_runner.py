@@ -29,8 +29,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from unittest import mock
 
+import pytest
+
 from urscript.catalogue import catalogue_for
-from urscript.errors import ScriptError
+from urscript.errors import ScriptCompileError, ScriptError
 from urscript.inference import StaticTypes, Type
 from urscript.parser import parse
 from urscript.printer import print_program
@@ -82,8 +84,8 @@ def _split(file: Path) -> list[Chunk]:
 
 
 def _expectations(chunk: Chunk) -> Chunk:
-    for line in chunk.text.replace("\r\n", "\n").split("\n"):
-        mark = re.search(r"#(>|!|~|@|<|log|ref|software)(?: (.*))?$", line)
+    for line in chunk.text.split("\n"):
+        mark = re.search(r"#(>|!|~|@|<|log|ref|software)(?: (.*))?$", line.rstrip("\r"))
         if mark is None:
             continue
         kind, rest = mark[1], mark[2] or ""
@@ -114,7 +116,13 @@ def run_chunk(chunk: Chunk) -> list[ScriptError]:
     sockets = {} if chunk.frames is None else {"s": FakeSocket(chunk.frames, closed=True)}
     host = RecordingHost(catalogue=catalogue, sockets=sockets)
     errors: list[ScriptError] = list(check_program(chunk.text, catalogue=catalogue)[0])
-    if not errors:
+    raised: list[ScriptError] = []
+    if errors:
+        with pytest.raises(ScriptCompileError) as caught:
+            compile_program(chunk.text, catalogue=catalogue)
+        raised = [caught.value]
+        assert str(raised[0]) == str(errors[0]), f"{chunk}: {raised[0]} is not the first of {errors}"
+    else:
         program = compile_program(chunk.text, catalogue=catalogue)
         running = host.run(program, MAX_CYCLES)
         assert running.status is not ProgramStatus.RUNNING, f"{chunk}: still running"
@@ -134,7 +142,7 @@ def run_chunk(chunk: Chunk) -> list[ScriptError]:
     assert host.messages == chunk.messages, f"{chunk}: {host.messages}"
     if chunk.calls is not None:
         assert host.names_called() == chunk.calls
-    return errors
+    return errors + raised
 
 
 def matches(expected: str, text: str) -> bool:

@@ -166,6 +166,13 @@ def test_a_fault_of_the_host_is_reported_as_such_and_keeps_its_cause():
     assert isinstance(running.error.__cause__, KeyError)
 
 
+def test_a_chain_of_a_thousand_functions_is_too_deep():
+    functions = "".join(f"def f{i}():\n  return f{i + 1}()\nend\n" for i in range(1_000))
+    running = RecordingHost().run(compile_program(f"{functions}def f1000():\n  return 1\nend\nx = f0()\n"))
+    assert running.error.message == "calls are nested too deeply"
+    assert running.error.stack[0] == ("f0", 3004, 5)
+
+
 def test_a_builtin_that_nobody_offers_says_so():
     class Bare(RecordingHost):
         def builtins(self):

@@ -46,25 +46,25 @@ class Shape:
         seen = set(self.names[:n_positional])
         for keyword in keywords:
             if keyword not in self.names:
-                raise self._error(f"{self.function}() got an unexpected keyword argument '{keyword}'")
+                raise self._misfit(f"{self.function}() got an unexpected keyword argument '{keyword}'")
             if keyword in seen:
-                raise self._error(f"{self.function}() got multiple values for keyword argument '{keyword}'")
+                raise self._misfit(f"{self.function}() got multiple values for keyword argument '{keyword}'")
             seen.add(keyword)
         given = n_positional + len(keywords)
         if n_positional > len(self.names) or given < len(self.names) - len(self.optional):
             raise self._wrong_count(given)
         for name in self.names[n_positional:]:
             if name not in seen and name not in self.optional:
-                raise self._error(f"{self.function}() missing required argument '{name}'")
+                raise self._misfit(f"{self.function}() missing required argument '{name}'")
 
     def _wrong_count(self, given: int) -> ScriptTypeError:
         most = len(self.names)
         least = most - len(self.optional)
         between = "" if least == most else f"{least} or " if least == most - 1 else f"{least} to "
         arguments = "argument" if most == 1 else "arguments"
-        return self._error(f"{self.function} takes exactly {between}{most} {arguments} ({given} given)")
+        return self._misfit(f"{self.function} takes exactly {between}{most} {arguments} ({given} given)")
 
-    def _error(self, message: str) -> ScriptTypeError:
+    def _misfit(self, message: str) -> ScriptTypeError:
         return ScriptTypeError(message, hint=self.hint)
 
 

@@ -1,0 +1,158 @@
+"""Every error that the language can make is made by some chunk, which says its place and text.
+
+The places in the code that make an error are found in its syntax; those that chunks pass are recorded while
+the chunks run. An error counts only if a chunk ended with it.
+"""
+
+import ast
+import re
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+from chunk_runner import load_chunks, run_chunk
+
+import urscript
+from urscript import errors
+
+PACKAGE = Path(urscript.__file__).parent
+CHUNKS = load_chunks(*sorted(Path(__file__).parent.glob("chunks/*.script")))
+# Commands and warnings: they report errors, their own tests look at those.
+NOT_THE_LANGUAGE = re.compile(r"advice/.*|cli\.py|formatter\.py|lint\w*\.py|run_\w+\.py")
+ERROR_CLASSES = {
+    name for name, value in vars(errors).items() if isinstance(value, type) and issubclass(value, Exception)
+}
+
+OUT_OF_REACH = {
+    "catalogue/catalogue.py Catalogue.bind": "for hosts; the compiler binds before the program runs",
+    "compiler.py _FunctionCompiler._assign": "every builtin array has a setter",
+    "ops.py equal": "dialect.MIXED_TYPES_COMPARE",
+    "program.py _resolve": "the resolver is deeper than the compiler in no program short enough for a chunk",
+    "program.py RunningProgram._finish": "a fault of a host; test_urscript_lang_running",
+    "runtime.py script_error": "a thousand functions, a fault of a host; test_urscript_lang_running",
+    "values.py Pose.of": "six items are the grammar's",
+    "values.py wrap_int": "dialect.INT_OVERFLOW",
+}
+"""Functions whose errors no chunk can make, and why."""
+
+
+UNUSED_TEXTS = {r"at\ most\ .+"}
+"""Parts of texts that no builtin needs: none has an upper bound alone."""
+
+
+@cache
+def modules():
+    """Path below the package, syntax tree of every module of the language."""
+    names = [path.relative_to(PACKAGE).as_posix() for path in sorted(PACKAGE.rglob("*.py"))]
+    return [
+        (name, ast.parse((PACKAGE / name).read_text(encoding="utf-8")))
+        for name in names
+        if not NOT_THE_LANGUAGE.fullmatch(name)
+    ]
+
+
+def functions(tree, prefix=""):
+    """Qualified name and node of every function, the innermost first."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.FunctionDef):
+            yield from functions(node, f"{prefix}{node.name}.")
+            yield prefix + node.name, node
+        else:
+            inner = f"{prefix}{node.name}." if isinstance(node, ast.ClassDef) else prefix
+            yield from functions(node, inner)
+
+
+def makers():
+    """Names of the functions that return an error, by what they declare."""
+    return {
+        node.name
+        for _, tree in modules()
+        for _, node in functions(tree)
+        if isinstance(node.returns, ast.Name) and node.returns.id in ERROR_CLASSES
+    }
+
+
+def error_sites():
+    """File, function, first and last line of every expression that makes an error."""
+    making = ERROR_CLASSES | makers()
+    for file, tree in modules():
+        seen = set()
+        for name, function in functions(tree):
+            for node in ast.walk(function):
+                if isinstance(node, ast.Call):
+                    made = getattr(node.func, "id", getattr(node.func, "attr", ""))
+                elif isinstance(node, ast.Raise):
+                    made = getattr(node.exc, "id", "")
+                else:
+                    continue
+                if made in making and id(node) not in seen:
+                    seen.add(id(node))
+                    yield file, name, node.lineno, node.end_lineno
+
+
+def partial_texts():
+    """Patterns of what is put into a variable first, on its way to a message."""
+    for _, tree in modules():
+        for node in ast.walk(tree):
+            if isinstance(node, (ast.Assign, ast.AugAssign)):
+                targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+                if any(getattr(target, "id", "") in ("message", "allowed") for target in targets):
+                    yield from patterns(node.value)
+
+
+def patterns(expression):
+    """The strings that an expression can be, with anything where values are filled in."""
+    match expression:
+        case ast.Constant(str(text)):
+            yield re.escape(text)
+        case ast.JoinedStr(parts):
+            yield "".join(re.escape(p.value) if isinstance(p, ast.Constant) else ".+" for p in parts)
+        case ast.IfExp(body=one, orelse=other):
+            yield from patterns(one)
+            yield from patterns(other)
+        case ast.BinOp(left=left):
+            yield from patterns(left)
+
+
+@pytest.fixture(scope="module")
+def met():
+    """All errors that chunks end with; `passed` of each are the places it came through."""
+    make = errors.ScriptError.__init__
+    home = f"{PACKAGE.as_posix()}/"
+
+    def note(self, *args, **kwargs):
+        make(self, *args, **kwargs)
+        self.passed = set()
+        frame = sys._getframe(1)
+        while frame is not None and frame.f_code.co_filename.startswith(home):
+            self.passed.add((frame.f_code.co_filename.removeprefix(home), frame.f_lineno))
+            frame = frame.f_back
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(errors.ScriptError, "__init__", note)
+        return [error for chunk in CHUNKS if chunk.errors for error in run_chunk(chunk)]
+
+
+def test_every_error_is_made_by_a_chunk(met):
+    passed = set().union(*(error.passed for error in met))
+    missing = {
+        f"{file} {function}": line
+        for file, function, line, last in error_sites()
+        if not any((file, number) in passed for number in range(line, last + 1))
+    }
+    assert {site: line for site, line in missing.items() if site not in OUT_OF_REACH} == {}
+    assert set(OUT_OF_REACH) - set(missing) == set(), "chunks reach these"
+
+
+def test_every_part_of_a_text_occurs_in_a_chunk(met):
+    texts = [error.message for error in met]
+    missing = {pattern for pattern in partial_texts() if not any(re.search(pattern, text) for text in texts)}
+    assert missing == UNUSED_TEXTS
+
+
+def test_the_search_finds_the_places():
+    sites = list(error_sites())
+    assert len(sites) > 80
+    assert {"type_error", "explain", "_wrong", "_out_of_range"} <= makers()
+    assert {file for file, *_ in sites} >= {"ops.py", "elements.py", "builtins/urmath.py", "resolver.py"}
