@@ -3,6 +3,21 @@
 Two kinds: what differs between software generations or deserves a switch is a field of `Dialect`; what is
 merely unknown is a constant. Letters: D documented, O observed, I inferred, U unknown. `docs/fidelity.md`
 lists the U rows for users.
+
+Choices that are no switch, and where they are made:
+
+| question (all U) | our reading | made in |
+|---|---|---|
+| hexadecimal literals, a line end in a string | refused | grammar.lark |
+| a label behind a statement, `return` without a value | accepted | grammar.lark |
+| list * matrix, matrix / matrix; matrix + matrix | errors; of equal shape by element | ops |
+| a sign before a list or matrix | by element | ops |
+| reading a variable before it has a value | run-time error | variables |
+| two definitions of one name | the later one counts | resolver |
+| `sleep` of a fraction of a cycle, of less than 0 | a whole cycle, none | runtime |
+| order of threads | the body, then by age | threads |
+| log(b, 0), asin(NaN), floor(1e10) | infinite, NaN, an error | builtins.urmath |
+| str_find from beyond the ends, to_num("12 "), to_num("5e-4") | -1, an error, a float | builtins.strings |
 """
 
 from __future__ import annotations
