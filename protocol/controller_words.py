@@ -34,7 +34,7 @@ CONTROLLER_WORDS: tuple[ControllerWord, ...] = (
     _W("power on", False, "as the dashboard command", "UR client library"),
     _W("power off", False, "as the dashboard command", "UR client library"),
     _W("set robotmode run", False, "release the brakes; powers on if needed", "UR client library, SAW"),
-    _W("set robotmode freedrive", False, "freedrive, CB2", "SAW"),
+    _W("set robotmode freedrive", False, "freedrive, until `set robotmode run`; CB2", "SAW"),
     _W("set unlock protective stop", False, "leave a protective stop", "UR client library"),
     _W("stop program", False, "stop the running program", "UR client library"),
     _W("pause program", False, "pause the running program", "UnderAutomation; wording inferred"),

@@ -11,20 +11,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import sys
-import threading
 from collections.abc import Callable
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self, Unpack
 
 from protocol.ur_types import Ports, RobotMode, SoftwareVersion, simulated_serial
 from ur_emulator.box_log import LogEntry
 from ur_emulator.controller.commands import Command
 from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.hands import HangLoad, Push
 from ur_emulator.errors import EmulatorError, PortPermissionError
 from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robot_model import Vector3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.realtime.loop_runner import LoopRunner
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.servers.dashboard_port import BUILD, BoxIdentity, DashboardPort
@@ -34,14 +35,15 @@ from ur_emulator.servers.modbus_server import ModbusPort
 from ur_emulator.servers.primary_port import PrimaryPort
 from ur_emulator.servers.program_intake import ProgramIntake
 from ur_emulator.servers.realtime_port import RealtimePort
+from ur_emulator.servers.reserve import Reserve
 from ur_emulator.servers.robot_state import StateEncoder
 from ur_emulator.servers.rtde_port import RtdePort
 from ur_emulator.servers.script_sockets import LoopNetwork
 
+if TYPE_CHECKING:
+    from ur_emulator.rack import BoxOptions, BoxRack
+
 DEFAULT_VERSION = "3.15.8"
-# The compile worker shares the interpreter with the loop; short turns keep the loop on time.
-_SWITCH_INTERVAL = 1e-4  # s
-_JOIN_TIMEOUT = 10.0  # s
 
 
 class ControlBox:
@@ -65,6 +67,9 @@ class ControlBox:
         seed: int = 0,
         fidelity: str = "typical",
         port_base: int | None = 0,
+        *,
+        loop: EventLoop | None = None,
+        phase: float = 0.0,
     ) -> None:
         """Assemble the box; nothing listens before it is started.
 
@@ -77,6 +82,8 @@ class ControlBox:
             seed: of calibration, phases and noise; the same seed is the same arm.
             fidelity: "ideal", "typical" or "poor".
             port_base: offset added to all standard ports; None takes free ports.
+            loop: shared with other boxes, see `BoxRack`, which runs it; None gives the box its own.
+            phase: which part of a period its cycles lie after those of the first box of the loop.
 
         Raises:
             EmulatorError: an argument is not among the allowed ones.
@@ -96,13 +103,15 @@ class ControlBox:
         self.ports = Ports.standard(self.port_base)
         self.serial_number = simulated_serial(model.robot_type, seed)
         self._free_ports = port_base is None
-        self._loop = EventLoop(precise=named_pace is Pace.REALTIME)
+        self._owns_loop = loop is None
+        self._loop = loop or EventLoop(precise=named_pace is Pace.REALTIME)
+        self._runner = LoopRunner(self._loop, self.close)
         modbus = CodecLoader(self._loop)
         self._network = LoopNetwork(self._loop, modbus)
         controller = Controller(model, imperfections, seed, self._network, mode=RobotMode.RUNNING)
         controller.state.ports.version = (software.major, software.minor)
         self._box = ServedBox(
-            controller, make_pacer(named_pace, controller.period_s, speed), self._loop.expect_soon
+            controller, make_pacer(named_pace, controller.period_s, speed, phase), self._loop.expect_soon
         )
         self._intake = ProgramIntake(self._loop, software, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)
@@ -120,9 +129,24 @@ class ControlBox:
             "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),
         }
         self._listeners: dict[str, Listener] = {}
+        self._reserve = Reserve()
         self.notices: list[str] = []
-        self._thread: threading.Thread | None = None
-        self._failure: BaseException | None = None
+
+    @staticmethod
+    def many(count: int, **options: Unpack[BoxOptions]) -> BoxRack:
+        """Return `count` boxes that share a thread, for one `with`; hosts and seeds are counted up.
+
+        Args:
+            count: how many.
+            options: as for one box; `host` and `seed` are those of the first. With `port_base=None` all boxes
+                listen on that host, each on free ports of its own.
+
+        Raises:
+            EmulatorError: an argument is not among the allowed ones.
+        """
+        from ur_emulator.rack import BoxRack, counted_up
+
+        return BoxRack(counted_up(count, options))
 
     # --- what is going on, and what shall happen
 
@@ -146,6 +170,30 @@ class ControlBox:
         """
         self._loop.call_soon_threadsafe(lambda: self._box.submit(command))
 
+    def push(self, force: Vector3, point: Vector3 = (0.0, 0.0, 0.0)) -> None:
+        """Push the flange as a hand would, from the next cycle on, from any thread; a zero force ends it.
+
+        Args:
+            force: in base axes [N].
+            point: where it acts, in the flange frame [m].
+
+        Raises:
+            PlantError: no hand pushes like that.
+        """
+        self.submit(Push(force, point))
+
+    def hang(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
+        """Hang a load on the flange that no program has declared, from the next cycle on, from any thread.
+
+        Args:
+            mass: [kg].
+            cog: centre of gravity in the flange frame [m].
+
+        Raises:
+            PlantError: that is no load.
+        """
+        self.submit(HangLoad(mass, cog))
+
     # --- life
 
     def listen(self) -> None:
@@ -156,11 +204,12 @@ class ControlBox:
         """
         if self._listeners:
             return
+        self._reserve.fill()
         try:
             for name, port in self._port_objects.items():
                 self._listen_on(name, port)
         except EmulatorError:
-            self._close()
+            self.close()
             raise
         numbers = {name: item.number for name, item in self._listeners.items()}
         self.ports = dataclasses.replace(self.ports, **{"modbus": 0, **numbers})
@@ -175,7 +224,14 @@ class ControlBox:
             return
         try:
             self._listeners[name] = Listener(
-                self._loop, self.host, number, port, self._box.backlog, self._box.notice, name
+                self._loop,
+                self.host,
+                number,
+                port,
+                self._box.backlog,
+                self._box.notice,
+                name,
+                self._reserve,
             )
         except PortPermissionError as error:
             if name != "modbus":
@@ -184,48 +240,45 @@ class ControlBox:
 
     def serve_forever(self) -> None:
         """Run in the calling thread until `stop`; the ports must be open."""
-        sys.setswitchinterval(_SWITCH_INTERVAL)
-        try:
-            self._loop.run()
-        finally:
-            self._close()
+        self._must_be_alone()
+        self._runner.run()
 
     def stop(self) -> None:
-        """Let the loop end, from any thread."""
-        self._loop.stop()
+        """Let the loop end, from any thread; in a rack that is the loop of all its boxes."""
+        self._runner.stop()
 
     def __enter__(self) -> Self:
         """Open the ports and run the loop in a thread."""
+        self._must_be_alone()
         self.listen()
-        self._thread = threading.Thread(target=self._run_in_thread, name="control-box", daemon=True)
-        self._thread.start()
+        self._runner.start("control-box")
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the loop; an error that ended it earlier is raised here."""
-        self.stop()
-        if self._thread is not None:
-            self._thread.join(_JOIN_TIMEOUT)
-        if self._failure is not None and error is None:
-            raise self._failure
+        failure = self._runner.finish()
+        if failure is not None and error is None:
+            raise failure
 
-    def _run_in_thread(self) -> None:
-        try:
-            self.serve_forever()
-        except BaseException as failure:  # kept for the thread that leaves the `with` block
-            self._failure = failure
+    def _must_be_alone(self) -> None:
+        if not self._owns_loop:
+            raise EmulatorError("this box is one of several in a rack: start the rack, it runs them all")
 
-    def _close(self) -> None:
+    def close(self) -> None:
+        """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
+        self._loop.remove(self._box)
         self._intake.close()
         self._network.close()
+        self._reserve.close()
         for listener in self._listeners.values():
             listener.close()
         for port in self._port_objects.values():
             for connection in tuple(port.clients):  # type: ignore[attr-defined]
                 connection.close()
-        self._loop.close()
+        if self._owns_loop:
+            self._loop.close()
 
 
 def _parse_version(text: str) -> SoftwareVersion:

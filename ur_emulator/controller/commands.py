@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from protocol.rtde_types import RtdeValue
+from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
 from ur_emulator.controller.operator import Answer
 from urscript import CompiledProgram
 
@@ -128,4 +129,7 @@ Command = (
     | WriteModbus
     | AnswerRequest
     | ClosePopup
+    | GuideByHand
+    | Push
+    | HangLoad
 )

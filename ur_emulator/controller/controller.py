@@ -20,6 +20,7 @@ from ur_emulator.controller.events import (
     SafetyModeChanged,
     ScriptFailed,
 )
+from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
 from ur_emulator.controller.port_map import write_range
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
@@ -207,7 +208,14 @@ class Controller:
                 self.programs.stop()
                 state.mode.command(ModeCommand.POWER_OFF)
                 self._hold_here()
+            case GuideByHand():
+                state.compliance.guide(by_client=True)
+            case Push(force, point):
+                self.plant.push(force, point)
+            case HangLoad(mass, cog):
+                self.plant.hang(mass, cog)
             case cmd.ReleaseBrakes():
+                state.compliance.by_client = False
                 state.mode.command(ModeCommand.BRAKE_RELEASE)
             case cmd.UnlockProtectiveStop():
                 if state.safety.mode is SafetyMode.PROTECTIVE_STOP:

@@ -86,6 +86,7 @@ def make_snapshot(
         tool_output_voltage=state.io.tool_voltage,
         registers=state.registers.values(),
         control_mode=int(state.compliance.mode),
+        is_guided_by_input=state.compliance.by_input,
         script_control_line=programs.line if state.wants_script_line else 0,
     )
 

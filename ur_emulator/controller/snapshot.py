@@ -60,6 +60,7 @@ class Snapshot(NamedTuple):
     tcp_offset: Vector6
     program_name: str
     control_mode: int
+    is_guided_by_input: bool
     # --- what only RTDE needs; lines in the order standard inputs, standard outputs, tool inputs
     analog_values: tuple[float, ...]
     analog_domains: tuple[int, ...]

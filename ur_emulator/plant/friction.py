@@ -54,7 +54,8 @@ class Friction:
     @property
     def dry_compensation(self) -> NDArray[np.float64]:
         """Return the part of `compensation` that does not grow with the speed (6,) [Nm]."""
-        return np.subtract(self.compensation, self._set_viscous)
+        dry: NDArray[np.float64] = self.compensation - self._set_viscous
+        return dry
 
     def evaluate(
         self, qd_actual: NDArray[np.float64], qd_target: NDArray[np.float64], qd_set: NDArray[np.float64]

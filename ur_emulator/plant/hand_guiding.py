@@ -24,6 +24,9 @@ RANGE_MARGIN = 0.15
 SPEED_MARGIN = 0.7
 # It has grown to this part of the rated torque at the limit.
 LIMIT_SHARE = 0.6
+# At the end of the range a resting joint feels only a part of that; all of it while it moves on outwards at
+# this speed [rad/s]. A mere spring would throw the arm back.
+_REST_SHARE, _FULL_SPEED = 0.3, 0.1
 
 
 class HandGuiding:
@@ -56,8 +59,10 @@ class HandGuiding:
             qd: joint speeds (6,) [rad/s].
         """
         beyond = np.maximum(q - self._high, 0.0) + np.minimum(q - self._low, 0.0)
-        depth = beyond / RANGE_MARGIN
+        depth = np.clip(beyond / RANGE_MARGIN, -1.0, 1.0)
+        outwards = np.clip(qd * np.sign(depth) / _FULL_SPEED, 0.0, 1.0)
+        repelling = depth * np.abs(depth) * (_REST_SHARE + (1.0 - _REST_SHARE) * outwards)
         excess = np.maximum(np.abs(qd) - self._free_speed, 0.0) / self._braking_speed
-        push_back = depth * np.abs(depth) + np.sign(qd) * excess
+        push_back = repelling + np.sign(qd) * excess
         torque: NDArray[np.float64] = gravity + FRICTION_SHARE * dry_friction - self._strength * push_back
         return torque

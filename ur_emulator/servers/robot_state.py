@@ -82,7 +82,7 @@ def state_records(snapshot: Snapshot) -> tuple[SubPackage, ...]:
             tool_mode=snap.joint_mode[-1],
         ),
         ForceModeData(wrench=snap.actual_tcp_force),
-        AdditionalInfo(),
+        AdditionalInfo(io_enabled_freedrive=snap.is_guided_by_input),
         SafetyData(),
     )
 

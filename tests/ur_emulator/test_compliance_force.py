@@ -1,0 +1,476 @@
+"""Force mode: on the table, in free space, with moves on top, and what it refuses."""
+
+import numpy as np
+import pytest
+from compliance_support import TABLE, above_table, failures, place, push, reported, said, truth
+
+from protocol.ur_types import ControlMode
+from ur_emulator.controller import commands as cmd
+
+BASE = "p[0,0,0,0,0,0]"
+LIMITS = "[0.05,0.05,0.05,0.2,0.2,0.2]"
+WAIT = "  sleep(1)\n"
+
+
+def pressing(force, *, frame=BASE, sign=-1, limits=LIMITS):
+    """Statements that press along z of a frame."""
+    wrench = f"[0,0,{sign * force},0,0,0]"
+    return WAIT + f"  force_mode({frame}, [0,0,1,0,0,0], {wrench}, 2, {limits})\n"
+
+
+# --- on the table
+
+
+@pytest.mark.parametrize("force", [20, 50])
+@pytest.mark.parametrize("seed", [1, 2, 3, 5, 8])
+def test_the_true_force_on_the_table_comes_within_a_tenth_of_the_one_asked(seed, force):
+    bench = above_table(pressing(force) + "  sleep(100)", seed=seed)
+    forces, _ = truth(bench, 750)
+    assert forces[-250:, 2].mean() == pytest.approx(force, rel=0.1)
+    assert reported(bench) == []
+
+
+@pytest.mark.parametrize("fidelity", ["ideal", "typical", "poor"])
+@pytest.mark.parametrize("scaling", [0.5, 1.0, 2.0])
+def test_pressing_is_stable(fidelity, scaling):
+    bench = above_table(
+        f"  force_mode_set_gain_scaling({scaling})\n" + pressing(30) + "  sleep(100)", fidelity=fidelity
+    )
+    forces, places = truth(bench, 1000)
+    last = forces[-300:, 2]
+    assert last.min() > 20.0  # never lets go, never hammers
+    assert last.max() < 40.0
+    assert np.ptp(places[-300:, 2]) < 5e-5
+    assert reported(bench) == []
+
+
+def test_without_noise_the_force_is_exact():
+    bench = above_table(pressing(25) + "  sleep(100)", fidelity="ideal")
+    forces, _ = truth(bench, 750)
+    assert forces[-100:, 2].mean() == pytest.approx(25.0, abs=0.1)
+
+
+def test_the_tool_frame_presses_as_well():
+    bench = above_table(pressing(20, frame="tool_pose()", sign=1) + "  sleep(100)")
+    forces, _ = truth(bench, 750)
+    assert forces[-250:, 2].mean() == pytest.approx(20.0, rel=0.1)
+
+
+def test_calling_it_again_and_again_changes_nothing():
+    once = above_table(pressing(20) + "  sleep(100)")
+    looped = above_table(
+        WAIT
+        + f"  while True:\n    force_mode({BASE}, [0,0,1,0,0,0], [0,0,-20,0,0,0], 2, {LIMITS})\n    sync()\n  end"
+    )
+    assert np.array_equal(truth(once, 600)[0], truth(looped, 600)[0])
+
+
+def test_another_wrench_is_taken_on_without_letting_go():
+    bench = above_table(
+        pressing(20)
+        + f"  sleep(4)\n  force_mode({BASE}, [0,0,1,0,0,0], [0,0,-40,0,0,0], 2, {LIMITS})\n  sleep(100)"
+    )
+    forces, _ = truth(bench, 1000)
+    assert forces[550:620, 2].mean() == pytest.approx(20.0, rel=0.1)
+    assert forces[640:, 2].min() > 15.0
+    assert forces[-200:, 2].mean() == pytest.approx(40.0, rel=0.1)
+
+
+def test_what_is_pressed_against_at_the_start_counts_as_contact():
+    """A force beyond the precision of the estimate is no error of it: entering twice does not press twice."""
+    bench = above_table(pressing(30) + "  sleep(4)\n  end_force_mode()\n" + pressing(30) + "  sleep(100)")
+    forces, _ = truth(bench, 1300)
+    assert forces[-200:, 2].mean() == pytest.approx(30.0, abs=5.0)
+
+
+# --- moves on top
+
+
+@pytest.mark.parametrize("fidelity", ["ideal", "typical", "poor"])
+def test_a_move_on_top_follows_its_path_and_keeps_the_force(fidelity):
+    bench = above_table(
+        pressing(20)
+        + "  sleep(3.5)\n  movel(pose_add(get_target_tcp_pose(), p[0.08,0,0,0,0,0]), a=0.5, v=0.05)\n"
+        + '  textmsg("there")\n  sleep(100)',
+        fidelity=fidelity,
+    )
+    forces, places = truth(bench, 850)
+    assert said(bench) == ["there"]
+    sliding = forces[620:760, 2]
+    assert sliding.mean() == pytest.approx(20.0, abs=3.0)
+    assert (sliding > 0.0).all()
+    assert places[-1][:2] - places[0][:2] == pytest.approx([0.08, 0.0], abs=2e-3)
+    assert reported(bench) == []
+
+
+def test_what_the_program_moves_along_a_compliant_axis_is_not_executed():
+    """An arm that shall not press anywhere along z does not go there because of a move either."""
+    bench = above_table(
+        WAIT + f"  force_mode({BASE}, [0,0,1,0,0,0], [0,0,0,0,0,0], 2, {LIMITS})\n"
+        "  movel(pose_add(get_target_tcp_pose(), p[0.05,0,0.1,0,0,0]), v=0.1)\n  sleep(100)",
+        z=0.2,
+        fidelity="ideal",
+    )
+    before = place(bench)
+    bench.tick(400)
+    assert place(bench) - before == pytest.approx([0.05, 0.0, 0.0], abs=2e-3)
+
+
+def test_joint_positions_along_the_path_know_nothing_of_the_displacement():
+    bench = above_table(
+        pressing(20) + "  sleep(3)\n"
+        "  textmsg(get_forward_kin(get_joint_positions()))\n  textmsg(get_target_tcp_pose())\n  sleep(100)",
+        fidelity="ideal",
+    )
+    bench.tick(600)
+    along, displaced = (float(text.split(",")[2]) for text in said(bench))
+    assert along == pytest.approx(0.03, abs=1e-4)
+    assert displaced < TABLE
+
+
+def test_no_selected_axis_means_the_program_is_followed():
+    bench = above_table(
+        WAIT + f"  force_mode({BASE}, [0,0,0,0,0,0], [0,0,-50,0,0,0], 2, {LIMITS})\n"
+        "  movel(pose_add(get_target_tcp_pose(), p[0.05,0,0.05,0,0,0]), v=0.1)\n  sleep(100)",
+        z=0.2,
+    )
+    before = place(bench)
+    bench.tick(400)
+    assert place(bench) - before == pytest.approx([0.05, 0.0, 0.05], abs=1e-3)
+    assert bench.now.control_mode == ControlMode.FORCE
+
+
+# --- in free space
+
+
+@pytest.mark.parametrize("limit", [0.02, 0.08])
+def test_in_free_space_it_moves_at_the_limit_speed(limit):
+    bench = above_table(pressing(20, limits=f"[0.1,0.1,{limit},0.2,0.2,0.2]") + "  sleep(100)", z=0.25)
+    bench.tick(260)
+    speeds = [-s.target_tcp_speed[2] for s in bench.snapshots[-20:]]
+    assert np.mean(speeds) == pytest.approx(limit, rel=0.02)
+    assert max(-s.target_tcp_speed[2] for s in bench.snapshots) < 1.1 * limit
+
+
+def test_with_nothing_asked_and_nobody_pushing_the_arm_stays():
+    bench = above_table(
+        WAIT + f"  force_mode({BASE}, [1,1,1,0,0,0], [0,0,0,0,0,0], 2, {LIMITS})\n  sleep(100)", z=0.2
+    )
+    bench.tick(150)
+    before = place(bench)
+    bench.tick(750)
+    assert np.abs(place(bench) - before).max() < 3e-3
+
+
+def test_a_push_moves_a_compliant_arm_and_damping_lets_it_stop_sooner():
+    def run(damping):
+        bench = above_table(
+            f"  force_mode_set_damping({damping})\n"
+            + WAIT
+            + f"  force_mode({BASE}, [0,1,0,0,0,0], [0,0,0,0,0,0], 2, [1,1,1,1,1,1])\n  sleep(100)",
+            z=0.2,
+            fidelity="ideal",
+        )
+        bench.tick(150)
+        before = place(bench)[1]
+        push(bench, 0.0, 15.0, 0.0)
+        bench.tick(50)
+        pushed = bench.now.actual_tcp_speed[1]
+        push(bench, 0.0, 0.0, 0.0)
+        bench.tick(40)
+        return place(bench)[1] - before, pushed, bench.now.actual_tcp_speed[1]
+
+    far, fast, later = run(0.0)
+    assert far > 0.02
+    assert later > 0.6 * fast  # no damping: the speed is maintained
+    way, speed, rest = run(0.5)
+    assert 0.0 < way < 0.5 * far
+    assert speed < 0.5 * fast
+    assert abs(rest) < 0.005
+
+
+def test_a_moment_is_regulated_too():
+    """The tool turns under a push beside its axis until it meets nothing any more."""
+    bench = above_table(
+        WAIT + f"  force_mode({BASE}, [0,0,0,0,0,1], [0,0,0,0,0,1.5], 2, [1,1,1,1,1,0.3])\n  sleep(100)",
+        z=0.2,
+        fidelity="ideal",
+    )
+    bench.tick(300)
+    assert bench.now.target_tcp_speed[5] == pytest.approx(0.3, rel=0.05)
+    assert np.abs(np.array(bench.now.target_tcp_speed[:5])).max() < 0.01
+
+
+# --- types of frames
+
+
+def test_type_1_points_y_at_the_origin_of_the_frame():
+    bench = above_table(
+        WAIT
+        + f"  force_mode(p[0.3,0.2,0.2,0.3,0.1,0.2], [0,1,0,0,0,0], [0,20,0,0,0,0], 1, {LIMITS})\n  sleep(100)",
+        z=0.2,
+    )
+    before = place(bench)
+    bench.tick(400)
+    way = place(bench) - before
+    assert way[1] > 0.03
+    assert np.abs(way[[0, 2]]).max() < 2e-3
+
+
+def test_type_3_has_compliant_axes_once_the_tool_moves():
+    bench = above_table(
+        WAIT + f"  force_mode({BASE}, [0,1,0,0,0,0], [0,20,0,0,0,0], 3, {LIMITS})\n  sleep(2)\n"
+        "  movel(pose_add(get_target_tcp_pose(), p[0,-0.1,0,0,0,0]), v=0.05)\n  sleep(100)",
+        z=0.2,
+    )
+    before = place(bench)
+    bench.tick(350)
+    assert np.abs(place(bench) - before).max() < 1e-3  # it has not moved yet
+    bench.tick(300)
+    # x of the frame is the way of the tool, -y; so its y is +x of the base.
+    assert (place(bench) - before)[0] > 0.04
+    assert (place(bench) - before)[1] == pytest.approx(-0.1, abs=2e-3)
+    bench.tick(50)  # it stands again: the frame stays
+    assert bench.now.target_tcp_speed[0] > 0.03
+
+
+# --- ends
+
+
+@pytest.mark.parametrize("where", ["in contact", "in free space"])
+def test_the_end_is_without_a_jump(where):
+    z, wait = (0.03, 4) if where == "in contact" else (0.25, 1.5)
+    bench = above_table(pressing(20) + f"  sleep({wait})\n  end_force_mode()\n  sleep(100)", z=z)
+    n = round((1 + wait) / 0.008) - 5
+    bench.tick(n)
+    assert bench.now.control_mode == ControlMode.FORCE
+    speeds, before = [], bench.controller.plant.qd_true
+    for _ in range(60):
+        bench.tick()
+        speeds.append(bench.controller.plant.qd_true)
+    assert bench.now.control_mode == ControlMode.POSITION
+    changes = np.abs(np.diff([before, *speeds], axis=0)) / 0.008
+    assert changes.max() < 21.0
+    assert not any(bench.now.target_qd)
+    if where == "in contact":
+        forces, _ = truth(bench, 200)
+        assert 10.0 < forces[:, 2].min() <= forces[:, 2].max() < 32.0  # it neither lets go nor presses harder
+    assert reported(bench) == []
+
+
+def test_after_the_end_moves_start_from_where_the_arm_is():
+    bench = above_table(
+        pressing(20) + "  sleep(3)\n  end_force_mode()\n"
+        '  movel(pose_add(get_target_tcp_pose(), p[0,0,0.05,0,0,0]), v=0.1)\n  textmsg("up")\n  sleep(100)'
+    )
+    bench.tick(650)
+    assert said(bench) == ["up"]
+    bench.tick(100)
+    assert place(bench)[2] == pytest.approx(TABLE + 0.05, abs=2e-3)
+
+
+@pytest.mark.parametrize("end", ["stop", "by itself", "protective stop", "power off", "replaced"])
+def test_it_ends_with_the_program_and_with_every_stop(end):
+    bench = above_table(pressing(20) + "  sleep(1)", z=0.25)
+    bench.tick(150)
+    assert bench.now.control_mode == ControlMode.FORCE
+    match end:
+        case "stop":
+            bench.tick(1, cmd.StopProgram())
+        case "by itself":
+            bench.tick(120)
+        case "protective stop":
+            bench.tick(1, cmd.TriggerProtectiveStop())
+        case "power off":
+            bench.tick(1, cmd.PowerOff())
+        case "replaced":
+            bench.start("def g():\n  sleep(100)\nend\n")
+    bench.tick(60)
+    assert bench.now.control_mode == ControlMode.POSITION
+    assert not any(bench.now.target_qd)
+    here = place(bench)
+    bench.tick(50)
+    assert np.abs(place(bench) - here).max() < 1e-4
+
+
+def test_killing_a_thread_that_moves_does_not_end_it():
+    bench = above_table(
+        "  thread mover():\n    movel(pose_add(get_target_tcp_pose(), p[0.1,0,0,0,0,0]), v=0.02)\n  end\n"
+        + pressing(20)
+        + "  h = run mover()\n  sleep(1)\n  kill h\n  sleep(100)",
+        z=0.2,
+    )
+    bench.tick(300)
+    assert bench.now.control_mode == ControlMode.FORCE
+    assert -bench.now.target_tcp_speed[2] == pytest.approx(0.05, rel=0.05)
+
+
+def test_hand_guiding_takes_its_place():
+    bench = above_table(pressing(20) + "  freedrive_mode()\n  sleep(100)", z=0.2)
+    bench.tick(200)
+    assert bench.now.control_mode == ControlMode.TEACH
+    before = place(bench)
+    bench.tick(50)
+    assert np.abs(place(bench) - before).max() < 1e-4
+
+
+def test_is_steady_is_false_meanwhile():
+    bench = above_table(
+        f"  sleep(1)\n  textmsg(is_steady())\n  force_mode({BASE}, [0,0,0,0,0,0], [0,0,0,0,0,0], 2, {LIMITS})\n"
+        "  sleep(1)\n  textmsg(is_steady())\n  end_force_mode()\n  sleep(1)\n  textmsg(is_steady())",
+        z=0.2,
+    )
+    bench.tick(500)
+    assert said(bench) == ["True", "False", "True"]
+
+
+def test_a_pause_holds_the_arm_and_the_force():
+    bench = above_table(pressing(20) + "  sleep(100)")
+    bench.tick(600)
+    bench.tick(1, cmd.PauseProgram())
+    bench.tick(50)
+    forces, places = truth(bench, 100)
+    assert np.ptp(places[:, 2]) < 1e-5
+    assert np.ptp(forces[:, 2]) < 1.0
+    bench.tick(1, cmd.ResumeProgram())
+    forces, _ = truth(bench, 300)
+    assert forces[-100:, 2].mean() == pytest.approx(20.0, rel=0.1)
+
+
+# --- limits of stiff axes
+
+
+def test_a_stiff_axis_that_is_pushed_too_far_stops_the_arm():
+    def run(limit):
+        bench = above_table(
+            WAIT
+            + f"  force_mode({BASE}, [0,0,1,0,0,0], [0,0,0,0,0,0], 2, [{limit},{limit},0.2,0.5,0.5,0.5])\n  sleep(100)",
+            z=0.2,
+        )
+        bench.tick(150)
+        push(bench, 0.0, 150.0, 0.0)
+        bench.tick(100)
+        return reported(bench)
+
+    assert [code for code, _ in run(0.003)] == [153]
+    assert run(0.02) == []
+
+
+def test_an_arm_that_is_led_out_of_its_reach_stops():
+    bench = above_table(
+        WAIT + f"  force_mode({BASE}, [1,0,0,0,0,0], [60,0,0,0,0,0], 2, [0.5,1,1,1,1,1])\n  sleep(100)", z=0.2
+    )
+    bench.tick(400)
+    assert reported(bench)[0][0] == 204
+    assert bench.now.control_mode == ControlMode.POSITION
+    here = place(bench)
+    bench.tick(100)
+    assert np.abs(place(bench) - here).max() < 1e-4
+
+
+# --- arguments
+
+GOOD = [BASE, "[0,0,1,0,0,0]", "[0,0,-20,0,0,0]", "2", LIMITS]
+NAN = 'to_num("nan")'
+
+
+@pytest.mark.parametrize(
+    ("index", "value", "text"),
+    [
+        (
+            0,
+            f"p[{NAN},0,0,0,0,0]",
+            "force_mode: Parameter 'task_frame' must be finite, got [nan, 0.0, 0.0, 0.0, 0.0, 0.0]",
+        ),
+        (0, "[0,0,0,0,0,0]", "force_mode: Parameter must be a Pose on the form p[x,y,z,a,b,c]"),
+        (1, "[]", "force_mode: Parameter 'selection_vector' must be a list of 6 numbers, got a list of 0"),
+        (
+            1,
+            "[0,0,1]",
+            "force_mode: Parameter 'selection_vector' must be a list of 6 numbers, got a list of 3",
+        ),
+        (1, "[0,0,2,0,0,0]", "force_mode: selection_vector must hold only 0 and 1, got [0,0,2,0,0,0]"),
+        (1, "[0,0,0.5,0,0,0]", "force_mode: selection_vector must hold only 0 and 1, got [0,0,0.5,0,0,0]"),
+        (
+            1,
+            "[True,False,False,False,False,False]",
+            "force_mode: Parameter 'selection_vector' must be a list of 6 numbers, got a list of 6 with a bool in it",
+        ),
+        (2, f"[0,0,{NAN},0,0,0]", "force_mode: Parameter 'wrench' must be finite, got [0, 0, nan, 0, 0, 0]"),
+        (3, "0", "force_mode: Parameter 'type' must be in the range 1 to 3, got 0"),
+        (3, "2.5", "force_mode: Parameter 'type' must be an integer, got the float 2.5"),
+        (4, "[0,0,-0.1,0,0,0]", "force_mode: limits must not be below 0, got [0,0,-0.1,0,0,0]"),
+        (4, f"[0,0,{NAN},0,0,0]", "force_mode: Parameter 'limits' must be finite, got [0, 0, nan, 0, 0, 0]"),
+    ],
+)
+def test_absurd_arguments_are_one_line_errors_and_move_nothing(index, value, text):
+    arguments = list(GOOD)
+    arguments[index] = value
+    bench = above_table(f"  force_mode({', '.join(arguments)})\n  sleep(100)", z=0.2)
+    before = bench.now.target_q
+    bench.tick(10)
+    assert failures(bench) == [text]
+    assert bench.now.control_mode == ControlMode.POSITION
+    assert bench.now.target_q == before
+    assert not any(bench.now.target_qd)
+
+
+def test_a_point_too_near_is_refused():
+    bench = above_table(
+        f"  force_mode(get_target_tcp_pose(), [0,1,0,0,0,0], [0,9,0,0,0,0], 1, {LIMITS})", z=0.2
+    )
+    bench.tick(3)
+    assert failures(bench) == [
+        "force_mode: the tool is 0.0 mm from the origin of the task frame, type 1 needs at least 10 mm"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (
+            "force_mode_set_damping(1.5)",
+            "force_mode_set_damping: Parameter 'damping' must be in the range 0 to 1, got 1.5",
+        ),
+        (
+            "force_mode_set_gain_scaling(-1)",
+            "force_mode_set_gain_scaling: Parameter 'scaling' must be in the range 0 to 2, got -1",
+        ),
+    ],
+)
+def test_absurd_settings_are_errors(call, text):
+    bench = above_table(f"  {call}", z=0.2)
+    bench.tick(3)
+    assert failures(bench) == [text]
+
+
+@pytest.mark.parametrize("wrench", ["[0,0,-1e6,0,0,0]", "[1e6,1e6,1e6,1e6,1e6,1e6]"])
+def test_a_force_that_no_arm_has_ends_in_a_protective_stop_not_in_numbers(wrench):
+    bench = above_table(
+        WAIT + f"  force_mode({BASE}, [1,1,1,1,1,1], {wrench}, 2, [100,100,100,100,100,100])\n  sleep(100)"
+    )
+    bench.tick(400)
+    assert len(reported(bench)) >= 1
+    assert np.abs(bench.controller.plant.qd_true).max() < 1e-2
+
+
+def test_two_equal_runs_are_equal_to_the_last_bit():
+    def run():
+        bench = above_table(pressing(20) + "  sleep(100)", seed=4)
+        bench.tick(400)
+        return [(s.actual_q, s.actual_current, s.actual_tcp_force) for s in bench.snapshots]
+
+    assert run() == run()
+
+
+def test_what_is_not_in_use_is_not_looked_after(monkeypatch):
+    from ur_emulator.controller.compliance import Compliance
+
+    def never(*_):
+        raise AssertionError("compliance was looked after in a cycle that needs none")
+
+    bench = above_table("  movej([0.2,-1.5,-1.5,-1.5,1.5,0])\n  sleep(1)", z=0.2)
+    monkeypatch.setattr(Compliance, "step", never)
+    monkeypatch.setattr(Compliance, "follow_hand", never)
+    monkeypatch.setattr(Compliance, "find_violation", never)
+    bench.tick(200)
