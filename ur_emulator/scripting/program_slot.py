@@ -16,7 +16,9 @@ from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.robot_host import RobotHost
 from urscript import CompiledProgram, ProgramStatus, RunningProgram
 
-# States in which the threads of a program have their turn; while it resumes, see `ProgramSlot.step`.
+# Looked up once: a cycle asks for them several times.
+_PLAYING, _PAUSED = ProgramState.PLAYING, ProgramState.PAUSED
+# States in which the threads of a program do not have their turn.
 _STANDS_STILL = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
 
 
@@ -58,7 +60,7 @@ class ProgramSlot:
         """True while any program wants cycles, and in the cycle in which one ended."""
         if self._primary is None:
             return self._ran or bool(self._secondaries)
-        return self._phase is not ProgramState.PAUSED or bool(self._secondaries)
+        return self._phase is not _PAUSED or bool(self._secondaries)
 
     @property
     def runtime_state(self) -> ProgramState:
@@ -70,7 +72,7 @@ class ProgramSlot:
         if self._primary is not None:
             return self._phase
         if self._ran:
-            return ProgramState.PLAYING
+            return _PLAYING
         return ProgramState.STOPPING if self._state.motion.is_moving else ProgramState.STOPPED
 
     @property
@@ -83,9 +85,7 @@ class ProgramSlot:
     @property
     def waits_outside(self) -> bool:
         """True when a program cannot go on before something comes from outside the box."""
-        return (
-            self._primary is not None and self._phase is ProgramState.PLAYING and self._primary.waits_outside
-        )
+        return self._primary is not None and self._phase is _PLAYING and self._primary.waits_outside
 
     # --- commands
 
@@ -145,7 +145,7 @@ class ProgramSlot:
                 else:
                     program.kill()  # a secondary program has one cycle
             self._secondaries.clear()
-        if self._primary is not None and (self._phase is ProgramState.PLAYING or self._may_run()):
+        if self._primary is not None and (self._phase is _PLAYING or self._may_run()):
             self._state.program_tick += 1
             status = self._primary.step()
             if status is not ProgramStatus.RUNNING:
