@@ -100,7 +100,7 @@ class PrimaryPort:
 
     def publish(self, snapshot: Snapshot) -> None:
         """Send a state and what has changed of the variables if they are due in this cycle."""
-        if self._labels.is_watching and self._channels:
+        if self._channels and self._labels.is_watching:
             message = self._labels.message(self._now)
             if message is not None:
                 self._send(self._package(message))
