@@ -47,7 +47,7 @@ def compile_resolved(
     """Compile a program without errors to Python.
 
     Raises:
-        ScriptContextError: Loops are nested deeper than Python can (20 levels).
+        ScriptContextError: Something is nested deeper than Python can; loops are limited before.
     """
     types = StaticTypes(program, catalogue)
     expressions = ExpressionCompiler(program, types, catalogue, dialect)

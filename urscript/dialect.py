@@ -33,6 +33,10 @@ start without a sync, so real budgets are at least 10^4 to 10^5 (O)."""
 RECURSION_LIMIT: Final = 200
 """Depth at which a recursive function is stopped with a run-time error (U; no field script recurses)."""
 
+MAX_LOOP_DEPTH: Final = 16
+"""Loops that may stand inside each other (U). The oldest Python that runs the box allows 20 blocks; a
+recursive function needs one more."""
+
 MAX_THREADS: Final = 200
 """Threads that one program may have running at the same time (U). Driver scripts have a handful."""
 

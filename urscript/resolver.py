@@ -15,7 +15,7 @@ from urscript.assignment import find_unsure
 from urscript.call_graph import mark_recursion, spread_blocking
 from urscript.catalogue import Catalogue
 from urscript.catalogue.binding import Shape
-from urscript.dialect import Dialect
+from urscript.dialect import MAX_LOOP_DEPTH, Dialect
 from urscript.errors import (
     ScriptCompileError,
     ScriptContextError,
@@ -151,18 +151,22 @@ class _Resolver:
                 if parameter.default is not None:
                     # A default belongs to the scope around: it sees no parameters. It runs in the callee.
                     self._expression(parameter.default, scope.around(), runs_in=scope)
-        self._block(scope.body, scope, in_loop=False)
+        self._block(scope.body, scope, loops=0)
 
-    def _block(self, block: Block, scope: FunctionScope, in_loop: bool) -> None:
+    def _block(self, block: Block, scope: FunctionScope, loops: int) -> None:
+        """Look up the names of a block that stands inside so many loops."""
         for statement in block:
-            self._statement(statement, scope, in_loop)
-            inside = in_loop or isinstance(statement, nodes.While)
+            self._statement(statement, scope, loops)
+            inside = loops + isinstance(statement, nodes.While)
             for inner in own_blocks(statement):
                 self._block(inner, scope, inside)
 
-    def _statement(self, statement: Statement, scope: FunctionScope, in_loop: bool) -> None:
+    def _statement(self, statement: Statement, scope: FunctionScope, loops: int) -> None:
         match statement:
-            case nodes.Simple(word="break" | "continue" as word) if not in_loop:
+            case nodes.While() if loops == MAX_LOOP_DEPTH:
+                message = f"loops are nested more than {MAX_LOOP_DEPTH} deep"
+                self._error(ScriptContextError(message), statement.span)
+            case nodes.Simple(word="break" | "continue" as word) if not loops:
                 self._error(ScriptContextError(f"'{word}' outside a loop"), statement.span)
             case nodes.Join():
                 scope.blocks = True
