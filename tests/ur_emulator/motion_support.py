@@ -8,6 +8,7 @@ from protocol.pose import pose_trans
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.leg import move_tool
+from ur_emulator.motion.move import Follow, Move
 from ur_emulator.motion.path import PoseLine
 from ur_emulator.motion.target import ZERO6, JointTarget
 from ur_emulator.motion.tool import Tool
@@ -68,6 +69,41 @@ def distance_to_polyline(points, corners):
     best = np.full(len(points), np.inf)
     for a, b in itertools.pairwise(corners):
         a, way = np.array(a), np.subtract(b, a)
-        share = np.clip((points - a) @ way / (way @ way), 0.0, 1.0)
+        share = np.clip((points - a) @ way / max(way @ way, 1e-30), 0.0, 1.0)
         best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * way, axis=1))
     return best
+
+
+def run_chain(makers, q=HOME, limit=20000):
+    """Ride moves one after the other as a program does: each in the cycle in which the one before gives way.
+
+    Args:
+        makers: each makes a leg for joint angles and tool pose at its start.
+        q: joint angles at the beginning.
+        limit: most cycles.
+
+    Returns:
+        All targets, the legs that were travelled, and what became of those that were to follow.
+    """
+    targets = [JointTarget(tuple(q), ZERO6)]
+    makers, legs, outcomes = list(makers), [], []
+    while makers:
+        last = targets[-1]
+        legs.append(makers.pop(0)(last.q, TOOL.pose(last.q)))
+        move = Move(legs[-1])
+        refused = False
+        while not move.done:
+            while (
+                makers and not refused and not move.done and move.open and move.leg.r > 0 and move.taken < 4
+            ):
+                leg = makers[0](move.leg.goal, move.leg.goal_pose)
+                outcomes.append(move.follow(leg))
+                refused = outcomes[-1] is Follow.REFUSED
+                if not refused:
+                    makers.pop(0)
+                    move.taken += outcomes[-1] is Follow.SKIPPED
+                if outcomes[-1] is Follow.BLENDED:
+                    legs.append(leg)
+            targets.append(move.step(targets[-1], DT, 1.0))
+            assert len(targets) < limit
+    return targets, legs, outcomes

@@ -24,7 +24,7 @@ from ur_emulator.motion.survey import Sample, survey
 SHARPEST_ARC = 0.9 * pi
 _STRAIGHT = 1e-6  # m/m
 _SAMPLES = 8  # points of a blend at which its speed is looked at
-# Ways before and behind the waypoint that differ by more make a curve that no longer turns one way.
+# Ways of the joints before and behind the waypoint that differ by more make a curve with a bulge.
 _LOPSIDED = 3.0
 
 
@@ -67,8 +67,11 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     after = second.first_part(r, 0.5 * second.path.length)
     if before <= 0.0 or after <= 0.0 or first.goal is None:
         return None
-    leave = first.path.length - before
     a, b = first.path, second.path
+    if isinstance(a, ToolPath) and isinstance(b, ToolPath):
+        # As far before the waypoint as behind it: the speed stays the same through the curve.
+        before = after = min(before, after)
+    leave = first.path.length - before
     if isinstance(a, ToolPath) and isinstance(b, ToolPath):
         curve = _tool_curve(first, second, a, b, leave, after)
         v = max(first.v, second.v)
@@ -83,7 +86,7 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     if isinstance(a, ToolPath) or isinstance(b, ToolPath):
         scale, length, end_length = before / after, 2.0 * before, 2.0 * after
     else:
-        scale, length = 1.0, _length(before, after)
+        scale, length = 1.0, min(before + after, _LOPSIDED * min(before, after))
         end_length = length
     cubic = Cubic.between(start_q, _times(length, slope), end_q, _times(end_length, end_slope))
     joint_curve = JointCurve(cubic, length)
@@ -92,11 +95,6 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
         v /= joint_curve.rate
     limit = min(leg.a for leg in (first, second) if isinstance(leg.path, JointLine))
     return Blend(joint_curve, leave, after, scale, v, limit)
-
-
-def _length(before: float, after: float) -> float:
-    """Return the length of a blend whose speed is that of both moves at its ends."""
-    return min(before + after, _LOPSIDED * min(before, after))
 
 
 def _tool_curve(
@@ -110,7 +108,7 @@ def _tool_curve(
     start, slope = a.path.at(leave)
     end, end_slope = b.path.at(enter)
     waypoint = first.goal_pose
-    length = _length(first.path.length - leave, enter)
+    length = 2.0 * enter
     cubic = Cubic.between(
         pose_sub(start, waypoint), _times(length, slope), pose_sub(end, waypoint), _times(length, end_slope)
     )

@@ -22,7 +22,7 @@ _SPACING, _MOST, _HALVINGS = 0.025, 40, 6
 _LIMIT = 200
 # The way between samples is halved where a joint is faster than this share of its limit, and its speed in the
 # middle differs from the mean of the ends by more than this share of the fastest.
-_FAST, _ROUGH = 0.4, 0.2
+_FAST, _ROUGH = 0.4, 0.1
 # A prediction for the inverse kinematics reaches no further than this [rad].
 _FARTHEST = 0.5
 

@@ -1,0 +1,260 @@
+"""Chains of moves: many waypoints close together, sharp corners, singularities, anything at random."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from box_support import Bench
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from motion_support import (
+    ARM,
+    DT,
+    HOME,
+    START,
+    TOOL,
+    at,
+    distance_to_polyline,
+    positions,
+    ride,
+    run_chain,
+    tool_accelerations,
+    tool_velocities,
+)
+
+from ur_emulator.controller.events import ErrorReported
+from ur_emulator.controller.safety import find_invalid_setpoint
+from ur_emulator.motion.leg import move_j, move_tool
+from ur_emulator.motion.move import Follow, Move
+from ur_emulator.motion.path import PoseLine, arc_through
+from ur_emulator.motion.survey import JOINT_ACCELERATION
+from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.tool import UnreachableError
+
+V, A = 0.25, 1.2
+
+
+def straight(goal, **limits):
+    return lambda q, pose: move_tool(PoseLine(pose, goal), q, TOOL, **({"a": A, "v": V} | limits))
+
+
+def arc(via, goal, *, fixed=False, **limits):
+    return lambda q, pose: move_tool(
+        arc_through(pose, via, goal, fixed=fixed), q, TOOL, process=True, **({"a": A, "v": V} | limits)
+    )
+
+
+def joints(goal, **limits):
+    return lambda q, pose: move_j(q, goal, TOOL, **({"a": 1.4, "v": 1.05} | limits))
+
+
+def joints_to(pose, **limits):
+    def make(q, _):
+        goal = TOOL.joints(pose, q)
+        if goal is None:
+            raise UnreachableError
+        return move_j(q, goal, TOOL, **({"a": 1.4, "v": 1.05} | limits))
+
+    return make
+
+
+def circle(n, radius=0.05):
+    return [
+        at(radius * (1.0 - math.cos(2 * math.pi * k / n)), radius * math.sin(2 * math.pi * k / n), 0.0)
+        for k in range(1, n + 1)
+    ]
+
+
+def speeds(targets):
+    return np.linalg.norm(tool_velocities(targets), axis=1)
+
+
+# --- many waypoints
+
+
+@pytest.mark.parametrize("process", [False, True])
+@pytest.mark.parametrize("spacing", [0.002, 0.005])
+def test_waypoints_close_together_do_not_slow_the_tool_down(spacing, process):
+    corners = [at(spacing * k, 0.0, 0.0) for k in range(1, round(0.12 / spacing) + 1)]
+    makers = [straight(p, r=0.4 * spacing, process=process) for p in corners[:-1]]
+    targets, legs, _ = run_chain([*makers, straight(corners[-1], process=process)])
+    assert len(legs) == len(corners)
+    plain = ride(Move(straight(corners[-1])(HOME, START)))
+    # As fast as the whole way in one move.
+    assert len(targets) <= len(plain) + 2
+    assert speeds(targets).max() <= V * (1 + 1e-6)
+    assert tool_accelerations(targets).max() <= A * (1 + 1e-3) + 1e-6
+    assert TOOL.pose(targets[-1].q) == pytest.approx(corners[-1], abs=1e-9)
+
+
+def test_a_polygon_that_is_nearly_a_circle_is_ridden_like_one():
+    corners = circle(60)
+    side = math.dist(corners[0][:3], corners[1][:3])
+    makers = [straight(p, r=0.45 * side, process=True) for p in corners[:-1]]
+    targets, legs, outcomes = run_chain([*makers, straight(corners[-1], process=True)])
+    assert set(outcomes) == {Follow.BLENDED}
+    speed = speeds(targets)
+    # A circle of this radius allows sqrt(a R) = 0.245 m/s; the blends are a little tighter.
+    assert speed[45:-45].min() > 0.2
+    assert tool_accelerations(targets).max() <= A * 1.001
+    points = positions(targets)
+    assert distance_to_polyline(points, [START[:3], *(p[:3] for p in corners)]).max() < 0.3 * side
+    for leg in legs:
+        assert np.linalg.norm(points - leg.goal_pose[:3], axis=1).min() < 0.45 * side
+
+
+def test_a_program_with_waypoints_close_together_runs_ahead_but_not_far():
+    bench = Bench(fidelity="ideal")
+    place = "p[0.25,-0.25,0.25,2.2,-2.2,0]"
+    bench.run(f"movej({place}, a=8, v=3)\n")
+    bench.snapshots.clear()
+    bench.run(
+        "def f():\n  i = 1\n  while i <= 50:\n"
+        f"    movel(pose_add({place}, p[0.002 * i,0,0,0,0,0]), a=1.2, v=0.25, r=0.0008)\n"
+        "    write_output_integer_register(0, i)\n    i = i + 1\n  end\n"
+        f"  movel(pose_add({place}, p[0.104,0,0,0,0,0]))\nend\n"
+    )
+    x = np.array([s.target_tcp_pose[0] for s in bench.snapshots]) - 0.25
+    known = np.array([s.registers.output_integers[0] for s in bench.snapshots]) * 0.002
+    speed = np.array([s.target_tcp_speed[0] for s in bench.snapshots])
+    assert speed.max() == pytest.approx(V, abs=1e-6)
+    # Known is what is needed to stop, the blend in the waypoint, two cycles and the move that was just told.
+    running = (known > 0.0) & (known < 0.1)
+    ahead = (known - x)[running]
+    assert ahead.max() <= V * V / (2 * A) + 0.001 + 4 * V * DT + 2 * 0.002
+    assert not [e for e in bench.events if isinstance(e, ErrorReported)]
+
+
+def test_waypoints_whose_blends_overlap_are_left_out_without_a_stop():
+    corners = [at(0.003 * k, 0.0, 0.0) for k in range(1, 41)]
+    makers = [straight(p, r=0.004) for p in corners]
+    targets, _, outcomes = run_chain([*makers, straight(at(0.126, 0, 0))])
+    assert outcomes.count(Follow.SKIPPED) == 26
+    assert Follow.REFUSED not in outcomes
+    assert len(targets) <= len(ride(Move(straight(at(0.126, 0, 0))(HOME, START)))) + 2
+
+
+def test_a_program_that_only_moves_to_one_place_with_a_blend_still_takes_time():
+    bench = Bench(fidelity="ideal")
+    bench.start("def f():\n  p0 = get_target_tcp_pose()\n  while True:\n    movel(p0, r=0.01)\n  end\nend\n")
+    bench.tick(20)
+    assert bench.controller.programs.is_running
+
+
+# --- bends
+
+
+@pytest.mark.parametrize("v", [0.25, 0.8])
+@pytest.mark.parametrize("r", [0.001, 0.01])
+def test_corners_of_process_moves_keep_the_acceleration(r, v):
+    corners = [at(0.08, 0, 0), at(0.08, 0.08, 0), at(0.0, 0.08, 0)]
+    makers = [straight(p, r=r, v=v, process=True) for p in corners[:-1]]
+    targets, _, outcomes = run_chain([*makers, straight(corners[-1], v=v, process=True)])
+    assert outcomes == [Follow.BLENDED] * 2
+    assert tool_accelerations(targets).max() <= A * 1.001
+    # Through the arc as fast as its radius, here r, allows.
+    assert speeds(targets)[40:-40].min() == pytest.approx(min(v, math.sqrt(A * r)), rel=0.03)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(0.005, 0.05), st.floats(0.1, 2.0), st.booleans())
+def test_arcs_keep_the_acceleration(radius, v, fixed):
+    via, goal = at(radius, radius, 0.0), at(2 * radius, 0.0, 0.0)
+    targets, _, _ = run_chain([arc(via, goal, fixed=fixed, v=v)])
+    assert tool_accelerations(targets).max() <= A * 1.001
+    assert speeds(targets).max() <= min(v, math.sqrt(A * radius)) * 1.001
+
+
+def test_a_turn_in_a_small_blend_is_not_torn():
+    corner = at(0.05, 0, 0, 1.0, 0, 0)
+    targets, _, outcomes = run_chain(
+        [straight(corner, r=0.003, v=0.5), straight(at(0.1, 0, 0, 1.0, 0.8, 0), v=0.5)]
+    )
+    assert outcomes == [Follow.BLENDED]
+    turning = np.array([TOOL.twist(t.q, t.qd)[3:] for t in targets])
+    # A turn counts like the way of a point 0.1 m away.
+    assert np.linalg.norm(np.diff(turning, axis=0), axis=1).max() / DT <= A / 0.1 * 1.05
+
+
+# --- singularities
+
+WRIST = (0.0, -1.4, -1.9, -1.4, 0.12, 0.3)  # joint 5 close to where axes 4 and 6 are parallel
+
+
+def test_near_a_singularity_the_tool_slows_down_for_the_joints():
+    start = TOOL.pose(WRIST)
+    goal = (start[0], start[1] + 0.1, start[2], *start[3:])
+    move = Move(move_tool(PoseLine(start, goal), WRIST, TOOL, a=A, v=1.0))
+    targets = ride(move, WRIST)
+    qd = np.array([t.qd for t in targets])
+    limits = np.array(ARM.robot.qd_max)
+    assert (np.abs(qd) / limits).max() <= 1.0
+    assert np.abs(np.diff(qd, axis=0)).max() / DT <= 1.3 * JOINT_ACCELERATION
+    assert TOOL.pose(targets[-1].q) == pytest.approx(goal, abs=1e-9)
+    assert distance_to_polyline(positions(targets), [start[:3], goal[:3]]).max() < 1e-4
+    for before, after in itertools.pairwise(targets):
+        assert find_invalid_setpoint(ARM.robot, before, after, DT) is None
+
+
+# --- anything
+
+places = st.builds(at, *[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.6, 0.6)] * 3)
+angles = st.tuples(*[st.floats(-0.5, 0.5)] * 6).map(
+    lambda d: tuple(q + x for q, x in zip(HOME, d, strict=True))
+)
+radii = st.sampled_from([0.0, 0.002, 0.01, 0.03])
+tool_limits = {"v": st.sampled_from([0.05, 0.25, 1.0]), "a": st.sampled_from([0.3, 1.2, 5.0])}
+joint_limits = {"v": st.sampled_from([0.3, 1.05, 3.0]), "a": st.sampled_from([0.5, 1.4, 10.0])}
+moves = st.one_of(
+    st.builds(straight, places, r=radii, process=st.booleans(), **tool_limits),
+    st.builds(arc, places, places, r=radii, fixed=st.booleans(), **tool_limits),
+    st.builds(joints, angles, r=radii, **joint_limits),
+    st.builds(joints_to, places, r=radii, **joint_limits),
+)
+
+
+def is_accepted(targets):
+    pairs = itertools.pairwise(targets)
+    return all(find_invalid_setpoint(ARM.robot, a, b, DT) is None for a, b in pairs)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(moves, min_size=2, max_size=5))
+def test_moves_that_can_be_ridden_one_by_one_can_be_ridden_as_a_chain(makers):
+    q = HOME
+    try:
+        for make in makers:
+            alone = ride(Move(make(q, TOOL.pose(q))), q)
+            assume(is_accepted(alone))
+            q = alone[-1].q
+    except UnreachableError:
+        assume(False)
+    targets, legs, _ = run_chain(makers)
+    assert is_accepted(targets)
+    at_q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
+    assert np.abs(np.diff(qd, axis=0)).max() / DT <= 1.6 * JOINT_ACCELERATION
+    assert np.abs(np.diff(at_q, axis=0) / DT - 0.5 * (qd[1:] + qd[:-1])).max() < 0.25
+    assert targets[-1].q == pytest.approx(legs[-1].goal, abs=1e-8)
+    assert targets[-1] == JointTarget(targets[-1].q)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.lists(st.tuples(places, radii), min_size=2, max_size=5),
+    st.sampled_from([0.1, 0.25, 0.5]),
+    st.booleans(),
+)
+def test_chains_of_the_tool_keep_to_their_path_and_limits(waypoints, v, process):
+    makers = [straight(p, r=r, v=v, process=process) for p, r in waypoints]
+    try:
+        targets, legs, _ = run_chain(makers)
+    except UnreachableError:
+        assume(False)
+    assert speeds(targets).max() <= v * (1 + 1e-6)
+    assert tool_accelerations(targets).max() <= A * (1 + 5e-3) + 1e-6
+    points = positions(targets)
+    off_path = distance_to_polyline(points, [START[:3], *(leg.goal_pose[:3] for leg in legs)]) > 1e-4
+    for point in points[off_path]:
+        assert any(math.dist(point, leg.goal_pose[:3]) <= leg.r + 1e-6 for leg in legs[:-1])
+    assert TOOL.pose(targets[-1].q) == pytest.approx(legs[-1].goal_pose, abs=1e-9)
