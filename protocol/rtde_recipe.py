@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
@@ -105,7 +106,7 @@ class Recipe:
 
 
 def snapshot_encoder(fields: Sequence[RtdeField], header: bytes) -> Callable[[Any], bytes]:
-    """Make a function from snapshot to data package.
+    """Make a function from snapshot to data package; the same one for the same recipe.
 
     Args:
         fields: the variables; all of them must be ones that the box fills.
@@ -122,6 +123,11 @@ def snapshot_encoder(fields: Sequence[RtdeField], header: bytes) -> Callable[[An
     for field in fields:
         if field.filled is None:
             raise LocalProtocolError(f"{field.name} is no output that this box fills")
+    return _make_encoder(tuple(fields), header)
+
+
+@lru_cache(maxsize=64)
+def _make_encoder(fields: tuple[RtdeField, ...], header: bytes) -> Callable[[Any], bytes]:
     # One expression, all values flattened into one call: this runs every cycle. The text is made of names of
     # the tables only, never of what a client has sent.
     arguments = "".join(
@@ -157,5 +163,6 @@ def snapshot_encoder(fields: Sequence[RtdeField], header: bytes) -> Callable[[An
         "explain": explain,
     }
     exec(compile(source, "<rtde encoder>", "exec"), names)
-    encode: Callable[[Any], bytes] = names["encode"]
+    # Out of its own globals: a function that keeps itself alive is found by a full garbage collection only.
+    encode: Callable[[Any], bytes] = names.pop("encode")
     return encode

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ur_emulator.emulator import ControlBox
+    from ur_emulator.rack import BoxRack
 
-__all__ = ["ControlBox"]
+__all__ = ["BoxRack", "ControlBox"]
 
 
 def __getattr__(name: str) -> Any:
@@ -22,4 +23,8 @@ def __getattr__(name: str) -> Any:
         from ur_emulator.emulator import ControlBox
 
         return ControlBox
+    if name == "BoxRack":
+        from ur_emulator.rack import BoxRack
+
+        return BoxRack
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

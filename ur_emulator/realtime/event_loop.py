@@ -20,8 +20,11 @@ from typing import Protocol
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
 # microseconds.
 _COARSE = 0.050
-# A sleeping process wakes up about this much late [s]; so long before a deadline it stays awake.
+# A sleeping process wakes up about this much late [s]; so long before a deadline it stays awake. Services
+# that share a loop share this time, for awake is busy: twenty boxes would leave no time for anything else.
 _WAKE_UP = 250e-6
+# select() takes descriptors below this number only.
+_SELECT_LIMIT = 1024
 # How long to look again and again for what is expected soon [s]: a client in lockstep takes half of it.
 _EAGER_TIME = 200e-6
 # Most waits in a row that are not tried eagerly after failures.
@@ -148,9 +151,12 @@ class EventLoop:
 
     def _wait_precisely(self, descriptor: int, deadline: float) -> list[_Ready]:
         """Wait for a deadline to some microseconds: sleep for most of it, watch the clock for the rest."""
-        sleep = deadline - time.monotonic() - _WAKE_UP
+        sleep = deadline - time.monotonic() - _WAKE_UP / max(1, len(self._services))
         if sleep > 0.0:
-            select.select([descriptor], [], [], sleep)
+            if descriptor < _SELECT_LIMIT:
+                select.select([descriptor], [], [], sleep)
+            elif ready := self._selector.select((int(sleep * 1e3) - 0.5) * 1e-3):
+                return ready
         while not (ready := self._selector.select(0.0)) and time.monotonic() < deadline:
             pass
         return ready

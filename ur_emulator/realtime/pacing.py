@@ -67,21 +67,24 @@ class Pacer(Protocol):
 class RealtimePacer:
     """Cycles at absolute deadlines."""
 
-    def __init__(self, period_s: float, speed: float = 1.0) -> None:
+    def __init__(self, period_s: float, speed: float = 1.0, phase: float = 0.0) -> None:
         """Set the rate.
 
         Args:
             period_s: control cycle [s].
             speed: how many times as fast as real time, > 0.
+            phase: which part of a period to wait before the first cycle, 0 to 1: boxes that share a loop take
+                turns instead of all having their cycle at once.
         """
         self._period = period_s / speed
+        self._phase = phase
         self._deadline = math.nan
         self.lost_cycles = 0
 
     def may_tick(self, now: float, situation: Situation) -> bool:
         """True at and after the deadline; each call that says so uses up one deadline."""
         if math.isnan(self._deadline):
-            self._deadline = now
+            self._deadline = now + self._phase * self._period
         if now < self._deadline:
             return False
         behind = now - self._deadline
@@ -133,6 +136,6 @@ class LockstepPacer:
         return now + self._period
 
 
-def make_pacer(pace: Pace, period_s: float, speed: float = 1.0) -> Pacer:
+def make_pacer(pace: Pace, period_s: float, speed: float = 1.0, phase: float = 0.0) -> Pacer:
     """Return the pacer of that name."""
-    return LockstepPacer(period_s) if pace is Pace.LOCKSTEP else RealtimePacer(period_s, speed)
+    return LockstepPacer(period_s) if pace is Pace.LOCKSTEP else RealtimePacer(period_s, speed, phase)

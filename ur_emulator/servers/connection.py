@@ -15,6 +15,13 @@ OUTBOX_LIMIT = 64 * 1024
 # memory.
 SEND_BUFFER = 64 * 1024
 _READ_SIZE = 64 * 1024
+# A peer that is silent is asked whether it is still there, first after a minute; one that lost its power or
+# its cable is forgotten after two. Where the system has no such options, after two hours.
+_KEEP_ALIVE = [
+    (getattr(socket, name), value)
+    for name, value in (("TCP_KEEPIDLE", 60), ("TCP_KEEPINTVL", 10), ("TCP_KEEPCNT", 6))
+    if hasattr(socket, name)
+]
 
 
 class Connection:
@@ -56,6 +63,9 @@ class Connection:
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for option, value in _KEEP_ALIVE:
+            sock.setsockopt(socket.IPPROTO_TCP, option, value)
         try:
             self.peer = "{}:{}".format(*sock.getpeername()[:2])
         except OSError:

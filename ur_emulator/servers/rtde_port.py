@@ -82,9 +82,15 @@ class RtdePort:
         self._find_streams()
 
     def publish(self, snapshot: Snapshot) -> None:
-        """Send the data packages that are due in this cycle."""
+        """Send the data packages that are due in this cycle; a recipe is encoded once for all who have it."""
+        packages: dict[Callable[[Snapshot], bytes], bytes] = {}
         for session in self._streams:
-            session.publish(snapshot)
+            encode = session.due(snapshot.tick)
+            if encode is not None:
+                package = packages.get(encode)
+                if package is None:
+                    package = packages[encode] = encode(snapshot)
+                session.connection.send(package)
 
     def say(self, event: Event) -> None:
         """Nothing is said unasked: clients read one package after a request, whatever it is."""
@@ -100,7 +106,7 @@ class RtdePort:
             self._owners.update(dict.fromkeys(request.names, connection))
         if isinstance(request, SetupOutputs) and _SCRIPT_LINE in request.names:
             self._controller.state.wants_script_line = True
-        session.restart()
+        session.restart(is_new=isinstance(request, SetupOutputs))
         self._find_streams()
         if not connection.send(reply):
             connection.close()  # without its reply, everything after would answer the wrong request
@@ -113,7 +119,7 @@ class _Session:
     """One client: its connection, its protocol, and when its next data package is due.
 
     Attributes:
-        encode: makes its data packages; None while it gets none.
+        encode: makes its data packages; None while it gets none. Sessions with the same recipe have the same.
         is_lost: what comes from it makes no sense any more; it is told so, then the connection ends.
     """
 
@@ -121,27 +127,26 @@ class _Session:
         self.protocol = protocol
         self.encode: Callable[[Snapshot], bytes] | None = None
         self.is_lost = False
-        self._connection = connection
+        self.connection = connection
         self._divisor = 1
         self._first_tick = -1
         self._last_tick = -1
         self._repeats = 0
 
-    def restart(self) -> None:
+    def restart(self, *, is_new: bool) -> None:
         """Take over what the last request has changed; a new stream begins in the next cycle."""
         encode = self.protocol.encoder
-        if encode is not self.encode:
+        if is_new or encode is not self.encode:
             self.encode = encode
             self._first_tick = self._last_tick = -1
         self._divisor = self.protocol.cycles_per_package
 
-    def publish(self, snapshot: Snapshot) -> None:
-        """Send a package if one is due.
+    def due(self, tick: int) -> Callable[[Snapshot], bytes] | None:
+        """Return what makes the package that is due now, None if none is.
 
         Packages are due in every n-th cycle after the first one. While time stands still, snapshots repeat
         themselves at real pace: then every n-th repetition is sent, so that the client is fed at its rate.
         """
-        tick = snapshot.tick
         if tick == self._last_tick:
             self._repeats += 1
             is_due = self._repeats % self._divisor == 0
@@ -150,5 +155,4 @@ class _Session:
                 self._first_tick = tick
             self._last_tick, self._repeats = tick, 0
             is_due = (tick - self._first_tick) % self._divisor == 0
-        if is_due and self.encode is not None:
-            self._connection.send(self.encode(snapshot))
+        return self.encode if is_due else None

@@ -1,0 +1,59 @@
+"""Runs a loop, in the calling thread or in one of its own, and cleans up after it."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable
+
+from ur_emulator.realtime.event_loop import EventLoop
+
+# The compile worker shares the interpreter with the loop; short turns keep the loop on time.
+_SWITCH_INTERVAL = 1e-4  # s
+_JOIN_TIMEOUT = 10.0  # s
+
+
+class LoopRunner:
+    """The life of a loop: it runs once, then everything in it is closed."""
+
+    def __init__(self, loop: EventLoop, close: Callable[[], None]) -> None:
+        """Prepare.
+
+        Args:
+            loop: what runs.
+            close: called in the loop's thread after its last turn, whatever ended it.
+        """
+        self._loop = loop
+        self._close = close
+        self._thread: threading.Thread | None = None
+        self._failure: BaseException | None = None
+
+    def run(self) -> None:
+        """Run in the calling thread until `stop`; an error that ends the loop is raised here."""
+        sys.setswitchinterval(_SWITCH_INTERVAL)
+        try:
+            self._loop.run()
+        finally:
+            self._close()
+
+    def start(self, name: str) -> None:
+        """Run in a thread of its own, called `name`."""
+        self._thread = threading.Thread(target=self._run_and_keep_failure, name=name, daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Let the loop end, from any thread."""
+        self._loop.stop()
+
+    def finish(self) -> BaseException | None:
+        """Stop the loop, wait for its thread; return the error that had ended it earlier, if one had."""
+        self.stop()
+        if self._thread is not None:
+            self._thread.join(_JOIN_TIMEOUT)
+        return self._failure
+
+    def _run_and_keep_failure(self) -> None:
+        try:
+            self.run()
+        except BaseException as failure:
+            self._failure = failure
