@@ -6,7 +6,9 @@ import dataclasses
 import json
 import signal
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -46,6 +48,9 @@ def serve(
         str, typer.Option(help="How imperfect the arm is: ideal, typical or poor.")
     ] = "typical",
     port_base: Annotated[int, typer.Option(help="Offset added to all standard ports.")] = 0,
+    boxes: Annotated[
+        int, typer.Option(help="How many boxes; --host and --seed are those of the first, then counted up.")
+    ] = 1,
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
@@ -54,48 +59,71 @@ def serve(
         typer.Option("--log", "-v", help="Show the log of the box on stderr: programs, errors, clients."),
     ] = False,
 ) -> None:
-    """Serve a control box, powered on with its brakes released, until Ctrl-C."""
+    """Serve a control box, or several, powered on with the brakes released, until Ctrl-C."""
+    from ur_emulator.descriptor_limit import raise_descriptor_limit
     from ur_emulator.emulator import ControlBox
     from ur_emulator.errors import EmulatorError
 
+    raise_descriptor_limit()
     try:
-        box = ControlBox(robot, version, host, pace, speed, seed, fidelity, port_base)
+        rack = ControlBox.many(
+            boxes,
+            robot=robot,
+            version=version,
+            host=host,
+            pace=pace,
+            speed=speed,
+            seed=seed,
+            fidelity=fidelity,
+            port_base=port_base,
+        )
         for name in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(name, lambda number, frame: box.stop())
+            signal.signal(name, lambda number, frame: rack.stop())
         if log:
-            box.follow_log(_print_entry)
-        box.listen()
+            for box in rack:
+                box.follow_log(partial(_print_entry, f"{box.host} " if boxes > 1 else ""))
+        rack.listen()
         if ready_file is not None:
-            _write_ready_file(ready_file, box)
+            _write_ready_file(ready_file, rack)
     except (EmulatorError, ProtocolError, OSError) as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(1) from None
-    for notice in box.notices:
-        sys.stderr.write(f"ur-emulator: {notice}\n")
-    print(
-        f"{robot.upper()} CB3 {version} ready at {host}, {pace}, {fidelity}, "
-        f"seed {seed}, serial {box.serial_number}: "
-        f"dashboard {box.ports.dashboard}, primary {box.ports.primary}, secondary {box.ports.secondary}, "
-        f"realtime {box.ports.realtime}, rtde {box.ports.rtde}"
-        + (f", modbus {box.ports.modbus}" if box.ports.modbus else ""),
-        flush=True,
-    )
+    notices = [notice for box in rack for notice in box.notices]
+    if notices:
+        others = f" ({len(notices) - 1} more boxes say the like)" if len(notices) > 1 else ""
+        sys.stderr.write(f"ur-emulator: {notices[0]}{others}\n")
+    for k, box in enumerate(rack):
+        print(
+            f"{robot.upper()} CB3 {version} ready at {box.host}, {pace}, {fidelity}, "
+            f"seed {seed + k}, serial {box.serial_number}: "
+            f"dashboard {box.ports.dashboard}, primary {box.ports.primary}, "
+            f"secondary {box.ports.secondary}, realtime {box.ports.realtime}, rtde {box.ports.rtde}"
+            + (f", modbus {box.ports.modbus}" if box.ports.modbus else ""),
+            flush=True,
+        )
     try:
-        box.serve_forever()
+        rack.serve_forever()
     except EmulatorError as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(1) from None
 
 
-def _print_entry(entry: LogEntry) -> None:
+def _print_entry(prefix: str, entry: LogEntry) -> None:
     with suppress(OSError):  # nobody reads it any more
-        sys.stderr.write(f"{entry}\n")
+        sys.stderr.write(f"{prefix}{entry}\n")
         sys.stderr.flush()
 
 
-def _write_ready_file(path: Path, box: ControlBox) -> None:
-    """Write the file in one step, so that whoever waits for it never reads half of it."""
-    facts = {"host": box.host, "ports": dataclasses.asdict(box.ports), "serial_number": box.serial_number}
+def _write_ready_file(path: Path, rack: Sequence[ControlBox]) -> None:
+    """Write the file in one step, so that whoever waits for it never reads half of it.
+
+    It says of the first box what most readers look for, and of all boxes, the first included, in `boxes`.
+    """
+    boxes = [
+        {"host": box.host, "ports": dataclasses.asdict(box.ports), "serial_number": box.serial_number}
+        for box in rack
+    ]
+    facts = {**boxes[0], "boxes": boxes}
     partial = path.with_name(path.name + ".part")
     partial.write_text(json.dumps(facts) + "\n")
     partial.replace(path)

@@ -11,7 +11,7 @@ from pymodbus.client import ModbusTcpClient
 from typer.testing import CliRunner
 
 from protocol.primary_messages import TextMessage
-from ur_emulator import ControlBox, cli, emulator
+from ur_emulator import ControlBox, cli, rack
 from ur_emulator.controller.port_map import COILS, REGISTERS, read_coil, read_register
 from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
@@ -440,7 +440,7 @@ def test_a_box_without_its_modbus_port_serves_all_others_and_says_so(monkeypatch
 
 def test_the_command_says_so_in_one_line(monkeypatch):
     forbid_low_ports(monkeypatch)
-    monkeypatch.setattr(emulator.ControlBox, "serve_forever", emulator.ControlBox.close)
+    monkeypatch.setattr(rack.BoxRack, "serve_forever", rack.BoxRack._close)
     result = CliRunner().invoke(cli.app, ["serve", "--pace", "lockstep"])
     assert result.exit_code == 0
     assert result.stderr.startswith("ur-emulator: no Modbus server: port 502 on 127.0.0.1 needs privileges")
