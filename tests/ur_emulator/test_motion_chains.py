@@ -142,6 +142,16 @@ def test_a_program_that_only_moves_to_one_place_with_a_blend_still_takes_time():
     assert bench.controller.programs.is_running
 
 
+@pytest.mark.parametrize("t", [0.3, 1.0])
+def test_moves_with_a_duration_keep_it_in_a_chain(t):
+    makers = [straight(at(0.03 * k, 0.0, 0.0), t=t, r=0.004) for k in range(1, 4)]
+    targets, _, outcomes = run_chain([*makers, straight(at(0.12, 0.0, 0.0), t=t)])
+    assert outcomes == [Follow.BLENDED] * 3
+    assert (len(targets) - 1) * DT == pytest.approx(4 * t, rel=0.03)
+    # From rest, and to rest, the tool needs the middle speed of the way to be faster at the other end.
+    assert speeds(targets).max() < 2.0 * 0.03 / t
+
+
 # --- bends
 
 

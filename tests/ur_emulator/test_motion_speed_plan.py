@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ur_emulator.motion.profile import Trapezoid
 from ur_emulator.motion.speed_plan import Interval, plan, stopping_curve
 
 lengths = st.floats(1e-4, 1.0)
@@ -37,11 +36,14 @@ def interval_at(parts, s):
 @given(lengths, speeds, accelerations)
 def test_one_straight_part_is_the_trapezoid(length, v, a):
     found = plan([Interval(length, v * v, ((a, 0.0),))], 0.0)
-    like = Trapezoid.from_limits(length, v, a)
-    assert found.duration == pytest.approx(like.duration, rel=1e-9)
-    for k in range(11):
-        t = like.duration * k / 10
-        assert found.at(t) == pytest.approx(like.at(t)[:2], rel=1e-6, abs=1e-9)
+    top = min(v, math.sqrt(a * length))
+    assert found.duration == pytest.approx(length / top + top / a, rel=1e-9)
+    ramp = top / a
+    assert found.at(0.5 * ramp) == pytest.approx((a * ramp**2 / 8, 0.5 * top), rel=1e-6)
+    assert found.at(found.duration / 2) == pytest.approx((length / 2, top), rel=1e-6)
+    assert found.at(found.duration - 0.5 * ramp) == pytest.approx(
+        (length - a * ramp**2 / 8, 0.5 * top), rel=1e-6
+    )
 
 
 @settings(deadline=None)

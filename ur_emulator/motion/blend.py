@@ -19,6 +19,7 @@ from ur_emulator.motion.joint_path import JointCurve, JointLine, JointPath, Tool
 from ur_emulator.motion.leg import Leg
 from ur_emulator.motion.path import PoseLine, PosePath, measure
 from ur_emulator.motion.survey import Sample, survey
+from ur_emulator.motion.tool import UnreachableError
 
 # Beyond this turn the circular blend of a movep gets so narrow that the cubic takes its place.
 SHARPEST_ARC = 0.9 * pi
@@ -81,8 +82,13 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
         return Blend(
             ToolPath(curve, first.tool), leave, after, 1.0, v / curve.rate, min(first.a, second.a), samples
         )
-    start_q, slope = a.at(leave, first.near(leave))
-    end_q, end_slope = b.at(after, second.near(after))
+    if isinstance(b, ToolPath) and (not second.samples or second.samples[-1].s < after):
+        return None
+    try:
+        start_q, slope = a.at(leave, first.near(leave))
+        end_q, end_slope = b.at(after, second.near(after))
+    except UnreachableError:
+        return None
     if isinstance(a, ToolPath) or isinstance(b, ToolPath):
         scale, length, end_length = before / after, 2.0 * before, 2.0 * after
     else:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import dist
+from math import dist, sqrt
 
 from protocol.pose import Pose
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.joint_path import JointLine, JointPath, ToolPath
 from ur_emulator.motion.path import PoseLine, PosePath
-from ur_emulator.motion.profile import Trapezoid
 from ur_emulator.motion.survey import Sample, survey
 from ur_emulator.motion.tool import Tool
 
@@ -66,28 +65,30 @@ class Leg:
             x, y, z = self.tool.pose(self.path.at(s, ())[0])[:3]
         return x, y, z
 
-    def in_time(self, begin: float = 0.0) -> Leg:
+    def in_time(self, *, rolling: bool = False) -> Leg:
         """Return the same leg with `v` and `a` such that it takes `t`, if it asks for that.
 
-        The trapezoid of `a` and `v` is stretched; an end that blends has no ramp to or from rest.
+        From rest to rest the trapezoid of `a` and `v` is stretched. Where an end blends there is no ramp; the
+        speed is then chosen for the acceleration asked for, if that is enough. Source: URScript manual CB3
+        3.15, movej: `t` has priority; how is chosen.
 
         Args:
-            begin: where on the path the leg begins; above 0 at the end of a blend.
+            rolling: the leg begins with a blend.
         """
-        way = self.path.length
-        if self.t <= 0.0 or way <= 0.0:
+        way, t, a = self.path.length, self.t, self.a
+        if t <= 0.0 or way <= 0.0:
             return self
-        rolling = self.v if begin > 0.0 else 0.0
-        leave = self.v if self.r > 0.0 else 0.0
-        if rolling == leave == self.v:
-            natural = way / self.v
+        ramps = (not rolling) + (self.r <= 0.0)
+        if ramps == 0:
+            v = way / t
+        elif ramps == 1:
+            a = max(a, 2.0 * way / t**2)
+            v = 2.0 * a * way / (a * t + sqrt(max(0.0, (a * t) ** 2 - 2.0 * a * way)))
         else:
-            # A single ramp over the whole way is the longest that can be made of one.
-            top = min(self.v, (2.0 * self.a * way) ** 0.5) if rolling or leave else self.v
-            rolling, leave = min(rolling, top), min(leave, top)
-            natural = Trapezoid.from_limits(way, top, self.a, rolling, leave).duration
-        stretch = min(self.t / natural, _STANDSTILL)
-        return replace(self, v=min(self.v / stretch, _FASTEST), a=min(self.a / stretch**2, _STRONGEST))
+            top = min(self.v, sqrt(a * way))
+            stretch = min(t / (way / top + top / a), _STANDSTILL)
+            v, a = top / stretch, a / stretch**2
+        return replace(self, v=min(v, _FASTEST), a=min(a, _STRONGEST))
 
     @property
     def _way_rate(self) -> float | None:

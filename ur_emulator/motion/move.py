@@ -55,7 +55,7 @@ class Move:
         self._ends: list[float] = []
         self._plan: SpeedPlan
         self._stopping: StoppingCurve | None = None
-        rest = plan(self._pieces[0].intervals(), 0.0)
+        rest = plan(self._pieces[0].intervals, 0.0)
         assert rest is not None
         self._use(rest)
         # A move to where the arm is has no way, but may have a duration.
@@ -106,17 +106,17 @@ class Move:
         s, speed = self._plan.at(self._time)
         ahead = self._ahead(s)
         last, radius = ahead[-1], self._leg.r
+        second = leg.in_time(rolling=True)
         for _ in range(_ATTEMPTS):
-            found = blend(self._leg, leg, radius, min(self._zone, last.end - last.begin))
+            found = blend(self._leg, second, radius, min(self._zone, last.end - last.begin))
             if found is not None:
-                second = leg.in_time(found.enter)
                 pieces = [
                     *ahead[:-1],
                     last.cut(end=found.leave),
                     piece_of_blend(found, second, last.scale),
                     piece_of_leg(second, found.enter, last.scale * found.scale),
                 ]
-                planned = plan([part for piece in pieces for part in piece.intervals()], speed)
+                planned = plan([part for piece in pieces for part in piece.intervals], speed)
                 if planned is not None:
                     self._leg = second
                     self._zone = _zone(second, found.enter)
@@ -168,7 +168,7 @@ class Move:
         self._stopping = None
         if self._zone > 0.0:
             last = self._pieces[-1]
-            intervals = [part for piece in self._pieces for part in piece.intervals()]
+            intervals = [part for piece in self._pieces for part in piece.intervals]
             self._stopping = stopping_curve(intervals, self._ends[-1] - self._zone * last.scale)
 
     def _at(self, s: float) -> int:

@@ -43,6 +43,7 @@ class Piece:
         scale: units of the chain that one unit of the path counts.
         leg: the move whose waypoint it leads to.
         parts: limits, of the whole path.
+        intervals: limits of the piece, in units of the chain.
     """
 
     path: JointPath
@@ -51,6 +52,7 @@ class Piece:
     scale: float
     leg: Leg
     parts: tuple[Part, ...]
+    intervals: tuple[Interval, ...]
 
     @property
     def length(self) -> float:
@@ -59,29 +61,18 @@ class Piece:
 
     def cut(self, *, begin: float | None = None, end: float | None = None) -> Piece:
         """Return a shorter piece."""
-        return replace(
-            self, begin=self.begin if begin is None else begin, end=self.end if end is None else end
-        )
-
-    def intervals(self) -> list[Interval]:
-        """Return the limits in units of the chain."""
-        found: list[Interval] = []
-        k, s = self.scale, self.begin
-        for part in self.parts:
-            way = min(part.end, self.end) - s
-            if way > 0.0:
-                bounds = part.bounds if k == 1.0 else tuple((k * a, b / k) for a, b in part.bounds)
-                # What a bend leaves of the acceleration changes with the speed, so not over long ways.
-                n = min(_MOST, max(1, ceil(way / _SHORT * max(b for _, b in part.bounds))))
-                found += n * [Interval(way * k / n, (k * part.speed) ** 2, bounds)]
-                s = part.end
-        return found
+        begin = self.begin if begin is None else begin
+        end = self.end if end is None else end
+        intervals = _intervals(self.parts, begin, end, self.scale)
+        return replace(self, begin=begin, end=end, intervals=intervals)
 
 
 def piece_of_leg(leg: Leg, begin: float, scale: float) -> Piece:
     """Return a move from a point of its path on."""
     path = leg.path
-    return Piece(path, begin, path.length, scale, leg, _parts(path, leg.v, leg.a, leg.samples, _robot(leg)))
+    parts = _parts(path, leg.v, leg.a, leg.samples, _robot(leg))
+    intervals = _intervals(parts, begin, path.length, scale)
+    return Piece(path, begin, path.length, scale, leg, parts, intervals)
 
 
 def piece_of_blend(blend: Blend, to: Leg, scale: float) -> Piece:
@@ -91,7 +82,26 @@ def piece_of_blend(blend: Blend, to: Leg, scale: float) -> Piece:
     if isinstance(path, JointCurve):
         for speed, most in zip(path.speeds, _robot(to).qd_max, strict=True):
             v = min(v, JOINT_SPEED_SHARE * most / speed) if speed > 0.0 else v
-    return Piece(path, 0.0, path.length, scale, to, _parts(path, v, blend.a, blend.samples, _robot(to)))
+    parts = _parts(path, v, blend.a, blend.samples, _robot(to))
+    intervals = _intervals(parts, 0.0, path.length, scale)
+    return Piece(path, 0.0, path.length, scale, to, parts, intervals)
+
+
+def _intervals(parts: tuple[Part, ...], begin: float, end: float, scale: float) -> tuple[Interval, ...]:
+    """Return the limits from one point of a path to another, in units of the chain."""
+    found: list[Interval] = []
+    s = begin
+    for part in parts:
+        way = min(part.end, end) - s
+        if way > 0.0:
+            bounds = part.bounds
+            # What a bend leaves of the acceleration changes with the speed, so not over long ways.
+            n = min(_MOST, max(1, ceil(way / _SHORT * max(b for _, b in bounds))))
+            if scale != 1.0:
+                bounds = tuple((scale * a, b / scale) for a, b in bounds)
+            found += n * [Interval(way * scale / n, (scale * part.speed) ** 2, bounds)]
+            s = part.end
+    return tuple(found)
 
 
 def _robot(leg: Leg) -> RobotModel:

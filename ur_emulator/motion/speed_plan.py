@@ -41,15 +41,15 @@ class Interval(NamedTuple):
 
         The bounds hold up to the other end, or up to the cap where that comes first.
         """
-        way = 2.0 * self.length
         least = inf
         for a, b in self.bounds:
-            # Where z is largest, the bound is tightest.
-            slope = 2.0 * a
+            slope = a
             if b > 0.0:
-                slope = max(2.0 * (a - b * self.cap), 2.0 * (a - b * z) / (1.0 + way * b))
-            least = min(least, slope)
-        return max(0.0, least)
+                # Where z is largest, the bound is tightest.
+                slope = max(a - b * self.cap, (a - b * z) / (1.0 + 2.0 * self.length * b))
+            if slope < least:
+                least = slope
+        return 2.0 * least if least > 0.0 else 0.0
 
 
 class Segment(NamedTuple):
@@ -116,7 +116,7 @@ def plan(intervals: Sequence[Interval], entry: float) -> SpeedPlan | None:
     Returns:
         None when the speed at the beginning is too high for what follows.
     """
-    backward = _backward(intervals)
+    backward, slopes = _backward(intervals)
     z = entry * entry
     if z > backward[0] * _ROUNDING:
         return None
@@ -124,9 +124,9 @@ def plan(intervals: Sequence[Interval], entry: float) -> SpeedPlan | None:
     segments: list[Segment] = []
     times: list[float] = []
     time = begin = 0.0
-    for interval, z_end in zip(intervals, backward[1:], strict=True):
+    for interval, z_end, down in zip(intervals, backward[1:], slopes, strict=True):
         done = 0.0
-        for end, z_next in _shape(interval, z, z_end):
+        for end, z_next in _shape(interval, z, z_end, down):
             way = end - done
             if way > _NOTHING * interval.length:
                 v = sqrt(z)
@@ -149,30 +149,39 @@ def stopping_curve(intervals: Sequence[Interval], stop: float) -> StoppingCurve:
             break
         cut.append(interval._replace(length=length))
         knots.append(knots[-1] + length)
-    return StoppingCurve(tuple(knots), tuple(_backward(cut)))
+    return StoppingCurve(tuple(knots), tuple(_backward(cut)[0]))
 
 
-def _backward(intervals: Sequence[Interval]) -> list[float]:
-    """Return the greatest z at every border from which the end can be reached at rest."""
-    found = [0.0]
+def _backward(intervals: Sequence[Interval]) -> tuple[list[float], list[float]]:
+    """Return the greatest z at every border from which the end can be reached at rest, and the way down.
+
+    Returns:
+        z at the borders, and between them the slopes.
+    """
+    z = 0.0
+    found, slopes = [z], []
     for k in range(len(intervals) - 1, -1, -1):
         interval = intervals[k]
-        z = min(found[-1] + interval.slope(found[-1]) * interval.length, interval.cap)
-        found.append(min(z, intervals[k - 1].cap) if k > 0 else z)
+        slope = interval.slope(z)
+        z = min(z + slope * interval.length, interval.cap, intervals[k - 1].cap if k > 0 else inf)
+        found.append(z)
+        slopes.append(slope)
     found.reverse()
-    return found
+    slopes.reverse()
+    return found, slopes
 
 
-def _shape(interval: Interval, z: float, z_end: float) -> list[tuple[float, float]]:
+def _shape(interval: Interval, z: float, z_end: float, down: float) -> list[tuple[float, float]]:
     """Return the corners (way, z) of a plan within one interval: up, along the cap, down.
 
     Args:
         interval: in question.
         z: at its beginning.
         z_end: greatest z at its end.
+        down: greatest slope towards it.
     """
     length, cap, _ = interval
-    up, down = interval.slope(z), interval.slope(z_end)
+    up = interval.slope(z)
     peak = length
     if up + down > 0.0:
         peak = min(length, max(0.0, (z_end + down * length - z) / (up + down)))
