@@ -18,10 +18,12 @@ DEEP = DOWN.format(z=-0.15)
 @pytest.mark.parametrize("speed", [0.05, 0.25, 1.0])
 def test_a_move_into_the_table_is_a_protective_stop(fidelity, speed):
     bench = above_table(f"  movel({DEEP}, a=1.2, v={speed})", z=0.1, fidelity=fidelity)
-    _, places = truth(bench, 450)
+    forces, places = truth(bench, 450)
     assert [code for code, _ in reported(bench)] in ([153], [157])
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
-    # The table has held, the arm is whole: it rests on it, and its numbers are numbers.
+    # The table has held, the arm is whole: it rests on it, presses no harder, and its numbers are numbers.
+    assert np.ptp(forces[-100:, 2]) < 1.0
+    assert forces[-1, 2] < 50.0
     assert places[:, 2].min() > TABLE - 2e-3
     assert np.abs(bench.controller.plant.qd_true).max() < 5e-3
     assert np.isfinite(bench.now.actual_q).all()
@@ -38,6 +40,17 @@ def test_after_a_protective_stop_on_the_table_the_arm_can_be_moved_away():
     bench.tick(300)
     assert reported(bench) == []
     assert place(bench)[2] > TABLE + 0.08
+
+
+def test_an_arm_that_was_pushed_off_its_place_is_exact_again_where_it_then_stands():
+    bench = above_table("  sleep(100)", z=0.25)
+    push(bench, 0.0, 250.0, 0.0)
+    bench.controller.plant.push((0.0, 250.0, 0.0), (0.0, 0.0, 0.3))
+    bench.tick(100)
+    assert [code for code, _ in reported(bench)] in ([153], [157])
+    push(bench, 0.0, 0.0, 0.0)
+    bench.tick(300)
+    assert np.abs(bench.controller.plant.q_true - bench.now.target_q).max() < 3e-4
 
 
 def search(speed, direction):

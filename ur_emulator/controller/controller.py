@@ -299,6 +299,7 @@ class Controller:
         self.programs.interrupt(PROTECTIVE_STOP_DECELERATION)
         if violation.blocked:
             state.motion.place(actual_q)
+            self.plant.rest_trim()
 
     def _place_arm(self, q: Vector6) -> bool:
         if self.plant.touches(q):

@@ -71,6 +71,9 @@ class Drives:
         self._kp, self._kv = np.tile(gains.kp, (len(path.q), 1)), np.tile(gains.kv, (len(path.q), 1))
         self._torque_per_trim = gains.kp
         self._per_torque = 1.0 / np.array(robot.torque_constant)
+        # A servo that gives more than this at rest presses against something: more than its joint's friction
+        # at rest, and a few parts in a hundred of wrong masses, can ask for.
+        self._pressing = 0.5 * np.array(robot.coulomb)
         self._trim_gain = np.full(6, period / _INTEGRAL_TIME)
         self._trim = np.zeros(6)
         self._knot = np.zeros((3, 6))
@@ -147,6 +150,11 @@ class Drives:
         self.table[:] = torque
         self.target_moment = six(gravity.tolist())
         self.target_current = six((torque * self._per_torque).tolist())
+
+    def presses(self, q_motor: NDArray[np.float64]) -> bool:
+        """True when some servo of a resting arm, motors at q_motor (6,) [rad], pushes against something."""
+        effort = self._torque_per_trim * (self._path.q_final + self._trim - q_motor)
+        return bool((np.abs(effort) > self._pressing).any())
 
     def integrate(self, error: NDArray[np.float64]) -> None:
         """Trim the servos by the joints' error (6,) [rad] of this cycle; not to be called in saturation."""

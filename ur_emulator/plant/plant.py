@@ -121,17 +121,12 @@ class Plant:
         self._amperes_per_torque = [1.0 / constant for constant in robot.torque_constant]
         self._servos = JointServos(self._model)
         self._mode = ControlMode.POSITION
-        # In force mode and after it, until the arm is moved away: what is pressed against would be pressed
-        # harder and harder.
+        # In force mode and after it, until the arm is moved away; see `rest_trim`.
         self._trim_rests = False
         self._loads = Loads(self._model, data)
         self._error = np.zeros(6)
         self._ripple = np.zeros(6)
         self._braked = True
-        self._trim_rests = False
-        if self._mode is not ControlMode.POSITION:
-            self._mode = ControlMode.POSITION
-            self._servos.set_free(False)
         self._saturated = self._saturated_now = False
         self._control_current = NO_LOAD
         self._rest_record = np.zeros(N_RECORD)
@@ -218,6 +213,13 @@ class Plant:
             PlantError: when the mass is negative or a number is not finite.
         """
         self._loads.hang(mass, cog)
+
+    def rest_trim(self) -> None:
+        """Let the slow outer loop of the servos rest until the target moves, where the arm presses something.
+
+        It would press harder and harder for the sake of its encoders.
+        """
+        self._trim_rests = True
 
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
         """Push the flange from now on; a zero force ends it.
@@ -329,8 +331,13 @@ class Plant:
             return
         np.subtract(self._path.q_final, self._qpos, error)
         np.subtract(error, gear.error, error)
-        if not (self._saturated_now or self._trim_rests):
+        if not (self._saturated_now or (self._trim_rests and self._presses)):
             self._drives.integrate(error)
+
+    @property
+    def _presses(self) -> bool:
+        """True in force mode, and after it while the joints press against something."""
+        return self._mode is ControlMode.FORCE or self._drives.presses(self._qpos)
 
     # --- ways to be driven ---
 
@@ -347,6 +354,10 @@ class Plant:
     def _engage_brakes(self) -> None:
         """Stand still at once, wherever the arm is."""
         self._braked = True
+        self._trim_rests = False
+        if self._mode is not ControlMode.POSITION:
+            self._mode = ControlMode.POSITION
+            self._servos.set_free(False)
         self._saturated = self._saturated_now = False
         self._qvel[:] = 0.0
         self._error[:] = 0.0
