@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check check-static bench format docs clean
+.PHONY: pictures help setup demo test check check-static bench format docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -42,6 +42,9 @@ format: $(STAMP) ## put the code into its canonical layout
 docs: $(STAMP) ## rewrite the generated pages
 	$(BIN)/python -m urscript.catalogue.coverage > docs/urscript-coverage.md
 	$(BIN)/python -m ur_emulator.controller.port_map_page > docs/protocol/modbus.md
+
+pictures: $(STAMP) ## draw the pictures of docs/contact.md (needs off-screen OpenGL, e.g. libegl1)
+	$(BIN)/python docs/make_contact_pictures.py
 
 clean: ## remove what the targets made
 	rm -rf $(VENV) out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

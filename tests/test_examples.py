@@ -26,6 +26,7 @@ def run(name, *arguments):
         ("02_read_the_stream.py", ("--seconds", "0.1"), "q = ["),
         ("03_script_without_a_robot.py", (), "did you mean 'textmsg'?"),
         ("04_plan_a_movement.py", (), "top joint speed"),
+        ("06_contact.py", (), "Protective"),
     ],
 )
 def test_example(name, arguments, said):
@@ -44,5 +45,5 @@ def test_demo_and_plot(tmp_path):
 
 def test_no_example_is_left_out():
     tested = {"demo.py", "01_run_a_program.py", "02_read_the_stream.py", "03_script_without_a_robot.py"}
-    tested |= {"04_plan_a_movement.py", "05_plot_a_recording.py"}
+    tested |= {"04_plan_a_movement.py", "05_plot_a_recording.py", "06_contact.py"}
     assert {path.name for path in EXAMPLES.glob("*.py")} == tested
