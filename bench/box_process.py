@@ -23,15 +23,19 @@ PORT_BASE = 5000
 
 @dataclass(frozen=True, slots=True)
 class BoxProcess:
-    """A running box.
+    """A running box, or several.
 
     Attributes:
         process: for its memory and processor time.
-        ports: where it listens on 127.0.0.1.
+        host: address of the box, of the first of several.
+        hosts: addresses of all.
+        ports: where it listens, the same for all.
         startup_s: from the start of the process until all ports accepted.
     """
 
     process: psutil.Process
+    host: str
+    hosts: tuple[str, ...]
     ports: Ports
     startup_s: float
 
@@ -52,8 +56,9 @@ def box_process(*arguments: str) -> Iterator[BoxProcess]:
                     sys.exit("bench: the box did not start")
                 time.sleep(0.001)
             startup = time.monotonic() - began
-            ports = Ports(**json.loads(ready.read_text())["ports"])
-            yield BoxProcess(psutil.Process(child.pid), ports, startup)
+            facts = json.loads(ready.read_text())
+            hosts = tuple(box["host"] for box in facts["boxes"])
+            yield BoxProcess(psutil.Process(child.pid), hosts[0], hosts, Ports(**facts["ports"]), startup)
         finally:
             child.terminate()
             child.wait(10)

@@ -21,10 +21,14 @@ class Box:
     waits_outside: bool = False
     readers_full: bool = False
     given_up: int = 0
+    cycles_behind: int = 0
 
     def give_up_readers(self):
         self.given_up += 1
         self.readers_full = False
+
+    def fell_behind(self, n_cycles):
+        self.cycles_behind += n_cycles
 
 
 def test_realtime_ticks_at_absolute_deadlines_so_lateness_does_not_add_up():
@@ -46,17 +50,29 @@ def test_realtime_catches_up_short_delays_but_starts_anew_after_long_ones():
         ticks += 1
     assert ticks == int(0.1 / PERIOD)
     later = 0.1 + 10 * MAX_BACKLOG
-    ticks = 0
-    while pacer.may_tick(later, Box()):
+    box, ticks = Box(), 0
+    while pacer.may_tick(later, box):
         ticks += 1
     assert ticks < MAX_BACKLOG / PERIOD
     assert pacer.lost_cycles == pytest.approx(10 * MAX_BACKLOG / PERIOD, abs=2)
+    assert box.cycles_behind == pacer.lost_cycles
 
 
 def test_speed_divides_the_period():
     pacer = RealtimePacer(PERIOD, speed=4.0)
     pacer.may_tick(0.0, Box())
     assert pacer.next_call(0.0) == PERIOD / 4
+
+
+def test_boxes_that_share_a_loop_take_turns():
+    pacers = [RealtimePacer(PERIOD, phase=k / 4) for k in range(4)]
+    ticks = [
+        (step, k)
+        for step in range(16)
+        for k, pacer in enumerate(pacers)
+        if pacer.may_tick(10.0 + step * PERIOD / 8 + 1e-9, Box())
+    ]
+    assert ticks == [(0, 0), (2, 1), (4, 2), (6, 3), (8, 0), (10, 1), (12, 2), (14, 3)]
 
 
 def test_lockstep_ticks_at_once_while_something_goes_on_and_never_otherwise():

@@ -51,6 +51,10 @@ class Situation(Protocol):
         """Wait no longer for the clients that are behind; they lose frames until they have caught up."""
         ...
 
+    def fell_behind(self, n_cycles: int) -> None:
+        """Take note: the machine was too slow, real time is so many cycles further than the box."""
+        ...
+
 
 class Pacer(Protocol):
     """Decides when a cycle may begin."""
@@ -92,6 +96,7 @@ class RealtimePacer:
             skipped = int(behind / self._period)
             self.lost_cycles += skipped
             self._deadline += skipped * self._period
+            situation.fell_behind(skipped)
         self._deadline += self._period
         return True
 

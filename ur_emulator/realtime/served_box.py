@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Protocol
 
+from protocol.primary_messages import ReportLevel
 from ur_emulator.box_log import BoxLog
 from ur_emulator.controller.commands import Command
 from ur_emulator.controller.controller import Controller
@@ -101,6 +102,15 @@ class ServedBox:
     def give_up_readers(self) -> None:
         """Wait no longer for clients that are behind, until they have caught up."""
         self._given_up = set(self.backlog)
+
+    def fell_behind(self, n_cycles: int) -> None:
+        """Write into the log that the box does not keep up with real time."""
+        self.log.write(
+            self.controller.snapshot.tick,
+            "Controller",
+            f"{n_cycles} cycles behind real time: the machine is too slow or was held up",
+            ReportLevel.WARNING,
+        )
 
     # --- the loop
 

@@ -1,0 +1,42 @@
+"""Twenty boxes in one process in real time, each on its own address with one reader and one RTDE client."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from bench.box_process import box_process
+from bench.side_process import SideProcesses
+
+N_BOXES = 20
+# On Linux and Windows all of 127.0.0.0/8 is this machine.
+_FIRST_HOST = "127.0.0.2"
+_SETTLE = 1.0  # s
+
+
+def measure_boxes(seconds: float) -> dict[str, float]:
+    """Run them for so many seconds."""
+    if sys.platform == "darwin":
+        return {}
+    with box_process("--seed", "7", "--boxes", str(N_BOXES), "--host", _FIRST_HOST) as rack:
+        time.sleep(_SETTLE)
+        kinds = (("realtime", rack.ports.realtime), ("rtde", rack.ports.rtde))
+        clients = [(host, port, kind) for host in rack.hosts for kind, port in kinds]
+        beside = SideProcesses(seconds, clients)
+        rack.process.cpu_percent()
+        time.sleep(seconds)
+        cpu = rack.process.cpu_percent()
+        seen = beside.wait()
+        rss = rack.process.memory_info().rss
+    per_box = [sum(seen.lost[k : k + 2]) for k in range(0, len(seen.lost), 2)]
+    return {
+        "boxes_realtime": float(sum(lost == 0 for lost in per_box)),
+        "boxes_lost_cycles": float(sum(per_box)),
+        "boxes_late_p50_us": seen.late_us[0],
+        "boxes_late_p999_us": seen.late_us[2],
+        "boxes_late_max_us": seen.late_us[3],
+        "boxes_bare_timer_late_p999_us": seen.timer_us[0],
+        "boxes_cpu_percent": cpu,
+        "boxes_rss_mb": rss / 2**20,
+        "boxes_startup_s": rack.startup_s,
+    }
