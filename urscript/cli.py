@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
+from urscript.advice import check_for_people, explained
 from urscript.command_support import (
     STANDARD_INPUT,
     AsJson,
@@ -27,7 +28,6 @@ from urscript.diagnostics import Diagnostic, diagnostic_of
 from urscript.errors import ScriptError, ScriptSyntaxError
 from urscript.formatter import format_program
 from urscript.lint_rules import RULES, ScriptWarning
-from urscript.program import check_program
 from urscript.run_command import run
 from urscript.source import Source, as_utf8
 
@@ -56,7 +56,7 @@ def check(
     ignored = _codes(ignore or ())
     found: list[tuple[str, ScriptError]] = []
     for file in files:
-        errors, warnings = check_program(read_program(file), catalogue=catalogue, name=shown_name(file))
+        errors, warnings = check_for_people(read_program(file), catalogue=catalogue, name=shown_name(file))
         found += [(str(file), error) for error in errors]
         found += [(str(file), warning) for warning in warnings if warning.rule.code not in ignored]
     if as_json:
@@ -100,7 +100,8 @@ def fmt(
         source = Source(read_program(file), shown_name(file))
         try:
             formatted = format_program(source)
-        except ScriptSyntaxError as error:
+        except ScriptSyntaxError as wrong:
+            error = explained(wrong)
             diagnostics.append(diagnostic_of(error, str(file)))
             if not as_json:
                 typer.echo(as_utf8(error.render()), err=True)

@@ -103,9 +103,16 @@ class ScriptCompileError(ScriptError):
 
 
 class ScriptSyntaxError(ScriptCompileError):
-    """The text does not follow the grammar; the place is where the parser noticed."""
+    """The text does not follow the grammar; the place is where the parser noticed.
+
+    Attributes:
+        unexpected: Terminal of the grammar that the parser met there; empty if it met none.
+        accepted: Terminals that it would have taken.
+    """
 
     kind = "Syntax error"
+    unexpected: str = ""
+    accepted: frozenset[str] = frozenset()
 
     @property
     def wire_text(self) -> str:

@@ -6,10 +6,12 @@ from urscript.catalogue import Catalogue
 from urscript.lint_flow import flow_warnings
 from urscript.lint_names import name_warnings
 from urscript.lint_rules import ScriptWarning
+from urscript.lint_values import value_warnings
 from urscript.scopes import ResolvedProgram
 
 
 def find_warnings(program: ResolvedProgram, catalogue: Catalogue) -> list[ScriptWarning]:
     """All warnings in the order of the text; `program` has no errors."""
-    found = [*name_warnings(program, catalogue), *flow_warnings(program, catalogue)]
+    groups = (name_warnings, flow_warnings, value_warnings)
+    found = [warning for group in groups for warning in group(program, catalogue)]
     return sorted(found, key=lambda warning: (warning.line, warning.column, warning.rule.code))

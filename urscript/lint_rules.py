@@ -67,6 +67,15 @@ CALL_OF_PROGRAM: Final = Rule(
     "on a port, defining it runs it; the call is a program of its own that does not know the name",
 )
 
+UNUSED_VALUE: Final = Rule(
+    "W114", "a value is computed and not used", "a comparison that should assign, or the other way round"
+)
+CALL_WITHOUT_HANDLE: Final = Rule(
+    "W115",
+    "a method is called where nothing has methods",
+    "only what rpc_factory returns has any; lists and texts have functions instead",
+)
+
 RULES: Final = (
     UNUSED_GLOBAL,
     UNUSED_LOCAL,
@@ -81,6 +90,8 @@ RULES: Final = (
     DEFINED_TWICE,
     RUN_OF_DEF,
     CALL_OF_PROGRAM,
+    UNUSED_VALUE,
+    CALL_WITHOUT_HANDLE,
 )
 
 

@@ -134,10 +134,15 @@ _BLOCK_OPENERS = frozenset({"DEF", "SEC", "THREAD", "IF", "WHILE"})
 
 
 def _unexpected_token(error: UnexpectedToken, source: Source) -> ScriptSyntaxError:
-    token: Token = error.token
-    if token.type == "$END":
-        return _unexpected_end(source)
     accepted = error.accepts or error.expected
+    found = (
+        _unexpected_end(source) if error.token.type == "$END" else _unwanted(error.token, accepted, source)
+    )
+    found.unexpected, found.accepted = error.token.type, frozenset(accepted)
+    return found
+
+
+def _unwanted(token: Token, accepted: set[str], source: Source) -> ScriptSyntaxError:
     wanted = {_SPELLING[name] for name in accepted if name in _SPELLING}
     if "RUN" in accepted:
         wanted -= {"'('", "'['", "a name"}

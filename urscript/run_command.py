@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from urscript.advice import explained
 from urscript.catalogue import Catalogue
 from urscript.command_support import AsJson, Software, catalogue_of, read_program, show, shown_name
 from urscript.errors import ScriptCompileError
@@ -68,7 +69,7 @@ def run(
     try:
         program = compile_program(source.text, catalogue=catalogue, name=source.name)
     except ScriptCompileError as error:
-        story.wrong(error)
+        story.wrong(explained(error))
         raise typer.Exit(1) from None
     n_lines = trace_lines if trace else 0
     if make is None:

@@ -27,6 +27,15 @@ BLANKS: Final = " \t\r\n\f\v"
 bytes 0x85 and 0xA0 too, which end many a UTF-8 character."""
 
 
+def as_bytes(text: str) -> str:
+    """Text as a controller sees it, one character a byte."""
+    try:
+        text.encode("latin-1")
+    except UnicodeEncodeError:
+        return text.encode("utf-8", "surrogateescape").decode("latin-1")
+    return text
+
+
 def as_utf8(text: str) -> str:
     """Text of a program for people: bytes that are UTF-8 become the characters they mean."""
     try:
@@ -54,10 +63,12 @@ class Source:
     def caret(self, line: int, column: int, width: int = 1) -> str:
         """The source line and, below it, carets under `width` characters from `column` on.
 
-        Tabs before the caret are kept, so that it stands below the same character in any terminal.
+        Tabs before the caret are kept, and characters of several bytes count as one, so that it stands below
+        the same character in any terminal.
         """
         shown = self.line(line)
-        lead = "".join("\t" if char == "\t" else " " for char in shown[: column - 1])
-        lead += " " * (column - 1 - len(lead))
-        width = max(1, min(width, len(shown) - column + 1))
+        before, under = as_utf8(shown[: column - 1]), as_utf8(shown[column - 1 : column - 1 + width])
+        lead = "".join("\t" if char == "\t" else " " for char in before)
+        lead += " " * max(0, column - 1 - len(shown))
+        width = max(1, len(under))
         return f"    {shown}\n    {lead}{'^' * width}"

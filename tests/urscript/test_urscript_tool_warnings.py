@@ -70,6 +70,12 @@ WARNED = {
     ],
     "W111": [(body("def f():", "end", "def f():", "end", "f()"), "2:7 'f' is defined twice here, the last definition counts")],
     "W112": [(body("def f():", "end", "run f()"), "4:3 'f' is run as a thread but defined with 'def'")],
+    "W114": [
+        (body("x = 0", "x == 1", "textmsg(x)"), "3:3 this compares, and nothing is done with the result"),
+        (body("i = 0", "i++", "textmsg(i)"), "3:3 a value is computed and not used"),
+        (body('"text"'), "2:3 a value is computed and not used"),
+    ],
+    "W115": [(body("x = [1]", "x.append(2)"), "3:3 nothing in this program has a method 'append'")],
     "W113": [("def f():\n  sync()\nend\nf()\n", "4:1 'f' runs when it is defined; this call is a program of its own and fails")],
 }  # fmt: skip
 
@@ -120,6 +126,8 @@ FINE = {
     ],
     "W111": [body("def f():", "def g():", "end", "g()", "end", "def h():", "def g():", "end", "g()", "end", "f()", "h()")],
     "W112": [body("thread t():", "end", "run t()")],
+    "W114": [body("x = [1]", "x[0] == 1 textmsg(x)".replace("==", "=")), body("def f():", "return 1", "end", "f()"), body("thread t():", "end", "run t()")],
+    "W115": [body('x = rpc_factory("xmlrpc", "http://a")', "x.append(2)")],
     "W113": ["def f(a):\n  textmsg(a)\nend\nf(1)\n", "def f():\n  sync()\nend\n"],
 }  # fmt: skip
 

@@ -1,0 +1,518 @@
+"""Programs as people get them wrong, and what `urscript check` tells them; a controller is told nothing of it."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_urscript_lang_properties import WORDS, statements
+from typer.testing import CliRunner
+
+from urscript.advice import check_for_people
+from urscript.advice.checking import RULES, advise, first_syntax_error
+from urscript.cli import app
+from urscript.errors import ScriptSyntaxError
+from urscript.parser import parse
+from urscript.printer import print_program
+from urscript.program import check_program, compile_program
+from urscript.source import Source, as_utf8
+
+
+def body(*lines):
+    return "def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n"
+
+
+def told(text):
+    return [as_utf8(error.headline()).removeprefix("a:") for error in check_for_people(text, name="a")[0]]
+
+
+WRONG = {
+    "missing end if": (
+        body("x = 1", "if x == 1:", "  movej([0,0,0,0,0,0])", "textmsg(x)"),
+        "3:3: Syntax error: this 'if' has no 'end' (it seems to belong before line 5)",
+    ),
+    "missing end while": (
+        body("i = 0", "while i < 3:", "  i = i + 1", "textmsg(i)"),
+        "3:3: Syntax error: this 'while' has no 'end' (it seems to belong before line 5)",
+    ),
+    "missing end fn": (
+        body("def f(x):", "  return x + 1", "textmsg(f(1))"),
+        "2:3: Syntax error: this 'def' has no 'end' (it seems to belong before line 4)",
+    ),
+    "missing end prog": (
+        "def p():\n  textmsg(1)\n",
+        "1:1: Syntax error: this 'def' has no 'end' (write it at the end of the text)",
+    ),
+    "python indent only": (
+        "def p():\n  if True:\n    textmsg(1)\n  else:\n    textmsg(2)\n",
+        "1:1: Syntax error: this 'def' has no 'end' (write it at the end of the text)",
+        "2:3: Syntax error: this 'if' has no 'end' (write it at the end of the text)",
+    ),
+    "extra end": (
+        "def p():\n  textmsg(1)\n  end\nend\n",
+        "3:3: Syntax error: this 'end' closes nothing (take it out)",
+    ),
+    "endif": (
+        body("if True:", "  sync()", "endif"),
+        "4:3: Syntax error: there is no 'endif' in URScript (write end)",
+    ),
+    "end if": (
+        body("if True:", "  sync()", "end if"),
+        "4:3: Syntax error: 'end' stands alone, not 'end if' (write end)",
+    ),
+    "missing colon if": (
+        body("x = 1", "if x == 1", "  textmsg(x)", "end"),
+        "3:11: Syntax error: a ':' is missing after '1' (write if x == 1:)",
+    ),
+    "missing colon while": (
+        body("while True", "  sync()", "end"),
+        "2:12: Syntax error: a ':' is missing after 'True' (write while True:)",
+    ),
+    "missing colon def": (
+        "def p()\n  textmsg(1)\nend\n",
+        "1:7: Syntax error: a ':' is missing after ')' (write def p():)",
+    ),
+    "missing colon else": (
+        body("if True:", "  textmsg(1)", "else", "  textmsg(2)", "end"),
+        "4:6: Syntax error: a ':' is missing after 'else' (write else:)",
+    ),
+    "missing colon elif": (
+        body("x = 1", "if x == 1:", "  textmsg(1)", "elif x == 2", "  textmsg(2)", "end"),
+        "5:13: Syntax error: a ':' is missing after '2' (write elif x == 2:)",
+    ),
+    "missing colon thread": (
+        body("thread t()", "  sync()", "end", "run t()"),
+        "2:12: Syntax error: a ':' is missing after ')' (write thread t():)",
+    ),
+    "assign in if": (
+        body("x = 1", "if x = 1:", "  textmsg(x)", "end"),
+        "3:8: Syntax error: '=' assigns, it does not compare (write ==)",
+    ),
+    "double assign": (
+        body("a = b = 1"),
+        "2:9: Syntax error: an assignment has no value to assign again (write two assignments)",
+    ),
+    "unknown name": (
+        body("speed = 0.1", "movej([0,0,0,0,0,0], v=sped)"),
+        "3:26: Compile error: name 'sped' is not defined (did you mean 'speed'?)",
+    ),
+    "unknown fn": (
+        body("move_j([0,0,0,0,0,0])"),
+        "2:3: Compile error: name 'move_j' is not defined (did you mean 'movej'?)",
+    ),
+    "wrong count": (
+        body("movej()", "sleep()", "sin(1, 2)"),
+        "2:3: Type error: movej takes exactly 1 to 5 arguments (0 given) (use movej(q, a=1.4, v=1.05, t=0, r=0))",
+        "3:3: Type error: sleep takes exactly 1 argument (0 given) (use sleep(t))",
+        "4:3: Type error: sin takes exactly 1 argument (2 given) (use sin(f))",
+    ),
+    "kw typo": (
+        body("movej([0,0,0,0,0,0], acc=1.4, vel=1)"),
+        "2:24: Type error: movej() got an unexpected keyword argument 'acc' (write a=, use movej(q, a=1.4, v=1.05, t=0, r=0))",
+    ),
+    "kw case": (
+        body("movej([0,0,0,0,0,0], A=1.4)"),
+        "2:24: Type error: movej() got an unexpected keyword argument 'A' (write a=, use movej(q, a=1.4, v=1.05, t=0, r=0))",
+    ),
+    "smart quotes": (
+        body("textmsg(“hello”)"),
+        '2:11: Lexer exception: “ is no quotation mark (write ")',
+    ),
+    "single quotes": (
+        body("textmsg('hello')"),
+        "2:11: Lexer exception: ' is no quotation mark (a text stands between two \")",
+    ),
+    "tabs": (
+        "def p():\n\tx = 1\n\ttextmsg(y)\nend\n",
+        "3:10: Compile error: name 'y' is not defined",
+    ),
+    "nbsp": (
+        body("x =\u00a01", "textmsg(x)"),
+        "2:6: Lexer exception: a no-break space means nothing here (write a blank)",
+    ),
+    "degree": (
+        body("movej([90°,0,0,0,0,0])"),
+        "2:12: Lexer exception: character '°' has no meaning here",
+    ),
+    "unclosed paren": (
+        body("textmsg(sin(1)", "textmsg(2)"),
+        "2:10: Syntax error: this '(' is never closed (write ) at the end of line 2)",
+    ),
+    "unclosed paren last": (
+        body("textmsg(1"),
+        "2:10: Syntax error: this '(' is never closed (write ) at the end of line 2)",
+    ),
+    "extra paren": (
+        body("textmsg(1))", "textmsg(2)"),
+        "2:13: Syntax error: this ')' closes nothing (take it out)",
+    ),
+    "unclosed bracket": (
+        body("movej([0,0,0,0,0,0, a=1)", "textmsg(2)"),
+        "2:9: Syntax error: this '[' is never closed (write ] before ', a=')",
+    ),
+    "wrong bracket": (
+        body("x = [1, 2)", "textmsg(x)"),
+        "2:12: Syntax error: ')' does not close the '[' of 2:7 (write ])",
+    ),
+    "else if": (
+        body("x = 1", "if x == 1:", "  textmsg(1)", "else if x == 2:", "  textmsg(2)", "end"),
+        "5:3: Syntax error: there is no 'else if' in URScript (write elif)",
+    ),
+    "elseif": (
+        body("x = 1", "if x == 1:", "  textmsg(1)", "elseif x == 2:", "  textmsg(2)", "end"),
+        "5:3: Syntax error: there is no 'elseif' in URScript (write elif)",
+    ),
+    "for in": (
+        body("for i in range(3):", "  textmsg(i)", "end"),
+        "2:3: Syntax error: there is no 'for' in URScript (write i = 0, then while i < n: ... i = i + 1 end)",
+    ),
+    "for c": (
+        body("for (i = 0; i < 3; i = i + 1) {", "  textmsg(i)", "}"),
+        "2:3: Lexer exception: there is no 'for' in URScript (write i = 0, then while i < n: ... i = i + 1 end)",
+        "4:3: Lexer exception: there is no '}' in URScript (a block begins with ':' and ends with 'end')",
+    ),
+    "plus eq": (
+        body("i = 0", "i += 1", "textmsg(i)"),
+        "3:5: Syntax error: there is no '+=' in URScript (write i = i + ...)",
+    ),
+    "pose comma": (
+        body("movel(p[0.1, 0.2 0.3, 0, 0, 0])"),
+        "2:20: Syntax error: a ',' is missing before '0.3'",
+    ),
+    "pose five": (
+        body("movel(p[0.1, 0.2, 0.3, 0, 0])"),
+        "2:9: Syntax error: a pose has six parts, not 5 (write p[x, y, z, rx, ry, rz])",
+    ),
+    "list comma": (
+        body("x = [1, 2 3]", "textmsg(x)"),
+        "2:13: Syntax error: a ',' is missing before '3'",
+    ),
+    "args comma": (
+        body("movej([0,0,0,0,0,0] a=1.4)"),
+        "2:23: Syntax error: a ',' is missing before 'a'",
+    ),
+    "args comma2": (
+        body("movej([0,0,0,0,0,0], a=1.4 v=1)"),
+        "2:30: Syntax error: a ',' is missing before 'v'",
+    ),
+    "list of lists trailing": (
+        body("x = [1, 2,]", "textmsg(x)"),
+        "2:12: Syntax error: nothing stands behind this ',' (take it out)",
+    ),
+    "print": (
+        body('print("hello")'),
+        "2:3: Compile error: name 'print' is not defined (write textmsg(...))",
+    ),
+    "comment slash": (
+        body("// go home", "textmsg(1)"),
+        "2:3: Syntax error: there is no '//' in URScript (a comment begins with '#')",
+    ),
+    "comment slash end": (
+        body("textmsg(1) // go home"),
+        "2:14: Syntax error: there is no '//' in URScript (a comment begins with '#')",
+    ),
+    "comment star": (
+        body("/* go", "home */", "textmsg(1)"),
+        "2:3: Syntax error: there is no '/*' in URScript (begin each line of a comment with '#')",
+    ),
+    "comment dash": (
+        body("-- go home", "textmsg(1)"),
+        "2:6: Compile error: name 'go' is not defined (a comment begins with '#')",
+    ),
+    "TRUE": (
+        body("x = TRUE", "textmsg(x)"),
+        "2:7: Compile error: name 'TRUE' is not defined (write True)",
+    ),
+    "null": (
+        body("x = null", "textmsg(x)"),
+        "2:7: Compile error: name 'null' is not defined (write None)",
+    ),
+    "semicolon": (
+        body("x = 1;", "textmsg(x);"),
+        "2:8: Lexer exception: there is no ';' in URScript (take it out, a statement ends where the next one begins)",
+        "3:13: Lexer exception: there is no ';' in URScript (take it out, a statement ends where the next one begins)",
+    ),
+    "braces": (
+        "def p() {\n  textmsg(1)\n}\n",
+        "1:9: Lexer exception: there is no '{' in URScript (a block begins with ':' and ends with 'end')",
+        "3:1: Lexer exception: there is no '}' in URScript (a block begins with ':' and ends with 'end')",
+    ),
+    "and amp": (
+        body("x = 1", "if x == 1 && True:", "  textmsg(x)", "end"),
+        "3:13: Lexer exception: there is no '&&' in URScript (write and)",
+    ),
+    "or bar": (
+        body("x = 1", "if x == 1 || True:", "  textmsg(x)", "end"),
+        "3:13: Lexer exception: there is no '||' in URScript (write or)",
+    ),
+    "power": (
+        body("x = 2**3", "textmsg(x)", "y = 2^3", "textmsg(y)"),
+        "2:8: Syntax error: there is no '**' in URScript (write pow(a, b))",
+        "4:8: Lexer exception: there is no '^' in URScript (write pow(a, b))",
+    ),
+    "intdiv": (
+        body("x = 7//2", "textmsg(x)"),
+        "2:8: Syntax error: there is no '//' in URScript (write floor(a / b))",
+    ),
+    "ne": (
+        body("x=1", "if x <> 1:", "  textmsg(1)", "end"),
+        "3:8: Syntax error: there is no '<>' in URScript (write !=)",
+    ),
+    "is none": (
+        body("x=1", "if x is None:", "  textmsg(1)", "end"),
+        "3:8: Syntax error: there is no 'is' in URScript (write ==)",
+    ),
+    "not in": (
+        body("x=[1]", "if 1 in x:", "  textmsg(1)", "end"),
+        "3:8: Syntax error: there is no 'in' in URScript (write a while loop)",
+    ),
+    "chain": (
+        body("x = 1", "if 0 < x < 2:", "  textmsg(x)", "end"),
+        "3:12: Syntax error: comparisons cannot be chained (write ... and x < ...)",
+    ),
+    "ternary": (
+        body("x = 1 if True else 2", "textmsg(x)"),
+        "2:9: Syntax error: a value has no 'if' in it (write if ...: x = a else: x = b end)",
+    ),
+    "lambda": (
+        body("f = lambda x: x"),
+        "2:7: Syntax error: there is no 'lambda' in URScript (write a def)",
+    ),
+    "fstring": (
+        body("x=1", 'textmsg(f"x {x}")'),
+        "3:11: Syntax error: there is no 'f' before a text (write textmsg(text, x) or str_cat(text, x))",
+    ),
+    "escape": (
+        body('textmsg("say \\"hi\\"")'),
+        '2:16: Syntax error: there is no \\" in a text, it ends here (leave the quotation marks out)',
+    ),
+    "string newline": (
+        body('textmsg("hello)', "textmsg(2)"),
+        "2:11: Lexer exception: a text without closing '\"' (close it on the same line)",
+    ),
+    "hex": (
+        body("x = 0xFF", "textmsg(x)"),
+        '2:7: Lexer exception: there are no hexadecimal numbers, got 0xFF (write 255 or to_num("0xFF"))',
+    ),
+    "unit": (
+        body("sleep(5s)"),
+        "2:9: Lexer exception: a number has no unit, got 5s (write 5 alone: lengths are in m, times in s, angles in rad)",
+    ),
+    "dec comma": (
+        body("x = 0,5", "textmsg(x)"),
+        "2:8: Syntax error: the point of a number is '.', not ',' (write 0.5)",
+    ),
+    "tuple": (
+        body("x = (1, 2)", "textmsg(x)"),
+        "2:7: Syntax error: a list stands between [ and ] (write [a, b])",
+    ),
+    "unpack": (
+        body("a, b = 1, 2"),
+        "2:3: Syntax error: an assignment sets one variable (write one assignment for each)",
+    ),
+    "import": (
+        "import math\ndef p():\n  textmsg(math.pi)\nend\n",
+        "1:1: Compile error: name 'import' is not defined (all functions are there, take the line out)",
+        "3:11: Compile error: name 'math' is not defined (functions of mathematics stand alone: sqrt(x), sin(x))",
+    ),
+    "math pi": (
+        body("textmsg(pi)", "x = math.sin(1)", "textmsg(x)"),
+        "2:11: Compile error: name 'pi' is not defined (write 3.141592653589793)",
+        "3:7: Compile error: name 'math' is not defined (functions of mathematics stand alone: write sin(...))",
+    ),
+    "len": (
+        body("x=[1]", "textmsg(len(x))"),
+        "3:11: Compile error: name 'len' is not defined (write length(...))",
+    ),
+    "int decl": (
+        body("int x = 1", "textmsg(x)"),
+        "2:3: Compile error: name 'int' is not defined (there are no declarations of types: write x = ...)",
+    ),
+    "reserved": (
+        body("end = 3", "textmsg(end)"),
+        "2:3: Syntax error: 'end' is a word of the language and cannot be a name (choose another name, for example my_end)",
+        "3:11: Syntax error: 'end' is a word of the language and cannot be a name (choose another name, for example my_end)",
+    ),
+    "reserved2": (
+        body("run = 3", "textmsg(run)"),
+        "2:3: Syntax error: 'run' is a word of the language and cannot be a name (choose another name, for example my_run)",
+        "3:11: Syntax error: 'run' is a word of the language and cannot be a name (choose another name, for example my_run)",
+    ),
+    "run def": (
+        body("thread t(x):", "  sync()", "end", "run t(1)"),
+        "2:12: Syntax error: a thread takes no parameters (hand values over in global variables)",
+        "5:9: Syntax error: a thread takes no parameters (hand values over in global variables)",
+    ),
+    "return type": (
+        "def p() -> int:\n  textmsg(1)\nend\n",
+        "1:9: Syntax error: a function declares no type (take it out)",
+    ),
+    "function kw": (
+        "function p():\n  sync()\nend\n",
+        "1:1: Syntax error: there is no 'function' in URScript (write def)",
+    ),
+    "do": (
+        body("while True do", "  sync()", "end"),
+        "2:14: Syntax error: there is no 'do' in URScript (write ':')",
+    ),
+    "then": (
+        body("if True then", "  sync()", "end"),
+        "2:11: Syntax error: there is no 'then' in URScript (write ':')",
+    ),
+    "switch": (
+        body("x = 1", "switch x:", "case 1:", "  textmsg(1)", "end"),
+        "3:3: Syntax error: there is no 'switch' in URScript (write if, elif and else)",
+        "4:3: Syntax error: there is no 'case' in URScript (write if, elif and else)",
+    ),
+    "try": (
+        body("try:", "  x = 1", "except:", "  x = 2", "end"),
+        "2:3: Syntax error: there is no 'try' in URScript (an error ends the program, look before you leap)",
+        "4:3: Syntax error: there is no 'except' in URScript (an error ends the program, look before you leap)",
+    ),
+    "def call as value": (
+        body("x = get_actual_tcp_pose", "textmsg(x)"),
+        "2:7: Compile error: name 'get_actual_tcp_pose' is not defined ('get_actual_tcp_pose' is a function, call it as get_actual_tcp_pose(...))",
+    ),
+    "self call missing paren": (
+        body("sync"),
+        "2:3: Compile error: name 'sync' is not defined ('sync' is a function, call it as sync(...))",
+    ),
+    "wait": (
+        body("wait(1)", "delay(2)"),
+        "2:3: Compile error: name 'wait' is not defined (write sleep(...))",
+        "3:3: Compile error: name 'delay' is not defined (write sleep(...))",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_programs_get_the_place_and_what_to_write(name):
+    text, *expected = WRONG[name]
+    assert told(text) == expected
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_the_controller_says_where_the_parser_noticed(name):
+    """What is told to people changes nothing of what is sent to clients."""
+    text = WRONG[name][0]
+    with pytest.raises(Exception) as caught:  # noqa: PT011 - whichever it is, it is the first of check_program
+        compile_program(text)
+    first = check_program(text)[0][0]
+    assert (caught.value.line, caught.value.column, caught.value.message) == (
+        first.line,
+        first.column,
+        first.message,
+    )
+
+
+def test_every_rule_knows_a_program_of_the_table():
+    known = set()
+    for text, *_ in WRONG.values():
+        while (error := first_syntax_error(Source(text))) is not None:
+            advice = advise(text, error)
+            if advice is None or not advice.edits:
+                break
+            known.add(advice.message)
+            for edit in sorted(advice.edits, reverse=True):
+                text = text[: edit.start] + edit.new + text[edit.end :]
+    assert len(RULES) <= len(known)
+
+
+def test_all_errors_are_found_in_one_pass_with_their_own_lines():
+    text = body(
+        "x = 1;",
+        "if x = 1",
+        "  textmsg(x",
+        "else if x == 2:",
+        "  movej([0, 0 0, 0, 0, 0], acc=1)",
+        "end",
+        "for i in range(3):",
+        "  x += 1",
+        "end",
+        "while x < 3",
+        "  print(x)",
+        "end",
+        "textmsg('a')",
+        "texmsg(y)",
+    )
+    lines = [line.split(":")[0] for line in told(text)]
+    assert lines == ["2", "3", "4", "5", "6", "8", "9", "11", "12", "14", "15"]
+
+
+def test_names_are_looked_up_beside_syntax_errors():
+    assert told(body("x = 1;", "if y == 1", "  print(x)", "end")) == [
+        "2:8: Lexer exception: there is no ';' in URScript "
+        "(take it out, a statement ends where the next one begins)",
+        "3:11: Syntax error: a ':' is missing after '1' (write if y == 1:)",
+        "4:5: Compile error: name 'print' is not defined (write textmsg(...))",
+    ]
+
+
+def test_names_of_what_had_to_be_left_out_are_not_missed():
+    assert len(told(body("for i in [1, 2]:", "  textmsg(i)", "end"))) == 1
+
+
+def test_carets_stand_below_characters_of_several_bytes():
+    (error,), _ = check_for_people(body('textmsg("\u00e4\u00f6\u00fc", y)'))
+    assert as_utf8(error.render()).split("\n")[1:] == [
+        '      textmsg("\u00e4\u00f6\u00fc", y)',
+        "                     ^",
+    ]
+
+
+def test_the_same_words_when_a_wrong_program_is_run_or_laid_out(tmp_path):
+    file = tmp_path / "a.script"
+    file.write_text(body("x = 1", "if x == 1", "  sync()", "end"))
+    for command in ("check", "run", "fmt"):
+        result = CliRunner().invoke(app, [command, str(file)])
+        assert result.exit_code == 1
+        assert "a.script:3:11: Syntax error: a ':' is missing after '1'" in result.output
+
+
+# --- any text --------------------------------------------------------------------------------------------
+
+FOREIGN = (
+    WORDS
+    + " elseif for in then do { } ; && || += ++ // /* ' \" \\ 0x1F 5s 1,5 lambda \u201c \xe2\x80\x9c \xb0 -> := <>"
+)
+
+
+def assert_tells(text):
+    errors, _ = check_for_people(text)
+    assert bool(errors) == bool(check_program(text)[0])
+    n_lines = text.count("\n") + 1
+    for error in errors:
+        assert 1 <= error.line <= n_lines
+        assert error.column >= 1
+        assert error.message
+        assert error.render()
+    lines = [error.line for error in errors if isinstance(error, ScriptSyntaxError)]
+    assert lines == sorted(set(lines))
+
+
+@settings(max_examples=100)
+@given(st.lists(st.sampled_from([*FOREIGN.split(), "\n", "\n", "\t"]), max_size=30).map(" ".join))
+def test_any_words_are_told_about(text):
+    assert_tells(text)
+
+
+@given(st.text(st.characters(max_codepoint=255), max_size=60))
+def test_any_bytes_are_told_about(text):
+    assert_tells(text)
+
+
+@settings(max_examples=100)
+@given(st.lists(statements, min_size=1, max_size=4).map(tuple), st.data())
+def test_a_program_with_something_cut_out_is_told_about(tree, data):
+    text = print_program(tree)
+    start = data.draw(st.integers(0, len(text)))
+    end = data.draw(st.integers(start, min(len(text), start + 8)))
+    put = data.draw(st.sampled_from(["", " ", "\n", ";", "=", ")", "end", "x"]))
+    assert_tells(text[:start] + put + text[end:])
+
+
+@given(st.lists(statements, max_size=4).map(tuple))
+def test_a_program_without_syntax_errors_meets_no_rule(tree):
+    text = print_program(tree)
+    assert parse(Source(text)) == tree
+    assert [item.message for item in check_for_people(text)[0]] == [
+        item.message for item in check_program(text)[0]
+    ]

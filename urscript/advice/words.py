@@ -1,0 +1,213 @@
+"""What people write who know other languages, and what URScript has instead: tables only."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+
+class ForeignWord(NamedTuple):
+    """A word that begins a statement elsewhere.
+
+    Attributes:
+        hint: What to write here.
+        new: What may stand in its place, so that the rest of the text can be checked: a word, or, ending in
+            ":", a whole head of a block; empty: the line is left out.
+        sure: The text then means what was meant.
+    """
+
+    hint: str
+    new: str = ""
+    sure: bool = False
+
+
+_COUNT: Final = "write i = 0, then while i < n: ... i = i + 1 end"
+_IMPORT: Final = "all functions are there, take the line out"
+
+STATEMENTS: Final[dict[str, ForeignWord]] = {
+    "elseif": ForeignWord("write elif", "elif", True),
+    "elsif": ForeignWord("write elif", "elif", True),
+    "elsf": ForeignWord("write elif", "elif", True),
+    "function": ForeignWord("write def", "def", True),
+    "func": ForeignWord("write def", "def", True),
+    "fn": ForeignWord("write def", "def", True),
+    "sub": ForeignWord("write def", "def", True),
+    "procedure": ForeignWord("write def", "def", True),
+    "void": ForeignWord("write def", "def", True),
+    "for": ForeignWord(_COUNT, "while True:"),
+    "foreach": ForeignWord(_COUNT, "while True:"),
+    "loop": ForeignWord("write while True:", "while True:", True),
+    "repeat": ForeignWord("write while True: ... if done: break end ... end", "while True:"),
+    "until": ForeignWord("write while not done:", "while True:"),
+    "do": ForeignWord("write while True: ... if done: break end ... end", "while True:"),
+    "unless": ForeignWord("write if not ...:", "if True:"),
+    "switch": ForeignWord("write if, elif and else", "if True:"),
+    "match": ForeignWord("write if, elif and else", "if True:"),
+    "case": ForeignWord("write if, elif and else"),
+    "default": ForeignWord("write else"),
+    "try": ForeignWord("an error ends the program, look before you leap", "if True:"),
+    "except": ForeignWord("an error ends the program, look before you leap", "else:"),
+    "catch": ForeignWord("an error ends the program, look before you leap", "else:"),
+    "finally": ForeignWord("an error ends the program, look before you leap"),
+    "with": ForeignWord("open and close by hand", "if True:"),
+    "class": ForeignWord("write functions", "if True:"),
+    "import": ForeignWord(_IMPORT),
+    "from": ForeignWord(_IMPORT),
+    "include": ForeignWord(_IMPORT),
+    "var": ForeignWord("write x = 1, global x = 1 or local x = 1"),
+    "let": ForeignWord("write x = 1, global x = 1 or local x = 1"),
+    "const": ForeignWord("write x = 1, global x = 1 or local x = 1"),
+}
+
+BLOCK_ENDS: Final = frozenset(
+    {"endif", "endwhile", "endfor", "enddef", "endfunction", "endthread", "endloop", "fi", "done", "wend"}
+)
+"""Words that close a block elsewhere."""
+
+WORDS_AFTER_END: Final = frozenset({"if", "while", "def", "thread", "for", "function", "sec"})
+"""Words that stand behind `end` elsewhere."""
+
+OPERATORS: Final[dict[str, tuple[str, str]]] = {
+    "**": ("*", "write pow(a, b)"),
+    "<>": ("!=", "write !="),
+    "=>": (">=", "write >="),
+    "=<": ("<=", "write <="),
+}
+"""Operators of two signs: what to put in their place, and what to tell."""
+
+WORD_OPERATORS: Final[dict[str, tuple[str, str]]] = {
+    "is": ("==", "write =="),
+    "isnt": ("!=", "write !="),
+    "in": ("==", "write a while loop"),
+    "mod": ("%", "write %"),
+    "div": ("/", "write floor(a / b)"),
+}
+"""Operators that are words."""
+
+RESERVED: Final = frozenset(
+    {"def", "sec", "thread", "end", "if", "elif", "else", "while", "break", "continue", "halt", "return"}
+    | {"enter_critical", "exit_critical", "join", "kill", "run", "global", "local"}
+    | {"or", "xor", "and", "not", "None", "True", "False", "true", "false"}
+)
+"""Words of the language, which cannot be names."""
+
+NAMES: Final[dict[str, str]] = {
+    "print": "write textmsg(...)",
+    "printf": "write textmsg(...)",
+    "println": "write textmsg(...)",
+    "echo": "write textmsg(...)",
+    "log_message": "write textmsg(...)",
+    "len": "write length(...)",
+    "count": "write length(...)",
+    "str": "write to_str(...)",
+    "string": "write to_str(...)",
+    "int": "write floor(...), ceil(...), or to_num(...) for a text",
+    "float": "write to_num(...) for a text; numbers need no conversion",
+    "abs": "write norm(...)",
+    "fabs": "write norm(...)",
+    "max": "write an if",
+    "min": "write an if",
+    "round": "write floor(x + 0.5)",
+    "fmod": "write a % b",
+    "range": "count in a while loop",
+    "append": "a list has a fixed length; write one that is long enough",
+    "input": "write request_string_from_primary_client(...)",
+    "time": "count with get_steptime()",
+    "null": "write None",
+    "nil": "write None",
+    "none": "write None",
+    "NULL": "write None",
+    "TRUE": "write True",
+    "FALSE": "write False",
+    "on": "write True",
+    "off": "write False",
+    "pi": "write 3.141592653589793",
+    "PI": "write 3.141592653589793",
+    "M_PI": "write 3.141592653589793",
+    "math": "functions of mathematics stand alone: sqrt(x), sin(x)",
+    "np": "functions of mathematics stand alone: sqrt(x), sin(x)",
+    "self": "there are no objects",
+    "this": "there are no objects",
+    "pass": "a block may be empty, take it out",
+    "wait": "write sleep(...)",
+    "delay": "write sleep(...)",
+    "usleep": "write sleep(...), in seconds",
+    "pause": "write sleep(...) to wait, halt to end",
+    "stop": "write stopj(2) for the arm, halt for the program",
+    "exit": "write halt",
+    "quit": "write halt",
+    "goto": "write a while loop",
+    "degrees": "write r2d(...)",
+    "radians": "write d2r(...)",
+    "deg2rad": "write d2r(...)",
+    "rad2deg": "write r2d(...)",
+    "random_float": "write random()",
+    "rand": "write random()",
+    "moveJ": "write movej(...)",
+    "MoveJ": "write movej(...)",
+    "moveL": "write movel(...)",
+    "MoveL": "write movel(...)",
+    "move": "write movej(...) or movel(...)",
+    **dict.fromkeys(("double", "bool", "char", "auto"), "take it out: x = 1 is enough"),
+    **dict.fromkeys(("import", "from", "include"), _IMPORT),
+}
+"""Names that other languages know, and what to write here."""
+
+TYPES: Final = frozenset(
+    {"int", "float", "double", "bool", "boolean", "string", "char", "auto", "var", "let", "const"}
+)
+"""Words before a name that is declared elsewhere."""
+
+KEYWORDS: Final[dict[str, str]] = {
+    **dict.fromkeys(("acc", "accel", "acceleration"), "a"),
+    **dict.fromkeys(("vel", "speed", "velocity"), "v"),
+    **dict.fromkeys(("time", "duration"), "t"),
+    **dict.fromkeys(("radius", "blend", "blend_radius"), "r"),
+}
+"""Names of arguments that people guess, and what they are called here."""
+
+SIGNS: Final[dict[str, tuple[str, str]]] = {
+    "&&": ("and", "write and"),
+    "||": ("or", "write or"),
+    "&": ("and", "write and; bits are in integer_to_binary_list(...)"),
+    "|": ("or", "write or; bits are in integer_to_binary_list(...)"),
+    ";": (" ", "take it out, a statement ends where the next one begins"),
+    "{": (":", "a block begins with ':' and ends with 'end'"),
+    "}": ("end", "a block begins with ':' and ends with 'end'"),
+    "^": ("*", "write pow(a, b)"),
+    "?": (" ", "write if ...: x = a else: x = b end"),
+    "\u201c": ('"', 'write "'),
+    "\u201d": ('"', 'write "'),
+    "\u201e": ('"', 'write "'),
+    "\u00ab": ('"', 'write "'),
+    "\u00bb": ('"', 'write "'),
+    "\u2018": ('"', 'write "'),
+    "\u2019": ('"', 'write "'),
+    "\u00b4": ('"', 'write "'),
+    "`": ('"', 'write "'),
+    "'": ('"', 'a text stands between two "'),
+    "\u2013": ("-", "write -"),
+    "\u2014": ("-", "write -"),
+    "\u2212": ("-", "write -"),
+    "\u00d7": ("*", "write *"),
+    "\u00b7": ("*", "write *"),
+    "\u00f7": ("/", "write /"),
+    "\u2264": ("<=", "write <="),
+    "\u2265": (">=", "write >="),
+    "\u2260": ("!=", "write !="),
+    "\u00a0": (" ", "write a blank"),
+    "\u202f": (" ", "write a blank"),
+    "\u2009": (" ", "write a blank"),
+    "\u200b": (" ", "take it out"),
+    "\ufeff": (" ", "take it out"),
+    "\\": (" ", "take it out, a statement may go on in the next line"),
+}
+"""Characters that mean nothing here: what to put in their place, and what to tell."""
+
+INVISIBLE: Final = {
+    "\u00a0": "a no-break space",
+    "\u202f": "a narrow no-break space",
+    "\u2009": "a thin space",
+    "\u200b": "an invisible space",
+    "\ufeff": "a byte order mark",
+}
+"""What to call characters that cannot be seen."""
