@@ -124,12 +124,17 @@ class Listener:
 
     def _turn_away(self, error: OSError) -> None:
         """Close the next client, or be deaf for a while: the port stays readable, the loop would spin."""
-        if not self._is_out_of_means:
-            self._is_out_of_means = True
-            self._notice(f"clients are turned away from {self._name} port {self.number}: {error.strerror}")
-        if self._reserve is None or not self._reserve.turn_away(self._sock):
+        try:
+            if self._reserve is None:
+                raise error
+            is_refused = self._reserve.turn_away(self._sock)
+        except OSError:
             self._loop.unwatch(self._sock)
             self._loop.add(self)
+            is_refused = True
+        if is_refused and not self._is_out_of_means:
+            self._is_out_of_means = True
+            self._notice(f"clients are turned away from {self._name} port {self.number}: {error.strerror}")
 
     def _closed(self, connection: Connection) -> None:
         self._port.closed(connection)

@@ -23,14 +23,15 @@ class Reserve:
         """Accept the next client of a listening socket and close it at once.
 
         Returns:
-            False if there is no descriptor for that: someone else took it.
+            False if no client waits: without descriptors, the system does not look before it refuses.
+
+        Raises:
+            OSError: there is no descriptor for that: someone else took it.
         """
         self.close()
         try:
             listening.accept()[0].close()
         except BlockingIOError:
-            pass  # the client has gone again
-        except OSError:
             return False
         finally:
             self.fill()

@@ -1,0 +1,204 @@
+"""Several boxes in one process: each on its own address with the same ports, none knowing of the others."""
+
+import signal
+import socket
+import sys
+import threading
+
+import pytest
+from integration_support import (
+    LAYOUT,
+    TIMEOUT,
+    Frames,
+    connect,
+    finish,
+    free_port_base,
+    is_closed,
+    send,
+    serving,
+)
+
+from protocol.ur_types import Ports, ProgramState
+from ur_emulator import BoxRack, ControlBox
+from ur_emulator.errors import EmulatorError, PortError
+from ur_emulator.rack import MAX_BOXES
+from ur_emulator.realtime import event_loop
+
+own_addresses = pytest.mark.skipif(
+    sys.platform == "darwin", reason="only 127.0.0.1 is an address of a Mac unless others are added"
+)
+MOVE = "def p():\n  movej([0.1, -1.5, -1.5, 0, 1, 0])\nend\n"
+
+
+def run_move(box):
+    """Run a move; return all frames from its start on as bytes, heartbeats left out."""
+    frames = {}
+    with Frames(box) as reader:
+        reader.raw()
+        send(box, "secondary", MOVE)
+
+        def keep():
+            frame = reader.raw()
+            frames[reader.stamps[-1]] = frame
+            return LAYOUT.decode(frame)
+
+        begin = reader.until(lambda f: f.runtime_state == ProgramState.PLAYING, keep).timestamp
+        reader.until(lambda f: f.runtime_state == ProgramState.STOPPED and not any(f.target_qd), keep)
+        assert reader.lost() == 0
+    return [frame for stamp, frame in frames.items() if stamp >= begin]
+
+
+@own_addresses
+def test_boxes_have_addresses_seeds_and_the_same_ports_one_after_another():
+    base = free_port_base()
+    with ControlBox.many(3, host="127.0.0.2", seed=4, pace="lockstep", port_base=base) as boxes:
+        assert [box.host for box in boxes] == ["127.0.0.2", "127.0.0.3", "127.0.0.4"]
+        assert [box.serial_number for box in boxes] == ["20993000004", "20993000005", "20993000006"]
+        assert {box.ports for box in boxes} == {Ports.standard(base)}
+        for box in boxes:
+            with connect(box, "dashboard") as sock:
+                sock.sendall(b"get serial number\n")
+                lines = sock.makefile()
+                assert [lines.readline(), lines.readline()][1] == f"{box.serial_number}\n"
+
+
+def test_a_box_among_others_does_to_the_byte_what_it_does_alone():
+    with ControlBox.many(3, seed=20, pace="lockstep", port_base=None) as boxes:
+        assert len({box.ports.realtime for box in boxes}) == 3
+        together = {}
+        threads = [
+            threading.Thread(target=lambda box=box: together.update({box: run_move(box)})) for box in boxes
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        together = [together[box] for box in boxes]
+    assert together[0] != together[1]
+    for k, frames in enumerate(together):
+        with ControlBox(seed=20 + k, pace="lockstep", port_base=None) as alone:
+            assert run_move(alone) == frames
+
+
+def test_a_program_on_one_box_does_nothing_to_another():
+    with ControlBox.many(2, pace="lockstep", port_base=None) as (one, two):
+        with Frames(two) as frames:
+            before = frames.next()
+            run_move(one)
+            after = [frames.next() for _ in range(3)]
+        assert {frame.timestamp for frame in after} == {before.timestamp}
+
+
+def test_boxes_in_real_time_all_give_every_frame():
+    with ControlBox.many(4, port_base=None) as boxes:
+        readers = [Frames(box) for box in boxes]
+        for _ in range(100):
+            for reader in readers:
+                reader.raw()
+        assert [reader.lost() for reader in readers] == [0, 0, 0, 0]
+        for reader in readers:
+            reader.sock.close()
+
+
+def test_boxes_may_differ():
+    options = [
+        {"port_base": None, "pace": "lockstep", "version": "3.4.0"},
+        {"port_base": None, "pace": "realtime", "fidelity": "ideal", "seed": 9},
+    ]
+    with BoxRack(options) as boxes:
+        assert [box.serial_number for box in boxes] == ["20993000000", "20993000009"]
+        with connect(boxes[0], "realtime") as old, Frames(boxes[1]) as new:
+            assert int.from_bytes(old.recv(4), "big") == 1060
+            new.new()
+            new.new()
+
+
+def test_one_box_can_be_closed_and_the_others_go_on():
+    with ControlBox.many(2, pace="realtime", port_base=None) as (one, two):
+        with connect(one, "dashboard") as gone, Frames(two) as frames:
+            assert gone.recv(100).startswith(b"Connected")
+            one._loop.call_soon_threadsafe(one.close)
+            assert is_closed(gone)
+            for _ in range(20):
+                frames.new()
+            assert frames.lost() == 0
+        with pytest.raises(ConnectionRefusedError):
+            connect(one, "dashboard")
+
+
+def test_a_box_of_a_rack_is_not_started_by_itself():
+    rack = ControlBox.many(2, port_base=None)
+    with pytest.raises(EmulatorError, match="start the rack"), rack[0]:
+        pass
+    with pytest.raises(EmulatorError, match="start the rack"):
+        rack[1].serve_forever()
+    rack._close()
+
+
+@own_addresses
+def test_a_taken_port_of_one_box_leaves_no_port_open():
+    base = free_port_base()
+    ports = Ports.standard(base)
+    with socket.create_server(("127.0.0.3", ports.rtde)):
+        rack = ControlBox.many(3, host="127.0.0.2", port_base=base)
+        with pytest.raises(PortError, match=rf"127\.0\.0\.3:{ports.rtde}"):
+            rack.listen()
+    for host in ("127.0.0.2", "127.0.0.3"):
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection((host, ports.realtime), timeout=TIMEOUT)
+
+
+@pytest.mark.parametrize(
+    ("count", "options", "words"),
+    [
+        (0, {}, f"0 boxes asked for: 1 to {MAX_BOXES}"),
+        (MAX_BOXES + 1, {}, f"1 to {MAX_BOXES}"),
+        (2, {"host": "localhost"}, "'localhost' given for 2 boxes"),
+        (2, {"host": "0.0.0.0"}, r"'0\.0\.0\.0' given for 2 boxes"),
+        (2, {"host": "255.255.255.255"}, r"'255\.255\.255\.255' given for 2 boxes"),
+        (2, {"host": ""}, "'' given for 2 boxes"),
+        (2, {"fidelity": "perfect"}, "perfect"),
+        (2, {"seed": -1}, "seed -1"),
+    ],
+)
+def test_what_cannot_be_counted_is_one_line(count, options, words):
+    with pytest.raises(EmulatorError, match=words) as error:
+        ControlBox.many(count, **options)
+    assert "\n" not in str(error.value)
+
+
+def test_one_box_may_have_any_host():
+    rack = ControlBox.many(1, host="localhost", port_base=None)
+    assert rack[0].host == "localhost"
+    rack._close()
+
+
+@own_addresses
+def test_the_command_serves_several_boxes(tmp_path):
+    with serving(tmp_path, "--boxes", 3, "--host", "127.0.0.2", "--seed", 5, "--log") as first:
+        boxes = first.facts["boxes"]
+        assert [box["host"] for box in boxes] == ["127.0.0.2", "127.0.0.3", "127.0.0.4"]
+        assert [box["serial_number"] for box in boxes] == ["20993000005", "20993000006", "20993000007"]
+        assert {key: first.facts[key] for key in boxes[0]} == boxes[0]
+        for k, box in enumerate(boxes[1:], 1):
+            assert (
+                f"ready at {box['host']}, realtime, typical, seed {5 + k}" in first.process.stdout.readline()
+            )
+        for box in boxes:
+            with socket.create_connection((box["host"], box["ports"]["dashboard"]), timeout=TIMEOUT) as sock:
+                assert sock.recv(100) == b"Connected: Universal Robots Dashboard Server\n"
+        first.process.send_signal(signal.SIGINT)
+        done = finish(first.process)
+    assert done.code == 0
+    assert {line.split()[0] for line in done.err.splitlines()} == {box["host"] for box in boxes}
+
+
+def test_the_loop_waits_also_where_select_cannot(monkeypatch):
+    """A process with a thousand open files: the loop's own descriptor is out of select()'s range."""
+    monkeypatch.setattr(event_loop, "_SELECT_LIMIT", 0)
+    with ControlBox(pace="realtime", port_base=None) as box, Frames(box) as frames:
+        for _ in range(50):
+            frames.raw()
+        assert frames.lost() == 0
+        with connect(box, "dashboard") as sock:
+            assert sock.recv(100).startswith(b"Connected")
