@@ -40,12 +40,19 @@ class DashboardCommand:
         argument: what may follow, for people; "" if nothing may.
         since: first CB3 software.
         replies: templates by key; "ok" is always there. Braces name what the box fills in.
+        done_since: first software whose reply comes when the command is carried out; None for commands whose
+            reply has always come at once. (3, 0): all CB3 software.
     """
 
     name: str
     argument: str
     since: SoftwareVersion
     replies: Mapping[str, str]
+    done_since: SoftwareVersion | None = None
+
+    def replies_when_done(self, version: SoftwareVersion) -> bool:
+        """True if software `version` answers when the command is carried out, not when it is taken."""
+        return self.done_since is not None and version >= self.done_since
 
     def reply(self, key: str = "ok", /, **values: object) -> str:
         """The reply line.
@@ -62,19 +69,27 @@ class DashboardCommand:
             raise LocalProtocolError(f"reply {template!r} of {self.name!r} needs {missing}") from None
 
 
-def _row(name: str, argument: str, since: tuple[int, int], ok: str, **failures: str) -> DashboardCommand:
+def _row(
+    name: str,
+    argument: str,
+    since: tuple[int, int],
+    ok: str,
+    done_since: tuple[int, int] | None = None,
+    **failures: str,
+) -> DashboardCommand:
     replies = MappingProxyType({"ok": ok, **failures})
-    return DashboardCommand(name, argument, SoftwareVersion(*since), replies)
+    done = SoftwareVersion(*done_since) if done_since else None
+    return DashboardCommand(name, argument, SoftwareVersion(*since), replies, done)
 
 
 _NOT_FOUND = "File not found: {name}"
 
 COMMANDS: tuple[DashboardCommand, ...] = (
-    _row("load", "program.urp", (1, 4), "Loading program: {path}",
+    _row("load", "program.urp", (1, 4), "Loading program: {path}", (3, 3),
          not_found=_NOT_FOUND, failed="Error while loading program: {name}"),
-    _row("play", "", (1, 4), "Starting program", failed="Failed to execute: play"),
-    _row("stop", "", (1, 4), "Stopped", failed="Failed to execute: stop"),
-    _row("pause", "", (1, 4), "Pausing program", failed="Failed to execute: pause"),
+    _row("play", "", (1, 4), "Starting program", (3, 3), failed="Failed to execute: play"),
+    _row("stop", "", (1, 4), "Stopped", (3, 3), failed="Failed to execute: stop"),
+    _row("pause", "", (1, 4), "Pausing program", (3, 3), failed="Failed to execute: pause"),
     _row("quit", "", (1, 4), "Disconnected"),
     _row("shutdown", "", (1, 4), "Shutting down"),
     _row("running", "", (1, 6), "Program running: {running}"),  # true or false
@@ -98,15 +113,17 @@ COMMANDS: tuple[DashboardCommand, ...] = (
          too_early="Cannot unlock protective stop until 5s after occurrence. "
                    "Always inspect cause of protective stop before unlocking"),
     _row("close safety popup", "", (3, 1), "closing safety popup"),
-    _row("load installation", "file.installation", (3, 2), "Loading installation: {path}",
+    _row("load installation", "file.installation", (3, 2), "Loading installation: {path}", (3, 2),
          not_found=_NOT_FOUND, failed="Failed to load installation: {name}"),
     _row("restart safety", "", (3, 7), "Restarting safety"),
     _row("get serial number", "", (3, 12), "{serial}"),
     _row("get robot model", "", (3, 12), "{model}"),  # UR3, UR5, UR10
     _row("generate flight report", "controller|software|system", (3, 13),
-         "Flight Report generated with id:{id}", failed="{reason}"),
-    _row("generate support file", "directory", (3, 13), "Completed successfully:{file}", failed="{reason}"),
-    _row("saveLog", "", (3, 13), "Log saved to disk"),
+         "Flight Report generated with id:{id}", (3, 13),
+         failed="{reason}"),
+    _row("generate support file", "directory", (3, 13), "Completed successfully:{file}", (3, 13),
+         failed="{reason}"),
+    _row("saveLog", "", (3, 13), "Log saved to disk", (3, 13), failed="Failed to execute: saveLog"),
 )  # fmt: skip
 """All commands of CB3 software. What newer software renamed or added for e-Series is not here."""
 

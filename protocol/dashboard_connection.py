@@ -29,6 +29,7 @@ from protocol.ur_types import SoftwareVersion
 
 __all__ = [
     "MAX_LINE",
+    "MAX_WAITING",
     "CommandReceived",
     "DashboardConnection",
     "DashboardEvent",
@@ -41,6 +42,8 @@ __all__ = [
 MAX_LINE = 1 << 16
 """Longest line in bytes at either end; no document names a limit, no client comes near this one."""
 
+MAX_WAITING = 1 << 20
+"""Bytes of lines that may wait for their answer; nobody asks so much while one command takes its time."""
 
 _NEWEST_CB3 = SoftwareVersion(3, 15)
 
@@ -99,6 +102,7 @@ class DashboardConnection:
         self._version = version
         self._buffer = bytearray()
         self._lines: deque[str] = deque()
+        self._waiting = 0
         self._greeted = False
         self._unanswered: deque[str] = deque()
         self._closed = False
@@ -112,7 +116,7 @@ class DashboardConnection:
         """Take what the socket gave.
 
         Raises:
-            RemoteProtocolError: a line beyond `MAX_LINE`; close the connection.
+            RemoteProtocolError: a line beyond `MAX_LINE`, lines beyond `MAX_WAITING`; close the connection.
         """
         if self._closed:
             return
@@ -120,6 +124,9 @@ class DashboardConnection:
         *lines, self._buffer = self._buffer.split(b"\n")
         if any(len(line) > MAX_LINE for line in (*lines, self._buffer)):
             raise RemoteProtocolError(f"a dashboard line has more than {MAX_LINE} bytes")
+        self._waiting += sum(map(len, lines)) + len(lines)
+        if self._waiting > MAX_WAITING:
+            raise RemoteProtocolError(f"more than {MAX_WAITING} bytes of dashboard lines wait for an answer")
         self._lines.extend(line.decode("latin-1").strip() for line in lines)
 
     def next_event(self) -> DashboardEvent | None:
@@ -131,6 +138,7 @@ class DashboardConnection:
         if self._closed or not self._lines:
             return None
         line = self._lines.popleft()
+        self._waiting = max(0, self._waiting - len(line) - 1) if self._lines else 0
         if self._role is Role.PC:
             return self._read_robot(line)
         self._unanswered.append(line)

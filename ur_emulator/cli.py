@@ -51,6 +51,12 @@ def serve(
     boxes: Annotated[
         int, typer.Option(help="How many boxes; --host and --seed are those of the first, then counted up.")
     ] = 1,
+    programs: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of programs (.urp, .script) and installations, for the dashboard's load and play."
+        ),
+    ] = None,
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
@@ -76,6 +82,7 @@ def serve(
             seed=seed,
             fidelity=fidelity,
             port_base=port_base,
+            programs=programs,
         )
         for name in (signal.SIGINT, signal.SIGTERM):
             signal.signal(name, lambda number, frame: rack.stop())

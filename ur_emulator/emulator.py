@@ -12,6 +12,8 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, Unpack
 
@@ -24,15 +26,19 @@ from ur_emulator.errors import EmulatorError, PortPermissionError
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robot_model import Vector3
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.loop_runner import LoopRunner
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
-from ur_emulator.servers.dashboard_port import BUILD, BoxIdentity, DashboardPort
+from ur_emulator.servers.box_access import BUILD, BoxAccess, BoxIdentity
+from ur_emulator.servers.dashboard_answers import DashboardAnswers
+from ur_emulator.servers.dashboard_port import DashboardPort
 from ur_emulator.servers.listener import Listener, Port
 from ur_emulator.servers.modbus_loading import CodecLoader
 from ur_emulator.servers.modbus_server import ModbusPort
 from ur_emulator.servers.primary_port import PrimaryPort
+from ur_emulator.servers.program_desk import ProgramDesk
 from ur_emulator.servers.program_intake import ProgramIntake
 from ur_emulator.servers.realtime_port import RealtimePort
 from ur_emulator.servers.reserve import Reserve
@@ -55,6 +61,7 @@ class ControlBox:
         port_base: what was added to the standard ones.
         serial_number: as the dashboard gives it; simulated boxes are recognisable by it.
         notices: what a user should know although the box runs, one line each.
+        is_shut_down: a dashboard client has switched the box off: its ports are closed.
     """
 
     def __init__(
@@ -67,6 +74,7 @@ class ControlBox:
         seed: int = 0,
         fidelity: str = "typical",
         port_base: int | None = 0,
+        programs: str | PathLike[str] | None = None,
         *,
         loop: EventLoop | None = None,
         phase: float = 0.0,
@@ -82,6 +90,7 @@ class ControlBox:
             seed: of calibration, phases and noise; the same seed is the same arm.
             fidelity: "ideal", "typical" or "poor".
             port_base: offset added to all standard ports; None takes free ports.
+            programs: folder of programs and installations, for the dashboard's `load`; None for none.
             loop: shared with other boxes, see `BoxRack`, which runs it; None gives the box its own.
             phase: which part of a period its cycles lie after those of the first box of the loop.
 
@@ -98,6 +107,8 @@ class ControlBox:
             raise EmulatorError(f"seed {seed} given: it must be 0 or above")
         if not host:
             raise EmulatorError("no host given: name an address, 127.0.0.1 keeps other machines out")
+        if programs is not None and not Path(programs).is_dir():
+            raise EmulatorError(f"programs folder {programs} given: there is no such folder, make it first")
         self.host = host
         self.port_base = port_base or 0
         self.ports = Ports.standard(self.port_base)
@@ -115,6 +126,8 @@ class ControlBox:
         )
         self._intake = ProgramIntake(self._loop, software, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)
+        self._access = BoxAccess(identity, self._box, self._loop, self._network)
+        folder = ProgramFolder(None if programs is None else Path(programs))
         states = StateEncoder(software)
         # In the order in which they hear of a cycle: first those whose clients act on it.
         self._port_objects: dict[str, Port] = {
@@ -122,7 +135,10 @@ class ControlBox:
             "rtde": RtdePort(identity.version._replace(build=BUILD), controller, self._box.submit),
             "primary": PrimaryPort(software, controller, self._intake, states, all_messages=True),
             "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
-            "dashboard": DashboardPort(identity, controller, self._box.submit),
+            "dashboard": DashboardPort(
+                self._access,
+                DashboardAnswers(self._access, ProgramDesk(self._access, folder), self._shut_down),
+            ),
             "modbus": ModbusPort(controller, self._box.submit, modbus),
             "realtime_ro": RealtimePort(software, None),
             "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
@@ -131,6 +147,8 @@ class ControlBox:
         self._listeners: dict[str, Listener] = {}
         self._reserve = Reserve()
         self.notices: list[str] = []
+        self.is_shut_down = False
+        self.on_shut_down: Callable[[], None] = self._loop.stop if self._owns_loop else self.close
 
     @staticmethod
     def many(count: int, **options: Unpack[BoxOptions]) -> BoxRack:
@@ -262,6 +280,11 @@ class ControlBox:
         if failure is not None and error is None:
             raise failure
 
+    def _shut_down(self) -> None:
+        """Close the box as one that was switched off, after what is under way in the loop."""
+        self.is_shut_down = True
+        self._loop.call_soon_threadsafe(self.on_shut_down)
+
     def _must_be_alone(self) -> None:
         if not self._owns_loop:
             raise EmulatorError("this box is one of several in a rack: start the rack, it runs them all")
@@ -270,6 +293,7 @@ class ControlBox:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
         self._loop.remove(self._box)
         self._intake.close()
+        self._access.close()
         self._network.close()
         self._reserve.close()
         for listener in self._listeners.values():

@@ -4,6 +4,8 @@ EmulatorError
 ├── ModelError        an unknown robot or fidelity name, or numbers that make no arm
 ├── KinematicsError   arguments of the controller's own kinematics make no sense
 ├── PlantError        the physics cannot go on: a target that is no number, or a diverged simulation
+├── ProgramFileError  a program or installation file cannot be used
+│   └── FileMissingError      there is no such file
 └── PortError         a TCP port of the box cannot be opened
     └── PortPermissionError   because this user may not
 
@@ -36,6 +38,14 @@ class PlantError(EmulatorError):
     def __init__(self, message: str, *, cycle: int | None = None) -> None:
         super().__init__(message)
         self.cycle = cycle
+
+
+class ProgramFileError(EmulatorError):
+    """A program or installation file cannot be used."""
+
+
+class FileMissingError(ProgramFileError):
+    """There is no such program or installation file among those that the box may use."""
 
 
 class PortError(EmulatorError):

@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import ipaddress
 from collections.abc import Iterable, Sequence
+from functools import partial
+from os import PathLike
 from types import TracebackType
 from typing import Self, TypedDict, overload
 
@@ -38,6 +40,7 @@ class BoxOptions(TypedDict, total=False):
     seed: int
     fidelity: str
     port_base: int | None
+    programs: str | PathLike[str] | None
 
 
 class BoxRack(Sequence[ControlBox]):
@@ -64,6 +67,8 @@ class BoxRack(Sequence[ControlBox]):
         except BaseException:
             self._loop.close()
             raise
+        for box in self._boxes:
+            box.on_shut_down = partial(self._shut_down, box)
 
     @overload
     def __getitem__(self, index: int) -> ControlBox: ...
@@ -109,6 +114,12 @@ class BoxRack(Sequence[ControlBox]):
         failure = self._runner.finish()
         if failure is not None and error is None:
             raise failure
+
+    def _shut_down(self, box: ControlBox) -> None:
+        """Close a box that was switched off; after the last one the rack has nothing to do."""
+        box.close()
+        if all(other.is_shut_down for other in self._boxes):
+            self.stop()
 
     def _close(self) -> None:
         for box in self._boxes:

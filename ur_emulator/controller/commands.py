@@ -110,6 +110,18 @@ class AnswerRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class ShowPopup:
+    """Show a popup for which nobody waits; it stays until it is closed."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class RestartSafety:
+    """Restart the safety system: what had stopped the robot is forgotten, its power is off."""
+
+
+@dataclass(frozen=True, slots=True)
 class ClosePopup:
     """Press the button of all popups, so that programs that wait for it go on."""
 
@@ -129,6 +141,8 @@ Command = (
     | WriteModbus
     | AnswerRequest
     | ClosePopup
+    | ShowPopup
+    | RestartSafety
     | GuideByHand
     | Push
     | HangLoad

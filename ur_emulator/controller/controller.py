@@ -16,6 +16,7 @@ from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US, controller_time
 from ur_emulator.controller.events import (
     ErrorReported,
     Event,
+    PopupShown,
     RobotModeChanged,
     SafetyModeChanged,
     ScriptFailed,
@@ -233,6 +234,14 @@ class Controller:
                 state.operator.answer(value, request_id)
             case cmd.ClosePopup():
                 state.operator.close_popups()
+            case cmd.ShowPopup(text):
+                state.operator.show(text)
+                state.events.append(PopupShown("Popup", text, False, False, False))
+            case cmd.RestartSafety():
+                self._apply(cmd.PowerOff())
+                if state.safety.is_stopped:
+                    state.safety.restart()
+                    state.events.append(SafetyModeChanged(int(state.safety.mode)))
 
     def _start(self, program: CompiledProgram) -> None:
         """Start a program if the box is in a state to run one; say so if it is not."""

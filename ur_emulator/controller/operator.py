@@ -5,9 +5,13 @@ Answers come as `commands.AnswerRequest` and `commands.ClosePopup`.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 from protocol.primary_messages import RequestedType
+
+# Popups for which nobody waits: older ones than the last so many are forgotten.
+MAX_SHOWN = 20
 
 Answer = bool | int | float | str
 
@@ -44,11 +48,21 @@ class Operator:
     def __init__(self) -> None:
         self._count = 0
         self._open: dict[int, OperatorRequest] = {}
+        self._shown: deque[str] = deque(maxlen=MAX_SHOWN)
 
     @property
     def requests(self) -> tuple[OperatorRequest, ...]:
         """The questions that wait for an answer."""
         return tuple(self._open.values())
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Texts of popups for which nobody waits, the oldest first."""
+        return tuple(self._shown)
+
+    def show(self, text: str) -> None:
+        """Show a popup for which nobody waits; it stays, also without power, until it is closed."""
+        self._shown.append(text)
 
     def ask(self, kind: RequestedType, text: str) -> OperatorRequest:
         """Put a question on the screen."""
@@ -70,6 +84,7 @@ class Operator:
 
     def close_popups(self) -> None:
         """Press the button of every popup."""
+        self._shown.clear()
         for request in self.requests:
             if request.kind is RequestedType.NONE:
                 self._finish(request)

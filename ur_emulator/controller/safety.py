@@ -132,6 +132,10 @@ class SafetyState:
         """True when the dashboard's `unlock protective stop` is allowed."""
         return self.mode is SafetyMode.PROTECTIVE_STOP and now - self._stopped_since >= UNLOCK_DELAY
 
+    def restart(self) -> None:
+        """Begin anew: nothing stops the arm any more."""
+        self.mode = SafetyMode.NORMAL
+
     def unlock(self) -> None:
         """Leave a protective stop; any other mode stays."""
         if self.mode is SafetyMode.PROTECTIVE_STOP:

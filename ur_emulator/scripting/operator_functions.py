@@ -35,6 +35,7 @@ def operator_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
     ) -> Generator[Blocked, None, None]:
         text = wire_text(s)
         if not blocking:
+            state.operator.show(text)
             state.events.append(PopupShown(title, text, warning, error, blocking))
             return
         request = state.operator.ask(RequestedType.NONE, text)

@@ -30,6 +30,7 @@ class Connection:
     Attributes:
         peer: address of the client, for logs.
         dropped: packages that were dropped because the client did not read.
+        has_ended: the client says no more, see `hear_out`.
     """
 
     def __init__(
@@ -59,7 +60,10 @@ class Connection:
         self._closing = False
         self._deaf = False
         self._open = True
+        self._reading = selectors.EVENT_READ
+        self._on_end: Callable[[Connection], None] | None = None
         self.dropped = 0
+        self.has_ended = False
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
@@ -76,6 +80,19 @@ class Connection:
     def is_open(self) -> bool:
         """True until the connection is closed by either side."""
         return self._open
+
+    @property
+    def host(self) -> str:
+        """Address of the client without its port."""
+        return self.peer.rpartition(":")[0]
+
+    def hear_out(self, on_end: Callable[[Connection], None]) -> None:
+        """Stay open when the client says no more: it may still listen. The owner closes then.
+
+        Args:
+            on_end: called once, when that is so.
+        """
+        self._on_end = on_end
 
     def send(self, package: bytes) -> bool:
         """Send a package, whole or not at all.
@@ -100,7 +117,7 @@ class Connection:
             return False
         if sent < len(package):
             self._queue(memoryview(package)[sent:])
-            self._loop.watch(self._sock, selectors.EVENT_READ | selectors.EVENT_WRITE, self._on_ready)
+            self._loop.watch(self._sock, self._reading | selectors.EVENT_WRITE, self._on_ready)
         return True
 
     def close_when_sent(self) -> None:
@@ -129,7 +146,16 @@ class Connection:
         self._outbox.clear()
         self._pending = 0
         self._backlog.discard(self)
-        self._loop.watch(self._sock, selectors.EVENT_READ, self._on_ready)
+        if self._closing:
+            self.close()
+        else:
+            self._watch_for_data()
+
+    def _watch_for_data(self) -> None:
+        if self._reading:
+            self._loop.watch(self._sock, self._reading, self._on_ready)
+        else:
+            self._loop.unwatch(self._sock)
 
     def _queue(self, data: memoryview) -> None:
         self._outbox.append(data)
@@ -148,11 +174,19 @@ class Connection:
         except BlockingIOError:
             return
         except OSError:
-            data = b""
+            self.close()
+            return
         if data:
             self._on_data(self, data)
-        else:
+        elif self._on_end is None:
             self.close()
+        else:
+            self.has_ended = True
+            self._reading = 0
+            self._loop.unwatch(self._sock)
+            if self._pending:
+                self._loop.watch(self._sock, selectors.EVENT_WRITE, self._on_ready)
+            self._on_end(self)
 
     def _flush(self) -> None:
         try:
@@ -173,4 +207,4 @@ class Connection:
         if self._closing:
             self.close()
         else:
-            self._loop.watch(self._sock, selectors.EVENT_READ, self._on_ready)
+            self._watch_for_data()

@@ -1,0 +1,103 @@
+"""Installations: what they say that concerns a program.
+
+Only where External Control finds its PC is read; tool, payload, safety settings and names of lines are not.
+`default.installation` is always there, if only with nothing in it: a new box has one, too.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.programs.folder import WIRE_ROOTS, FoundFile, ProgramFolder
+from ur_emulator.programs.xml_tree import XmlTree, read_xml
+
+SUFFIX = ".installation"
+DEFAULT_NAME = "default" + SUFFIX
+# Who contributed the part of an installation. Source: a public generator of installations for CB3.
+_OWNER = "com.fzi.externalcontrol"
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalControlPc:
+    """Where External Control gets its program.
+
+    Attributes:
+        host: name or address; "" if it is not said here.
+        port: of its script sender; 0 if it is not said here.
+    """
+
+    host: str = ""
+    port: int = 0
+
+    def over(self, other: ExternalControlPc) -> ExternalControlPc:
+        """Return this, and what it leaves out from the other."""
+        return ExternalControlPc(self.host or other.host, self.port or other.port)
+
+
+@dataclass(frozen=True, slots=True)
+class Installation:
+    """An installation.
+
+    Attributes:
+        wire_path: how the box calls it.
+        pc: for External Control nodes that do not name one themselves.
+    """
+
+    wire_path: str
+    pc: ExternalControlPc
+
+
+def load_installation(folder: ProgramFolder, name: str) -> Installation:
+    """Read an installation by the name that a client gives it.
+
+    Raises:
+        FileMissingError: there is none of that name.
+        ProgramFileError: it is none.
+    """
+    try:
+        file = folder.find(name)
+    except FileMissingError:
+        if name.rpartition("/")[2].strip('"') != DEFAULT_NAME:
+            raise
+        return Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME), ExternalControlPc())
+    if file.path.suffix != SUFFIX:
+        raise ProgramFileError(f"{file.path.name} is no installation: its name must end in {SUFFIX}")
+    tree = read_xml(file.path)
+    data: dict[str, str] = {}
+    for part in tree.root.iter("Contributed"):
+        if part.get("ownerId") == _OWNER:
+            data |= {item.get("key", ""): item.get("value", "") for item in part.iter("data")}
+    return Installation(file.wire_path, pc_from(data, tree.name))
+
+
+def installation_of(folder: ProgramFolder, tree: XmlTree, program: FoundFile) -> Installation:
+    """Read the installation of a program: at its path from the program's folder, else by its name.
+
+    Raises:
+        ProgramFileError: there is none of that name, or it is none.
+    """
+    given = tree.root.get("installationRelativePath") or tree.root.get("installation") or ""
+    path = given.replace("\\", "/").removesuffix(SUFFIX) + SUFFIX if given else DEFAULT_NAME
+    for place in (PurePosixPath(program.wire_path).parent, WIRE_ROOTS[0]):
+        name = posixpath.normpath(place / path)
+        if folder.has(name):
+            return load_installation(folder, name)
+        path = PurePosixPath(path).name
+    if path == DEFAULT_NAME:
+        return load_installation(folder, DEFAULT_NAME)
+    raise ProgramFileError(f"{tree.name} needs the installation {path}: put it beside the program")
+
+
+def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
+    """Return the PC that the data of a node or an installation name. Keys: the source text of the URCap.
+
+    Raises:
+        ProgramFileError: the port is none.
+    """
+    port = data.get("port_nr", "")
+    if port and not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 1 << 16):
+        raise ProgramFileError(f"{file_name}: port {port!r} of External Control is none of 1 to 65535")
+    return ExternalControlPc(data.get("host_ip", ""), int(port or 0))

@@ -1,0 +1,118 @@
+"""From a name to a program that can be played: the steps of PolyScope's `load`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+from ur_emulator.errors import ProgramFileError
+from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.programs.installation import (
+    ExternalControlPc,
+    Installation,
+    installation_of,
+)
+from ur_emulator.programs.script_text import as_one_program, read_script, wire_text
+from ur_emulator.programs.script_writer import Gap
+from ur_emulator.programs.urp_program import ROOT, make_script, uses_external_control
+from ur_emulator.programs.urp_values import identifier
+from ur_emulator.programs.xml_tree import read_xml
+
+SCRIPT_SUFFIX = ".script"
+PROGRAM_SUFFIX = ".urp"
+# What the PC's program marks as belonging before everything else, once. Source: the External Control URCap.
+_HEADER_BEGIN = "# HEADER_BEGIN"
+_HEADER_END = "# HEADER_END"
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedProgram:
+    """A program as it is in the memory of the box.
+
+    Attributes:
+        wire_path: how the box calls its file, `/programs/sub/x.urp`.
+        installation: that it came with; a script file has none.
+        parts: its script, and gaps in it.
+    """
+
+    wire_path: str
+    installation: Installation | None
+    parts: tuple[str | Gap, ...]
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file without folder."""
+        return PurePosixPath(self.wire_path).name
+
+    @property
+    def pcs(self) -> tuple[ExternalControlPc, ...]:
+        """The PCs whose programs belong into it, each once, as far as its nodes name them."""
+        return tuple(dict.fromkeys(part.pc for part in self.parts if isinstance(part, Gap)))
+
+    def script(self, received: Callable[[ExternalControlPc], str]) -> str:
+        """Return the script, one character a byte.
+
+        Args:
+            received: gives what a PC has sent.
+        """
+        lines: list[str] = []
+        headed: set[ExternalControlPc] = set()
+        for part in self.parts:
+            if isinstance(part, str):
+                lines.append(part)
+                continue
+            header, body = split_header(received(part.pc))
+            if part.pc not in headed:
+                headed.add(part.pc)
+                lines.extend(part.indent + line for line in header)
+            lines.extend(part.indent + line for line in body)
+        return "\n".join(lines) + "\n"
+
+
+def split_header(text: str) -> tuple[list[str], list[str]]:
+    """Split what a PC has sent: what stands once in a program, and what stands at each of its nodes."""
+    lines = text.replace("\r\n", "\n").rstrip("\n").split("\n")
+    marks = [line.strip() for line in lines]
+    try:
+        begin = marks.index(_HEADER_BEGIN)
+        end = marks.index(_HEADER_END, begin)
+    except ValueError:
+        return [], lines
+    return lines[begin : end + 1], lines[end + 1 :]
+
+
+def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
+    """Read a program and its installation.
+
+    Args:
+        folder: of all programs.
+        name: as a client gives it.
+
+    Raises:
+        FileMissingError: there is no such program.
+        ProgramFileError: it cannot be used, for the reason that is told.
+    """
+    file = folder.find(name)
+    program_name = identifier(file.path.stem)
+    if file.path.suffix == SCRIPT_SUFFIX:
+        script = as_one_program(read_script(file.path), program_name)
+        return LoadedProgram(file.wire_path, None, (script,))
+    if file.path.suffix != PROGRAM_SUFFIX:
+        raise ProgramFileError(
+            f"{file.path.name} is no program: its name must end in {PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
+        )
+    tree = read_xml(file.path)
+    if tree.root.tag != ROOT:
+        raise ProgramFileError(f"{file.path.name} is no program: it is a <{tree.root.tag}>, not a <{ROOT}>")
+    installation = installation_of(folder, tree, file)
+    saved = file.path.with_suffix(SCRIPT_SUFFIX)
+    if saved.is_file() and not uses_external_control(tree):
+        parts: tuple[str | Gap, ...] = (as_one_program(read_script(saved), program_name),)
+    else:
+        parts = _in_bytes(make_script(file, tree, program_name, folder))
+    return LoadedProgram(file.wire_path, installation, parts)
+
+
+def _in_bytes(parts: tuple[str | Gap, ...]) -> tuple[str | Gap, ...]:
+    return tuple(wire_text(part) if isinstance(part, str) else part for part in parts)

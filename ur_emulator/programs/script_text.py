@@ -1,0 +1,46 @@
+"""Scripts in files, and how they become one program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from protocol.script_channel import ProgramText, ScriptChannel
+from ur_emulator.errors import ProgramFileError
+from ur_emulator.programs.xml_tree import read_bytes
+
+_BYTE_ORDER_MARK = "\ufeff"
+
+
+def read_script(path: Path) -> str:
+    """Read a text file, UTF-8 or else Latin-1.
+
+    Raises:
+        ProgramFileError: it cannot be read, is too large, or is no text.
+    """
+    data = read_bytes(path)
+    if b"\0" in data:
+        raise ProgramFileError(f"{path.name} is no text: it has zero bytes")
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text.removeprefix(_BYTE_ORDER_MARK).replace("\r\n", "\n")
+
+
+def as_one_program(text: str, name: str) -> str:
+    """Return a script file as one program, one character a byte.
+
+    A file with one `def` and nothing else is a program already, as PolyScope saves it beside a .urp.
+    Anything else is wrapped into a program with the name of the file, as a node of type script would be: then
+    several functions and a call of one of them are a program, and so are bare statements.
+    """
+    plain = wire_text(text).rstrip() + "\n"
+    items = ScriptChannel().feed(plain.encode("latin-1"))
+    if len(items) == 1 and isinstance(items[0], ProgramText) and items[0].kind == "def":
+        return items[0].text
+    return f"def {name}():\n{plain}end\n"
+
+
+def wire_text(text: str) -> str:
+    """Return a text as a script port would hand it on: UTF-8, one character a byte."""
+    return text.encode("utf-8", "replace").decode("latin-1")

@@ -1,0 +1,74 @@
+"""Puts a script together line by line, with indentation, labels, and gaps for what a PC will send."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from ur_emulator.programs.installation import ExternalControlPc
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A place for the program that a PC sends when the program is played.
+
+    Attributes:
+        pc: who sends it.
+        indent: blanks before each of its lines.
+    """
+
+    pc: ExternalControlPc
+    indent: str
+
+
+class ScriptWriter:
+    """The script so far.
+
+    Attributes:
+        parts: lines and gaps, in order.
+    """
+
+    def __init__(self) -> None:
+        self.parts: list[str | Gap] = []
+        self._depth = 0
+        self._labels = 0
+
+    @property
+    def depth(self) -> int:
+        """How many blocks are open."""
+        return self._depth
+
+    def add(self, text: str) -> None:
+        """Write a line; a text of several lines is written as it is, each one indented."""
+        indent = "  " * self._depth
+        self.parts.extend(indent + line for line in text.replace("\r\n", "\n").rstrip("\n").split("\n"))
+
+    def label(self, text: str) -> None:
+        """Write the label of a node, as PolyScope numbers and names them for those who watch the program."""
+        self._labels += 1
+        self.add(f'$ {self._labels} "{one_line(text)}"')
+
+    def gap(self, pc: ExternalControlPc) -> None:
+        """Leave a place for a program that comes later."""
+        self.parts.append(Gap(pc, "  " * self._depth))
+
+    @contextmanager
+    def block(self, head: str) -> Iterator[None]:
+        """Write a block, `head` being its first line."""
+        self.add(head)
+        with self.indented():
+            yield
+        self.add("end")
+
+    @contextmanager
+    def indented(self) -> Iterator[None]:
+        """Indent what is written meanwhile."""
+        self._depth += 1
+        yield
+        self._depth -= 1
+
+
+def one_line(text: str) -> str:
+    """Return a text that may stand between quotes in a script, which knows no escapes."""
+    return " ".join(text.replace('"', "'").split())

@@ -1,0 +1,155 @@
+"""What turns nodes into a script has at hand: the file, the script so far, names given, files beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ur_emulator.errors import ProgramFileError
+from ur_emulator.programs.folder import FoundFile, ProgramFolder
+from ur_emulator.programs.script_writer import ScriptWriter
+from ur_emulator.programs.urp_values import identifier
+from ur_emulator.programs.xml_tree import XmlTree, read_xml
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+# Programs nest a few levels; a file beyond this was made to break something.
+_MAX_DEPTH = 50
+_MAX_SUBPROGRAMS = 200
+
+# Elements that give a variable its name.
+_VARIABLES = ("variable", "ProgramVariable")
+
+NodeWriter = Callable[["UrpMaker", "Element"], None]
+
+
+@dataclass(frozen=True, slots=True)
+class SubProgram:
+    """A sub-program that is called somewhere.
+
+    Attributes:
+        name: of its function.
+        maker: of the file that it is written in.
+        body: the element whose children it consists of.
+    """
+
+    name: str
+    maker: UrpMaker
+    body: Element
+
+
+@dataclass(slots=True)
+class Shared:
+    """What the files of one program have in common.
+
+    Attributes:
+        nodes: what writes each kind of node.
+        folder: of all programs.
+        writer: takes the script.
+        subprograms: by the element that defines each, in the order of the first calls.
+        names: of variables, functions and threads, so that none is given twice.
+    """
+
+    nodes: Mapping[str, NodeWriter]
+    folder: ProgramFolder
+    writer: ScriptWriter = field(default_factory=ScriptWriter)
+    subprograms: dict[Element, SubProgram] = field(default_factory=dict)
+    names: set[str] = field(default_factory=set)
+
+    def new_name(self, wanted: str) -> str:
+        """Return a name like the wanted one that no function or thread has yet."""
+        plain = identifier(wanted)
+        name, count = plain, 1
+        while name in self.names:
+            count += 1
+            name = f"{plain}_{count}"
+        self.names.add(name)
+        return name
+
+
+class UrpMaker:
+    """Writes the nodes of one file.
+
+    Attributes:
+        file: of the program.
+        tree: its content.
+        shared: with the files of its sub-programs.
+        move: the `<Move>` node around the one that is being written.
+        previous: the node before it, in the same node.
+    """
+
+    def __init__(self, file: FoundFile, tree: XmlTree, shared: Shared) -> None:
+        self.file = file
+        self.tree = tree
+        self.shared = shared
+        shared.names.update(
+            name
+            for element in tree.root.iter()
+            if element.tag in _VARIABLES and (name := element.get("name"))
+        )
+        self.move: Element | None = None
+        self.previous: Element | None = None
+        self._depth = 0
+
+    @property
+    def writer(self) -> ScriptWriter:
+        """Takes the script."""
+        return self.shared.writer
+
+    def error(self, problem: str) -> ProgramFileError:
+        """Return the error that says what is wrong with this file."""
+        return ProgramFileError(f"{self.tree.name}: {problem}")
+
+    def write(self, element: Element) -> None:
+        """Write one node.
+
+        Raises:
+            ProgramFileError: nobody knows how.
+        """
+        node_writer = self.shared.nodes.get(element.tag)
+        if node_writer is None:
+            raise self.error(
+                f"a <{element.tag}> node cannot be turned into a script; "
+                "put the .script that PolyScope saved with the program beside it"
+            )
+        node_writer(self, element)
+
+    def write_children(self, element: Element) -> None:
+        """Write the nodes inside a node."""
+        self._depth += 1
+        if self._depth > _MAX_DEPTH:
+            raise self.error(f"nodes are nested more than {_MAX_DEPTH} deep")
+        outer, self.previous = self.previous, None
+        for child in element.findall("children/*"):
+            self.write(child)
+            self.previous = child
+        self.previous = outer
+        self._depth -= 1
+
+    def name_of_subprogram(self, element: Element) -> str:
+        """Return the function that a sub-program becomes; it is remembered to be written.
+
+        Args:
+            element: that defines it, or stands for the one that does.
+        """
+        definition = self.tree.resolve(element)
+        known = self.shared.subprograms.get(definition)
+        if known is not None:
+            return known.name
+        if len(self.shared.subprograms) >= _MAX_SUBPROGRAMS:
+            raise self.error(f"there are more than {_MAX_SUBPROGRAMS} sub-programs")
+        name = self.shared.new_name(definition.get("name") or "SubProgram")
+        maker, body = self, definition
+        file_name = (definition.findtext("programFile") or "").strip()
+        if file_name and definition.find("children/*") is None:
+            maker = UrpMaker(
+                beside := self.shared.folder.beside(self.file, file_name), read_xml(beside.path), self.shared
+            )
+            main = maker.tree.root.find("children/MainProgram")
+            if main is None:
+                raise maker.error("there is no <MainProgram> in it")
+            body = main
+        self.shared.subprograms[definition] = SubProgram(name, maker, body)
+        return name

@@ -1,0 +1,167 @@
+"""Files that the box writes for people: the log, flight reports, support files.
+
+They go into the folder of programs, or into a temporary one. What stands in them comes from the controller:
+the same run writes the same bytes. Name of the support file: UR dashboard documents; of the log: PolyScope's
+own; the rest is ours.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from ur_emulator.box_log import LogEntry
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.programs.folder import ProgramFolder
+
+REPORT_KINDS = ("controller", "software", "system")
+LOG_NAME = "log_history.txt"
+REPORT_FOLDER = "flightreports"
+# When the controller's clock was at 0; nobody has told the box the date.
+CLOCK_EPOCH = datetime(2021, 11, 30, tzinfo=UTC)
+_MAX_SAME_SECOND = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class BoxFacts:
+    """What a report tells; taken in the thread of the loop, written in another.
+
+    Attributes:
+        serial_number: of the box.
+        versions: of its software and what it rests on.
+        snapshot: the state of the last cycle.
+        log: all entries.
+        programs: names of what is loaded.
+        script: of the loaded program.
+    """
+
+    serial_number: str
+    versions: dict[str, str]
+    snapshot: Snapshot
+    log: Sequence[LogEntry]
+    programs: dict[str, str] = field(default_factory=dict)
+    script: str = ""
+
+    @property
+    def time(self) -> datetime:
+        """Date and time of the controller, to the second."""
+        return CLOCK_EPOCH + timedelta(seconds=int(self.snapshot.timestamp))
+
+
+class BoxReports:
+    """Writes files; its methods take a while and run in the worker."""
+
+    def __init__(self, folder: ProgramFolder) -> None:
+        self._folder = folder
+
+    def save_log(self, facts: BoxFacts) -> Path:
+        """Write the log, in place of what was written before; return the file."""
+        return _write(self._root() / LOG_NAME, _log_text(facts).encode("utf-8"))
+
+    def flight_report(self, kind: str, facts: BoxFacts) -> str:
+        """Write a flight report; return its number.
+
+        Args:
+            kind: one of `REPORT_KINDS`, or "" for the last of them.
+            facts: what it tells.
+
+        Raises:
+            ProgramFileError: there is no such kind.
+        """
+        if kind not in ("", *REPORT_KINDS):
+            raise ProgramFileError(f"Unknown report type: {kind}")
+        folder = self._root() / REPORT_FOLDER
+        folder.mkdir(exist_ok=True)
+        number = 1 + max((int(p.stem.rpartition("_")[2]) for p in _reports(folder)), default=0)
+        contents = {
+            "report.json": _json({"kind": kind or REPORT_KINDS[-1], "id": number}),
+            **_contents(facts),
+        }
+        _write(folder / f"flightreport_{number}.zip", _zip(contents, facts.time))
+        return str(number)
+
+    def support_file(self, directory: str, facts: BoxFacts) -> str:
+        """Write a support file, which holds all flight reports and a new one; return its name.
+
+        Args:
+            directory: of the folder of programs, as a client names it.
+            facts: what the new report tells.
+
+        Raises:
+            ProgramFileError: there is no such directory.
+        """
+        root = self._root()
+        try:
+            place = ProgramFolder(root).locate(directory or "?")
+        except FileMissingError:
+            place = root / "?"  # the path on this machine is nobody's business
+        if not place.is_dir():
+            raise ProgramFileError(f"Directory not found: {directory}")
+        self.flight_report("", facts)
+        contents = {f"{REPORT_FOLDER}/{p.name}": p.read_bytes() for p in _reports(root / REPORT_FOLDER)}
+        contents |= _contents(facts)
+        for later in range(_MAX_SAME_SECOND):  # no file takes the place of another
+            stamp = f"{facts.time + timedelta(seconds=later):%Y-%m-%d_%H-%M-%S}"
+            path = place / f"ur_{facts.serial_number}_{stamp}.zip"
+            if not path.exists():
+                break
+        return _write(path, _zip(contents, facts.time)).name
+
+    def _root(self) -> Path:
+        if self._folder.root is None:
+            self._folder = ProgramFolder(Path(tempfile.mkdtemp(prefix="ur-emulator-")))
+        root = self._folder.root
+        assert root is not None
+        return root
+
+
+def _reports(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.glob("flightreport_*.zip") if p.stem.rpartition("_")[2].isdecimal())
+
+
+def _contents(facts: BoxFacts) -> dict[str, bytes]:
+    files = {
+        LOG_NAME: _log_text(facts).encode("utf-8"),
+        "versions.json": _json(facts.versions),
+        "programs.json": _json(facts.programs),
+        "state.json": _json(facts.snapshot._asdict()),
+    }
+    if facts.script:
+        files["program.script"] = facts.script.encode("latin-1", "replace")
+    return files
+
+
+def _log_text(facts: BoxFacts) -> str:
+    return "".join(f"{entry}\n" for entry in facts.log)
+
+
+def _json(value: Any) -> bytes:
+    return (json.dumps(value, indent=2, default=list) + "\n").encode()
+
+
+def _zip(files: dict[str, bytes], time: datetime) -> bytes:
+    """Return an archive; equal contents are equal bytes."""
+    import io
+    import zipfile
+
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in sorted(files.items()):
+            info = zipfile.ZipInfo(name, date_time=time.timetuple()[:6])
+            info.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(info, content)
+    return buffer.getvalue()
+
+
+def _write(path: Path, data: bytes) -> Path:
+    """Write a file in one step, so that nobody reads half of it."""
+    partial = path.with_name(path.name + ".part")
+    partial.write_bytes(data)
+    partial.replace(path)
+    return path
