@@ -202,3 +202,17 @@ def test_a_hung_load_stays_when_another_one_is_declared():
     states = hold(plant, HOME, 100)
     assert states[-1].tcp_force[2] == pytest.approx(-9.81, abs=0.3)
     assert np.abs(plant.q_true - HOME).max() < 1e-4  # the outer loop carries it anyway
+
+
+def test_another_sensor_begins_without_zero_and_past():
+    bench = above_table(
+        "  sleep(1)\n  zero_ftsensor()\n  ft_rtde_input_enable(True)\n  while True:\n"
+        "    textmsg(tool_contact([0,0,0,0,0,0]))\n    sync()\n  end",
+        z=0.2,
+    )
+    bench.tick(100)
+    for _ in range(60):
+        bench.tick(1, cmd.WriteInputs((("external_force_torque", (0.0, 0.0, 40.0, 0.0, 0.0, 0.0)),)))
+    assert np.hypot.reduce(bench.now.actual_tcp_force[:3]) == pytest.approx(40.0)
+    # The first reading was there before the first cycle with the sensor was over: no contact came.
+    assert set(said(bench)) == {"0"}

@@ -9,6 +9,8 @@ from protocol.ur_types import ControlMode, ProgramState, SafetyMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
 from ur_emulator.errors import PlantError
+from urscript import compile_program
+from urscript.catalogue import catalogue_for
 
 FREE = "  freedrive_mode()\n  sleep(100)"
 
@@ -324,3 +326,23 @@ def test_a_load_can_be_hung_by_command():
     bench.tick(100)
     assert bench.now.actual_tcp_force[2] == pytest.approx(-9.81, abs=0.5)
     assert failures(bench) == []
+
+
+def test_the_form_of_the_e_series_frees_all_axes_or_says_that_it_cannot_block_any():
+    for call, mode, text in (
+        ("freedrive_mode()", ControlMode.TEACH, []),
+        ("freedrive_mode(freeAxes=[1,1,1,1,1,1], feature=p[0,0,0,0,0,0])", ControlMode.TEACH, []),
+        (
+            "freedrive_mode(freeAxes=[1,0,0,0,0,0])",
+            ControlMode.POSITION,
+            [
+                "freedrive_mode: blocked axes are not modelled, got freeAxes=[1,0,0,0,0,0], allowed is [1,1,1,1,1,1]"
+            ],
+        ),
+    ):
+        bench = Bench()
+        program = compile_program(f"def f():\n  {call}\n  sleep(1)\nend\n", catalogue=catalogue_for("5.11"))
+        bench.tick(1, cmd.StartProgram(program))
+        bench.tick(5)
+        assert bench.now.control_mode == mode
+        assert failures(bench) == text

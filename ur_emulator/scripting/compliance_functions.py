@@ -29,7 +29,12 @@ def compliance_functions(state: ControllerState) -> Mapping[str, Callable[..., A
     def freedrive_unchecked(thread: object) -> None:
         state.compliance.guide(by_program=True)
 
-    def freedrive_mode(thread: object) -> None:
+    def freedrive_mode(thread: object, free_axes: Any = (1,) * 6, feature: Any = None) -> None:
+        if not all(x == 1 for x in free_axes):
+            raise ScriptRuntimeError(
+                f"freedrive_mode: blocked axes are not modelled, got freeAxes={wire_text(free_axes)}, "
+                "allowed is [1,1,1,1,1,1]"
+            )
         if not state.compliance.is_guided:
             state.compliance.check_payload(state.force_sense.unexplained(state.steady_cycles))
         freedrive_unchecked(thread)
@@ -91,6 +96,8 @@ def _force_mode(state: ControllerState) -> dict[str, Callable[..., Any]]:
         "end_force_mode": end_force_mode,
         "force_mode_set_damping": force_mode_set_damping,
         "force_mode_set_gain_scaling": force_mode_set_gain_scaling,
+        "force_mode_get_damping": lambda thread: state.force_mode_damping,
+        "force_mode_get_gain_scaling": lambda thread: state.force_mode_gain_scaling,
     }
 
 

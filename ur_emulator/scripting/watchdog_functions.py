@@ -42,6 +42,7 @@ def watchdog_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
             else:
                 state.external_sensor = None
                 state.watchdogs.set(VARIABLE, 0.0, WatchdogAction.IGNORE, state.tick)
+            state.force_sense.forget()
 
         return enable_sensor
 

@@ -289,6 +289,8 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "None",
         "hand guiding along the free axes of a feature",
         time=SWITCH,
+        support=APPROXIMATE,
+        note="with all axes free only; " + _GUIDED,
         since=releases(None, "5.10", "10.0"),
     ),
     _row(
@@ -603,13 +605,22 @@ _LATER: tuple[Builtin, ...] = (
         since=releases(None, "5.19", "10.0"),
         source=MANUAL_LATE,
     ),
-    _row("force_mode_get_damping", (), "float", "damping in force", since=LATE_E_SERIES, source=MANUAL_LATE),
+    _row(
+        "force_mode_get_damping",
+        (),
+        "float",
+        "damping in force",
+        since=LATE_E_SERIES,
+        support=EXACT,
+        source=MANUAL_LATE,
+    ),
     _row(
         "force_mode_get_gain_scaling",
         (),
         "float",
         "gain scaling in force",
         since=LATE_E_SERIES,
+        support=EXACT,
         source=MANUAL_LATE,
     ),
 )
