@@ -216,16 +216,18 @@ def test_a_program_that_ends_in_a_pause_leaves_nothing_behind(end):
     assert motion.target.qd == ZERO6
 
 
+class Lift:
+    tool = TOOL
+    time = 0.0
+
+    def displace(self, tool_pose, path, dt):
+        assert dt > 0.0
+        self.time += dt
+        z = tool_pose[2] + 0.02 * (1.0 - math.cos(2.0 * self.time))
+        return (*tool_pose[:2], z, *tool_pose[3:])
+
+
 def test_overlays_stand_still_in_a_pause():
-    class Lift:
-        tool = TOOL
-        time = 0.0
-
-        def displace(self, tool_pose, path, dt):
-            self.time += dt
-            z = tool_pose[2] + 0.02 * (1.0 - math.cos(2.0 * self.time))
-            return (*tool_pose[:2], z, *tool_pose[3:])
-
     motion = ArmMotion(HOME)
     lift = Lift()
     motion.add_overlay(lift)
@@ -241,3 +243,21 @@ def test_overlays_stand_still_in_a_pause():
         START[2] + 0.02 * (1.0 - math.cos(2.0 * lift.time)), abs=1e-8
     )
     assert np.abs(np.diff([t.qd for t in targets], axis=0)).max() < 0.02
+
+
+def test_a_stream_under_an_overlay_comes_to_rest_without_a_jump():
+    motion = ArmMotion(HOME)
+    motion.add_overlay(Lift())
+    motion.command("me", SpeedJ((1.5, 0, 0, 0, 0, 0), 4.0))
+    for _ in range(60):
+        motion.renew()
+        motion.step(DT, 1.0)
+    targets = [motion.target]
+    motion.pause()
+    while not motion.is_paused:
+        targets.append(motion.step(DT, 1.0))
+    targets += [motion.step(DT, 1.0) for _ in range(10)]
+    motion.resume()
+    targets += [motion.step(DT, 1.0) for _ in range(60)]
+    assert np.abs(np.diff([t.qd for t in targets], axis=0)).max() < 0.06
+    assert np.abs(np.diff([t.q for t in targets], axis=0)).max() < 1.6 * DT

@@ -130,7 +130,7 @@ class OverlayChain:
             path: target along the path at the end of the cycle.
             before: displaced target at the end of the last one.
             dt: control cycle [s].
-            share: part of it that the overlays advance by, above 0.
+            share: part of it that the overlays advance by; 0 while they stand still.
 
         Raises:
             UnreachableError: the arm cannot be where the overlays want it.
@@ -141,10 +141,13 @@ class OverlayChain:
         for overlay in self.overlays:
             tcp = overlay.tool.tcp
             pose = pose_trans(flange, tcp)
-            moved = overlay.displace(pose, path, share * dt)
-            shift = shift_between(pose, moved)
             previous = self._shifts.get(id(overlay), _NO_SHIFT)[0]
-            self._shifts[id(overlay)] = (shift, previous, share * dt)
+            if share > 0.0:
+                moved = overlay.displace(pose, path, share * dt)
+                shift = shift_between(pose, moved)
+                self._shifts[id(overlay)] = (shift, previous, share * dt)
+            else:
+                moved, shift = apply_shift(previous, pose), previous
             still = still and shift == previous
             flange = pose_trans(moved, pose_inv(tcp))
         near = [q + dt * v for q, v in zip(before.q, before.qd, strict=True)]

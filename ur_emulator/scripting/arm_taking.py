@@ -7,8 +7,8 @@ from typing import Any
 
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import Vector6, six
-from ur_emulator.motion.arm_motion import OwnershipError
 from ur_emulator.motion.generators import Generator as MotionGenerator
+from ur_emulator.motion.path_motion import OwnershipError
 from urscript.errors import ScriptRuntimeError
 
 # What a motion builtin is to the interpreter: a generator that yields once per cycle it lasts.

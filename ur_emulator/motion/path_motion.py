@@ -1,0 +1,165 @@
+"""Who moves the arm along its path: the current generator, its owner, and what a pause does to both.
+
+The rules of ownership come from the controller's behaviour as users report it:
+
+* only one script thread moves the arm at a time; a second one gets "Another thread is already controlling
+  the robot";
+* ownership ends when the motion has brought the arm to rest, or when the owner ends or is killed;
+* a velocity command lives only as long as it is renewed in every cycle: when the next `speedj` is late the
+  arm begins to stop (the stutter seen by every driver that streams too slowly), and when the program ends it
+  stops.
+
+Must not know scripts or physics: an owner is any object, compared by identity.
+"""
+
+from __future__ import annotations
+
+from ur_emulator.models.robot_model import Vector6
+from ur_emulator.motion.generators import Generator, Hold, Streamed
+from ur_emulator.motion.move import Move
+from ur_emulator.motion.pause import Detour, Pace, Suspended
+from ur_emulator.motion.target import JointTarget
+
+# How fast the speed scaling follows the slider [1/s]: a step would be a step of the joints' speed. Chosen.
+SCALING_RATE = 4.0
+
+HOLD = Hold()
+
+
+class OwnershipError(Exception):
+    """A second owner asked for the arm while the first still has it."""
+
+
+class PathMotion:
+    """One generator, one owner, one target along the path.
+
+    Attributes:
+        path: target along the path of the program; what generators see.
+    """
+
+    def __init__(self, q: Vector6) -> None:
+        self.path = JointTarget(q)
+        self._generator: Generator = HOLD
+        self._owner: object | None = None
+        self._renewed = False
+        self._scale = 1.0
+        self._pace = Pace()
+        self._suspended: Suspended | None = None
+        # A pause, or something else that the usual cycle does not look after: one test in the hot path.
+        self._is_special = False
+
+    @property
+    def owner(self) -> object | None:
+        """The object that controls the arm at present, or None."""
+        return self._owner
+
+    @property
+    def goal(self) -> Vector6:
+        """Joint positions that the present move leads to; the path's own if no move has a goal [rad]."""
+        move = self._move
+        goal = None if move is None else move.goal
+        return self.path.q if goal is None else goal
+
+    @property
+    def _move(self) -> Move | None:
+        """The move under way, also while it is interrupted."""
+        generator = self._generator if self._suspended is None else self._suspended.generator
+        if isinstance(generator, Detour):
+            return generator.move
+        return generator if isinstance(generator, Move) else None
+
+    def move_of(self, owner: object) -> Move | None:
+        """Return the move that `owner` has under way, if it has one."""
+        return self._move if self._owner is owner else None
+
+    def command(self, owner: object, generator: Generator) -> None:
+        """Let `owner` move the arm with `generator` from the next cycle on.
+
+        Raises:
+            OwnershipError: somebody else has the arm.
+        """
+        if self._owner is not None and self._owner is not owner:
+            raise OwnershipError
+        self._owner = owner
+        self._generator = generator
+        self._renewed = True
+
+    def renew(self) -> None:
+        """Keep a streamed velocity alive for one more cycle."""
+        self._renewed = True
+
+    # --- pauses
+
+    @property
+    def is_pausing(self) -> bool:
+        """True from `pause` to `resume`."""
+        return self._pace.paused
+
+    @property
+    def is_returning(self) -> bool:
+        """True while the arm goes back to the path that an interruption led it away from."""
+        return isinstance(self._generator, Detour)
+
+    def pause(self) -> None:
+        """Ramp the arm to rest on its path; a stream ends like one that is not renewed any more.
+
+        Overlays stand still too.
+        """
+        if self._pace.paused:
+            return
+        self._pace.paused = self._is_special = True
+        generator = self._generator
+        if isinstance(generator, Streamed):
+            self._suspend()
+            self._generator = generator.when_paused()
+
+    def resume(self) -> None:
+        """End a pause: a move goes on where it stopped, a stream if it is renewed in this cycle."""
+        if not self._pace.paused:
+            return
+        self._pace.paused = False
+        if (suspended := self._suspended) is not None:
+            self._suspended = None
+            generator, self._owner, back_to = suspended
+            self._generator = Detour(generator, back_to) if isinstance(generator, Move) else generator
+            self._renewed = True
+
+    def _suspend(self) -> None:
+        generator = self._generator
+        if self._suspended is None and isinstance(generator, Move | Detour | Streamed):
+            if isinstance(generator, Detour):
+                self._suspended = Suspended(generator.move, self._owner, generator.back_to)
+            else:
+                self._suspended = Suspended(generator, self._owner, self.path.q)
+
+    def _abandon(self) -> None:
+        """Give up the move under way, for good."""
+        if (move := self._move) is not None:
+            move.abandon()
+        self._suspended = None
+
+    # --- cycle
+
+    def _advance(self, dt: float, scale: float, pace: float) -> JointTarget:
+        """Advance on the path by one cycle."""
+        generator = self._generator
+        if scale != self._scale:
+            change = SCALING_RATE * dt
+            self._scale = scale = min(max(scale, self._scale - change), self._scale + change)
+        if isinstance(generator, Streamed):
+            if not self._renewed:
+                generator = self._generator = generator.when_lost()
+            self._renewed = False
+        path = self.path = generator.step(self.path, dt, scale * pace)
+        if generator.done and not isinstance(generator, Streamed):
+            self._end_of(generator)
+        return path
+
+    def _end_of(self, generator: Generator) -> None:
+        if isinstance(generator, Detour):
+            self._generator = generator.move
+            self._pace.factor = 0.0
+            self._is_special = True
+        else:
+            self._generator = HOLD
+            self._owner = None
