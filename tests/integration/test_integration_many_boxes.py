@@ -100,6 +100,19 @@ def test_boxes_in_real_time_all_give_every_frame():
             reader.sock.close()
 
 
+def test_boxes_in_real_time_take_turns_within_a_period():
+    rack = ControlBox.many(4, port_base=None)
+    pacers = [box._box._pacer for box in rack]
+    assert [pacer.may_tick(10.0, box._box) for pacer, box in zip(pacers, rack, strict=True)] == [
+        True,
+        False,
+        False,
+        False,
+    ]
+    assert [pacer.next_call(10.0) for pacer in pacers] == pytest.approx([10.008, 10.002, 10.004, 10.006])
+    rack._close()
+
+
 def test_boxes_may_differ():
     options = [
         {"port_base": None, "pace": "lockstep", "version": "3.4.0"},
@@ -122,6 +135,7 @@ def test_one_box_can_be_closed_and_the_others_go_on():
             for _ in range(20):
                 frames.new()
             assert frames.lost() == 0
+        assert one._box not in one._loop._services
         with pytest.raises(ConnectionRefusedError):
             connect(one, "dashboard")
 

@@ -106,7 +106,7 @@ class RtdePort:
             self._owners.update(dict.fromkeys(request.names, connection))
         if isinstance(request, SetupOutputs) and _SCRIPT_LINE in request.names:
             self._controller.state.wants_script_line = True
-        session.restart(is_new=isinstance(request, SetupOutputs))
+        session.restart()
         self._find_streams()
         if not connection.send(reply):
             connection.close()  # without its reply, everything after would answer the wrong request
@@ -133,10 +133,10 @@ class _Session:
         self._last_tick = -1
         self._repeats = 0
 
-    def restart(self, *, is_new: bool) -> None:
+    def restart(self) -> None:
         """Take over what the last request has changed; a new stream begins in the next cycle."""
         encode = self.protocol.encoder
-        if is_new or encode is not self.encode:
+        if encode is not self.encode:
             self.encode = encode
             self._first_tick = self._last_tick = -1
         self._divisor = self.protocol.cycles_per_package
