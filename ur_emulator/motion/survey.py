@@ -23,6 +23,9 @@ _LIMIT = 200
 # The way between samples is halved where a joint is faster than this share of its limit, and its speed in the
 # middle differs from the mean of the ends by more than this share of the fastest.
 _FAST, _ROUGH = 0.4, 0.1
+# Also where a joint is further than this from where its speeds would bring it [rad]: it may have gone over to
+# another solution, which a tool that follows the path closely would not.
+_ASTRAY = 0.1
 # A prediction for the inverse kinematics reaches no further than this [rad].
 _FARTHEST = 0.5
 
@@ -139,8 +142,8 @@ def _is_rough(a: Sample, b: Sample, robot: RobotModel, speed: float) -> bool:
     way = b.s - a.s
     for k, most in enumerate(robot.qd_max):
         u, w, middle = a.slope[k], b.slope[k], _middle(a, b, k, way)
-        rate = max(abs(u), abs(w), abs(middle))
-        if speed * rate > _FAST * most and abs(middle - 0.5 * (u + w)) > _ROUGH * rate:
+        rate, off = max(abs(u), abs(w), abs(middle)), abs(middle - 0.5 * (u + w))
+        if (speed * rate > _FAST * most and off > _ROUGH * rate) or off * way > _ASTRAY:
             return True
     return False
 
