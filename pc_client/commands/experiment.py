@@ -63,6 +63,7 @@ def _run(
 ) -> None:
     from pc_client.control.controller_config import controller_config
     from pc_client.driver.probe import read_info
+    from pc_client.driver.robot_info import UNKNOWN
     from pc_client.driver.transport import TcpNetwork
     from pc_client.driver.ur_driver import UrDriver
     from pc_client.experiment.preflight import is_loopback
@@ -74,8 +75,10 @@ def _run(
     ports = ports_of(port_base)
     with console.status("planning"):
         loaded = load_movements(movements)
-        arm = read_info(TcpNetwork(), robot, ports).model.lower()
-        planned = prepare_experiment(loaded, repeat=repeat, out=out, robot=arm)
+        arm = read_info(TcpNetwork(), robot, ports).model
+        if arm == UNKNOWN:
+            raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")
+        planned = prepare_experiment(loaded, repeat=repeat, out=out, robot=arm.lower())
     if not yes and not is_loopback(robot):
         _ask(planned, robot, ports)
     try:

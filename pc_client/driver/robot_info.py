@@ -12,6 +12,9 @@ from protocol.ur_types import SerialNumber, SoftwareVersion, parse_serial
 
 _SERIAL, _MODEL = "get serial number", "get robot model"
 
+UNKNOWN = "unknown"
+"""Stands for what a robot does not tell."""
+
 _CB3_PERIOD = 0.008
 _E_SERIES_PERIOD = 0.002
 
@@ -58,9 +61,9 @@ def read_robot_info(network: Network, host: str, dashboard_port: int, primary: P
     try:
         serial = parse_serial(answers.get(_SERIAL, ""))
     except RemoteProtocolError:  # software before 3.12 does not know the question
-        serial = SerialNumber("unknown", simulated=False, seed=None)
+        serial = SerialNumber(UNKNOWN, simulated=False, seed=None)
     model = answers.get(_MODEL, "")
     if not model.startswith("UR"):
         robot_type = primary.wait_for_robot_type()
-        model = "unknown" if robot_type is None else robot_type.name
+        model = UNKNOWN if robot_type is None else robot_type.name
     return RobotInfo(version, model, serial)

@@ -20,11 +20,11 @@ from integration_support import (
 
 from pc_client import cli
 from pc_client.driver import dashboard_query, package_stream, realtime_client
+from protocol.primary_framing import PackageType
 from protocol.ur_types import Ports, ProgramState, SafetyMode
 
 FAR = "t,x,y,z\n" + "".join(f"{0.2 * i:.1f},{0.3 + 0.05 * i:.2f},0.1,0.3\n" for i in range(20))
 MOVEMENT_FILES = {
-    "far.csv": (FAR, ""),
     "empty.toml": ("", "empty.toml"),
     "empty.csv": ("", "empty.csv"),
     "no.toml": ("this is no TOML [", "no.toml"),
@@ -47,6 +47,18 @@ def test_a_movement_file_that_cannot_be_done_is_refused_before_anything_is_asked
     complaint = done.complaint()
     assert words in complaint
     assert "robot.invalid" not in complaint
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_movement_out_of_the_arm_s_reach_is_refused_before_anything_moves(
+    standard_box, ur_client, tmp_path
+):
+    (tmp_path / "far.csv").write_text(FAR)
+    with Messages(standard_box) as primary:
+        done = ur_client("run", tmp_path / "far.csv", *at(standard_box), "--out", tmp_path / "out")
+        assert done.code == 1
+        assert "far" in done.complaint()
+        assert not programs_since(primary, standard_box)
     assert not (tmp_path / "out").exists()
 
 
@@ -181,7 +193,7 @@ def test_a_port_that_is_no_robots_is_one_line(answers, words, command_name, tmp_
 @pytest.mark.parametrize("realtime", [b"", b"\x00\x00\x04\x74" + bytes(500), b"garbage!" * 400, b"bye"])
 def test_a_realtime_port_that_gives_no_frames_is_one_line(lockstep_box, realtime, tmp_path, capsys):
     with Messages(lockstep_box) as primary:
-        greeting = _first_package(primary.sock)
+        greeting = _greeting(primary.sock)
     with pretender(primary=greeting, secondary=greeting, realtime=realtime) as base:
         code = cli.run(
             [
@@ -201,9 +213,19 @@ def test_a_realtime_port_that_gives_no_frames_is_one_line(lockstep_box, realtime
     assert "realtime" in error
 
 
-def _first_package(sock):
-    data = sock.recv(4096)
-    return data[: int.from_bytes(data[:4], "big")]
+def _greeting(sock):
+    """All packages up to the first state: they tell software and arm."""
+    data = b""
+    end = 0
+    while True:
+        while len(data) < end + 5:
+            data += sock.recv(4096)
+        size, kind = int.from_bytes(data[end : end + 4], "big"), data[end + 4]
+        end += size
+        while len(data) < end:
+            data += sock.recv(4096)
+        if kind == PackageType.ROBOT_STATE:
+            return data[:end]
 
 
 # --- what goes wrong in the middle of a run
