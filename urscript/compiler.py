@@ -79,6 +79,9 @@ def _cost(block: Block) -> int:
             cost += 1 + max(_cost(body) for body in [*arms, statement.otherwise or ()])
         elif not isinstance(statement, (nodes.Function, nodes.Label)):
             cost += 1
+            value = getattr(statement, "value", None)
+            if isinstance(value, nodes.ListLiteral):
+                cost += len(value.items) // 16  # long lists take as long as many statements
     return cost
 
 

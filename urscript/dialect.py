@@ -30,6 +30,13 @@ STATEMENT_BUDGET: Final = 100_000
 """Statements a thread may run in one cycle (U). Exported programs run thousands of assignments at their
 start without a sync, so real budgets are at least 10^4 to 10^5 (O)."""
 
+PROGRAM_BUDGET: Final = 4
+"""All threads of a program together may run this many times STATEMENT_BUDGET in one cycle (U)."""
+
+LONGEST_STRING: Final = 65_536
+"""Characters of a string that `+` makes (U; str_cat and to_str end at 1023, D). Without an end, one that is
+added to itself fills the memory within thirty statements."""
+
 RECURSION_LIMIT: Final = 200
 """Depth at which a recursive function is stopped with a run-time error (U; no field script recurses)."""
 

@@ -29,6 +29,10 @@ def add(a: Any, b: Any) -> Any:
     if (ta is float or ta is int) and (tb is float or tb is int):
         return a + b
     if ta is str and tb is str:
+        if len(a) + len(b) > dialect.LONGEST_STRING:
+            raise ScriptRuntimeError(
+                f"a string of {len(a) + len(b)} characters, allowed are {dialect.LONGEST_STRING}"
+            )
         return a + b
     return _spread("+", add, a, b)
 

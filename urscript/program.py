@@ -17,6 +17,7 @@ from urscript.catalogue import CB3_3_15, Catalogue
 from urscript.compiler import compile_resolved
 from urscript.dialect import Dialect, dialect_for
 from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError
+from urscript.metering import Meter
 from urscript.parser import find_syntax_errors, parse
 from urscript.resolver import resolve
 from urscript.scopes import ResolvedProgram
@@ -53,7 +54,10 @@ def compile_program(
     dialect = dialect or dialect_for(catalogue.version)
     program, errors = _resolve(Source(_as_bytes(text), name), catalogue, dialect)
     if errors:
-        raise errors[0]
+        try:
+            raise errors[0]
+        finally:
+            del errors  # or the error's traceback and this frame would keep each other alive
     assert program is not None
     return _compile(program, catalogue, dialect)
 
@@ -185,10 +189,12 @@ class RunningProgram:
         self._host = host
         self._in_step = False
         self._kill_wanted = False
-        self._namespace = runtime.base_namespace(program.dialect)
+        self._namespace: dict[str, Any] = {}
+        meter = Meter(self._namespace)
+        self._namespace.update(runtime.base_namespace(program.dialect, meter))
         self._scheduler = Scheduler(self._namespace, program.dialect.statement_budget, host.thread_ended)
-        self._namespace.update(runtime.flow_namespace(self._scheduler, self._namespace))
-        self._namespace.update(runtime.builtin_namespace(program.builtins, program.catalogue, host))
+        self._namespace.update(runtime.flow_namespace(self._scheduler, self._namespace, meter))
+        self._namespace.update(runtime.builtin_namespace(program.builtins, program.catalogue, host, meter))
         self._namespace.update(program.constants)
         self._namespace.update(dict.fromkeys((f"g_{name}" for name in program.globals), UNDEFINED))
         exec(program.code, self._namespace)

@@ -24,6 +24,7 @@ from urscript.catalogue import Catalogue
 from urscript.dialect import Dialect
 from urscript.errors import ScriptBudgetError, ScriptRuntimeError, StackEntry
 from urscript.host import Handle, Host
+from urscript.metering import COSTS, HOST_COST, PURE_COST, START_COST, Meter
 from urscript.source import Source
 from urscript.threads import ProgramHalted, Scheduler, ScriptThread, join
 from urscript.values import Pose, a_type, log_form, type_name, wrap_int
@@ -101,8 +102,8 @@ _ARITHMETIC: Final = {
 }
 
 
-def base_namespace(dialect: Dialect) -> dict[str, Any]:
-    """The names that do not depend on the run: operators and values."""
+def base_namespace(dialect: Dialect, meter: Meter) -> dict[str, Any]:
+    """The names that do not depend on the host: operators and values."""
 
     def enter(thread: ScriptThread) -> ScriptThread:
         thread.depth += 1
@@ -117,13 +118,14 @@ def base_namespace(dialect: Dialect) -> dict[str, Any]:
     names = {**_COMMON, "_assign": assign, "_enter": enter, "_leave": leave}
     if not dialect.array_arithmetic:
         names |= {name: ops.without_arrays(sign, _COMMON[name]) for name, sign in _ARITHMETIC.items()}
-    return names
+    return names | meter.operations(names)
 
 
-def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any]) -> dict[str, Any]:
+def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any], meter: Meter) -> dict[str, Any]:
     """The names through which a program reaches its own scheduler."""
 
     def run(function: Callable[[], Any], name: str) -> ScriptThread:
+        meter.charge(START_COST)
         return scheduler.start(function, name, namespace["_T"])
 
     return {"_run": run, "_kill": scheduler.kill}
@@ -132,7 +134,7 @@ def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any]) -> dict[s
 # --- builtins ------------------------------------------------------------------------------------------
 
 
-def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host) -> dict[str, Any]:
+def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, meter: Meter) -> dict[str, Any]:
     """The builtins a program uses; those with effects get the check of their arguments in front."""
     offered = host.builtins()
     flow = _flow_builtins(host)
@@ -142,9 +144,11 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host) ->
     for name in names:
         function = flow.get(name) or offered.get(name)
         if function is not None:
-            bound[f"b_{name}"] = _checked(name, function, catalogue)
+            checked = _checked(name, function, catalogue)
+            bound[f"b_{name}"] = meter.function(checked, COSTS.get(name, HOST_COST), name)
         elif name in PURE:
-            bound[f"b_{name}"] = _without_thread(PURE[name])
+            pure = _without_thread(PURE[name])
+            bound[f"b_{name}"] = meter.function(pure, COSTS.get(name, PURE_COST), name)
         else:
             bound[f"b_{name}"] = _declared_only(name)
     return bound

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator
 from typing import Any, Final, cast
 
-from urscript.dialect import MAX_THREADS
+from urscript.dialect import MAX_THREADS, PROGRAM_BUDGET
 from urscript.errors import ScriptRuntimeError
 from urscript.values import a_type
 from urscript.waits import NEXT_CYCLE, Blocked, Wait
@@ -103,6 +103,7 @@ class Scheduler:
         """Args: the globals of the compiled program, statements per thread and cycle, a notice of ends."""
         self._namespace = namespace
         self._budget = budget
+        self._left = 0
         self._thread_ended = thread_ended
         self._count = 0
         self._some_finished = False
@@ -132,6 +133,7 @@ class Scheduler:
         """Run one control cycle; what a thread raises goes through."""
         threads = self.threads
         budget = self._budget
+        self._left = budget * PROGRAM_BUDGET
         for thread in threads:
             thread.slice_used = False
             thread.budget = budget
@@ -171,22 +173,23 @@ class Scheduler:
     def _resume(self, thread: ScriptThread) -> None:
         namespace = self._namespace
         namespace["_T"] = thread
-        namespace["_b"] = thread.budget
+        namespace["_b"] = budget = min(thread.budget, self._left)
         proceed = thread.body.send
         try:
             while True:
                 wait = proceed(None)
                 if wait is NEXT_CYCLE:
                     thread.slice_used = True
-                    return
+                    break
                 if not wait.ready():
                     thread.wait = wait
                     thread.budget = cast(int, namespace["_b"])
-                    return
+                    break
         except StopIteration:
             self._end(thread)
         except ThreadKilled:
             self._end(thread)
+        self._left -= budget - cast(int, namespace["_b"])
 
     def _end(self, thread: ScriptThread) -> None:
         thread.finished = True
