@@ -23,7 +23,8 @@ from motion_support import (
     tool_velocities,
 )
 
-from ur_emulator.controller.events import ErrorReported
+from protocol.ur_types import SafetyMode
+from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.controller.safety import find_invalid_setpoint
 from ur_emulator.motion.leg import move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
@@ -268,3 +269,59 @@ def test_chains_of_the_tool_keep_to_their_path_and_limits(waypoints, v, process)
     for point in points[off_path]:
         assert any(math.dist(point, leg.goal_pose[:3]) <= leg.r + 1e-6 for leg in legs[:-1])
     assert TOOL.pose(targets[-1].q) == pytest.approx(legs[-1].goal_pose, abs=1e-9)
+
+
+# --- what a chain may meet
+
+
+def test_the_waypoint_is_that_of_the_move_under_way_also_when_more_are_known():
+    corners = [at(0.004 * k, 0.0, 0.0) for k in range(1, 25)]
+    move = Move(straight(corners[0], r=0.0015)(HOME, START))
+    rest = corners[1:]
+    target, seen, ahead = JointTarget(HOME), [], 0
+    while not move.done:
+        while rest and move.open and not move.done:
+            r = 0.0015 if len(rest) > 1 else 0.0
+            assert (
+                move.follow(straight(rest.pop(0), r=r)(move.leg.goal, move.leg.goal_pose)) is Follow.BLENDED
+            )
+            ahead = max(ahead, len(corners) - len(rest) - len(seen))
+        target = move.step(target, DT, 1.0)
+        if not seen or move.goal != seen[-1]:
+            seen.append(move.goal)
+    assert ahead > 3
+    goals = [TOOL.joints(p, HOME) for p in corners]
+    order = [np.abs(np.subtract(goals, q)).max(axis=1).argmin() for q in seen]
+    assert order == sorted(set(order))
+    assert order[-1] == len(corners) - 1
+
+
+@pytest.mark.parametrize("first", ["movej", "movel"])
+@pytest.mark.parametrize(
+    "second", ["movel(pose_add(p0,p[2,0,0,0,0,0]))", "movec(p0,pose_add(p0,p[0,3,0,0,0,0]))"]
+)
+def test_a_way_out_of_reach_behind_a_blend_is_a_protective_stop_and_no_more(first, second):
+    bench = Bench(fidelity="ideal")
+    bench.run("movej(p[0.25,-0.25,0.25,2.2,-2.2,0], a=8, v=3)\n")
+    bench.events.clear()
+    bench.start(
+        f"def f():\n  p0 = get_target_tcp_pose()\n  {first}(pose_add(p0,p[0.05,0,0,0,0,0]), r=0.02)\n  {second}\nend\n"
+    )
+    bench.tick(1000)
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert [e.code for e in bench.events if isinstance(e, ErrorReported)] == [204]
+    assert not [e for e in bench.events if isinstance(e, ScriptFailed)]
+
+
+def test_another_tool_does_not_join_a_chain():
+    bench = Bench(fidelity="ideal")
+    bench.run("movej(p[0.25,-0.25,0.25,2.2,-2.2,0], a=8, v=3)\n")
+    bench.snapshots.clear()
+    bench.run(
+        "def f():\n  p0 = get_target_tcp_pose()\n  movel(pose_add(p0,p[0.05,0,0,0,0,0]), r=0.02)\n"
+        "  set_tcp(p[0,0.05,0.05,0,0,0])\n  movel(pose_add(get_target_tcp_pose(),p[0,0.05,0,0,0,0]))\nend\n"
+    )
+    qd = np.array([s.target_qd for s in bench.snapshots])
+    assert np.abs(np.diff(qd, axis=0)).max() / DT < 20.0
+    still = np.nonzero(np.abs(qd).max(axis=1) == 0.0)[0]
+    assert any(20 < k < len(qd) - 40 for k in still)  # at rest at the waypoint
