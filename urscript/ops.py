@@ -186,8 +186,8 @@ def equal(a: Any, b: Any) -> bool:
     ta, tb = type(a), type(b)
     if ta is tb:
         if ta is list or ta is Pose:
-            # Not Python's own comparison: that takes True for 1, and a NaN for equal to itself.
-            return len(a) == len(b) and all(map(equal, a, b))
+            # Python's own comparison takes True for 1, and a NaN for equal to itself.
+            return a == b and all(map(equal, a, b))
         return bool(a == b)
     if ta is bool or tb is bool:
         return False
