@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -67,10 +68,12 @@ def serve(
 ) -> None:
     """Serve a control box, or several, powered on with the brakes released, until Ctrl-C."""
     from ur_emulator.descriptor_limit import raise_descriptor_limit
+
+    raise_descriptor_limit()
+    os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is drawn: no need to look for a display
     from ur_emulator.emulator import ControlBox
     from ur_emulator.errors import EmulatorError
 
-    raise_descriptor_limit()
     try:
         rack = ControlBox.many(
             boxes,

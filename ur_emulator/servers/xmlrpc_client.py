@@ -5,25 +5,17 @@ The worker owns the connection; a result reaches the loop only through its call 
 
 from __future__ import annotations
 
-import contextlib
-import http.client
 import queue
-import socket
 import threading
-import xmlrpc.client
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
-from urllib.parse import urlsplit
-from xml.parsers.expat import ExpatError
+from typing import TYPE_CHECKING, Any
 
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.network import RemoteCallError
 
-# A server that cannot be reached fails the call after this [s]; an answer may take any time.
-CONNECT_TIMEOUT = 5.0
-# Path of a URL without one, as the standard library's clients have it.
-DEFAULT_PATH = "/RPC2"
+if TYPE_CHECKING:
+    from ur_emulator.servers.xmlrpc_transport import XmlRpcTransport
 
 
 class XmlRpcCall:
@@ -66,57 +58,14 @@ class XmlRpcServer:
             self._worker = None
 
 
-class _Connection(http.client.HTTPConnection):
-    """A connection that waits for answers without limit."""
-
-    def __init__(self, host: str, is_stopped: Callable[[], bool]) -> None:
-        super().__init__(host, timeout=CONNECT_TIMEOUT)
-        self._is_stopped = is_stopped
-
-    def connect(self) -> None:
-        super().connect()
-        self.sock.settimeout(None)
-        if self._is_stopped():  # before there was a socket to break off
-            raise OSError("the connection was closed")
-
-
-class _Transport(xmlrpc.client.Transport):
-    """Keeps its connection where another thread can break it off."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.connection: _Connection | None = None
-        self.is_stopped = False
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        if self.is_stopped:
-            raise OSError("the connection was closed")
-        if self.connection is None:
-            self.connection = _Connection(host, lambda: self.is_stopped)
-        return self.connection
-
-    def close(self) -> None:
-        connection, self.connection = self.connection, None
-        if connection is not None:
-            connection.close()
-
-    def abort(self) -> None:
-        """Break the connection off, from any thread."""
-        self.is_stopped = True
-        connection = self.connection
-        sock = None if connection is None else connection.sock
-        if sock is not None:
-            with contextlib.suppress(OSError):
-                sock.shutdown(socket.SHUT_RDWR)
-
-
 class _Worker:
     """Makes the calls of one handle, one after the other."""
 
     def __init__(self, loop: EventLoop, url: str) -> None:
         self._loop = loop
         self._url = url
-        self._transport = _Transport()
+        self._transport: XmlRpcTransport | None = None
+        self._is_stopped = False
         self._jobs: queue.SimpleQueue[tuple[XmlRpcCall, str, tuple[Any, ...]] | None] = queue.SimpleQueue()
         threading.Thread(target=self._run, name="script-xmlrpc", daemon=True).start()
 
@@ -128,30 +77,19 @@ class _Worker:
 
     def stop(self) -> None:
         """Let the thread end, soon."""
+        self._is_stopped = True
         self._jobs.put(None)
-        self._transport.abort()
+        if self._transport is not None:
+            self._transport.abort()
 
     def _run(self) -> None:
+        from ur_emulator.servers.xmlrpc_transport import XmlRpcTransport
+
+        self._transport = transport = XmlRpcTransport(self._url)
+        if self._is_stopped:  # before there was a transport to break off
+            transport.abort()
         while (job := self._jobs.get()) is not None:
             call, method, arguments = job
-            value, error = self._call(method, arguments)
+            value, error = transport.call(method, arguments)
             self._loop.call_soon_threadsafe(partial(call.finish, value, error))
-        self._transport.close()
-
-    def _call(self, method: str, arguments: tuple[Any, ...]) -> tuple[Any, str]:
-        """Return the result and an empty text, or why there is none."""
-        try:
-            url = urlsplit(self._url)
-            if url.scheme != "http" or not url.netloc:
-                return None, f"{self._url} is no address, write http://host:port/path"
-            body = xmlrpc.client.dumps(arguments, method).encode()
-            values = self._transport.request(url.netloc, url.path or DEFAULT_PATH, body)
-        except xmlrpc.client.Fault as fault:
-            return None, fault.faultString
-        except xmlrpc.client.ProtocolError as problem:
-            return None, f"the server answered {problem.errcode} {problem.errmsg}"
-        except OSError as problem:
-            return None, f"{self._url} does not answer: {problem.strerror or problem}"
-        except (http.client.HTTPException, xmlrpc.client.Error, ExpatError, ValueError, TypeError) as problem:
-            return None, f"the answer makes no sense: {problem}"
-        return (values[0] if len(values) == 1 else list(values)), ""
+        transport.close()
