@@ -9,7 +9,6 @@ from box_support import Bench
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
-from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 
@@ -80,7 +79,9 @@ def test_when_a_program_is_stopped_the_arm_ramps_to_rest(bench):
     states = []
     bench.tick(1, cmd.StopProgram())
     while bench.now.target_qd[0] > 0:
-        assert before - bench.now.target_qd[0] <= PROGRAM_END_DECELERATION * 0.008 * (1 + 1e-9)
+        assert before - bench.now.target_qd[0] <= bench.controller.state.robot.stop_deceleration * 0.008 * (
+            1 + 1e-9
+        )
         before = bench.now.target_qd[0]
         states.append(bench.now.runtime_state)
         bench.tick()

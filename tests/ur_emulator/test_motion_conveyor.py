@@ -52,7 +52,7 @@ def linear(motion, speed, direction=(0.0, 1.0, 0.0), density=1000.0, **kwargs):
 @pytest.mark.parametrize("range_id", [0, 1, 2])
 @pytest.mark.parametrize("speed", [0.08, -0.05])
 def test_a_move_on_a_running_belt_is_a_move_in_the_frame_of_the_belt(speed, range_id):
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     belt = linear(motion, speed, range_id=range_id)
     for _ in range(150):
         belt.step()
@@ -67,7 +67,7 @@ def test_a_move_on_a_running_belt_is_a_move_in_the_frame_of_the_belt(speed, rang
 @settings(max_examples=15, deadline=None)
 @given(st.floats(-0.15, 0.15), st.sampled_from([200.0, 1000.0, 20000.0]))
 def test_the_arm_catches_up_with_bounded_acceleration_and_without_a_jump(speed, density):
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     belt = linear(motion, speed, density=density)
     start = np.array(TOOL.pose(HOME)[:3])
     carried = np.array([(TOOL.pose(belt.step().q)[:3] - start)[1] for _ in range(110)])
@@ -78,7 +78,7 @@ def test_the_arm_catches_up_with_bounded_acceleration_and_without_a_jump(speed, 
 
 
 def test_targets_of_a_carried_arm_are_consistent():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     belt = linear(motion, 0.1)
     targets = [belt.step() for _ in range(120)]
     q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
@@ -88,7 +88,7 @@ def test_targets_of_a_carried_arm_are_consistent():
 
 @pytest.mark.parametrize("rotate_tool", [False, True])
 def test_a_turning_conveyor_carries_the_tool_around_its_axis(rotate_tool):
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     centre = (START[0] - 0.05, START[1] - 0.1, 0.0, 0.0, 0.0, 0.4)
     per_turn = 5000.0
     belt = Belt(
@@ -107,7 +107,7 @@ def test_a_turning_conveyor_carries_the_tool_around_its_axis(rotate_tool):
 
 
 def test_a_pause_stands_still_and_catches_up_afterwards():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     belt = linear(motion, 0.05, range_id=1)
     targets = [belt.step() for _ in range(100)]
     motion.pause()

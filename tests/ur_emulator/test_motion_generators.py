@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, ArmMotion
+from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import SpeedJ, StopJ
 from ur_emulator.motion.leg import move_j
 from ur_emulator.motion.move import Move
@@ -94,7 +94,7 @@ def test_speed_slider_stretches_time_on_the_path():
 
 
 def test_only_the_owner_moves_the_arm_until_it_rests():
-    motion = ArmMotion(ZERO6)
+    motion = ArmMotion(ZERO6, 20.0)
     first, second = object(), object()
     motion.command(first, SpeedJ((0.1,) * 6, 10.0))
     with pytest.raises(OwnershipError):
@@ -105,7 +105,7 @@ def test_only_the_owner_moves_the_arm_until_it_rests():
 
 
 def test_a_velocity_lives_only_while_it_is_renewed():
-    motion = ArmMotion(ZERO6)
+    motion = ArmMotion(ZERO6, 20.0)
     owner = object()
     for _ in range(20):
         motion.command(owner, SpeedJ((0.2,) * 6, 5.0))
@@ -119,7 +119,7 @@ def test_a_velocity_lives_only_while_it_is_renewed():
 
 
 def test_the_end_of_the_owner_stops_the_arm_with_a_ramp():
-    motion = ArmMotion(ZERO6)
+    motion = ArmMotion(ZERO6, 20.0)
     owner = object()
     for _ in range(50):
         motion.command(owner, SpeedJ((1.0,) * 6, 5.0))
@@ -127,6 +127,6 @@ def test_the_end_of_the_owner_stops_the_arm_with_a_ramp():
     motion.release(owner)
     speeds = [motion.step(DT, 1.0).qd[0] for _ in range(20)]
     drops = [a - b for a, b in itertools.pairwise([1.0, *speeds])]
-    assert max(drops) <= PROGRAM_END_DECELERATION * DT * (1 + 1e-9)
+    assert max(drops) <= 20.0 * DT * (1 + 1e-9)
     assert speeds[-1] == 0.0
     assert not motion.is_moving

@@ -31,7 +31,7 @@ def ride(motion, n):
 
 
 def test_without_overlays_target_and_path_are_one_object():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     motion.command("me", Move(line(START, at(0.05, 0, 0))))
     for _ in range(100):
         motion.step(DT, 1.0)
@@ -39,7 +39,7 @@ def test_without_overlays_target_and_path_are_one_object():
 
 
 def test_a_move_under_an_overlay_is_displaced_and_the_path_is_not():
-    plain, displaced = ArmMotion(HOME), ArmMotion(HOME)
+    plain, displaced = ArmMotion(HOME, 20.0), ArmMotion(HOME, 20.0)
     swing = Swing()
     displaced.add_overlay(swing)
     for motion in (plain, displaced):
@@ -54,7 +54,7 @@ def test_a_move_under_an_overlay_is_displaced_and_the_path_is_not():
 
 
 def test_speeds_of_a_displaced_target_are_those_of_its_positions():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     motion.add_overlay(Swing(rate=4.0))
     targets = ride(motion, 200)
     q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
@@ -63,7 +63,7 @@ def test_speeds_of_a_displaced_target_are_those_of_its_positions():
 
 
 def test_overlays_act_one_after_the_other():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     swings = Swing(), Swing(reach=0.01, rate=3.0)
     for swing in swings:
         motion.add_overlay(swing)
@@ -73,7 +73,7 @@ def test_overlays_act_one_after_the_other():
 
 
 def test_removal_lets_the_path_go_on_from_where_the_arm_is_and_ramps_it_to_rest():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     swing = Swing()
     motion.add_overlay(swing)
     assert motion.is_moving
@@ -90,7 +90,7 @@ def test_removal_lets_the_path_go_on_from_where_the_arm_is_and_ramps_it_to_rest(
 
 
 def test_a_move_under_way_keeps_the_displacement_of_a_removed_overlay_to_its_end():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     swing = Swing()
     motion.add_overlay(swing)
     motion.command("me", move := Move(line(START, at(0.05, 0, 0))))
@@ -110,7 +110,7 @@ def test_a_move_under_way_keeps_the_displacement_of_a_removed_overlay_to_its_end
 
 
 def test_a_stream_goes_on_from_the_displaced_target():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     swing = Swing()
     motion.add_overlay(swing)
     motion.command("me", SpeedJ((0.1,) * 6, 2.0))
@@ -126,7 +126,7 @@ def test_a_stream_goes_on_from_the_displaced_target():
 
 @pytest.mark.parametrize("end", ["stop", "place"])
 def test_stops_end_all_overlays(end):
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     motion.add_overlay(Swing())
     ride(motion, 40)
     if end == "stop":
@@ -142,7 +142,7 @@ def test_stops_end_all_overlays(end):
 
 def test_a_changed_tool_does_not_make_the_arm_jump():
     swing = Swing()
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     motion.add_overlay(swing)
     ride(motion, 50)
     before = TOOL.pose(motion.target.q)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motion_support import DT, HOME, START, TOOL, at, distance_to_polyline, line, positions
 
-from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, ArmMotion
+from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import PAUSE_DECELERATION, SpeedJ
 from ur_emulator.motion.leg import move_j, move_tool
 from ur_emulator.motion.move import Move
@@ -39,7 +39,7 @@ def corner():
 
 def travel(make, pauses=(), limit=5000):
     """All targets of a move, paused at some cycles for some cycles; and the arm."""
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     move, legs = make()
     motion.command("me", move)
     changes = {}
@@ -80,7 +80,7 @@ def test_with_and_without_pauses_the_path_is_the_same(make, pauses):
 
 
 def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_asked_for():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     motion.command("me", straight()[0])
     for _ in range(20):
         motion.step(DT, 1.0)
@@ -104,7 +104,7 @@ def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_as
 
 @pytest.mark.parametrize("stream", [SpeedJ((0.5,) * 6, 2.0), ServoJ((0.5, *HOME[1:]), 0.1, 300.0)])
 def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(stream):
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     motion.command("me", stream)
     for _ in range(40):
         motion.renew()
@@ -130,7 +130,7 @@ def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(stream):
 
 
 def test_a_stream_that_nobody_renews_after_the_pause_stays_at_rest():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     motion.command("me", SpeedJ((0.5,) * 6, 2.0))
     for _ in range(20):
         motion.renew()
@@ -148,13 +148,13 @@ def test_a_stream_that_nobody_renews_after_the_pause_stays_at_rest():
 
 @pytest.mark.parametrize("pushed", [False, True])
 def test_an_interrupted_move_goes_back_to_its_path_and_on_to_its_goal(pushed):
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     move, _ = straight()
     motion.command("me", move)
     for _ in range(20):
         motion.step(DT, 1.0)
     left_at = motion.path.q
-    motion.interrupt(PROGRAM_END_DECELERATION)
+    motion.interrupt(20.0)
     while not motion.is_paused:
         motion.step(DT, 1.0)
     assert motion.target.q != left_at
@@ -177,7 +177,7 @@ def test_an_interrupted_move_goes_back_to_its_path_and_on_to_its_goal(pushed):
 
 
 def test_a_move_that_was_not_accepted_is_taken_back():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     move, _ = straight()
     motion.command("me", move)
     for _ in range(20):
@@ -198,7 +198,7 @@ def test_a_move_that_was_not_accepted_is_taken_back():
 
 @pytest.mark.parametrize("end", ["stop", "release"])
 def test_a_program_that_ends_in_a_pause_leaves_nothing_behind(end):
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     move, _ = straight()
     motion.command("me", move)
     for _ in range(20):
@@ -228,7 +228,7 @@ class Lift:
 
 
 def test_overlays_stand_still_in_a_pause():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     lift = Lift()
     motion.add_overlay(lift)
     targets = [motion.step(DT, 1.0) for _ in range(60)]
@@ -246,7 +246,7 @@ def test_overlays_stand_still_in_a_pause():
 
 
 def test_a_stream_under_an_overlay_comes_to_rest_without_a_jump():
-    motion = ArmMotion(HOME)
+    motion = ArmMotion(HOME, 20.0)
     motion.add_overlay(Lift())
     motion.command("me", SpeedJ((1.5, 0, 0, 0, 0, 0), 4.0))
     for _ in range(60):

@@ -68,7 +68,7 @@ def test_servoj_is_slowed_down_by_the_speed_slider():
 
 
 def test_a_servoj_that_is_not_renewed_stops():
-    motion = ArmMotion(ZERO6)
+    motion = ArmMotion(ZERO6, 20.0)
     owner = object()
     for _ in range(10):
         motion.command(owner, ServoJ((0.5,) * 6, 0.1, 300))

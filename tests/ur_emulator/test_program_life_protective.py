@@ -16,7 +16,6 @@ from ur_emulator.controller.events import (
     SafetyModeChanged,
     ScriptFailed,
 )
-from ur_emulator.controller.safety import PROTECTIVE_STOP_DECELERATION
 
 GOAL = [0.9, -1.6, -1.9, -0.2, 1.2, 1.6]
 MOVE = f'def m():\n  movej({GOAL}, a=1.4, v=1.0)\n  textmsg("there")\nend\n'
@@ -49,7 +48,9 @@ def test_the_program_is_paused_and_the_arm_rests(stopped):
     assert stopped.now.robot_mode == RobotMode.RUNNING
     assert at_rest(stopped)
     speeds = np.array([s.target_qd for s in stopped.snapshots])
-    assert np.abs(np.diff(speeds, axis=0)).max() <= PROTECTIVE_STOP_DECELERATION * 0.008 * (1 + 1e-9)
+    assert np.abs(
+        np.diff(speeds, axis=0)
+    ).max() <= stopped.controller.state.robot.stop_deceleration * 0.008 * (1 + 1e-9)
     assert [type(e) for e in stopped.events if not type(e).__name__.startswith("Text")] == [
         ProgramStarted,
         ErrorReported,

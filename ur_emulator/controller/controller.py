@@ -26,7 +26,6 @@ from ur_emulator.controller.port_map import write_range
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (
-    PROTECTIVE_STOP_DECELERATION,
     UNLOCK_DELAY,
     UNREACHABLE_PATH,
     Violation,
@@ -40,7 +39,7 @@ from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
-from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION, ArmMotion
+from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import UnreachableError
 from ur_emulator.plant.plant import Plant
@@ -50,8 +49,9 @@ from urscript import CompiledProgram
 
 # After the last activity the arm gets this many cycles to come to rest before time may stand still (0.2 s).
 SETTLE_CYCLES = 25
-# A protective stop can be unlocked after a while; time must not stand still before that.
-UNLOCK_CYCLES = round(UNLOCK_DELAY * 1_000_000 / PERIOD_US)
+# A protective stop can be unlocked after a while; time must not stand still before that. Two cycles more: the
+# one in which it happens counts, and the delay must have passed, not be about to.
+UNLOCK_CYCLES = round(UNLOCK_DELAY * 1_000_000 / PERIOD_US) + 2
 
 
 class Controller:
@@ -88,7 +88,7 @@ class Controller:
             arm=arm,
             period_s=self.period_s,
             seed=seed,
-            motion=ArmMotion(q),
+            motion=ArmMotion(q, robot.stop_deceleration),
             mode=RobotModeMachine(mode, self.period_s),
             tick=BOOT_TICK,
         )
@@ -305,7 +305,7 @@ class Controller:
         self._settle = UNLOCK_CYCLES
         state.events.append(violation.error)
         state.events.append(SafetyModeChanged(int(state.safety.mode)))
-        self.programs.interrupt(PROTECTIVE_STOP_DECELERATION)
+        self.programs.interrupt(state.robot.stop_deceleration)
         if violation.blocked:
             state.motion.place(actual_q)
             self.plant.rest_trim()
@@ -319,7 +319,7 @@ class Controller:
 
     def _hold_here(self) -> None:
         """Drop the target: the brakes hold the arm where it is."""
-        self.state.motion.stop(PROGRAM_END_DECELERATION)
+        self.state.motion.stop(self.state.robot.stop_deceleration)
         self.state.motion.place(self.state.snapshot.actual_q)
 
 

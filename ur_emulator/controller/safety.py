@@ -25,9 +25,6 @@ MAX_SATURATION_TIME = 0.1
 UNLOCK_DELAY = 5.0
 # A target above the rated joint speed by more than rounding is an invalid set-point.
 SPEED_TOLERANCE = 1.0 + 1e-6
-# Deceleration of the leading axis in a protective stop [rad/s^2]; mean of UR's stop category 0 tests,
-# UR3/CB3 manual 3.10.
-PROTECTIVE_STOP_DECELERATION = 20.0
 
 # Safety modes in which the arm may move.
 MOVING_MODES = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY})
@@ -64,7 +61,7 @@ def find_invalid_setpoint(
         target: set-point at the end of this one.
         period_s: control cycle [s].
     """
-    braking_time = max(map(abs, target.qd)) / (2.0 * PROTECTIVE_STOP_DECELERATION)
+    braking_time = max(map(abs, target.qd)) / (2.0 * robot.stop_deceleration)
     for i, (q_before, q, qd, limit, low, high) in enumerate(
         zip(before.q, target.q, target.qd, robot.qd_max, robot.q_min, robot.q_max, strict=True)
     ):

@@ -13,22 +13,23 @@ from ur_emulator.motion.pause import Detour
 from ur_emulator.motion.speed_l import StopL
 from ur_emulator.motion.target import ZERO6, JointTarget
 
-# Deceleration of the leading axis when a program ends, is replaced or killed while the arm moves. Users
-# call the real one "abrupt"; the number is not published. Chosen: the mean of UR's stop category 0 tests on
-# the base joint (183 deg/s in 159 ms, UR3/CB3 manual 3.10, appendix "stopping time").
-PROGRAM_END_DECELERATION = 20.0  # rad/s^2
-
 
 class ArmMotion(PathMotion):
     """The motion state of the arm.
 
+    When a program ends, is replaced or killed while the arm moves, the leading axis brakes with
+    `stop_deceleration`. Users call the real stop "abrupt"; its number is not published. Chosen: that of the
+    maker's tests of stop category 0, which the model of the arm holds.
+
     Attributes:
+        stop_deceleration: of the leading axis [rad/s^2].
         path: target along the path of the program; what generators see.
         target: what the joints get; the same object as `path` unless overlays displace it.
     """
 
-    def __init__(self, q: Vector6) -> None:
+    def __init__(self, q: Vector6, stop_deceleration: float) -> None:
         super().__init__(q)
+        self.stop_deceleration = stop_deceleration
         self.target = self.path
         self._chain = OverlayChain()
         self._overlays = self._chain.overlays
@@ -56,7 +57,7 @@ class ArmMotion(PathMotion):
             if move is not None and move.left:
                 self._owner = None
             else:
-                self.stop(PROGRAM_END_DECELERATION)
+                self.stop(self.stop_deceleration)
 
     def stop(self, deceleration: float) -> None:
         """Take the arm from whoever has it and ramp it to rest, leading axis at `deceleration` [rad/s^2].
@@ -82,7 +83,7 @@ class ArmMotion(PathMotion):
         self._chain.clear()
         self.path = self.target = JointTarget(q, qd)
         if any(qd):
-            self._generator = StopJ(PROGRAM_END_DECELERATION)
+            self._generator = StopJ(self.stop_deceleration)
 
     def retract(self, target: JointTarget) -> None:
         """Take back the last step: `target` is the one from before it."""
@@ -131,7 +132,7 @@ class ArmMotion(PathMotion):
             if self._chain.only_frozen and self._move is None:
                 self._take_over_target()
                 if self._generator is HOLD and any(self.path.qd):
-                    self._generator = StopJ(PROGRAM_END_DECELERATION)
+                    self._generator = StopJ(self.stop_deceleration)
 
     def _may_settle(self) -> bool:
         """True when no overlay acts any more, no move is on a displaced path nor has only just ended."""

@@ -10,7 +10,6 @@ from protocol.primary_messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import Vector6
-from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION
 from ur_emulator.motion.generators import StopJ
 from ur_emulator.motion.leg import Leg, move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
@@ -74,7 +73,7 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
             while not move.done:
                 yield NEXT_CYCLE
         if any(motion.path.qd):  # a move begins at rest, also after a program that was replaced in motion
-            take_arm(state, thread, stop := StopJ(PROGRAM_END_DECELERATION))
+            take_arm(state, thread, stop := StopJ(motion.stop_deceleration))
             while not stop.done:
                 yield NEXT_CYCLE
         start = motion.path.q

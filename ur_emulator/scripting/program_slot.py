@@ -11,7 +11,6 @@ from ur_emulator.controller.events import (
     ScriptFailed,
 )
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.motion.arm_motion import PROGRAM_END_DECELERATION
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.robot_host import RobotHost
 from urscript import CompiledProgram, ProgramStatus, RunningProgram
@@ -106,7 +105,7 @@ class ProgramSlot:
         if self._primary is not None:
             self._primary.kill()
             self._end()
-        self._state.motion.stop(PROGRAM_END_DECELERATION)
+        self._state.motion.stop(self._state.robot.stop_deceleration)
 
     def pause(self) -> None:
         """Let the primary program stand still, and the arm come to rest on its path."""
