@@ -15,10 +15,9 @@ from urscript.source import BLANKS, Span
 
 
 def _span(item: Any) -> Span:
-    """The place of a token or node."""
-    if isinstance(item, nodes.Node):
-        return item.span
-    return Span(item.line, item.column, item.end_line, item.end_column)
+    """The place of a node or token; lark's own tokens, in texts with errors, spell it out."""
+    span: Span | None = getattr(item, "span", None)
+    return span or Span(item.line, item.column, item.end_line, item.end_column)
 
 
 def _cover(items: list[Any]) -> Span:

@@ -40,6 +40,9 @@ ALL_ROWS: tuple[Builtin, ...] = (
 )
 
 
+_MOST_SHAPES = 10_000
+
+
 class Catalogue:
     """The builtins of one software version.
 
@@ -66,6 +69,7 @@ class Catalogue:
         self.variables: Mapping[str, ModuleVariable] = {item.name: item for item in VARIABLES}
         self.arrays: Mapping[str, BuiltinArray] = {item.name: item for item in ARRAYS}
         self.methods: Mapping[str, frozenset[str]] = methods_of(version)
+        self._slots: dict[tuple[str, int, tuple[str, ...]], list[Slot]] = {}
         self._checks = {name: compile_check(row) for name, row in self._by_name.items()}
 
     def lookup(self, name: str) -> Builtin | None:
@@ -97,12 +101,19 @@ class Catalogue:
         return by_lower_case[matches[0]] if matches else None
 
     def static_bind(self, name: str, n_positional: int, keyword_names: Sequence[str] = ()) -> list[Slot]:
-        """Where the value of each parameter comes from in a call of this shape.
+        """Where the value of each parameter comes from in a call of this shape; nobody may change the list.
 
         Raises:
             ScriptTypeError: the call does not fit the signature.
         """
-        return static_bind(self._by_name[name], n_positional, keyword_names)
+        shape = name, n_positional, tuple(keyword_names)
+        slots = self._slots.get(shape)
+        if slots is None:
+            # A program has few shapes, the catalogue is for all programs: do not let it grow for ever.
+            if len(self._slots) > _MOST_SHAPES:
+                self._slots.clear()
+            slots = self._slots[shape] = static_bind(self._by_name[name], n_positional, keyword_names)
+        return slots
 
     def bind(
         self, name: str, args: Sequence[Any], kwargs: Mapping[str, Any] | None = None
