@@ -74,9 +74,9 @@ def _arm(number):
     return f"        elif command == CMD_SMALL_{number}:\n            float_out(0, small_{number}(float_in(0), b=float_in(1)))\n"
 
 
-def driver_text():
-    """The whole script; more than 1,200 lines."""
-    numbers = range(FIRST_SMALL, FIRST_SMALL + SMALL_COMMANDS)
+def driver_text(small_commands=SMALL_COMMANDS):
+    """The whole script; more than 1,200 lines with all its small commands."""
+    numbers = range(FIRST_SMALL, FIRST_SMALL + small_commands)
     names = CONSTANTS | {f"CMD_{name}": number for name, number in COMMANDS.items()}
     names |= {f"CMD_SMALL_{number}": number for number in numbers}
     text = (PROGRAMS / "driver_control.template").read_text()
