@@ -327,6 +327,16 @@ def test_a_vision_program_picks_what_the_camera_sees():
     assert nearest(box, 0.28, -0.23, 0.15) < 1e-6
 
 
+def test_the_force_program_of_the_examples_presses_on_the_table():
+    box = Box(fidelity="typical")
+    box.send(program("press_on_table.script"))
+    assert box.finish() == ["contact: True", "pressed: True"]
+    assert_clean(box)
+    lowest = tool_path(box)[:, 2].min()
+    assert -0.03 < lowest < -0.018, "the table lies 20 mm below the base"
+    assert box.now.target_tcp_pose[:3] == pytest.approx((0.25, -0.25, 0.06), abs=1e-6)
+
+
 # --- lines -------------------------------------------------------------------------------------------------
 
 SPELLINGS = {
