@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -45,7 +46,11 @@ _ACCELERATION = np.repeat([5.0, 20.0], 3)
 # Least compliance to reckon with, in stretched poses [m/N, rad/Nm].
 _STIFFEST = (5e-6, 2e-4)
 # Deviations of stiff axes below this are the arm's own [m, rad]; tighter limits count as these.
-LEAST_DEVIATION = (0.002, 0.01)
+_LEAST_DEVIATION = np.repeat([0.002, 0.01], 3)
+# No joint moves a tool further than this per radian [m/rad, rad/rad].
+_LONGEST_LEVER = 2.0
+# Cycles for which the gains at a pose hold: the tool has gone a few millimetres.
+_GAIN_CYCLES = 8
 
 
 class Felt(NamedTuple):
@@ -123,15 +128,25 @@ class ForceMode:
         self._wrench = np.array(felt.wrench)
         self._twist = np.array(felt.twist)
         self._path_pose: Pose | None = None
+        self._gain = np.zeros(6)
+        self._gain_age = 0
+        self._settings: ForceSettings | None = None
         self.set(frame, settings)
 
     def set(self, frame: TaskFrame, settings: ForceSettings) -> None:
         """Go on with another frame and other settings, without a jump."""
         self.frame = frame
+        if settings == self._settings:
+            return
         self._settings = settings
+        self._rate = settings.gain_scaling * FORCE_RATE
+        self._maintained = 1.0 - settings.damping
         self._chosen = np.array(settings.selection)
         self._asked = np.array(settings.wrench)
         self._limits = np.array(settings.limits)
+        self._gain_age = 0
+        stiff = np.maximum(self._limits, _LEAST_DEVIATION)[~self._chosen]
+        self._tightest = float(stiff.min()) if stiff.size else inf
 
     def displace(self, tool_pose: Pose, path: JointTarget, dt: float) -> Pose:
         """See Overlay."""
@@ -165,10 +180,10 @@ class ForceMode:
             q: joint angles (6,) [rad].
             position_error: of the joints (6,) [rad].
         """
-        if self.frame.axes is None:
+        if self.frame.axes is None or _LONGEST_LEVER * sum(map(abs, position_error)) < self._tightest:
             return None
         off = np.abs(_both(self.frame.axes).T @ self.tool.twist(q, position_error))
-        limits = np.maximum(self._limits, np.repeat(LEAST_DEVIATION, 3))
+        limits = np.maximum(self._limits, _LEAST_DEVIATION)
         beyond = np.flatnonzero(~self._chosen & (off > limits))
         if not beyond.size:
             return None
@@ -177,13 +192,15 @@ class ForceMode:
 
     def _axis_speeds(self, turn: NDArray[np.float64], q: Sequence[float], dt: float) -> NDArray[np.float64]:
         """Return the speeds along the axes of the task frame at the end of this cycle."""
-        settings = self._settings
-        gain = settings.gain_scaling * FORCE_RATE * self._compliance(turn, q)
+        if self._gain_age == 0:
+            self._gain = self._rate * self._compliance(turn, q)
+        self._gain_age = (self._gain_age + 1) % _GAIN_CYCLES
+        gain = self._gain
         missing = self._asked + turn.T @ self._wrench
         actual = turn.T @ self._twist
         idle = gain * _IDLE_WRENCH
         maintained = np.sign(actual) * np.maximum(np.abs(actual) - idle, 0.0)
-        wanted = (1.0 - settings.damping) * maintained + gain * missing
+        wanted = self._maintained * maintained + gain * missing
         before = turn.T @ self._speed
         wanted = np.clip(wanted, before - _ACCELERATION * dt, before + _ACCELERATION * dt)
         return np.where(self._chosen, np.clip(wanted, -self._limits, self._limits), 0.0)
@@ -197,7 +214,8 @@ class ForceMode:
             chosen = np.flatnonzero(self._chosen[part])
             if chosen.size:
                 block = compliance[part, part][np.ix_(chosen, chosen)]
-                values[part] = max(float(np.linalg.eigvalsh(block)[0]), stiffest)
+                least = block[0, 0] if chosen.size == 1 else np.linalg.eigvalsh(block)[0]
+                values[part] = max(float(least), stiffest)
         return values
 
 

@@ -34,6 +34,7 @@ def contact_wrench(
         force = contact.frame.reshape(3, 3).T @ in_contact_frame[:3]
         if second == 0:
             force = -force
-        wrench[:3] += force
-        wrench[3:] += np.cross(contact.pos - flange, force)
+        fx, fy, fz = force.tolist()
+        rx, ry, rz = (contact.pos - flange).tolist()
+        wrench += (fx, fy, fz, ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx)
     return wrench
