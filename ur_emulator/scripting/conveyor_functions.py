@@ -18,6 +18,8 @@ from urscript.waits import NEXT_CYCLE
 
 # Encoders beyond have a tick for an atom, or none for the whole robot.
 FEWEST_TICKS, MOST_TICKS = 1e-3, 1e9
+# Deceleration where a program gives none [rad/s^2]. Source: URScript manual, stop_conveyor_tracking.
+STOP_DECELERATION = 20.0
 
 
 class ProgramConveyor:
@@ -81,6 +83,7 @@ class ProgramConveyor:
             )
 
         def stop(thread: object, a: float) -> Cycles:
+            a = a or STOP_DECELERATION  # field programs write 0
             require_positive("stop_conveyor_tracking", a=a)
             take_arm(state, thread, ramp := StopJ(a))
             self.end()
