@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from protocol.rtde_types import RtdeValue
 from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
 from ur_emulator.controller.operator import Answer
+from ur_emulator.controller.safety_commands import SafetyCommand
 from urscript import CompiledProgram
 
 
@@ -146,4 +147,5 @@ Command = (
     | GuideByHand
     | Push
     | HangLoad
+    | SafetyCommand
 )

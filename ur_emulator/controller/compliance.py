@@ -38,7 +38,7 @@ class Compliance:
         mode: how the arm is driven in this cycle.
         by_program: a program asks for hand guiding.
         by_client: the word `set robotmode freedrive` does.
-        by_input: an input does, and it is granted.
+        by_input: an input or the teach button does, and it is granted.
         force_mode: the overlay while a program is in force mode.
         is_on: there is something to look after in every cycle.
     """
@@ -49,6 +49,7 @@ class Compliance:
         self.force_mode: ForceMode | None = None
         self.is_on = False
         self._is_refused = False
+        self._is_teach_pressed = False
 
     @property
     def is_guided(self) -> bool:
@@ -61,6 +62,11 @@ class Compliance:
         """Let the arm be guided by hand from this cycle on."""
         self.by_program = self.by_program or by_program
         self.by_client = self.by_client or by_client
+        self.is_on = True
+
+    def press(self, pressed: bool) -> None:
+        """Press the teach button or let it go: it acts as an input that is set up for hand guiding."""
+        self._is_teach_pressed = pressed
         self.is_on = True
 
     def check_payload(self, wrench: Vector6) -> None:
@@ -97,7 +103,7 @@ class Compliance:
             self.by_program = self.by_client = self.by_input = False
             self.end_force(state)
         else:
-            wanted = state.io_configuration.asks_for_freedrive()
+            wanted = self._is_teach_pressed or state.io_configuration.asks_for_freedrive()
             self.by_input = wanted and (self.by_input or not motion.is_moving)
         was_guided = self.mode is ControlMode.TEACH
         if self.is_guided:
@@ -113,7 +119,7 @@ class Compliance:
                 if not motion.has_overlay(self.force_mode):
                     # A stop has ended it, such as that of a thread that was killed in motion.
                     motion.add_overlay(self.force_mode)
-        self.is_on = self.mode is not ControlMode.POSITION
+        self.is_on = self.mode is not ControlMode.POSITION or self._is_teach_pressed
         return self.mode
 
     def follow_hand(self, state: ControllerState) -> JointTarget:

@@ -9,16 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from protocol.primary_messages import ReportLevel
-from protocol.ur_types import ControlMode, RobotMode, SafetyMode
+from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.client_inputs import write_inputs
-from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US, controller_time
+from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US
 from ur_emulator.controller.events import (
     ErrorReported,
     Event,
     PopupShown,
     RobotModeChanged,
-    SafetyModeChanged,
     ScriptFailed,
 )
 from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
@@ -32,6 +31,8 @@ from ur_emulator.controller.safety import (
     find_invalid_setpoint,
     find_violation,
 )
+from ur_emulator.controller.safety_modes import ROW, SafetyEvent
+from ur_emulator.controller.safety_system import SafetySystem
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.controller.watchdogs import WatchdogAction
@@ -95,6 +96,8 @@ class Controller:
         self.state.place_arm = self._place_arm
         self._payload = self.state.payload
         self.programs = ProgramSlot(self.state, network)
+        self._safety = SafetySystem(self.state, self.programs)
+        self.state.mode.command(ModeCommand.BOOT)
         # The first cycle only makes the first snapshot; nothing moves in it.
         self.tick(())
 
@@ -110,6 +113,7 @@ class Controller:
             self.programs.has_work
             or self.state.motion.is_moving
             or self.state.mode.is_changing
+            or self._safety.is_stopping
             or self._settle > 0
         )
 
@@ -141,6 +145,10 @@ class Controller:
         if state.mode.mode is not self._mode:
             self._mode = state.mode.mode
             state.events.append(RobotModeChanged(int(self._mode)))
+            if self._mode is RobotMode.RUNNING:
+                self._safety.check_range()
+        if self._safety.is_busy:
+            self._safety.step()
         if state.watchdogs and not self.programs.is_paused:
             self._check_watchdogs()
         if state.encoders.decoding:
@@ -168,8 +176,10 @@ class Controller:
         self.plant.step(target if running else None, mode)
         sensed = self.plant.sense()
         self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
-        if running and not state.safety.is_stopped:
+        if running and state.safety.is_watched:
             violation = find_violation(sensed.position_error, self._saturated_s)
+            if self._safety.is_busy and violation is None:
+                violation = self._safety.find_violation(sensed)
             if mode and violation is None:
                 violation = compliance.find_violation(state.robot, sensed)
             if violation is None and state.stop_requested:
@@ -204,11 +214,9 @@ class Controller:
             case cmd.ResumeProgram():
                 self._resume()
             case cmd.PowerOn():
-                state.mode.command(ModeCommand.POWER_ON)
+                self._power(ModeCommand.POWER_ON)
             case cmd.PowerOff():
-                self.programs.stop()
-                state.mode.command(ModeCommand.POWER_OFF)
-                self._hold_here()
+                self._safety.cut_power()
             case GuideByHand():
                 state.compliance.guide(by_client=True)
             case Push(force, point):
@@ -217,11 +225,9 @@ class Controller:
                 self.plant.hang(mass, cog)
             case cmd.ReleaseBrakes():
                 state.compliance.by_client = False
-                state.mode.command(ModeCommand.BRAKE_RELEASE)
+                self._power(ModeCommand.BRAKE_RELEASE)
             case cmd.UnlockProtectiveStop():
-                if state.safety.mode is SafetyMode.PROTECTIVE_STOP:
-                    state.safety.unlock()
-                    state.events.append(SafetyModeChanged(int(state.safety.mode)))
+                self._safety.happen(SafetyEvent.UNLOCK)
             case cmd.SetSpeedSlider(fraction):
                 state.speed_slider = min(1.0, max(0.0, fraction))
             case cmd.TriggerProtectiveStop():
@@ -238,10 +244,18 @@ class Controller:
                 state.operator.show(text)
                 state.events.append(PopupShown("Popup", text, False, False, False))
             case cmd.RestartSafety():
-                self._apply(cmd.PowerOff())
-                if state.safety.is_stopped:
-                    state.safety.restart()
-                    state.events.append(SafetyModeChanged(int(state.safety.mode)))
+                self._safety.happen(SafetyEvent.RESTART)
+            case _:
+                self._safety.obey(command)
+
+    def _power(self, command: ModeCommand) -> None:
+        """Give the joints power or open their brakes, if the safety system lets them have it."""
+        mode = self.state.safety.mode
+        if ROW[mode].may_have_power:
+            self.state.mode.command(command)
+        else:
+            text = f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].way_out}"
+            self.state.events.append(ErrorReported(0, 0, ReportLevel.INFO, text))
 
     def _start(self, program: CompiledProgram) -> None:
         """Start a program if the box is in a state to run one; say so if it is not."""
@@ -267,7 +281,8 @@ class Controller:
         """Return why no program may move the arm now; "" if one may."""
         state = self.state
         if state.safety.is_stopped:
-            return f"the robot is in {state.safety.mode.name}, it must be RUNNING"
+            safety = state.safety.mode
+            return f"the robot is in {safety.name}, it must be RUNNING: {ROW[safety].way_out}"
         mode = state.mode.mode
         return "" if mode is RobotMode.RUNNING else f"the robot is in {mode.name}, it must be RUNNING"
 
@@ -286,8 +301,11 @@ class Controller:
     def _next_target(self) -> JointTarget:
         """Advance the motion; an invalid set-point never reaches the joints: they brake before it."""
         state, before = self.state, self.state.motion.target
+        scale = state.speed_slider
+        if state.limiter is not None:
+            scale = state.limiter.step(state.motion, scale, self.period_s)
         try:
-            target = state.motion.step(self.period_s, state.speed_slider)
+            target = state.motion.step(self.period_s, scale)
             if target is before or state.safety.is_stopped:
                 return target
             violation = find_invalid_setpoint(state.robot, before, target, self.period_s)
@@ -297,15 +315,13 @@ class Controller:
             return target
         state.motion.retract(before)
         self._stop_for(violation, state.snapshot.actual_q)
-        return state.motion.step(self.period_s, state.speed_slider)
+        return state.motion.step(self.period_s, scale)
 
     def _stop_for(self, violation: Violation, actual_q: Vector6) -> None:
         state = self.state
-        state.safety.protective_stop(controller_time(state.tick))
         self._settle = UNLOCK_CYCLES
         state.events.append(violation.error)
-        state.events.append(SafetyModeChanged(int(state.safety.mode)))
-        self.programs.interrupt(state.robot.stop_deceleration)
+        self._safety.happen(SafetyEvent.PROTECTIVE_STOP)
         if violation.blocked:
             state.motion.place(actual_q)
             self.plant.rest_trim()
@@ -316,11 +332,6 @@ class Controller:
         self.plant.reset(q)
         self.state.motion.place(q)
         return True
-
-    def _hold_here(self) -> None:
-        """Drop the target: the brakes hold the arm where it is."""
-        self.state.motion.stop(self.state.robot.stop_deceleration)
-        self.state.motion.place(self.state.snapshot.actual_q)
 
 
 _BY_POSITION, _BY_HAND = ControlMode.POSITION, ControlMode.TEACH

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from protocol.rtde_types import RobotStatusBits
 from protocol.ur_types import SafetyMode
 from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.io import CONFIGURABLE_SHIFT, N_CONFIGURABLE, N_STANDARD, N_TOOL, TOOL_SHIFT
 from ur_emulator.controller.robot_mode import POWERED
+from ur_emulator.controller.safety_modes import EMERGENCY_MODES
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 
@@ -129,14 +131,13 @@ def of_snapshot(values: Callable[[Snapshot], tuple[float, ...]], scale: float = 
 def flag(state: ControllerState, offset: int) -> int:
     """Read 260-265: power, protective stop, emergency stop, two buttons, any safety stop."""
     safety = state.safety.mode
-    is_emergency = safety in (SafetyMode.SYSTEM_EMERGENCY_STOP, SafetyMode.ROBOT_EMERGENCY_STOP)
     return int(
         (
             state.mode.mode in POWERED,
             safety is SafetyMode.PROTECTIVE_STOP,
-            is_emergency,
-            False,
-            False,
+            safety in EMERGENCY_MODES,
+            bool(state.buttons & RobotStatusBits.TEACH_BUTTON_PRESSED),
+            bool(state.buttons & RobotStatusBits.POWER_BUTTON_PRESSED),
             state.safety.is_stopped,
         )[offset]
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from ur_emulator.controller.cycle import controller_time
 from ur_emulator.controller.external_sensor import VARIABLE
 from ur_emulator.controller.force_sense import moved_wrench
-from ur_emulator.controller.robot_mode import JOINT_MODE, POWERED
+from ur_emulator.controller.robot_mode import JOINT_MODES, POWERED
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.target import ZERO6, JointTarget
@@ -38,7 +38,8 @@ def make_snapshot(
     if sensor is not None:
         wrench = sensor.wrench_at_flange(state.client_inputs.get(VARIABLE, ZERO6), arm.fk(sensed.actual_q))
     wrench = state.force_sense.take(wrench)
-    mode = state.mode.mode
+    mode, safety_mode = state.mode.mode, state.safety.mode
+    limiter = state.limiter
     powered = mode in POWERED
     return Snapshot(
         tick=state.tick,
@@ -61,10 +62,10 @@ def make_snapshot(
         joint_temperatures=sensed.joint_temperatures,
         actual_execution_time=0.0,
         robot_mode=int(mode),
-        joint_mode=(int(JOINT_MODE[mode]),) * 6,
-        safety_mode=int(state.safety.mode),
+        joint_mode=(int(JOINT_MODES[mode, safety_mode]),) * 6,
+        safety_mode=int(safety_mode),
         actual_tool_accelerometer=sensed.tool_accelerometer,
-        speed_scaling=state.speed_slider,
+        speed_scaling=state.speed_slider if limiter is None else limiter.scale,
         actual_momentum=arm.momentum(),
         actual_main_voltage=BUS_VOLTAGE,
         actual_robot_voltage=BUS_VOLTAGE if powered else 0.0,
@@ -74,7 +75,7 @@ def make_snapshot(
         runtime_state=int(programs.runtime_state),
         elbow_position=elbow_position,
         elbow_velocity=elbow_velocity,
-        safety_status=int(state.safety.mode),
+        safety_status=int(safety_mode),
         payload=state.payload.mass,
         payload_cog=state.payload.cog,
         payload_inertia=ZERO6,
@@ -87,6 +88,7 @@ def make_snapshot(
         registers=state.registers.values(),
         control_mode=int(state.compliance.mode),
         is_guided_by_input=state.compliance.by_input,
+        buttons=state.buttons,
         script_control_line=programs.line if state.wants_script_line else 0,
     )
 

@@ -9,15 +9,24 @@ from __future__ import annotations
 
 from enum import Enum
 
-from protocol.ur_types import JointMode, RobotMode
+from protocol.ur_types import JointMode, RobotMode, SafetyMode
 
 # How long the box stays in a passing mode before the next one of its way [s].
-PASSING_TIME = {RobotMode.POWER_ON: 1.0, RobotMode.BACKDRIVE: 0.4}
+PASSING_TIME = {
+    RobotMode.NO_CONTROLLER: 0.5,
+    RobotMode.DISCONNECTED: 0.5,
+    RobotMode.BOOTING: 1.0,
+    RobotMode.POWER_ON: 1.0,
+    RobotMode.BACKDRIVE: 0.4,
+}
 
 
 class ModeCommand(Enum):
     """What may change the robot mode."""
 
+    BOOT = "boot"
+    ASK_TO_CONFIRM = "change safety settings"
+    CONFIRM = "confirm safety settings"
     POWER_ON = "power on"
     POWER_OFF = "power off"
     BRAKE_RELEASE = "brake release"
@@ -40,14 +49,23 @@ TRANSITIONS: dict[tuple[RobotMode, ModeCommand], tuple[RobotMode, ...]] = {
         RobotMode.RUNNING,
     ),
     (RobotMode.IDLE, ModeCommand.BRAKE_RELEASE): (RobotMode.BACKDRIVE, RobotMode.RUNNING),
+    (RobotMode.NO_CONTROLLER, ModeCommand.BOOT): (
+        RobotMode.NO_CONTROLLER,
+        RobotMode.DISCONNECTED,
+        RobotMode.BOOTING,
+        RobotMode.POWER_OFF,
+    ),
+    (RobotMode.POWER_OFF, ModeCommand.ASK_TO_CONFIRM): (RobotMode.CONFIRM_SAFETY,),
+    (RobotMode.CONFIRM_SAFETY, ModeCommand.CONFIRM): (RobotMode.POWER_OFF,),
     (RobotMode.POWER_ON, ModeCommand.POWER_OFF): (RobotMode.POWER_OFF,),
     (RobotMode.IDLE, ModeCommand.POWER_OFF): (RobotMode.POWER_OFF,),
     (RobotMode.BACKDRIVE, ModeCommand.POWER_OFF): (RobotMode.POWER_OFF,),
     (RobotMode.RUNNING, ModeCommand.POWER_OFF): (RobotMode.POWER_OFF,),
 }
 
-# What every joint reports in each robot mode (inferred from captures and from the joint mode names).
-JOINT_MODE = {
+# What every joint reports in each robot mode (inferred from captures and from the joint mode names), unless
+# the safety mode says more.
+_BY_ROBOT_MODE = {
     RobotMode.NO_CONTROLLER: JointMode.NOT_RESPONDING,
     RobotMode.DISCONNECTED: JointMode.NOT_RESPONDING,
     RobotMode.CONFIRM_SAFETY: JointMode.POWER_OFF,
@@ -62,6 +80,28 @@ JOINT_MODE = {
 
 # Modes in which the joints have power.
 POWERED = frozenset({RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING})
+
+# What joints that have power report in a safety mode; inferred from the names: 240 was EMERGENCY_STOPPED.
+_BY_SAFETY_MODE = {
+    SafetyMode.ROBOT_EMERGENCY_STOP: JointMode.READY_FOR_POWER_OFF,
+    SafetyMode.SYSTEM_EMERGENCY_STOP: JointMode.READY_FOR_POWER_OFF,
+    SafetyMode.VIOLATION: JointMode.VIOLATION,
+    SafetyMode.FAULT: JointMode.FAULT,
+}
+# These two say so without power too, until safety is restarted (chosen).
+_LASTING = frozenset({SafetyMode.VIOLATION, SafetyMode.FAULT})
+
+
+def _joint_mode(robot: RobotMode, safety: SafetyMode) -> JointMode:
+    if robot in POWERED or (safety in _LASTING and robot is RobotMode.POWER_OFF):
+        return _BY_SAFETY_MODE.get(safety, _BY_ROBOT_MODE[robot])
+    return _BY_ROBOT_MODE[robot]
+
+
+# (robot mode, safety mode) -> what every joint reports.
+JOINT_MODES = {
+    (robot, safety): _joint_mode(robot, safety) for robot in _BY_ROBOT_MODE for safety in SafetyMode
+}
 
 
 class RobotModeMachine:

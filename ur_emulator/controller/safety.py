@@ -1,7 +1,7 @@
 """What stops the arm by itself: limit checks, and the protective stop they lead to.
 
 Pure: `find_invalid_setpoint` looks at what the joints are asked next, `find_violation` at what they did;
-`SafetyState` remembers the stop.
+`SafetyState` remembers the causes of the safety mode.
 Sources: joint limits and torque limits of the robot model; C153 "position deviates from path" and C204
 "invalid setpoints" from user reports. The thresholds of the deviation are not published; those here are the
 proposal of the arm's notes.
@@ -14,6 +14,13 @@ from dataclasses import dataclass
 from protocol.primary_messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
 from ur_emulator.controller.events import ErrorReported
+from ur_emulator.controller.safety_modes import (
+    MOVING_MODES,
+    WATCHED_MODES,
+    SafetyEvent,
+    after,
+    mode_of,
+)
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.target import JointTarget
 
@@ -25,9 +32,6 @@ MAX_SATURATION_TIME = 0.1
 UNLOCK_DELAY = 5.0
 # A target above the rated joint speed by more than rounding is an invalid set-point.
 SPEED_TOLERANCE = 1.0 + 1e-6
-
-# Safety modes in which the arm may move.
-MOVING_MODES = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY})
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,32 +112,36 @@ def find_violation(position_error: tuple[float, ...], saturated_s: float) -> Vio
 
 
 class SafetyState:
-    """The safety mode and, while stopped, since when."""
+    """Which causes stand, and the safety mode that follows from them; see `safety_modes`.
+
+    Attributes:
+        mode: the safety mode.
+        is_stopped: the safety system does not let programs move the arm.
+        is_watched: a protective stop would be something new.
+    """
 
     def __init__(self) -> None:
-        self.mode = SafetyMode.NORMAL
+        self._causes: frozenset[SafetyMode] = frozenset()
         self._stopped_since = 0.0
+        self._enter(SafetyMode.NORMAL)
 
-    @property
-    def is_stopped(self) -> bool:
-        """True when the safety system does not let the arm move."""
-        return self.mode not in MOVING_MODES
-
-    def protective_stop(self, now: float) -> None:
-        """Enter the protective stop at controller time `now` [s]; a stop already entered keeps its time."""
-        if not self.is_stopped:
-            self.mode = SafetyMode.PROTECTIVE_STOP
+    def apply(self, event: SafetyEvent, now: float) -> None:
+        """Let something happen at controller time `now` [s]."""
+        had_stop = SafetyMode.PROTECTIVE_STOP in self._causes
+        self._causes = after(self._causes, event)
+        if not had_stop and SafetyMode.PROTECTIVE_STOP in self._causes:
             self._stopped_since = now
+        self._enter(mode_of(self._causes))
+
+    def has(self, cause: SafetyMode) -> bool:
+        """True while the cause of a mode stands, also under a mode of higher rank."""
+        return cause in self._causes
 
     def may_unlock(self, now: float) -> bool:
         """True when the dashboard's `unlock protective stop` is allowed."""
         return self.mode is SafetyMode.PROTECTIVE_STOP and now - self._stopped_since >= UNLOCK_DELAY
 
-    def restart(self) -> None:
-        """Begin anew: nothing stops the arm any more."""
-        self.mode = SafetyMode.NORMAL
-
-    def unlock(self) -> None:
-        """Leave a protective stop; any other mode stays."""
-        if self.mode is SafetyMode.PROTECTIVE_STOP:
-            self.mode = SafetyMode.NORMAL
+    def _enter(self, mode: SafetyMode) -> None:
+        self.mode = mode
+        self.is_stopped = mode not in MOVING_MODES
+        self.is_watched = mode in WATCHED_MODES

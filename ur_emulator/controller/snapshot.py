@@ -61,6 +61,7 @@ class Snapshot(NamedTuple):
     program_name: str
     control_mode: int
     is_guided_by_input: bool
+    buttons: int
     # --- what only RTDE needs; lines in the order standard inputs, standard outputs, tool inputs
     analog_values: tuple[float, ...]
     analog_domains: tuple[int, ...]
@@ -70,8 +71,8 @@ class Snapshot(NamedTuple):
 
     @property
     def robot_status_bits(self) -> int:
-        """Power and program, as RobotStatusBits."""
-        return robot_status_bits(self.robot_mode, self.runtime_state)
+        """Power, program and buttons, as RobotStatusBits."""
+        return robot_status_bits(self.robot_mode, self.runtime_state) | self.buttons
 
     @property
     def safety_status_bits(self) -> int:

@@ -25,6 +25,7 @@ from ur_emulator.controller.registers import Registers
 from ur_emulator.controller.robot_mode import RobotModeMachine
 from ur_emulator.controller.safety import SafetyState
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.controller.speed_limiter import SpeedLimiter
 from ur_emulator.controller.watchdogs import Watchdogs
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6
@@ -59,6 +60,8 @@ class ControllerState:
         motion: where the joints are asked to go, and by whom.
         mode: robot mode and its way.
         safety: safety mode.
+        limiter: keeps joint speeds below those of a safety mode that limits them; None in the others.
+        buttons: of the pendant that are pressed, as in RobotStatusBits.
         snapshot: state at the end of the last cycle; what scripts see as "actual" during this one.
         events: what was said since the last cycle ended, in order.
         speed_slider: 0..1.
@@ -93,6 +96,8 @@ class ControllerState:
     mode: RobotModeMachine
     snapshot: Snapshot = field(init=False)
     safety: SafetyState = field(default_factory=SafetyState)
+    limiter: SpeedLimiter | None = None
+    buttons: int = 0
     registers: Registers = field(default_factory=Registers)
     io: InputOutput = field(default_factory=InputOutput)
     payload: Payload = field(default_factory=Payload)

@@ -32,7 +32,7 @@ SAFETY_BITS: dict[int, int] = {
 
 
 def robot_status_bits(robot_mode: int, runtime_state: int) -> int:
-    """Return `robot_status_bits`; the buttons of the pendant are never pressed."""
+    """Return `robot_status_bits`, but for the buttons of the pendant."""
     power = RobotStatusBits.POWER_ON if robot_mode in POWERED else RobotStatusBits(0)
     running = RobotStatusBits.PROGRAM_RUNNING if runtime_state in RUNNING_STATES else RobotStatusBits(0)
     return int(power | running)

@@ -15,9 +15,9 @@ Must not know scripts or physics: an owner is any object, compared by identity.
 from __future__ import annotations
 
 from ur_emulator.models.robot_model import Vector6
-from ur_emulator.motion.generators import Generator, Hold, Streamed
+from ur_emulator.motion.generators import Generator, Hold, StopJ, Streamed
 from ur_emulator.motion.move import Move
-from ur_emulator.motion.pause import Detour, Pace, Suspended
+from ur_emulator.motion.pause import PAUSE_RATE, Detour, Pace, Suspended
 from ur_emulator.motion.target import JointTarget
 
 # How fast the speed scaling follows the slider [1/s]: a step would be a step of the joints' speed. Chosen.
@@ -35,6 +35,7 @@ class PathMotion:
 
     Attributes:
         path: target along the path of the program; what generators see.
+        scaling_rate: how fast the speed scaling follows what is asked for [1/s].
     """
 
     def __init__(self, q: Vector6) -> None:
@@ -42,6 +43,7 @@ class PathMotion:
         self._generator: Generator = HOLD
         self._owner: object | None = None
         self._renewed = False
+        self.scaling_rate = SCALING_RATE
         self._scale = 1.0
         self._pace = Pace()
         self._suspended: Suspended | None = None
@@ -52,6 +54,11 @@ class PathMotion:
     def owner(self) -> object | None:
         """The object that controls the arm at present, or None."""
         return self._owner
+
+    @property
+    def scale(self) -> float:
+        """Speed scaling of the last cycle, 0..1."""
+        return self._scale
 
     @property
     def goal(self) -> Vector6:
@@ -100,18 +107,24 @@ class PathMotion:
         """True while the arm goes back to the path that an interruption led it away from."""
         return isinstance(self._generator, Detour)
 
-    def pause(self) -> None:
+    def pause(self, deceleration: float = 0.0) -> None:
         """Ramp the arm to rest on its path; a stream ends like one that is not renewed any more.
 
         Overlays stand still too.
+
+        Args:
+            deceleration: of the leading axis, if that is faster than the usual ramp [rad/s^2].
         """
-        if self._pace.paused:
+        pace = self._pace
+        if pace.paused:
             return
-        self._pace.paused = self._is_special = True
+        pace.paused = self._is_special = True
+        speed = max(map(abs, self.path.qd))
+        pace.slowing = max(PAUSE_RATE, deceleration * pace.factor / speed if speed > 0.0 else 0.0)
         generator = self._generator
         if isinstance(generator, Streamed):
             self._suspend()
-            self._generator = generator.when_paused()
+            self._generator = StopJ(deceleration) if deceleration else generator.when_paused()
 
     def resume(self) -> None:
         """End a pause: a move goes on where it stopped, a stream if it is renewed in this cycle."""
@@ -144,7 +157,7 @@ class PathMotion:
         """Advance on the path by one cycle."""
         generator = self._generator
         if scale != self._scale:
-            change = SCALING_RATE * dt
+            change = self.scaling_rate * dt
             self._scale = scale = min(max(scale, self._scale - change), self._scale + change)
         if isinstance(generator, Streamed):
             if not self._renewed:

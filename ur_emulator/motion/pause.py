@@ -27,11 +27,13 @@ class Pace:
     Attributes:
         paused: it goes to 0, else to 1.
         factor: present one.
+        slowing: how fast it goes to 0 [1/s].
     """
 
     def __init__(self) -> None:
         self.paused = False
         self.factor = 1.0
+        self.slowing = PAUSE_RATE
 
     @property
     def is_normal(self) -> bool:
@@ -40,8 +42,10 @@ class Pace:
 
     def step(self, dt: float) -> float:
         """Advance the ramp by a cycle."""
-        change = PAUSE_RATE * dt
-        self.factor = max(0.0, self.factor - change) if self.paused else min(1.0, self.factor + change)
+        if self.paused:
+            self.factor = max(0.0, self.factor - self.slowing * dt)
+        else:
+            self.factor = min(1.0, self.factor + PAUSE_RATE * dt)
         return self.factor
 
     def reset(self) -> None:

@@ -107,10 +107,14 @@ class ProgramSlot:
             self._end()
         self._state.motion.stop(self._state.robot.stop_deceleration)
 
-    def pause(self) -> None:
-        """Let the primary program stand still, and the arm come to rest on its path."""
+    def pause(self, deceleration: float = 0.0) -> None:
+        """Let the primary program stand still, and the arm come to rest on its path.
+
+        Args:
+            deceleration: of the leading axis, if that is faster than the usual ramp [rad/s^2].
+        """
         if self._primary is not None and self._phase not in _STANDS_STILL:
-            self._state.motion.pause()
+            self._state.motion.pause(deceleration)
             self._enter(ProgramState.PAUSING)
 
     def interrupt(self, deceleration: float) -> None:

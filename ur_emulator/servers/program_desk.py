@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.events import ScriptFailed
-from ur_emulator.controller.safety import MOVING_MODES
+from ur_emulator.controller.safety_modes import MOVING_MODES
 from ur_emulator.controller.status_bits import RUNNING_STATES
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
@@ -88,7 +88,7 @@ class ProgramDesk:
             return self._failed(f"load {name}", "a program runs, stop it first")
         try:
             loaded, ready = yield from self._access.in_worker(lambda: self._read(name))
-        except ProgramFileError as error:
+        except Exception as error:  # a defect of ours must not end the box
             return self._failed(f"load {name}", error)
         self.loaded, self._ready = loaded, ready
         self.installation = loaded.installation or self.installation
@@ -105,7 +105,7 @@ class ProgramDesk:
             self.installation = yield from self._access.in_worker(
                 lambda: load_installation(self.folder, name)
             )
-        except ProgramFileError as error:
+        except Exception as error:  # as above
             return self._failed(f"load installation {name}", error)
         self._access.note(f"Loaded installation: {self.installation.wire_path}")
         return Loading.DONE
@@ -200,7 +200,7 @@ class ProgramDesk:
             return ScriptFailed(1, 1, f"{loaded.file_name} cannot be compiled: {error!r}")
 
     def _failed(self, what: str, why: object) -> Loading:
-        self._refused(what, why)
+        self._refused(what, why if isinstance(why, str | ProgramFileError) else repr(why))
         return Loading.MISSING if isinstance(why, FileMissingError) else Loading.FAILED
 
     def _refused(self, what: str, why: object) -> bool:

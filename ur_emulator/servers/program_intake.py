@@ -17,6 +17,7 @@ from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
 from ur_emulator.controller.hands import GuideByHand
+from ur_emulator.controller.safety_commands import ConfirmSafety
 from ur_emulator.realtime.event_loop import EventLoop
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
@@ -36,7 +37,7 @@ WORDS: dict[str, cmd.Command | None] = {
     "resume program": cmd.ResumeProgram(),
     "set real": None,
     "set sim": None,
-    "confirm user safety parameters": None,
+    "confirm user safety parameters": ConfirmSafety(),
 }
 SPEED_WORD = "set speed"
 # Script of one sender that may wait for the compiler, each program counted with its cost beside its text

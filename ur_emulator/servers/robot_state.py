@@ -20,6 +20,7 @@ from protocol.primary_packages import encode_state
 from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.robot_mode import POWERED
+from ur_emulator.controller.safety_modes import EMERGENCY_MODES
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.status_bits import RUNNING_STATES
 from ur_emulator.models.robot_model import DhRow, RobotModel
@@ -39,6 +40,7 @@ def state_records(snapshot: Snapshot) -> tuple[SubPackage, ...]:
             timestamp=snap.tick * PERIOD_US,
             is_real_robot_enabled=powered,
             is_robot_power_on=powered,
+            is_emergency_stopped=snap.safety_mode in EMERGENCY_MODES,
             is_protective_stopped=snap.safety_mode == SafetyMode.PROTECTIVE_STOP,
             is_program_running=snap.runtime_state in RUNNING_STATES,
             is_program_paused=snap.runtime_state == ProgramState.PAUSED,

@@ -1,0 +1,217 @@
+"""The safety modes as tables: what may happen to the safety system, and what each mode does to the box.
+
+Every mode but NORMAL has a cause of its own: a button that is pressed, an input, or something that has
+happened and stays until somebody deals with it. Several causes may stand at a time; the mode is that of the
+first of `MODES` whose cause stands, so that releasing an emergency stop leads back to the safeguard stop that
+lies under it. `EVENTS` says which causes an event brings and takes.
+
+Sources: UR3/CB3 user manual 3.13, safety chapters: stop categories (0: power is cut at once, 1: brake and
+then cut the power, 2: brake and keep the power), safeguard stop with automatic resume or a reset button,
+reduced mode and recovery mode; the dashboard server's documents for unlocking and restarting. What is marked
+C in `why` is chosen because nothing is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from enum import Enum
+
+from protocol.ur_types import SafetyMode as Mode
+
+
+class ArmEffect(Enum):
+    """What happens to the arm when a mode begins."""
+
+    NOTHING = "moves"
+    SLOW = "moves, with limited joint speeds"
+    PATH_STOP = "brakes on its path, keeps its power"
+    STOP = "brakes, keeps its power"
+    POWER_OFF = "brakes, then the power is cut"
+
+
+class ProgramEffect(Enum):
+    """What happens to the primary program when a mode begins."""
+
+    NOTHING = "runs"
+    PAUSE_FOR_A_WHILE = "paused, goes on when the mode ends"
+    PAUSE = "paused until somebody resumes it"
+    END = "ended"
+
+
+@dataclass(frozen=True, slots=True)
+class ModeRow:
+    """A safety mode.
+
+    Attributes:
+        mode: its number.
+        arm: what it does to the arm.
+        program: what it does to the program.
+        latches: its cause is no button or input that somebody releases.
+        way_out: what to do about it, for messages.
+        why: source of the above.
+    """
+
+    mode: Mode
+    arm: ArmEffect
+    program: ProgramEffect
+    latches: bool
+    way_out: str
+    why: str
+
+    @property
+    def may_move(self) -> bool:
+        """True when programs may move the arm."""
+        return self.arm in (ArmEffect.NOTHING, ArmEffect.SLOW)
+
+    @property
+    def may_have_power(self) -> bool:
+        """True when the joints may have power."""
+        return self.arm is not ArmEffect.POWER_OFF
+
+
+_A, _P = ArmEffect, ProgramEffect
+_AGAIN = "then power on and brake release"
+
+# The modes by rank, the first cause that stands counts.
+MODES: tuple[ModeRow, ...] = (
+    ModeRow(
+        Mode.FAULT, _A.POWER_OFF, _P.END, True, f"restart safety, {_AGAIN}", "D; that the program ends C"
+    ),
+    ModeRow(
+        Mode.VIOLATION, _A.POWER_OFF, _P.END, True, f"restart safety, {_AGAIN}", "D; that the program ends C"
+    ),
+    ModeRow(
+        Mode.ROBOT_EMERGENCY_STOP,
+        _A.POWER_OFF,
+        _P.END,
+        False,
+        f"release the emergency stop, {_AGAIN}",
+        "stop category 1 D; that the program ends I",
+    ),
+    ModeRow(
+        Mode.SYSTEM_EMERGENCY_STOP,
+        _A.POWER_OFF,
+        _P.END,
+        False,
+        f"release the emergency stop, {_AGAIN}",
+        "stop category 1 D; that the program ends I",
+    ),
+    ModeRow(
+        Mode.PROTECTIVE_STOP,
+        _A.STOP,
+        _P.PAUSE,
+        True,
+        "unlock the protective stop, on the dashboard 5 s after it",
+        "stop category 2 D; that it leaves the path C",
+    ),
+    ModeRow(
+        Mode.SAFEGUARD_STOP,
+        _A.PATH_STOP,
+        _P.PAUSE_FOR_A_WHILE,
+        False,
+        "close the safeguard",
+        "stop category 2 and automatic resume D",
+    ),
+    ModeRow(Mode.RECOVERY, _A.SLOW, _P.NOTHING, True, "move the joints into their range", "D; programs C"),
+    ModeRow(Mode.REDUCED, _A.SLOW, _P.NOTHING, False, "end reduced mode", "D"),
+    ModeRow(Mode.NORMAL, _A.NOTHING, _P.NOTHING, False, "", "D"),
+)
+ROW: dict[Mode, ModeRow] = {row.mode: row for row in MODES}
+_RANK = {row.mode: rank for rank, row in enumerate(MODES)}
+
+# Modes in which programs may move the arm.
+MOVING_MODES = frozenset(row.mode for row in MODES if row.may_move)
+EMERGENCY_MODES = frozenset({Mode.ROBOT_EMERGENCY_STOP, Mode.SYSTEM_EMERGENCY_STOP})
+# Modes in which the arm is watched: it has power, and a protective stop would be something new.
+WATCHED_MODES = frozenset(row.mode for row in MODES if _RANK[row.mode] > _RANK[Mode.PROTECTIVE_STOP])
+
+
+class SafetyEvent(Enum):
+    """What may happen to the safety system."""
+
+    PROTECTIVE_STOP = "protective stop"
+    UNLOCK = "unlock protective stop"
+    SAFEGUARD_OPENED = "safeguard opened"
+    SAFEGUARD_RESTORED = "safeguard restored"
+    ROBOT_EMERGENCY_PRESSED = "robot emergency stop pressed"
+    SYSTEM_EMERGENCY_PRESSED = "system emergency stop pressed"
+    ROBOT_EMERGENCY_RELEASED = "robot emergency stop released"
+    SYSTEM_EMERGENCY_RELEASED = "system emergency stop released"
+    REDUCED_ON = "reduced mode on"
+    REDUCED_OFF = "reduced mode off"
+    RANGE_LEFT = "joint out of range when the brakes open"
+    RANGE_KEPT = "joints back in range"
+    VIOLATION = "violation"
+    FAULT = "fault"
+    RESTART = "restart safety"
+    POWERED_OFF = "power off"
+
+
+@dataclass(frozen=True, slots=True)
+class EventRow:
+    """What an event does.
+
+    Attributes:
+        brings: the mode whose cause it brings, or None. One that latches is not noted in a mode above it.
+        takes: modes whose causes it ends.
+        cuts_power: the joints lose their power, whatever the mode.
+        meaning: who or what makes it happen.
+    """
+
+    brings: Mode | None
+    takes: frozenset[Mode]
+    meaning: str
+    cuts_power: bool = False
+
+
+def _brings(mode: Mode, meaning: str) -> EventRow:
+    return EventRow(mode, frozenset(), meaning)
+
+
+def _takes(meaning: str, *modes: Mode, cuts_power: bool = False) -> EventRow:
+    return EventRow(None, frozenset(modes), meaning, cuts_power)
+
+
+_E = SafetyEvent
+EVENTS: dict[SafetyEvent, EventRow] = {
+    _E.PROTECTIVE_STOP: _brings(
+        Mode.PROTECTIVE_STOP, "physics, a set-point, a script, a client; only while the robot is RUNNING"
+    ),
+    _E.UNLOCK: _takes("dashboard, 5 s after the stop; port 30001 at once", Mode.PROTECTIVE_STOP),
+    _E.SAFEGUARD_OPENED: _brings(Mode.SAFEGUARD_STOP, "safeguard input SI"),
+    _E.SAFEGUARD_RESTORED: _takes(
+        "safeguard input SI; where a reset button is set up, that button once SI is closed",
+        Mode.SAFEGUARD_STOP,
+    ),
+    _E.ROBOT_EMERGENCY_PRESSED: _brings(Mode.ROBOT_EMERGENCY_STOP, "button on the pendant, input EI"),
+    _E.SYSTEM_EMERGENCY_PRESSED: _brings(Mode.SYSTEM_EMERGENCY_STOP, "configurable input"),
+    _E.ROBOT_EMERGENCY_RELEASED: _takes("button on the pendant, input EI", Mode.ROBOT_EMERGENCY_STOP),
+    _E.SYSTEM_EMERGENCY_RELEASED: _takes("configurable input", Mode.SYSTEM_EMERGENCY_STOP),
+    _E.REDUCED_ON: _brings(Mode.REDUCED, "configurable input"),
+    _E.REDUCED_OFF: _takes("configurable input", Mode.REDUCED),
+    _E.RANGE_LEFT: _brings(Mode.RECOVERY, "the controller, when the brakes open"),
+    _E.RANGE_KEPT: _takes("the controller, in every cycle of recovery", Mode.RECOVERY),
+    _E.VIOLATION: _brings(Mode.VIOLATION, "the control API"),
+    _E.FAULT: _brings(Mode.FAULT, "the control API"),
+    _E.RESTART: _takes(
+        "dashboard", Mode.FAULT, Mode.VIOLATION, Mode.PROTECTIVE_STOP, Mode.RECOVERY, cuts_power=True
+    ),
+    _E.POWERED_OFF: _takes("the power is off, for whatever reason", Mode.RECOVERY),
+}
+
+
+def mode_of(causes: AbstractSet[Mode]) -> Mode:
+    """Return the mode when these causes stand."""
+    return next((row.mode for row in MODES if row.mode in causes), Mode.NORMAL)
+
+
+def after(causes: frozenset[Mode], event: SafetyEvent) -> frozenset[Mode]:
+    """Return the causes that stand after an event."""
+    row = EVENTS[event]
+    causes -= row.takes
+    if row.brings is not None and not (
+        ROW[row.brings].latches and _RANK[mode_of(causes)] < _RANK[row.brings]
+    ):
+        causes |= {row.brings}
+    return causes
