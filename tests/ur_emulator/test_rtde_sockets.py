@@ -13,7 +13,7 @@ from protocol.primary_layout import MasterboardData, ToolData
 from protocol.rtde_fields import INPUTS, output_fields
 from protocol.ur_types import ProgramState, SoftwareVersion
 from ur_emulator import ControlBox
-from ur_emulator.servers.dashboard_port import BUILD
+from ur_emulator.servers.box_access import BUILD
 
 COUNT = "def c():\n  i = 0\n  while i < {}:\n    i = i + 1\n    write_output_integer_register(24, i)\n    sync()\n  end\nend\n"
 
