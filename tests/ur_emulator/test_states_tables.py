@@ -1,0 +1,197 @@
+"""The tables of safety modes and events, written down once more by hand, and the box that follows them."""
+
+import pytest
+from states_support import BRAKING, COMMANDS, WAY_IN, infos, moving
+
+from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller.robot_mode import JOINT_MODES, POWERED, TRANSITIONS, ModeCommand, RobotModeMachine
+from ur_emulator.controller.safety_modes import (
+    EVENTS,
+    MODES,
+    MOVING_MODES,
+    ROW,
+    WATCHED_MODES,
+    SafetyEvent,
+    after,
+    mode_of,
+)
+
+M, E = SafetyMode, SafetyEvent
+N, RD, RC, SG, PS, SE, RE, V, F = (
+    M.NORMAL,
+    M.REDUCED,
+    M.RECOVERY,
+    M.SAFEGUARD_STOP,
+    M.PROTECTIVE_STOP,
+    M.SYSTEM_EMERGENCY_STOP,
+    M.ROBOT_EMERGENCY_STOP,
+    M.VIOLATION,
+    M.FAULT,
+)
+# From (columns) by event (rows) to; from a mode whose cause alone stands.
+FROM = (N, RD, RC, SG, PS, SE, RE, V, F)
+EXPECTED = {
+    E.PROTECTIVE_STOP: (PS, PS, PS, PS, PS, SE, RE, V, F),
+    E.UNLOCK: (N, RD, RC, SG, N, SE, RE, V, F),
+    E.SAFEGUARD_OPENED: (SG, SG, SG, SG, PS, SE, RE, V, F),
+    E.SAFEGUARD_RESTORED: (N, RD, RC, N, PS, SE, RE, V, F),
+    E.ROBOT_EMERGENCY_PRESSED: (RE, RE, RE, RE, RE, RE, RE, V, F),
+    E.SYSTEM_EMERGENCY_PRESSED: (SE, SE, SE, SE, SE, SE, RE, V, F),
+    E.ROBOT_EMERGENCY_RELEASED: (N, RD, RC, SG, PS, SE, N, V, F),
+    E.SYSTEM_EMERGENCY_RELEASED: (N, RD, RC, SG, PS, N, RE, V, F),
+    E.REDUCED_ON: (RD, RD, RC, SG, PS, SE, RE, V, F),
+    E.REDUCED_OFF: (N, N, RC, SG, PS, SE, RE, V, F),
+    E.RANGE_LEFT: (RC, RC, RC, SG, PS, SE, RE, V, F),
+    E.RANGE_KEPT: (N, RD, N, SG, PS, SE, RE, V, F),
+    E.VIOLATION: (V, V, V, V, V, V, V, V, F),
+    E.FAULT: (F, F, F, F, F, F, F, F, F),
+    E.RESTART: (N, RD, N, SG, N, SE, RE, N, N),
+    E.POWERED_OFF: (N, RD, N, SG, PS, SE, RE, V, F),
+}
+CASES = [(event, was, EXPECTED[event][i]) for event in SafetyEvent for i, was in enumerate(FROM)]
+
+
+def test_the_tables_are_whole():
+    assert {row.mode for row in MODES} == set(FROM)
+    assert set(EVENTS) == set(EXPECTED) == set(SafetyEvent)
+    assert all(row.way_out for row in MODES if row.mode is not N)
+    assert {N, RD, RC} == MOVING_MODES
+    assert {N, RD, RC, SG} == WATCHED_MODES
+
+
+@pytest.mark.parametrize(("event", "was", "then"), CASES)
+def test_transitions(event, was, then):
+    causes = frozenset() if was is N else frozenset({was})
+    assert mode_of(causes) is was
+    assert mode_of(after(causes, event)) is then
+
+
+def test_what_lies_under_a_mode_comes_back():
+    causes = frozenset()
+    for event in (
+        E.REDUCED_ON,
+        E.SAFEGUARD_OPENED,
+        E.PROTECTIVE_STOP,
+        E.SYSTEM_EMERGENCY_PRESSED,
+        E.ROBOT_EMERGENCY_PRESSED,
+    ):
+        causes = after(causes, event)
+    seen = [mode_of(causes)]
+    for event in (
+        E.ROBOT_EMERGENCY_RELEASED,
+        E.SYSTEM_EMERGENCY_RELEASED,
+        E.UNLOCK,
+        E.SAFEGUARD_RESTORED,
+        E.REDUCED_OFF,
+    ):
+        causes = after(causes, event)
+        seen.append(mode_of(causes))
+    assert seen == [RE, SE, PS, SG, RD, N]
+
+
+# --- the box in each mode
+
+
+def enter(mode):
+    bench = moving(fidelity="ideal")
+    way_in = WAY_IN[mode]
+    if mode is M.RECOVERY:
+        bench.controller._safety.happen(E.RANGE_LEFT)
+        bench.controller.state.snapshot = bench.now._replace(actual_q=(7.0, *bench.now.actual_q[1:]))
+    elif way_in is not None:
+        bench.tick(1, COMMANDS[way_in])
+    return bench
+
+
+@pytest.mark.parametrize("mode", [mode for mode in FROM if mode is not RC])
+@pytest.mark.parametrize("event", COMMANDS)
+def test_commands_lead_where_the_table_says(mode, event):
+    bench = enter(mode)
+    assert bench.now.safety_mode == mode
+    bench.tick(BRAKING)
+    if event in (E.ROBOT_EMERGENCY_RELEASED, E.SYSTEM_EMERGENCY_RELEASED):
+        then = N if mode in (SE, RE) else mode  # the command releases both
+    else:
+        then = EXPECTED[event][FROM.index(mode)]
+    bench.tick(1, COMMANDS[event])
+    assert bench.now.safety_mode == then
+
+
+@pytest.mark.parametrize("mode", [mode for mode in FROM if mode is not RC])
+def test_what_a_mode_does_to_arm_program_and_power(mode):
+    bench = enter(mode)
+    bench.tick(BRAKING)
+    row, now = ROW[mode], bench.now
+    rests = now.target_qd == (0.0,) * 6
+    assert rests is not row.may_move
+    assert now.robot_mode == (RobotMode.RUNNING if row.may_have_power else RobotMode.POWER_OFF)
+    assert {
+        "runs": ProgramState.PLAYING,
+        "paused, goes on when the mode ends": ProgramState.PAUSED,
+        "paused until somebody resumes it": ProgramState.PAUSED,
+        "ended": ProgramState.STOPPED,
+    }[row.program.value] == now.runtime_state
+    bench.start("def other():\n  movej([0,-1.5,1,0,0,0])\nend\n")
+    bench.tick(20)
+    assert any(bench.now.target_qd) is row.may_move
+
+
+@pytest.mark.parametrize("mode", [mode for mode in FROM if not ROW[mode].may_have_power])
+def test_power_is_refused_with_a_word_about_the_way_out(mode):
+    bench = enter(mode)
+    bench.tick(BRAKING)
+    bench.tick(1, cmd.PowerOn(), cmd.ReleaseBrakes())
+    bench.tick(300)
+    assert bench.now.robot_mode == RobotMode.POWER_OFF
+    first, second = infos(bench)[-2:]
+    assert first.startswith("power on refused") and second.startswith("brake release refused")
+    assert mode.name in first and ROW[mode].way_out in first
+
+
+# --- robot and joint modes
+
+WAYS = {
+    (RobotMode.POWER_OFF, ModeCommand.POWER_ON): "POWER_ON IDLE",
+    (RobotMode.POWER_OFF, ModeCommand.BRAKE_RELEASE): "POWER_ON IDLE BACKDRIVE RUNNING",
+    (RobotMode.POWER_ON, ModeCommand.BRAKE_RELEASE): "POWER_ON IDLE BACKDRIVE RUNNING",
+    (RobotMode.IDLE, ModeCommand.BRAKE_RELEASE): "BACKDRIVE RUNNING",
+    (RobotMode.POWER_ON, ModeCommand.POWER_OFF): "POWER_OFF",
+    (RobotMode.IDLE, ModeCommand.POWER_OFF): "POWER_OFF",
+    (RobotMode.BACKDRIVE, ModeCommand.POWER_OFF): "POWER_OFF",
+    (RobotMode.RUNNING, ModeCommand.POWER_OFF): "POWER_OFF",
+    (RobotMode.NO_CONTROLLER, ModeCommand.BOOT): "NO_CONTROLLER DISCONNECTED BOOTING POWER_OFF",
+    (RobotMode.POWER_OFF, ModeCommand.ASK_TO_CONFIRM): "CONFIRM_SAFETY",
+    (RobotMode.CONFIRM_SAFETY, ModeCommand.CONFIRM): "POWER_OFF",
+}
+
+
+@pytest.mark.parametrize("mode", RobotMode)
+@pytest.mark.parametrize("command", ModeCommand)
+def test_ways_of_the_robot_mode(mode, command):
+    machine = RobotModeMachine(mode, 0.008)
+    machine.command(command)
+    seen = [machine.mode]
+    for _ in range(1000):
+        machine.step()
+        if machine.mode is not seen[-1]:
+            seen.append(machine.mode)
+    assert not machine.is_changing
+    assert " ".join(step.name for step in seen) == WAYS.get((mode, command), mode.name)
+    assert ((mode, command) in TRANSITIONS) is ((mode, command) in WAYS)
+
+
+def test_joint_modes():
+    assert set(JOINT_MODES) == {(robot, safety) for robot in RobotMode for safety in SafetyMode}
+    plain = {robot: JOINT_MODES[robot, N] for robot in RobotMode}
+    assert plain[RobotMode.RUNNING] is JointMode.RUNNING
+    assert plain[RobotMode.POWER_OFF] is JointMode.POWER_OFF
+    assert plain[RobotMode.IDLE] is JointMode.IDLE
+    assert plain[RobotMode.BACKDRIVE] is JointMode.BACKDRIVE
+    assert plain[RobotMode.POWER_ON] is JointMode.BOOTING
+    for robot in POWERED:
+        assert JOINT_MODES[robot, RE] is JOINT_MODES[robot, SE] is JointMode.READY_FOR_POWER_OFF
+        assert JOINT_MODES[robot, V] is JointMode.VIOLATION
+        assert JOINT_MODES[robot, F] is JointMode.FAULT
+        assert JOINT_MODES[robot, PS] is plain[robot]
+    assert JOINT_MODES[RobotMode.POWER_OFF, RE] is JointMode.POWER_OFF
