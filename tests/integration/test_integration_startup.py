@@ -5,7 +5,10 @@ import signal
 import subprocess
 import sys
 
+import pytest
 from integration_support import finish, free_port_base
+
+from ur_emulator.descriptor_limit import WANTED
 
 # Each costs time or memory that no box needs before somebody asks for it.
 LATE = {
@@ -28,6 +31,12 @@ START = (
     "cli.main()\n"
 )
 
+RAISE = (
+    "import json, resource\n"
+    "from ur_emulator.descriptor_limit import raise_descriptor_limit\n"
+    "print(json.dumps([raise_descriptor_limit(), *resource.getrlimit(resource.RLIMIT_NOFILE)]))\n"
+)
+
 
 def test_a_box_that_serves_has_loaded_nothing_that_can_wait():
     process = subprocess.Popen(
@@ -43,3 +52,21 @@ def test_a_box_that_serves_has_loaded_nothing_that_can_wait():
     loaded = {name.split(".")[0] for name in json.loads(done.out)}
     assert {"mujoco", "numpy", "lark"} <= loaded
     assert loaded & LATE.keys() == set()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such limit")
+@pytest.mark.parametrize(("hard", "given"), [(300, 300), (None, WANTED)])
+def test_the_limit_of_descriptors_is_raised_as_far_as_the_system_allows(hard, given):
+    import resource
+
+    now = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    hard = now if hard is None else hard
+    done = subprocess.run(
+        [sys.executable, "-c", RAISE],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (100, hard)),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    expected = given if hard == resource.RLIM_INFINITY else min(given, hard)
+    assert json.loads(done.stdout) == [expected, expected, hard]
