@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
+from protocol import dashboard_page
 from protocol import dashboard_replies as R
 from protocol.dashboard_commands import COMMANDS, find, match_command, unknown_command_reply
 from protocol.dashboard_connection import (
     MAX_LINE,
+    MAX_WAITING,
     CommandReceived,
     DashboardConnection,
     Greeting,
@@ -21,6 +24,11 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
 
 V3_15 = SoftwareVersion(3, 15, 8)
+PAGE = Path(__file__).parents[2] / "docs" / "protocol" / "dashboard.md"
+
+
+def test_the_page_is_made_from_the_table():
+    assert PAGE.read_text() == dashboard_page.render(), "run: make docs"
 
 
 def events(connection, data, step=None):
@@ -209,6 +217,27 @@ def test_endless_lines_are_refused(data):
         DashboardConnection(Role.ROBOT, V3_15).receive_data(data)
     with pytest.raises(LocalProtocolError, match="longer than"):
         DashboardConnection(Role.PC).command("popup", "x" * MAX_LINE)
+
+
+def test_lines_that_wait_are_bounded_and_count_no_more_when_they_are_answered():
+    robot = DashboardConnection(Role.ROBOT, V3_15)
+    lines = b"robotmode\n" * (MAX_WAITING // 10)
+    for _ in range(3):
+        for start in range(0, len(lines), 65_536):
+            robot.receive_data(lines[start : start + 65_536])
+        while robot.next_event() is not None:
+            robot.reply("Robotmode: RUNNING")
+    robot.receive_data(lines[: MAX_WAITING - 10])
+    with pytest.raises(RemoteProtocolError, match="wait for an answer"):
+        robot.receive_data(b"robotmode\n" * 2)
+
+
+def test_which_software_answers_when_it_is_done():
+    for name, since in {"load": (3, 3), "play": (3, 3), "stop": (3, 3), "pause": (3, 3)}.items():
+        row = find(name)
+        assert row.replies_when_done(SoftwareVersion(*since))
+        assert not row.replies_when_done(SoftwareVersion(3, 2, 9))
+    assert not find("power on").replies_when_done(V3_15)
 
 
 def test_what_a_pc_reads_out_of_replies():

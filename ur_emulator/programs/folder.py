@@ -47,7 +47,7 @@ class ProgramFolder:
             FileMissingError: there is none, or the name leads out of the folder.
         """
         path = self.locate(name)
-        if not path.is_file():
+        if not _is_file(path):
             raise FileMissingError(f"there is no file {name!r} in {self.root}")
         return self._found(path)
 
@@ -95,7 +95,7 @@ class ProgramFolder:
             return self.find(name)
         except FileMissingError:
             path = file.path.parent / PurePosixPath(name.replace("\\", "/")).name
-            if not path.is_file():
+            if not _is_file(path):
                 raise
             return self._found(self.locate(str(path.relative_to(self._known_root()))))
 
@@ -106,3 +106,10 @@ class ProgramFolder:
     def _found(self, path: Path) -> FoundFile:
         inside = PurePosixPath(path.relative_to(self._known_root()).as_posix())
         return FoundFile(path, str(WIRE_ROOTS[0] / inside))
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long, a folder that may not be looked into
+        return False

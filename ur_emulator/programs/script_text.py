@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from protocol.script_channel import ProgramText, ScriptChannel
+from protocol.script_channel import MAX_PROGRAM, ProgramText, ScriptChannel
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.xml_tree import read_bytes
 
@@ -33,12 +33,17 @@ def as_one_program(text: str, name: str) -> str:
     A file with one `def` and nothing else is a program already, as PolyScope saves it beside a .urp.
     Anything else is wrapped into a program with the name of the file, as a node of type script would be: then
     several functions and a call of one of them are a program, and so are bare statements.
+
+    Raises:
+        ProgramFileError: the script is longer than a box takes.
     """
+    if len(text) > MAX_PROGRAM:
+        raise ProgramFileError(f"the script has more than {MAX_PROGRAM} bytes")
     plain = wire_text(text).rstrip() + "\n"
     items = ScriptChannel().feed(plain.encode("latin-1"))
     if len(items) == 1 and isinstance(items[0], ProgramText) and items[0].kind == "def":
-        return items[0].text
-    return f"def {name}():\n{plain}end\n"
+        return items[0].text.rstrip("\n")
+    return f"def {name}():\n{plain}end"
 
 
 def wire_text(text: str) -> str:

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from protocol.script_channel import MAX_PROGRAM
+from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.installation import ExternalControlPc
 
 
@@ -33,6 +35,7 @@ class ScriptWriter:
         self.parts: list[str | Gap] = []
         self._depth = 0
         self._labels = 0
+        self._size = 0
 
     @property
     def depth(self) -> int:
@@ -40,7 +43,14 @@ class ScriptWriter:
         return self._depth
 
     def add(self, text: str) -> None:
-        """Write a line; a text of several lines is written as it is, each one indented."""
+        """Write a line; a text of several lines is written as it is, each one indented.
+
+        Raises:
+            ProgramFileError: the script becomes longer than a box takes.
+        """
+        self._size += len(text)
+        if self._size > MAX_PROGRAM:
+            raise ProgramFileError(f"a script of more than {MAX_PROGRAM} bytes comes of the program")
         indent = "  " * self._depth
         self.parts.extend(indent + line for line in text.replace("\r\n", "\n").rstrip("\n").split("\n"))
 

@@ -22,6 +22,8 @@ MAX_SIZE = 32 << 20
 # References that lead to references; PolyScope writes one step.
 _MAX_STEPS = 16
 _STEP = re.compile(r"([A-Za-z_][\w.\-]*)(?:\[(\d{1,6})\])?")
+# So much is parsed without a break [bytes]: the control cycle of the same process must not wait for more.
+_BITE = 16 << 10
 _GZIP_MAGIC = b"\x1f\x8b"
 
 
@@ -82,8 +84,11 @@ def read_xml(path: Path) -> XmlTree:
         raise ProgramFileError(f"{path.name}: a document type is declared, PolyScope's files have none")
     from xml.etree import ElementTree  # costs more than all else here, and few boxes need it
 
+    parser = ElementTree.XMLParser()
     try:
-        root = ElementTree.fromstring(data)
+        for start in range(0, len(data), _BITE):
+            parser.feed(data[start : start + _BITE])
+        root: Element = parser.close()
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise ProgramFileError(f"{path.name} is no XML that PolyScope has written: {error}") from None
     return XmlTree(path.name, root)

@@ -1,0 +1,366 @@
+"""Programs from a folder: names and places, script files, what is loaded, External Control."""
+
+import pytest
+from box_support import FrameReader, MessageReader, connect, listening_socket
+from dashboard_support import (
+    Dashboard,
+    external_control,
+    installation,
+    pc_with_script,
+    script_line,
+    urp,
+    write_programs,
+)
+
+from protocol.primary_messages import KeyMessage, PopupMessage, RuntimeExceptionMessage, TextMessage
+from ur_emulator.emulator import ControlBox
+from ur_emulator.errors import EmulatorError, FileMissingError, ProgramFileError
+from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.programs.installation import ExternalControlPc, load_installation
+from ur_emulator.programs.loading import load_program, split_header
+from ur_emulator.programs.script_text import as_one_program
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "programs").mkdir()
+    (tmp_path / "secret.script").write_text('textmsg("secret")\n')
+    return write_programs(tmp_path / "programs")
+
+
+@pytest.fixture
+def box(folder):
+    with ControlBox(pace="lockstep", port_base=None, seed=7, programs=folder) as box:
+        yield box
+
+
+@pytest.fixture
+def dashboard(box):
+    with Dashboard(box) as dashboard:
+        yield dashboard
+
+
+# --- names
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        ("hello.urp", "hello.urp"),
+        ("/programs/hello.urp", "hello.urp"),
+        ("/ursim/programs/hello.urp", "hello.urp"),
+        ("cell/count me.script", "cell/count me.script"),
+        ("/programs/cell/count me.script", "cell/count me.script"),
+        ('"cell/count me.script"', "cell/count me.script"),
+        ("./hello.urp", "hello.urp"),
+    ],
+)
+def test_names_of_programs(folder, name, path):
+    found = ProgramFolder(folder).find(name)
+    assert (found.path, found.wire_path) == (folder / path, f"/programs/{path}")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../secret.script", "/programs/../secret.script", "cell/../../secret.script", "cell/../hello.urp", "/etc/passwd",
+        "/programsx/hello.urp", "/hello.urp", "link.script", "circle", "", ".", "cell", "a\0b", "x" * 5000, "no.urp", "~/x",
+        "..\\secret.script", "/ursim/hello.urp",
+    ],
+)  # fmt: skip
+def test_names_that_lead_nowhere_or_out(folder, name):
+    (folder / "link.script").symlink_to(folder.parent / "secret.script")
+    (folder / "circle").symlink_to(folder / "circle")
+    with pytest.raises(FileMissingError):
+        ProgramFolder(folder).find(name)
+
+
+def test_a_box_without_folder_has_no_programs():
+    with ControlBox(pace="lockstep", port_base=None) as box, Dashboard(box) as dashboard:
+        assert dashboard.ask_all("load hello.urp", "play", "load installation default.installation") == [
+            "File not found: hello.urp",
+            "Failed to execute: play",
+            "Loading installation: /programs/default.installation",
+        ]
+        assert any("give it --programs DIR" in entry.text for entry in box.log)
+
+
+def test_a_folder_that_does_not_exist_is_refused(tmp_path):
+    with pytest.raises(EmulatorError, match="no such folder, make it first"):
+        ControlBox(programs=tmp_path / "nowhere")
+
+
+# --- script files
+
+
+@pytest.mark.parametrize(
+    ("text", "program"),
+    [
+        ("def p():\n  sync()\nend\n", "def p():\n  sync()\nend"),
+        ("# made by hand\n\ndef p():\n  sync()\nend", "def p():\n  sync()\nend"),
+        ("sync()\nsync()\n", "def name():\nsync()\nsync()\nend"),
+        ("def p():\n  sync()\nend\np()\n", "def name():\ndef p():\n  sync()\nend\np()\nend"),
+        ("sec s():\n  sync()\nend\n", "def name():\nsec s():\n  sync()\nend\nend"),
+        ("", "def name():\n\nend"),
+    ],
+    ids=["def", "def after comments", "statements", "def and call", "sec", "empty"],
+)
+def test_a_script_file_is_one_program(text, program):
+    assert as_one_program(text, "name") == program
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        (b"x = 1\0", "is no text"),
+        (b"#" * (5 << 20), "more than 4194304 bytes"),
+        (b"#" * (40 << 20), "more than 33554432 bytes"),
+    ],
+    ids=["zeros", "long", "huge"],
+)
+def test_script_files_that_are_none(tmp_path, data, problem):
+    (tmp_path / "p.script").write_bytes(data)
+    with pytest.raises(ProgramFileError, match=problem):
+        load_program(ProgramFolder(tmp_path), "p.script")
+
+
+def test_files_of_other_kinds_are_no_programs(tmp_path):
+    (tmp_path / "notes.txt").write_text("x = 1")
+    with pytest.raises(
+        ProgramFileError, match=r"notes\.txt is no program: its name must end in \.urp or \.script"
+    ):
+        load_program(ProgramFolder(tmp_path), "notes.txt")
+
+
+def test_a_script_program_carries_the_name_of_its_file(box, dashboard):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.next()
+        assert dashboard.ask("load cell/count me.script") == "Loading program: /programs/cell/count me.script"
+        assert dashboard.ask_all("programState", "play") == ["STOPPED count me.script", "Starting program"]
+        assert reader.message(KeyMessage).text == "count_me"
+        assert reader.message(TextMessage).text == "counted 3"
+
+
+def test_a_program_that_does_not_compile_is_told_when_it_is_played(box, dashboard):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.next()
+        assert dashboard.ask_all("load broken.script", "programState", "play", "programState") == [
+            "Loading program: /programs/broken.script", "STOPPED broken.script", "Failed to execute: play",
+            "STOPPED broken.script",
+        ]  # fmt: skip
+        told = reader.message(RuntimeExceptionMessage)
+        assert (told.line, told.text) == (2, "syntax_error_on_line:2:  x = = 1:")
+
+
+# --- what is loaded
+
+
+def test_play_starts_at_the_top_each_time(box, dashboard):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.next()
+        dashboard.ask("load hello.urp")
+        for _ in range(3):
+            assert dashboard.ask("play") == "Starting program"
+            assert reader.message(TextMessage).text == "hello"
+            dashboard.until("programState", "STOPPED hello.urp")
+
+
+def test_a_loaded_program_is_in_memory(box, dashboard, folder):
+    dashboard.ask("load hello.urp")
+    (folder / "hello.urp").unlink()
+    assert dashboard.ask("play") == "Starting program"
+
+
+def test_what_is_loaded_stays_when_another_cannot_be_loaded(box, dashboard):
+    dashboard.ask("load hello.urp")
+    assert dashboard.ask_all("load strange.urp", "load nothing.urp", "get loaded program", "programState") == [
+        "Error while loading program: strange.urp", "File not found: nothing.urp",
+        "Loaded program: /programs/hello.urp", "STOPPED hello.urp",
+    ]  # fmt: skip
+    assert any("<PalletWizard> node cannot be turned into a script" in entry.text for entry in box.log)
+
+
+@pytest.mark.parametrize("state", ["play", "pause"])
+def test_nothing_is_loaded_while_a_program_runs(dashboard, state):
+    dashboard.ask_all("load wait.urp", "play", state)
+    assert dashboard.ask_all("load hello.urp", "load installation other.installation", "get loaded program") == [
+        "Error while loading program: hello.urp", "Failed to load installation: other.installation",
+        "Loaded program: /programs/wait.urp",
+    ]  # fmt: skip
+
+
+def test_a_program_that_was_sent_shows_the_loaded_name(box, dashboard):
+    dashboard.ask("load hello.urp")
+    with connect(box, "secondary") as sock:
+        sock.sendall(b"def sent():\n  while True:\n    sync()\n  end\nend\n")
+        dashboard.until("programState", "PLAYING hello.urp")
+    assert dashboard.ask_all("play", "stop", "play") == [
+        "Failed to execute: play",
+        "Stopped",
+        "Starting program",
+    ]
+
+
+def test_the_main_program_loops_unless_it_runs_once(box, dashboard, folder):
+    (folder / "twice.urp").write_bytes(
+        urp(script_line('textmsg("turn")') + script_line("sync()"), once=False)
+    )
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        dashboard.ask_all("load twice.urp", "play")
+        assert [reader.message(TextMessage).text for _ in range(3)] == ["turn"] * 3
+    assert dashboard.ask_all("programState", "stop") == ["PLAYING twice.urp", "Stopped"]
+
+
+def test_a_move_of_a_program_file_goes_to_its_waypoint(box, dashboard, folder):
+    waypoint = (
+        '<Waypoint type="Fixed" name="W"><motionParameters/><position><JointAngles angles="0.3,-1.4,-1.7,0.1,1.2,1.4"/>'
+        "</position></Waypoint>"
+    )
+    (folder / "go.urp").write_bytes(
+        urp(f'<Move motionType="MoveJ" speed="1.0" acceleration="1.4"><children>{waypoint}</children></Move>')
+    )
+    with connect(box, "realtime") as sock:
+        frames = FrameReader(sock)
+        dashboard.ask_all("load go.urp", "play")
+        frames.until(lambda frame: abs(frame.target_q - [0.3, -1.4, -1.7, 0.1, 1.2, 1.4]).max() < 1e-9)
+
+
+# --- installations
+
+
+@pytest.mark.parametrize(
+    ("directory", "attribute", "expected"),
+    [
+        ("", "cell", "/programs/cell.installation"),
+        ("cell", "../cell", "/programs/cell.installation"),
+        ("cell", "cell", "/programs/cell.installation"),
+        ("cell", "inner", "/programs/cell/inner.installation"),
+        ("cell", "default", "/programs/default.installation"),
+    ],
+)
+def test_a_program_brings_its_installation(folder, directory, attribute, expected):
+    (folder / "cell.installation").write_bytes(installation("10.0.0.1"))
+    (folder / "cell" / "inner.installation").write_bytes(installation("10.0.0.2"))
+    (folder / directory / "p.urp").write_bytes(urp("<Halt/>", installation=attribute))
+    program = load_program(ProgramFolder(folder), f"{directory}/p.urp".lstrip("/"))
+    assert program.installation.wire_path == expected
+
+
+def test_the_default_installation_of_the_folder_is_read_if_there_is_one(folder):
+    files = ProgramFolder(folder)
+    assert load_installation(files, "default.installation").pc == ExternalControlPc()
+    (folder / "default.installation").write_bytes(installation("10.0.0.1", "50010"))
+    assert load_installation(files, "/programs/default.installation").pc == ExternalControlPc(
+        "10.0.0.1", 50010
+    )
+    assert load_program(files, "wait.urp").installation.pc == ExternalControlPc("10.0.0.1", 50010)
+
+
+@pytest.mark.parametrize("port", ["0", "65536", "x", "-1", "9" * 5000])
+def test_an_installation_with_a_port_that_is_none(folder, port):
+    (folder / "p.installation").write_bytes(installation("h", port))
+    with pytest.raises(ProgramFileError, match="of External Control is none of 1 to 65535"):
+        load_installation(ProgramFolder(folder), "p.installation")
+
+
+# --- External Control
+
+SENT = 'textmsg("from the PC")\n'
+
+
+@pytest.mark.parametrize("keep_open", [False, True])
+def test_external_control_plays_what_the_pc_sends(box, dashboard, folder, keep_open):
+    with pc_with_script(SENT, keep_open=keep_open) as (port, asked), connect(box, "primary") as sock:
+        (folder / "pc.urp").write_bytes(
+            urp(external_control("127.0.0.1", port) + script_line('textmsg("behind it")'))
+        )
+        reader = MessageReader(sock)
+        assert dashboard.ask_all("load pc.urp", "play") == [
+            "Loading program: /programs/pc.urp",
+            "Starting program",
+        ]
+        assert [reader.message(TextMessage).text for _ in range(2)] == ["from the PC", "behind it"]
+    assert asked == [b"request_program\n"]
+
+
+def test_external_control_asks_each_time_it_is_played(box, dashboard, folder):
+    with pc_with_script(SENT, 'textmsg("again")\n') as (port, asked), connect(box, "primary") as sock:
+        (folder / "pc.urp").write_bytes(urp(external_control("127.0.0.1", port)))
+        reader = MessageReader(sock)
+        dashboard.ask_all("load pc.urp", "play")
+        assert reader.message(TextMessage).text == "from the PC"
+        dashboard.until("programState", "STOPPED pc.urp")
+        dashboard.ask("play")
+        assert reader.message(TextMessage).text == "again"
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize("where", ["installation", "client"])
+def test_where_external_control_finds_its_pc(box, dashboard, folder, where):
+    """The node names a PC, or the installation does, or it is the one that plays the program."""
+    with pc_with_script(SENT) as (port, _), connect(box, "primary") as sock:
+        if where == "installation":
+            (folder / "pc.installation").write_bytes(installation("127.0.0.1", port))
+            node = external_control()
+        else:
+            (folder / "pc.installation").write_bytes(installation())
+            node = external_control("", port)
+        (folder / "pc.urp").write_bytes(urp(node, installation="pc"))
+        reader = MessageReader(sock)
+        assert dashboard.ask_all("load pc.urp", "play")[1] == "Starting program"
+        assert reader.message(TextMessage).text == "from the PC"
+
+
+def test_an_installation_that_is_loaded_later_counts(box, dashboard, folder):
+    with pc_with_script(SENT) as (port, _), connect(box, "primary") as sock:
+        (folder / "pc.urp").write_bytes(urp(external_control()))
+        (folder / "late.installation").write_bytes(installation("127.0.0.1", port))
+        reader = MessageReader(sock)
+        dashboard.ask_all("load pc.urp", "load installation late.installation", "play")
+        assert reader.message(TextMessage).text == "from the PC"
+
+
+def test_two_nodes_share_the_header(box, dashboard, folder):
+    sent = "# HEADER_BEGIN\nglobal n = 0\ndef count():\n  n = n + 1\nend\n# HEADER_END\ncount()\ntextmsg(n)\n"
+    with pc_with_script(sent) as (port, asked), connect(box, "primary") as sock:
+        (folder / "pc.urp").write_bytes(urp(external_control("127.0.0.1", port) * 2))
+        reader = MessageReader(sock)
+        dashboard.ask_all("load pc.urp", "play")
+        assert [reader.message(TextMessage).text for _ in range(2)] == ["1", "2"]
+    assert len(asked) == 1
+
+
+@pytest.mark.parametrize("text", ["a\nb", "# HEADER_END\na\n# HEADER_BEGIN", "# HEADER_BEGIN\na"])
+def test_a_program_without_a_whole_header_is_not_split(text):
+    assert split_header(text) == ([], text.split("\n"))
+
+
+@pytest.mark.parametrize(("sent", "problem"), [(None, "cannot be reached"), ("", "sends nothing")])
+def test_a_pc_that_does_not_answer_gives_a_program_that_says_so(box, dashboard, folder, sent, problem):
+    with pc_with_script(*([] if sent is None else [sent])) as (port, _), connect(box, "primary") as sock:
+        if sent is None:
+            with listening_socket() as closed:
+                port = closed.getsockname()[1]
+        (folder / "pc.urp").write_bytes(urp(external_control("127.0.0.1", port)))
+        reader = MessageReader(sock)
+        assert dashboard.ask_all("load pc.urp", "play")[1] == "Starting program"
+        popup = reader.message(PopupMessage)
+        assert problem in popup.text
+        assert popup.is_error
+        assert popup.is_blocking
+        assert dashboard.ask_all("programState", "close popup")[0] == "PLAYING pc.urp"
+        dashboard.until("programState", "STOPPED pc.urp")
+
+
+def test_a_pc_that_sends_nonsense_is_told_on_the_primary_port(box, dashboard, folder):
+    with pc_with_script("x = = 1\n") as (port, _), connect(box, "primary") as sock:
+        (folder / "pc.urp").write_bytes(urp(external_control("127.0.0.1", port)))
+        reader = MessageReader(sock)
+        assert dashboard.ask_all("load pc.urp", "play", "running") == [
+            "Loading program: /programs/pc.urp", "Failed to execute: play", "Program running: false",
+        ]  # fmt: skip
+        assert "syntax_error_on_line" in reader.message(RuntimeExceptionMessage).text
