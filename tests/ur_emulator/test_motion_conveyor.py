@@ -206,7 +206,7 @@ def test_a_secondary_program_leaves_the_tracking_alone(bench):
         "track_conveyor_linear(p[1,0,0,0,0,0], 0.0000001)",
         "track_conveyor_linear(p[0,0,0,0,0,1], 1000)",
         "track_conveyor_circular(p[0,0,0,0,0,0], 0)",
-        "stop_conveyor_tracking(0)",
+        "stop_conveyor_tracking(-1)",
     ],
 )
 def test_absurd_arguments_are_runtime_errors(bench, call):
