@@ -145,8 +145,10 @@ def test_power_is_refused_with_a_word_about_the_way_out(mode):
     bench.tick(300)
     assert bench.now.robot_mode == RobotMode.POWER_OFF
     first, second = infos(bench)[-2:]
-    assert first.startswith("power on refused") and second.startswith("brake release refused")
-    assert mode.name in first and ROW[mode].way_out in first
+    assert first.startswith("power on refused")
+    assert second.startswith("brake release refused")
+    assert mode.name in first
+    assert ROW[mode].way_out in first
 
 
 # --- robot and joint modes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 def contact_wrench(
     model: mujoco.MjModel, data: mujoco.MjData, flange: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Sum up what fixed bodies (table, base) press on the arm.
+    """Sum up what fixed bodies (table, base, obstacles) press on the arm.
 
     Contacts between two links of the arm do not count: they push nothing from outside.
 
@@ -23,10 +23,11 @@ def contact_wrench(
         Wrench (6,) on the arm, base axes, force first [N, Nm].
     """
     wrench = np.zeros(6)
+    fixed_to = model.body_weldid
     in_contact_frame = np.zeros(6)
     for i in range(data.ncon):
         contact = data.contact[i]
-        first, second = (int(model.geom_bodyid[geom]) for geom in contact.geom)
+        first, second = (int(fixed_to[model.geom_bodyid[geom]]) for geom in contact.geom)
         if (first == 0) == (second == 0):
             continue
         mujoco.mj_contactForce(model, data, i, in_contact_frame)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
 from ur_emulator.models.robot_model import DhRow, RobotModel
+from ur_emulator.plant.obstacles import add_slots
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
 
@@ -125,6 +126,7 @@ def _add_hulls(spec: mujoco.MjSpec, robot: RobotModel, dh: Sequence[DhRow]) -> N
     world.add_geom(
         name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2.0, 2.0, 0.1], pos=[0.0, 0.0, TABLE_HEIGHT]
     )
+    add_slots(spec)
     for piece in robot.base_hull:
         _add_capsule(world, piece.start, piece.end, piece.radius)
     for name, link, row in zip(LINKS, robot.links, dh, strict=True):

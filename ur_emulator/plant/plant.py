@@ -28,12 +28,13 @@ from ur_emulator.models.calibration import calibrated_dh, draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import FLANGE, GRAVITY
 from ur_emulator.models.random_streams import random_stream
-from ur_emulator.models.robot_model import RobotModel, Vector3, six
+from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.contact import contact_wrench
 from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX, Drives
 from ur_emulator.plant.gear import GearRipple
 from ur_emulator.plant.loads import Loads
+from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.physics import JointServos, ServoGains, build_physics
 from ur_emulator.plant.plant_state import PlantState, Target
 from ur_emulator.plant.sensors import (
@@ -124,6 +125,7 @@ class Plant:
         # In force mode and after it, until the arm is moved away; see `rest_trim`.
         self._trim_rests = False
         self._loads = Loads(self._model, data)
+        self._obstacles = Obstacles(self._model)
         self._error = np.zeros(6)
         self._ripple = np.zeros(6)
         self._braked = True
@@ -232,6 +234,23 @@ class Plant:
             PlantError: when a number is not finite.
         """
         self._loads.push(force, point)
+
+    @property
+    def obstacles(self) -> tuple[str, ...]:
+        """Names of the obstacles that stand around the arm, in the order in which they came."""
+        return tuple(self._obstacles.slots)
+
+    def put_obstacle(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
+        """Put an obstacle somewhere; see `Obstacles.put`.
+
+        Raises:
+            PlantError: it is no obstacle, the arm is there, or there are too many; all stays as it was.
+        """
+        self._obstacles.put(name, shape, size, pose, self._qpos)
+
+    def remove_obstacle(self, name: str) -> None:
+        """Take an obstacle away; one that does not stand there is none."""
+        self._obstacles.remove(name)
 
     # --- the cycle ---
 

@@ -1,0 +1,202 @@
+"""Obstacles: fixed shapes that come and go while the arm works.
+
+MuJoCo's models do not grow at run time. So the model has SLOTS shapes from the beginning, on a fixed body of
+their own; those that are not in use collide with nothing and are skipped as a whole when none is in use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import cos, hypot, inf, isfinite, sin
+
+import mujoco
+import numpy as np
+
+from ur_emulator.errors import PlantError
+from ur_emulator.models.robot_model import Vector6
+
+OBSTACLES = "obstacles"
+SLOTS = 16
+
+# Limits that keep absurd numbers from the physics: how far away, how small and how large [m].
+FARTHEST, SMALLEST, LARGEST = 5.0, 0.001, 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A kind of obstacle.
+
+    Attributes:
+        geom: MuJoCo's type.
+        sizes: what its sizes mean, in order [m].
+        to_mujoco: those as MuJoCo's sizes.
+        half_extent: half edges of the smallest box around it [m]; infinite for what has no end.
+    """
+
+    geom: mujoco.mjtGeom
+    sizes: tuple[str, ...]
+    to_mujoco: Callable[..., tuple[float, float, float]]
+    half_extent: Callable[..., tuple[float, float, float]]
+
+
+SHAPES: dict[str, Shape] = {
+    "box": Shape(
+        mujoco.mjtGeom.mjGEOM_BOX,
+        ("edge along x", "edge along y", "edge along z"),
+        lambda x, y, z: (x / 2, y / 2, z / 2),
+        lambda x, y, z: (x / 2, y / 2, z / 2),
+    ),
+    "sphere": Shape(mujoco.mjtGeom.mjGEOM_SPHERE, ("radius",), lambda r: (r, 0.0, 0.0), lambda r: (r, r, r)),
+    "capsule": Shape(
+        mujoco.mjtGeom.mjGEOM_CAPSULE,
+        ("radius", "length along z without the ends"),
+        lambda r, length: (r, length / 2, 0.0),
+        lambda r, length: (r, r, length / 2 + r),
+    ),
+    # A wall without end; what is on the side of negative z is inside it.
+    "plane": Shape(mujoco.mjtGeom.mjGEOM_PLANE, (), lambda: (LARGEST, LARGEST, 0.1), lambda: (inf, inf, inf)),
+}
+
+
+def check_obstacle(name: str, shape: str, size: Sequence[float], pose: Sequence[float]) -> None:
+    """Refuse what is no obstacle.
+
+    Raises:
+        PlantError: says what was given and what is allowed.
+    """
+    if not name:
+        raise PlantError("obstacle without a name given: it needs one, to be removed by")
+    if shape not in SHAPES:
+        raise PlantError(f"obstacle {name}: shape {shape!r} given: choose one of {', '.join(SHAPES)}")
+    wanted = SHAPES[shape].sizes
+    if len(size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in size):
+        raise PlantError(
+            f"obstacle {name}: size {list(size)} given: a {shape} needs {len(wanted)} numbers "
+            f"({', '.join(wanted) or 'none'}), each {SMALLEST:g} to {LARGEST:g} m"
+        )
+    if len(pose) != 6 or not all(map(isfinite, pose)) or hypot(*pose[:3]) > FARTHEST:
+        raise PlantError(
+            f"obstacle {name}: pose {list(pose)} given: six finite numbers x, y, z, rx, ry, rz are needed, "
+            f"at most {FARTHEST:g} m away"
+        )
+
+
+def add_slots(spec: mujoco.MjSpec) -> None:
+    """Reserve shapes in a model."""
+    body = spec.worldbody.add_body(name=OBSTACLES)
+    for i in range(SLOTS):
+        body.add_geom(
+            name=f"{OBSTACLES}_{i}",
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[SMALLEST, 0.0, 0.0],
+            contype=0,
+            conaffinity=0,
+            mass=0.0,
+        )
+
+
+class Obstacles:
+    """Those that stand around one arm.
+
+    Attributes:
+        slots: name to the index of its shape, in the order in which they came.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        self._body: int = model.body(OBSTACLES).id
+        self._first: int = model.geom(f"{OBSTACLES}_0").id
+        self.slots: dict[str, int] = {}
+
+    def put(self, name: str, shape: str, size: Sequence[float], pose: Vector6, q: Sequence[float]) -> None:
+        """Put an obstacle somewhere; one of the same name gives way to it.
+
+        Args:
+            name: to remove it by.
+            shape: one of SHAPES.
+            size: as the shape wants it [m].
+            pose: of its middle in the base frame [m, rad].
+            q: where the hinges are now [rad]: nothing can be put into the arm.
+
+        Raises:
+            PlantError: it is no obstacle, the arm is there, or there are too many; all stays as it was.
+        """
+        check_obstacle(name, shape, size, pose)
+        slot = next(i for i in range(SLOTS + 1) if i not in self.slots.values())
+        if slot == SLOTS and name not in self.slots:
+            raise PlantError(f"obstacle {name}: there are {SLOTS} already, remove one first")
+        in_place = slot == SLOTS
+        if in_place:
+            slot = self.slots[name]
+            before = self._read(slot)
+        self._write(slot, SHAPES[shape], size, pose)
+        if self._touches(slot, q):
+            if in_place:
+                self._restore(slot, before)
+            else:
+                self._hide(slot)
+            raise PlantError(f"obstacle {name}: the arm is where it should stand, move one of them")
+        if not in_place:
+            self.remove(name)
+        self.slots[name] = slot
+
+    def remove(self, name: str) -> None:
+        """Take an obstacle away; one that does not stand there is none."""
+        slot = self.slots.pop(name, None)
+        if slot is not None:
+            self._hide(slot)
+
+    def _write(self, slot: int, shape: Shape, size: Sequence[float], pose: Vector6) -> None:
+        model, geom = self._model, self._first + slot
+        half = shape.half_extent(*size)
+        endless = half[0] == inf
+        model.geom_type[geom] = int(shape.geom)
+        model.geom_size[geom] = shape.to_mujoco(*size)
+        model.geom_aabb[geom] = (0.0, 0.0, 0.0, *((0.0, 0.0, 0.0) if endless else half))
+        model.geom_rbound[geom] = 0.0 if endless else hypot(*half)
+        model.geom_pos[geom] = pose[:3]
+        model.geom_quat[geom] = _quaternion(pose[3:])
+        # Left at "same frame as its body", the shape would not follow its own position.
+        model.geom_sameframe[geom] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
+        self._switch(geom, True)
+
+    def _hide(self, slot: int) -> None:
+        geom = self._first + slot
+        self._model.geom_sameframe[geom] = int(mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
+        self._switch(geom, False)
+
+    def _switch(self, geom: int, on: bool) -> None:
+        model = self._model
+        model.geom_contype[geom] = model.geom_conaffinity[geom] = int(on)
+        own = slice(self._first, self._first + SLOTS)
+        any_on = int(model.geom_contype[own].any())
+        model.body_contype[self._body] = model.body_conaffinity[self._body] = any_on
+
+    def _read(self, slot: int) -> list[np.ndarray]:
+        return [np.copy(field[self._first + slot]) for field in self._fields()]
+
+    def _restore(self, slot: int, values: list[np.ndarray]) -> None:
+        for field, value in zip(self._fields(), values, strict=True):
+            field[self._first + slot] = value
+
+    def _fields(self) -> tuple[np.ndarray, ...]:
+        m = self._model
+        return m.geom_type, m.geom_size, m.geom_aabb, m.geom_rbound, m.geom_pos, m.geom_quat
+
+    def _touches(self, slot: int, q: Sequence[float]) -> bool:
+        data = mujoco.MjData(self._model)
+        data.qpos[:] = q
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_comPos(self._model, data)
+        mujoco.mj_collision(self._model, data)
+        geom = self._first + slot
+        return any(geom in data.contact[i].geom for i in range(data.ncon))
+
+
+def _quaternion(vector: Sequence[float]) -> tuple[float, float, float, float]:
+    """Quaternion (w, x, y, z) of a rotation vector [rad]."""
+    angle = hypot(*vector)
+    x, y, z = vector
+    share = sin(angle / 2) / angle if angle > 0.0 else 0.5
+    return (cos(angle / 2), share * x, share * y, share * z)
