@@ -1,0 +1,416 @@
+"""What stops do to a moving arm, and how people and clients get it going again."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from box_support import Bench, FakeNetwork
+from states_support import BRAKING, ENDLESS, failures, infos, moving, power_up
+
+from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller import safety_commands as safe
+from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
+from ur_emulator.controller.hands import GuideByHand
+from ur_emulator.controller.speed_limiter import RECOVERY_SPEED, REDUCED_SHARE, TOLERANCE, joint_limits
+from ur_emulator.errors import EmulatorError
+from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robots import robot_by_name
+from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.generators import SpeedJ
+
+PRESS, RELEASE = safe.PressEmergencyStop("robot"), safe.ReleaseEmergencyStop()
+OPEN, CLOSE = safe.SafeguardStop(True), safe.SafeguardStop(False)
+REDUCE, NO_REDUCE = safe.ReducedMode(True), safe.ReducedMode(False)
+LONG_MOVE = "def m():\n  q = get_actual_joint_positions()\n  movej([q[0] + 2, q[1], q[2], q[3], q[4], q[5]], a=3, v=3)\nend\n"
+
+
+def speeds(bench, first=0):
+    return np.array([s.target_qd for s in bench.snapshots[first:]])
+
+
+def modes(bench):
+    return [SafetyMode(e.safety_mode).name for e in bench.events if isinstance(e, SafetyModeChanged)]
+
+
+# --- emergency stops
+
+
+@pytest.mark.parametrize(
+    "command", [PRESS, safe.PressEmergencyStop("system"), safe.TriggerViolation(), safe.TriggerFault()]
+)
+def test_the_arm_brakes_as_it_can_then_loses_its_power(command):
+    bench = moving()
+    first = len(bench.snapshots)
+    bench.tick(BRAKING, command)
+    limit = bench.controller.state.robot.stop_deceleration * 0.008
+    assert np.abs(np.diff(speeds(bench, first - 1), axis=0)).max() <= limit * (1 + 1e-9)
+    powered = [s.robot_mode == RobotMode.RUNNING for s in bench.snapshots[first:]]
+    n_braking = powered.index(False)
+    assert 5 < n_braking < 40
+    assert not any(powered[n_braking:])
+    resting = bench.snapshots[first + n_braking - 1]
+    assert resting.target_qd == (0.0,) * 6
+    assert np.abs(resting.actual_qd).max() < 0.02
+    assert bench.now.runtime_state == ProgramState.STOPPED
+
+
+def test_joint_modes_tell_of_the_stop_while_the_arm_brakes():
+    bench = moving()
+    assert bench.tick(1, PRESS).joint_mode == (JointMode.READY_FOR_POWER_OFF,) * 6
+    assert bench.tick(BRAKING).joint_mode == (JointMode.POWER_OFF,) * 6
+    bench.tick(1, safe.TriggerFault())
+    assert bench.now.joint_mode == (JointMode.FAULT,) * 6
+
+
+def test_a_client_gets_the_arm_going_after_an_emergency_stop():
+    bench = moving()
+    bench.tick(BRAKING, PRESS)
+    bench.tick(300, cmd.PowerOn())
+    assert bench.now.robot_mode == RobotMode.POWER_OFF
+    bench.tick(1, RELEASE)
+    assert (bench.now.safety_mode, bench.now.robot_mode) == (SafetyMode.NORMAL, RobotMode.POWER_OFF)
+    bench.start(ENDLESS)
+    assert "it must be RUNNING" in failures(bench)[-1]
+    assert power_up(bench).robot_mode == RobotMode.RUNNING
+    bench.start(ENDLESS)
+    bench.tick(30)
+    assert any(bench.now.target_qd)
+
+
+def test_a_stop_that_is_released_at_once_still_ends_without_power():
+    bench = moving()
+    bench.tick(1, PRESS)
+    bench.tick(1, RELEASE)
+    assert (bench.now.safety_mode, bench.now.robot_mode) == (SafetyMode.NORMAL, RobotMode.POWER_OFF)
+    before = bench.now.actual_q
+    bench.start(ENDLESS)
+    bench.tick(50)
+    assert bench.now.actual_q == pytest.approx(before, abs=0.01)
+
+
+@pytest.mark.parametrize("ticks", [1, 80, 140, 160])
+def test_a_stop_on_the_way_up_cuts_the_power(ticks):
+    bench = Bench(mode=RobotMode.POWER_OFF)
+    bench.tick(ticks, cmd.ReleaseBrakes())
+    assert bench.now.robot_mode not in (RobotMode.POWER_OFF, RobotMode.RUNNING)
+    assert bench.tick(1, PRESS).robot_mode == RobotMode.POWER_OFF
+    bench.tick(300)
+    assert bench.now.robot_mode == RobotMode.POWER_OFF
+
+
+def test_two_buttons_must_both_be_released():
+    bench = moving()
+    bench.tick(1, safe.AssignSafetyInput(0, safe.SafetyInput.EMERGENCY_STOP))
+    assert bench.now.safety_mode == SafetyMode.SYSTEM_EMERGENCY_STOP
+    bench.tick(BRAKING, PRESS)
+    assert bench.now.safety_mode == SafetyMode.ROBOT_EMERGENCY_STOP
+    bench.tick(1, RELEASE)
+    assert bench.now.safety_mode == SafetyMode.SYSTEM_EMERGENCY_STOP
+    bench.controller.state.io.digital_in = 0x0300
+    bench.tick(1)
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+
+
+def test_an_emergency_stop_in_freedrive_ends_it():
+    bench = Bench()
+    bench.tick(5, GuideByHand())
+    bench.controller.plant.push((30.0, 0.0, 0.0))
+    bench.tick(30)
+    assert max(map(abs, bench.now.actual_qd)) > 0.01
+    bench.tick(BRAKING, PRESS)
+    assert bench.now.robot_mode == RobotMode.POWER_OFF
+    assert bench.now.control_mode == 0
+
+
+def test_unknown_kinds_and_pairs_are_refused():
+    with pytest.raises(EmulatorError, match="choose robot or system"):
+        safe.PressEmergencyStop("red")
+    with pytest.raises(EmulatorError, match="allowed are 0 to 3"):
+        safe.AssignSafetyInput(4, None)
+
+
+# --- safeguard
+
+
+def test_a_safeguard_pauses_on_the_path_and_the_program_goes_on_by_itself():
+    bench, plain = (moving(fidelity="ideal") for _ in range(2))
+    first = len(bench.snapshots)
+    bench.tick(100, OPEN)
+    assert bench.now.runtime_state == ProgramState.PAUSED
+    assert bench.now.robot_mode == RobotMode.RUNNING
+    bench.tick(400, CLOSE)
+    assert bench.now.runtime_state == ProgramState.PLAYING
+    assert [type(e) for e in bench.events if isinstance(e, ProgramPaused | ProgramResumed)] == [
+        ProgramPaused,
+        ProgramResumed,
+    ]
+    plain.tick(400)
+    # The path is a line in joint space: it never was left, whatever the time on it.
+    path = np.array([s.target_q for s in bench.snapshots[first:]])
+    assert np.ptp(path[:, 1:], axis=0).max() < 1e-6
+    assert any(speeds(bench)[-100:, 0])
+
+
+@pytest.mark.parametrize(("hardness", "least", "most"), [(0, 15.0, 20.0), (1, 2.0, 8.0)])
+def test_the_hardness_of_the_stop_is_the_programs(hardness, least, most):
+    bench = Bench(fidelity="ideal")
+    bench.start(LONG_MOVE.replace("():\n", f"():\n  set_safety_mode_transition_hardness({hardness})\n"))
+    bench.tick(55)
+    first = len(bench.snapshots)
+    top = bench.now.target_qd[0]
+    assert top > 1.0
+    bench.tick(100, OPEN)
+    drops = -np.diff(speeds(bench, first)[:, 0]) / 0.008
+    assert least <= drops.max() <= most + 3.0 + 1e-6  # the move's own acceleration comes on top
+    assert bench.now.target_qd == (0.0,) * 6
+
+
+def test_with_a_reset_button_closing_is_not_enough():
+    bench = moving()
+    bench.tick(1, safe.RequireSafeguardReset(True))
+    bench.tick(100, OPEN)
+    bench.tick(1, safe.ResetSafeguard())
+    assert bench.now.safety_mode == SafetyMode.SAFEGUARD_STOP
+    bench.tick(50, CLOSE)
+    assert bench.now.safety_mode == SafetyMode.SAFEGUARD_STOP
+    bench.tick(10, safe.ResetSafeguard())
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+    assert bench.now.runtime_state == ProgramState.PLAYING
+
+
+def test_a_reset_input_resets_on_its_rising_edge():
+    bench = moving()
+    bench.tick(
+        1, safe.RequireSafeguardReset(True), safe.AssignSafetyInput(1, safe.SafetyInput.SAFEGUARD_RESET)
+    )
+    bench.tick(50, OPEN)
+    bench.tick(5, CLOSE)
+    assert bench.now.safety_mode == SafetyMode.SAFEGUARD_STOP
+    bench.controller.state.io.digital_in = 0x0C00
+    assert bench.tick(1).safety_mode == SafetyMode.NORMAL
+
+
+def test_what_was_paused_before_stays_paused():
+    bench = moving()
+    bench.tick(60, cmd.PauseProgram())
+    bench.tick(60, OPEN)
+    bench.tick(60, CLOSE)
+    assert bench.now.runtime_state == ProgramState.PAUSED
+    bench.tick(10, cmd.ResumeProgram())
+    assert bench.now.runtime_state == ProgramState.PLAYING
+
+
+def test_programs_and_resuming_are_refused_while_the_safeguard_is_open():
+    bench = moving()
+    bench.tick(60, OPEN)
+    bench.start(ENDLESS)
+    bench.tick(10, cmd.ResumeProgram())
+    assert "SAFEGUARD_STOP" in failures(bench)[-1]
+    assert "close the safeguard" in failures(bench)[-1]
+    assert "stays paused: the robot is in SAFEGUARD_STOP" in infos(bench)[-1]
+    assert bench.now.runtime_state == ProgramState.PAUSED
+
+
+def test_a_push_in_a_safeguard_stop_is_a_protective_stop():
+    bench = moving()
+    bench.tick(60, OPEN)
+    bench.tick(1, cmd.TriggerProtectiveStop())
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    bench.tick(20, CLOSE)
+    bench.tick(20, cmd.UnlockProtectiveStop())
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+    assert bench.now.runtime_state == ProgramState.PAUSED
+    assert modes(bench) == ["SAFEGUARD_STOP", "PROTECTIVE_STOP", "NORMAL"]
+
+
+def test_a_stream_of_speeds_stops_and_goes_on():
+    bench = Bench(fidelity="ideal")
+    bench.start("def s():\n  while True:\n    speedj([0.5, 0, 0, 0, 0, 0], 2, 0.008)\n  end\nend\n")
+    bench.tick(60)
+    first = len(bench.snapshots)
+    bench.tick(60, OPEN)
+    assert bench.now.target_qd == (0.0,) * 6
+    assert (-np.diff(speeds(bench, first)[:, 0])).max() <= 20.0 * 0.008 * (1 + 1e-9)
+    bench.tick(100, CLOSE)
+    assert bench.now.target_qd[0] == pytest.approx(0.5)
+
+
+# --- protective stop
+
+
+def test_unlocking_waits_five_seconds_for_the_dashboard_only():
+    bench = moving()
+    bench.tick(1, cmd.TriggerProtectiveStop())
+    stopped_at, safety = bench.now.timestamp, bench.controller.state.safety
+    while not safety.may_unlock(bench.now.timestamp):
+        assert bench.controller.is_active
+        bench.tick()
+    assert bench.now.timestamp - stopped_at == pytest.approx(5.0, abs=0.01)
+    bench.tick(1, cmd.UnlockProtectiveStop())
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+    bench.tick(1, cmd.TriggerProtectiveStop())
+    assert not safety.may_unlock(bench.now.timestamp)
+
+
+def test_an_emergency_stop_over_a_protective_stop_leads_back_to_it():
+    bench = moving()
+    bench.tick(50, cmd.TriggerProtectiveStop())
+    bench.tick(BRAKING, PRESS)
+    assert bench.now.runtime_state == ProgramState.STOPPED
+    bench.tick(1, RELEASE)
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    bench.tick(1, cmd.UnlockProtectiveStop())
+    assert power_up(bench).robot_mode == RobotMode.RUNNING
+
+
+@pytest.mark.parametrize("name", ["ur3", "ur5", "ur10"])
+def test_every_arm_brakes_with_its_own_deceleration(name):
+    robot = robot_by_name(name)
+    controller = Controller(robot, fidelity_by_name("ideal"), 1, FakeNetwork())
+    bench = Bench(fidelity="ideal")
+    bench.controller = controller
+    bench.start(LONG_MOVE)
+    bench.tick(55)
+    first = len(bench.snapshots)
+    bench.tick(2, cmd.TriggerProtectiveStop())
+    bench.tick(60)
+    drops = -np.diff(speeds(bench, first)[:, 0]) / 0.008
+    assert drops.max() == pytest.approx(robot.stop_deceleration)
+
+
+# --- reduced mode, recovery
+
+
+def test_reduced_mode_slows_a_move_down_to_half_the_rated_speed():
+    bench = Bench(fidelity="ideal")
+    bench.tick(1, REDUCE)
+    bench.run(LONG_MOVE)
+    limit = REDUCED_SHARE * bench.controller.state.robot.qd_max[0]
+    fastest = np.abs(speeds(bench)[:, 0]).max()
+    assert 0.85 * limit < fastest <= limit + TOLERANCE
+    assert bench.now.safety_mode == SafetyMode.REDUCED
+    assert min(s.speed_scaling for s in bench.snapshots) < 0.7
+    assert bench.now.target_speed_fraction == 1.0
+    bench.run(
+        "def b():\n  q = get_actual_joint_positions()\n  movej([q[0] - 2, q[1], q[2], q[3], q[4], q[5]], a=3, v=1)\nend\n"
+    )
+    assert np.abs(speeds(bench, -200)[:, 0]).max() == pytest.approx(
+        1.0, rel=1e-3
+    )  # what is slow stays as it is
+
+
+@pytest.mark.parametrize("hardness", [0, 1])
+def test_a_fast_arm_is_within_the_limits_half_a_second_after_reduced_mode_began(hardness):
+    bench = Bench(fidelity="ideal")
+    bench.start(
+        f"def m():\n  set_safety_mode_transition_hardness({hardness})\n  while True:\n"
+        "    speedj([2.6, 0, 0, 0, 0, 0], 8, 0.008)\n  end\nend\n"
+    )
+    bench.tick(50)
+    assert bench.now.target_qd[0] == pytest.approx(2.6)
+    first = len(bench.snapshots)
+    bench.tick(110, REDUCE)
+    limit = REDUCED_SHARE * bench.controller.state.robot.qd_max[0]
+    assert np.abs(speeds(bench, first + 62)[:, 0]).max() <= limit + TOLERANCE
+    assert bench.now.safety_mode == SafetyMode.REDUCED
+    bench.tick(100, NO_REDUCE)
+    assert bench.now.target_qd[0] == pytest.approx(2.6)
+
+
+def test_who_is_too_fast_for_too_long_is_stopped():
+    bench = Bench(fidelity="ideal")
+    bench.tick(1, REDUCE)
+    limiter = bench.controller.state.limiter
+    fast = (0.0, 0.0, 3.0, 0.0, 0.0, 0.0)
+    found = [limiter.find_violation(fast, 0.008) for _ in range(70)]
+    assert found[:60] == [None] * 60
+    assert found[-1].error.code == 191
+    assert "elbow at 3.000 rad/s" in found[-1].error.text
+    assert limiter.find_violation((0.0,) * 6, 0.008) is None
+    assert limiter.find_violation(fast, 0.008) is None
+
+
+def test_limits_of_the_modes():
+    robot = robot_by_name("ur3")
+    assert joint_limits(SafetyMode.NORMAL, robot) is None
+    assert joint_limits(SafetyMode.REDUCED, robot) == tuple(0.5 * v for v in robot.qd_max)
+    assert joint_limits(SafetyMode.RECOVERY, robot) == (RECOVERY_SPEED,) * 6
+
+
+def test_an_arm_that_wakes_up_out_of_range_is_in_recovery_until_it_is_back():
+    bench = Bench(fidelity="ideal", mode=RobotMode.POWER_OFF)
+    high = bench.controller.state.robot.q_max[0]
+    q = (high + 0.05, *bench.now.actual_q[1:])
+    bench.controller.plant.reset(q)
+    bench.controller.state.motion.place(q)
+    bench.tick(5)
+    bench.tick(220, cmd.ReleaseBrakes())
+    assert (bench.now.robot_mode, bench.now.safety_mode) == (RobotMode.RUNNING, SafetyMode.RECOVERY)
+    bench.start(
+        "def back():\n  q = get_actual_joint_positions()\n  movej([q[0] - 1, q[1], q[2], q[3], q[4], q[5]], a=2, v=2)\nend\n"
+    )
+    while bench.now.safety_mode == SafetyMode.RECOVERY:
+        bench.tick()
+        assert abs(bench.now.target_qd[0]) <= RECOVERY_SPEED + TOLERANCE
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+    assert bench.now.actual_q[0] <= high
+    bench.tick(100)
+    assert min(speeds(bench)[:, 0]) < -1.0  # fast again
+
+
+def test_the_scale_of_an_arm_at_rest_is_that_of_the_slider():
+    motion = ArmMotion((0.0,) * 6, 20.0)
+    bench = Bench()
+    bench.tick(1, REDUCE)
+    limiter = bench.controller.state.limiter
+    assert limiter.step(motion, 0.4, 0.008) == 0.4
+    assert limiter.step(motion, 0.0, 0.008) == 0.0
+    motion.command(SimpleNamespace(), SpeedJ((0.0,) * 6, 1.0))
+    assert limiter.step(motion, 1.0, 0.008) == 1.0
+
+
+# --- the pendant and the start
+
+
+def test_the_teach_button_guides_by_hand_and_is_told():
+    bench = Bench()
+    bench.tick(5, safe.PressButton(safe.Button.TEACH, True), safe.PressButton(safe.Button.POWER, True))
+    assert bench.now.robot_status_bits & 0b1100 == 0b1100
+    assert bench.now.control_mode == 1
+    bench.tick(5, safe.PressButton(safe.Button.TEACH, False))
+    assert bench.now.robot_status_bits & 0b1100 == 0b1000
+    assert bench.now.control_mode == 0
+
+
+def test_changed_safety_settings_want_to_be_confirmed():
+    bench = moving()
+    bench.tick(1, safe.ChangeSafetySettings())
+    assert bench.now.robot_mode == RobotMode.CONFIRM_SAFETY
+    bench.tick(300, cmd.ReleaseBrakes())
+    assert bench.now.robot_mode == RobotMode.CONFIRM_SAFETY
+    bench.tick(1, safe.ConfirmSafety())
+    assert bench.now.robot_mode == RobotMode.POWER_OFF
+    assert power_up(bench).robot_mode == RobotMode.RUNNING
+
+
+def test_a_controller_that_starts_from_nothing_boots():
+    bench = Bench(mode=RobotMode.NO_CONTROLLER)
+    seen = [bench.now.robot_mode]
+    while bench.controller.is_active:
+        if bench.tick().robot_mode != seen[-1]:
+            seen.append(bench.now.robot_mode)
+    assert seen == [RobotMode.NO_CONTROLLER, RobotMode.DISCONNECTED, RobotMode.BOOTING, RobotMode.POWER_OFF]
+
+
+def test_faults_and_violations_are_reported_and_end_with_a_restart():
+    bench = moving()
+    bench.tick(BRAKING, safe.TriggerViolation("too fast"))
+    reports = [e for e in bench.events if isinstance(e, ErrorReported)]
+    assert [(e.text, e.level.name) for e in reports] == [("too fast", "VIOLATION")]
+    bench.tick(1, safe.TriggerFault("broken"))
+    assert bench.now.safety_mode == SafetyMode.FAULT
+    bench.tick(1, cmd.RestartSafety())
+    assert (bench.now.safety_mode, bench.now.robot_mode) == (SafetyMode.NORMAL, RobotMode.POWER_OFF)
+    assert power_up(bench).robot_mode == RobotMode.RUNNING
