@@ -3,9 +3,11 @@
 import re
 
 import pytest
+from box_support import MessageReader, connect
 from dashboard_support import Dashboard, write_programs
 
 from protocol.dashboard_commands import COMMANDS, match_command
+from protocol.primary_messages import PopupMessage
 from protocol.ur_types import RobotMode, SoftwareVersion
 from ur_emulator.controller import commands as cmd
 from ur_emulator.emulator import ControlBox
@@ -204,6 +206,20 @@ def test_play_is_refused_while_a_paused_program_waits_for_its_popup(folder, dash
         "Loading program: /programs/asks.script", "Starting program", "Pausing program",
         "Failed to execute: play", "closing popup", "Starting program", "PLAYING asks.script",
     ]  # fmt: skip
+
+
+def test_a_popup_is_shown_to_all_clients(box, dashboard):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.next()
+        dashboard.ask("popup look here")
+        popup = reader.message(PopupMessage)
+        assert (popup.text, popup.is_blocking, popup.is_warning, popup.is_error) == (
+            "look here",
+            False,
+            False,
+            False,
+        )
 
 
 def test_a_popup_stays_without_power_until_it_is_closed(box, dashboard):

@@ -1,5 +1,7 @@
 """What bad, hasty and vanishing clients of the dashboard do, and a box that is switched off."""
 
+import random
+import re
 import socket
 import subprocess
 import sys
@@ -8,6 +10,7 @@ import pytest
 from box_support import FrameReader, connect
 from dashboard_support import Dashboard, external_control, urp, write_programs
 
+from protocol.dashboard_commands import COMMANDS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.servers.dashboard_port import LINES_PER_TURN
 
@@ -149,6 +152,50 @@ def test_a_client_that_reads_nothing_is_left_behind(folder, box):
         assert is_cut_off(greedy, b"load " + b"z" * 60_000 + b"\n")
         assert reader.next().timestamp >= first.timestamp
     still_serves(box)
+
+
+ARGUMENTS = [
+    "wait.urp",
+    "hello.urp",
+    "strange.urp",
+    "cell/count me.script",
+    "default.installation",
+    "x",
+    "OPERATOR",
+    ".",
+    "system",
+]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_sessions_get_one_fitting_reply_a_line(folder, seed):
+    draw = random.Random(seed)
+    rows = [row for row in COMMANDS if row.name not in ("quit", "shutdown")]
+    patterns = {
+        row.name: "|".join(re.sub(r"\\\{\w+\\\}", ".*", re.escape(reply)) for reply in row.replies.values())
+        for row in rows
+    }
+    with ControlBox(pace="lockstep", port_base=None, seed=seed, programs=folder) as box:
+        clients = [Dashboard(box) for _ in range(3)]
+        for _ in range(60):
+            asked = []
+            for client in clients:
+                row = draw.choice(rows)
+                line = (
+                    f"{row.name} {draw.choice(ARGUMENTS)}"
+                    if row.argument and draw.random() < 0.9
+                    else row.name
+                )
+                client.send(line)
+                asked.append((client, row, line))
+            for client, row, line in asked:
+                reply = client.reply()
+                assert re.fullmatch(patterns[row.name], reply), (line, reply)
+        clients[0].until("stop", "Stopped")
+        assert clients[0].ask("running") == "Program running: false"
+        for client in clients:
+            with client:
+                pass
 
 
 def test_many_clients_at_once(box):

@@ -1,6 +1,7 @@
 """Program files of PolyScope as scripts: every kind of node, what is not known, what is damaged."""
 
 import gzip
+from pathlib import Path
 
 import pytest
 from dashboard_support import expression, external_control, script_line, urp
@@ -175,6 +176,11 @@ SAMPLES = {
 
 def test_every_kind_of_node_has_a_sample():
     assert set(NODES) <= set(SAMPLES)
+
+
+def test_the_page_names_every_kind_of_node():
+    page = (Path(__file__).parents[2] / "docs" / "programs.md").read_text()
+    assert [kind for kind in NODES if f"`{kind}`" not in page] == []
 
 
 @pytest.mark.parametrize(("nodes", "expected"), SAMPLES.values(), ids=SAMPLES)
