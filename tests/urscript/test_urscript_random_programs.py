@@ -63,7 +63,7 @@ def test_the_trees_have_every_kind_of_node():
     } - {nodes.Node}
     seen = set()
 
-    @settings(max_examples=500, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=60, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
     @given(programs)
     def look(tree):
         seen.update(node_classes(tree))
