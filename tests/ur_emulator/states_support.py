@@ -1,17 +1,25 @@
 """What the tests of the state machines share: how to bring a box into any safety mode, and a moving arm."""
 
-from box_support import Bench
+from box_support import VERSION, Bench
 
+from protocol.primary_layout import JointData, MasterboardData, RobotModeData
+from protocol.primary_packages import decode_package, encode_state
+from protocol.realtime_layout import layout_for_version
+from protocol.rtde_types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller import safety_commands as safe
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
+from ur_emulator.controller.port_map import read_coil, read_register
 from ur_emulator.controller.safety_modes import SafetyEvent
+from ur_emulator.servers.robot_state import state_records
 
 ENDLESS = (
     "def endless():\n  q = get_actual_joint_positions()\n  while True:\n"
     "    movej([q[0] + 0.5, q[1], q[2], q[3], q[4], q[5]], a=3, v=1)\n    movej(q, a=3, v=1)\n  end\nend\n"
 )
+LAYOUT = layout_for_version(VERSION)
+encode_frame = LAYOUT.encoder()
 BRAKING = 150  # cycles, more than any arm needs to come to rest and lose its power
 
 # How each event is made to happen from outside, where it can be.
@@ -70,3 +78,40 @@ def power_up(bench):
     bench.tick(1, cmd.ReleaseBrakes())
     bench.tick(60)
     return bench.now
+
+
+def check_wires(bench):
+    """What the ports say of the modes in this cycle agrees, each in its own encoding."""
+    controller, now = bench.controller, bench.now
+    state, safety = controller.state, SafetyMode(now.safety_mode)
+    emergency = safety in (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP)
+    protective = safety is SafetyMode.PROTECTIVE_STOP
+    stops = safety not in (SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY)
+    powered = now.robot_mode in (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
+
+    frame = LAYOUT.decode(encode_frame(now))
+    assert frame.safety_mode == frame.safety_status == safety
+    assert frame.robot_mode == now.robot_mode
+    assert tuple(frame.joint_mode) == now.joint_mode
+
+    package = decode_package(encode_state(state_records(now), VERSION), VERSION)
+    mode_data, joints, board = (package.find(kind) for kind in (RobotModeData, JointData, MasterboardData))
+    assert (mode_data.is_emergency_stopped, mode_data.is_protective_stopped) == (emergency, protective)
+    assert (mode_data.is_robot_power_on, mode_data.robot_mode) == (powered, now.robot_mode)
+    assert board.safety_mode == safety
+    assert tuple(joints.joint_mode) == now.joint_mode
+
+    bits = SafetyStatusBits(now.safety_status_bits)
+    assert (SafetyStatusBits.EMERGENCY_STOPPED in bits) is emergency
+    assert (SafetyStatusBits.PROTECTIVE_STOPPED in bits) is protective
+    assert (SafetyStatusBits.STOPPED_DUE_TO_SAFETY in bits) is stops
+    assert (SafetyStatusBits.NORMAL_MODE in bits) is (safety is SafetyMode.NORMAL)
+    assert (SafetyStatusBits.REDUCED_MODE in bits) is (safety is SafetyMode.REDUCED)
+    own = RobotStatusBits(now.robot_status_bits)
+    assert (RobotStatusBits.POWER_ON in own) is powered
+
+    registers = [read_register(state, address) for address in range(260, 267)]
+    teach, power = RobotStatusBits.TEACH_BUTTON_PRESSED in own, RobotStatusBits.POWER_BUTTON_PRESSED in own
+    assert registers == [powered, protective, emergency, teach, power, stops, safety]
+    assert [read_coil(state, address) for address in range(260, 266)] == registers[:6]
+    assert read_register(state, 258) == now.robot_mode
