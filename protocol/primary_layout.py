@@ -216,7 +216,7 @@ class ForceModeData(SubPackage):
     SUB_TYPE: ClassVar[int] = 7
 
     wrench: tuple[float, ...] = wire("d", "in base axes", count=6, unit="N, Nm", default=0.0)
-    robot_dexterity: float = wire("d", default=0.0)
+    robot_dexterity: float = wire("d", "squared determinant of the Jacobian", default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +242,7 @@ class CalibrationData(SubPackage):
 
 @dataclass(frozen=True, slots=True)
 class SafetyData(SubPackage):
-    """Internal; names are ours, from one capture."""
+    """Internal; names are ours, from a capture whose four numbers are the elbow and a radius."""
 
     SUB_TYPE: ClassVar[int] = 10
     SINCE: ClassVar[Since] = _SINCE_3_5
@@ -250,7 +250,7 @@ class SafetyData(SubPackage):
     safety_checksum: int = wire("I", "repeats in MasterboardData")
     flag0: int = wire("B", default=1)
     flag1: int = wire("B", default=1)
-    values: tuple[float, ...] = wire("d", count=4, default=0.0)
+    elbow_sphere: tuple[float, ...] = wire("d", "x y z in base, radius", count=4, unit="m", default=0.0)
 
 
 @dataclass(frozen=True, slots=True)

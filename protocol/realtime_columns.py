@@ -87,7 +87,8 @@ COLUMNS: tuple[RealtimeColumn, ...] = (
     _C("actual_digital_input_bits", 1, "bits", 756, _MODELLED, "0-7 standard, 8-15 configurable, 16-17 tool; "
        "sent as the double 5.0 for bits 0 and 2", _DIGITAL_BITS),
     _C("joint_temperatures", 6, "degC", 756, _MEASURED, "motor temperatures"),
-    _C("actual_execution_time", 1, "-", 756, _CONSTANT, "controller timer: run time of the real-time thread"),
+    _C("actual_execution_time", 1, "-", 756, _CONSTANT,
+       "controller timer, run time of the real-time thread: 0, so that equal runs are equal"),
     _C("test_value", 1, "-", 756, _ZERO, "used by UR's own software only"),
     _C("robot_mode", 1, "enum", 764, _MODELLED, "RobotMode"),
     _C("joint_mode", 6, "enum", 812, _MODELLED, "JointMode"),
@@ -100,7 +101,7 @@ COLUMNS: tuple[RealtimeColumn, ...] = (
     _C("internal_120", 1, "-", 1044, _ZERO, "used by UR's own software only"),
     _C("internal_121", 1, "-", 1044, _ZERO, "used by UR's own software only"),
     _C("actual_main_voltage", 1, "V", 1044, _CONSTANT, "main voltage at the masterboard"),
-    _C("actual_robot_voltage", 1, "V", 1044, _CONSTANT, "48 V bus of the arm"),
+    _C("actual_robot_voltage", 1, "V", 1044, _MODELLED, "48 V bus of the arm, 0 without power"),
     _C("actual_robot_current", 1, "A", 1044, _MODELLED, "current into the arm"),
     _C("actual_joint_voltage", 6, "V", 1044, _MEASURED, "bus voltage at each joint"),
     _C("actual_digital_output_bits", 1, "bits", 1060, _MODELLED, "numbered and sent as the input bits",
@@ -114,7 +115,7 @@ COLUMNS: tuple[RealtimeColumn, ...] = (
     _C("internal_142", 1, "-", 1140, _ZERO, "used by UR's own software only"),
     _C("payload", 1, "kg", 1220, _MODELLED, "mass of the payload"),
     _C("payload_cog", 3, "m", 1220, _MODELLED, "x y z of its centre of gravity in the flange frame"),
-    _C("payload_inertia", 6, "kg m2", 1220, _CONSTANT, "Ixx Iyy Izz Ixy Ixz Iyz"),
+    _C("payload_inertia", 6, "kg m2", 1220, _MODELLED, "Ixx Iyy Izz Ixy Ixz Iyz, as stated; else 0"),
 )  # fmt: skip
 """Software 3.0 and later; a frame of n bytes holds the rows with `since_size` <= n."""
 

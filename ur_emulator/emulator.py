@@ -128,7 +128,7 @@ class ControlBox:
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         folder = ProgramFolder(None if programs is None else Path(programs))
-        states = StateEncoder(software)
+        states = StateEncoder(software, controller.state.arm)
         # In the order in which they hear of a cycle: first those whose clients act on it.
         self._port_objects: dict[str, Port] = {
             "realtime": RealtimePort(software, self._intake),

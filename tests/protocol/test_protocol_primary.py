@@ -247,7 +247,7 @@ CAPTURED = [
         + "41c00000 42400000 00000000 00000000 01 00 00 57f4285b 01 01 01",
     ),
     (
-        L.SafetyData(safety_checksum=0x57F4285B, values=(0.0, 0.0, 0.0, 0.13)),
+        L.SafetyData(safety_checksum=0x57F4285B, elbow_sphere=(0.0, 0.0, 0.0, 0.13)),
         "0000002b 0a 57f4285b 01 01" + "00" * 24 + "3fc0a3d70a3d70a4",
     ),
 ]  # fmt: skip

@@ -177,7 +177,7 @@ class Controller:
         sensed = self.plant.sense()
         self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
         if running and state.safety.is_watched:
-            violation = find_violation(sensed.position_error, self._saturated_s)
+            violation = find_violation(state.robot, sensed, self._saturated_s)
             if self._safety.is_busy and violation is None:
                 violation = self._safety.find_violation(sensed)
             if mode and violation is None:

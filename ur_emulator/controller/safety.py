@@ -23,6 +23,7 @@ from ur_emulator.controller.safety_modes import (
 )
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.target import JointTarget
+from ur_emulator.plant.plant_state import PlantState
 
 # A joint this far from its (delayed) target is blocked or pushed [rad].
 MAX_POSITION_DEVIATION = 0.15
@@ -94,20 +95,37 @@ UNREACHABLE_PATH = _stop(
 )
 
 
-def find_violation(position_error: tuple[float, ...], saturated_s: float) -> Violation | None:
+def hardest_joint(robot: RobotModel, currents: tuple[float, ...]) -> int:
+    """Return the number of the joint whose drive asks for most of its torque.
+
+    Args:
+        robot: torque constants and limits of the arm.
+        currents: that the drives ask for [A], (6,).
+    """
+    efforts = [
+        abs(current) * constant / limit
+        for current, constant, limit in zip(currents, robot.torque_constant, robot.tau_max, strict=True)
+    ]
+    return efforts.index(max(efforts))
+
+
+def find_violation(robot: RobotModel, sensed: PlantState, saturated_s: float) -> Violation | None:
     """Return what the arm has done wrong in this cycle, or None.
 
     Args:
-        position_error: delayed target minus true position [rad], (6,).
+        robot: torque constants and limits of the arm.
+        sensed: what the box reads from its arm.
         saturated_s: for how long a drive has been at its torque limit without a break [s].
     """
-    for i, error in enumerate(position_error):
+    for i, error in enumerate(sensed.position_error):
         if abs(error) > MAX_POSITION_DEVIATION:
             return _stop(
                 153, i, f"Protective stop: position deviates from path: {JOINT_NAMES[i]}", blocked=True
             )
     if saturated_s > MAX_SATURATION_TIME:
-        return _stop(157, 0, "Protective stop: joint torque limit", blocked=True)
+        joint = hardest_joint(robot, sensed.joint_control_output)
+        text = f"Protective stop: Collision detected by joint: {JOINT_NAMES[joint]}"
+        return _stop(157, joint, text, blocked=True)
     return None
 
 

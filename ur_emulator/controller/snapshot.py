@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from ur_emulator.controller import electrics
 from ur_emulator.controller.registers import RegisterValues
 from ur_emulator.controller.status_bits import robot_status_bits, safety_status_bits
 from ur_emulator.models.robot_model import Vector3, Vector6
@@ -66,6 +67,8 @@ class Snapshot(NamedTuple):
     analog_values: tuple[float, ...]
     analog_domains: tuple[int, ...]
     tool_output_voltage: int
+    euromap_inputs: int
+    euromap_outputs: int
     registers: RegisterValues
     script_control_line: int
 
@@ -83,6 +86,31 @@ class Snapshot(NamedTuple):
     def tcp_force_scalar(self) -> float:
         """Norm of the force part of `actual_tcp_force` [N]."""
         return math.hypot(*self.actual_tcp_force[:3])
+
+    @property
+    def tool_mode(self) -> int:
+        """JointMode of the tool."""
+        return electrics.tool_mode(self.joint_mode[-1])
+
+    @property
+    def io_current(self) -> float:
+        """Current of the box's outputs [A]."""
+        return electrics.io_current(self.actual_digital_output_bits)
+
+    @property
+    def tool_output_current(self) -> float:
+        """Current out of the tool's supply [A]."""
+        return electrics.tool_current(self.tool_output_voltage, self.actual_digital_output_bits)
+
+    @property
+    def tool_temperature(self) -> float:
+        """Temperature of the tool's board [degree C]: that of the last joint, on which it sits."""
+        return self.joint_temperatures[-1]
+
+    @property
+    def masterboard_temperature(self) -> float:
+        """Temperature inside the box [degree C]."""
+        return electrics.board_temperature(self.timestamp)
 
     @property
     def analog_io_types(self) -> int:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from ur_emulator.controller.state import ControllerState
+from ur_emulator.models.robot_model import six
 from urscript.errors import ScriptRuntimeError
 
 # Bits per second of the tool's serial line. Source: URScript manual e-Series, set_tool_communication.
@@ -36,12 +37,17 @@ def e_series_functions(
         """Take a setting that nothing here depends on; its range is checked with the catalogue."""
 
     def set_target_payload(thread: object, m: float, cog: Any, inertia: Any, *transition: float) -> None:
-        if not all(abs(moment) <= MAX_INERTIA for moment in inertia) or min(inertia[:3]) < 0.0:
+        if (
+            len(inertia) != 6
+            or not all(abs(moment) <= MAX_INERTIA for moment in inertia)
+            or min(inertia[:3]) < 0.0
+        ):
             raise ScriptRuntimeError(
-                f"set_target_payload: allowed are moments of inertia up to {MAX_INERTIA:g} kg m^2, "
+                f"set_target_payload: allowed are six moments of inertia up to {MAX_INERTIA:g} kg m^2, "
                 "the first three not below 0"
             )
         set_payload(thread, m, cog)
+        state.payload.inertia = six(inertia)
 
     return {
         "set_tool_communication": set_tool_communication,

@@ -1,27 +1,27 @@
 """Ports 30001, 30002 and their read-only twins: greeting, states at 10 Hz, messages; script text comes in.
 
+The first state to a new client, and the first after the brakes have opened, also tell of kinematics and
+configuration.
+
 The primary port also tells of the running program: its global variables at the rate of the states, and where
 its threads stand in PolyScope's tree.
 """
 
 from __future__ import annotations
 
-import zlib
-
 from protocol.primary_messages import RobotMessage, StartupMessage, version_message
-from protocol.primary_packages import encode_message_package, encode_safety_tolerances, encode_state
+from protocol.primary_packages import encode_message_package, encode_safety_tolerances
 from protocol.script_channel import ScriptChannel
-from protocol.ur_types import SoftwareVersion
+from protocol.ur_types import RobotMode, SoftwareVersion
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.events import Event, ProgramStarted, ProgramStopped
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.servers.connection import Connection
 from ur_emulator.servers.event_messages import message_for
 from ur_emulator.servers.label_reporter import LabelReporter
 from ur_emulator.servers.program_intake import ProgramIntake
-from ur_emulator.servers.robot_state import StateEncoder, setup_records, state_records
+from ur_emulator.servers.robot_state import StateEncoder
 from ur_emulator.servers.variable_reporter import VariableReporter
 from urscript import RunningProgram
 
@@ -61,9 +61,7 @@ class PrimaryPort:
         self._phase = 0
         self._variables = VariableReporter(version)
         self._labels = LabelReporter(version)
-        arm = controller.state.arm
-        dh = calibrated_dh(arm.robot, arm.calibration)
-        self._setup = setup_records(arm.robot, dh, zlib.crc32(repr(dh).encode()))
+        self._was_running = controller.snapshot.robot_mode == RobotMode.RUNNING
         self._greeting = encode_message_package(version_message(version), version)
         self._second_greeting = encode_message_package(StartupMessage(), version)
         if version >= _TOLERANCES_SINCE:
@@ -78,8 +76,7 @@ class PrimaryPort:
         """Greet: the version message in a segment of its own, the first, long state, then variables."""
         connection.send(self._greeting)
         connection.send(self._second_greeting)
-        records = (*state_records(self._controller.snapshot), *self._setup)
-        connection.send(encode_state(records, self._version))
+        connection.send(self._states.encode_first(self._controller.snapshot))
         if self._all_messages:
             programs = self._controller.programs
             if not self._channels:  # nobody has listened: what was told before is of no use
@@ -108,8 +105,11 @@ class PrimaryPort:
         if self._phase < _CYCLE_RATE:
             return
         self._phase -= _CYCLE_RATE
+        running = snapshot.robot_mode == RobotMode.RUNNING
+        has_started, self._was_running = running and not self._was_running, running
         if self._channels:
-            self._send(self._states.encode(snapshot), *self._variables.changes(self._now))
+            encode = self._states.encode_first if has_started else self._states.encode
+            self._send(encode(snapshot), *self._variables.changes(self._now))
 
     def say(self, event: Event) -> None:
         """Send a message for an event."""

@@ -79,7 +79,7 @@ _STATE: tuple[Builtin, ...] = (
         "float, degree C",
         "control box temperature",
         support=APPROXIMATE,
-        note="constant",
+        note="warms up by 8 degrees after the start, chosen",
     ),
     _row("get_actual_tcp_pose", (), "pose, m and rad", "measured TCP pose in base", support=EXACT),
     _row(
@@ -149,7 +149,7 @@ _STATE: tuple[Builtin, ...] = (
         "float, A",
         "current drawn by the tool",
         support=APPROXIMATE,
-        note="no electrical tool is modelled",
+        note="of a resistor at the tool's supply, chosen",
     ),
     _row("get_steptime", (), "float, s", "length of a control cycle", support=EXACT),
     _row("get_target_payload", (), "float, kg", "active payload mass", support=EXACT),

@@ -1,0 +1,52 @@
+"""Temperatures and currents of box and tool that follow from a snapshot: nothing is remembered here.
+
+Nothing in the notes gives numbers, so all of them are chosen: outputs drive the inputs of a PLC, the tool is
+a resistor, the box warms up after it was switched on. They are worked out when somebody asks.
+"""
+
+from __future__ import annotations
+
+from math import exp
+
+from protocol.ur_types import JointMode
+from ur_emulator.controller.io import N_TOOL, TOOL_SHIFT
+
+# What one high output of the box or one switched output of the tool carries [A]: a PLC's input.
+OUTPUT_CURRENT = 0.006
+# Resistance of what hangs at the tool's supply: 24 V give 60 mA, 12 V half of that [ohm].
+TOOL_RESISTANCE = 400.0
+# The masterboard goes from the temperature of the room to this much above, exponentially [degree C, s].
+ROOM_TEMPERATURE, BOARD_RISE, BOARD_TIME = 24.0, 8.0, 900.0
+
+_BOX_OUTPUTS = (1 << TOOL_SHIFT) - 1
+_TOOL_OUTPUTS = (1 << N_TOOL) - 1 << TOOL_SHIFT
+
+# The tool has fewer modes than a joint: what it reports when the last joint is in one of the others.
+TOOL_MODES: dict[int, JointMode] = {
+    JointMode.BACKDRIVE: JointMode.RUNNING,
+    JointMode.FREEDRIVE: JointMode.RUNNING,
+    JointMode.READY_FOR_POWER_OFF: JointMode.SHUTTING_DOWN,
+    JointMode.VIOLATION: JointMode.FAULT,
+}
+
+
+def io_current(digital_out: int) -> float:
+    """Return the current of the outputs of the box [A] for the word of the digital outputs."""
+    return OUTPUT_CURRENT * (digital_out & _BOX_OUTPUTS).bit_count()
+
+
+def tool_current(voltage: float, digital_out: int) -> float:
+    """Return the current out of the tool's supply [A]; 0 while it is off."""
+    if not voltage:
+        return 0.0
+    return voltage / TOOL_RESISTANCE + OUTPUT_CURRENT * (digital_out & _TOOL_OUTPUTS).bit_count()
+
+
+def board_temperature(uptime: float) -> float:
+    """Return the temperature of the masterboard [degree C] this long [s] after the controller has started."""
+    return ROOM_TEMPERATURE + BOARD_RISE * (1.0 - exp(-uptime / BOARD_TIME))
+
+
+def tool_mode(last_joint: int) -> int:
+    """Return the mode of the tool for that of the last joint."""
+    return int(TOOL_MODES.get(last_joint, last_joint))
