@@ -26,7 +26,7 @@ class ErrorSettings:
         pause_codes: (code, argument or None for any) at which the program pauses.
         warns_of_deviation: whether joints that deviate from the path are reported.
         deviation_threshold: part of the deviation limit at which to warn.
-        transition_hardness: 0 hard, 1 soft; kept only.
+        transition_hardness: of safeguard stops and reduced mode: 0 hard, 1 soft.
         revolution_reference: joint positions of the last `reset_revolution_counter` [rad]; kept only.
     """
 

@@ -12,6 +12,7 @@ from math import cos, hypot, inf, isfinite, sin
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ur_emulator.errors import PlantError
 from ur_emulator.models.robot_model import Vector6
@@ -109,7 +110,9 @@ class Obstacles:
         self._first: int = model.geom(f"{OBSTACLES}_0").id
         self.slots: dict[str, int] = {}
 
-    def put(self, name: str, shape: str, size: Sequence[float], pose: Vector6, q: Sequence[float]) -> None:
+    def put(
+        self, name: str, shape: str, size: Sequence[float], pose: Vector6, q: NDArray[np.float64]
+    ) -> None:
         """Put an obstacle somewhere; one of the same name gives way to it.
 
         Args:
@@ -184,7 +187,7 @@ class Obstacles:
         m = self._model
         return m.geom_type, m.geom_size, m.geom_aabb, m.geom_rbound, m.geom_pos, m.geom_quat
 
-    def _touches(self, slot: int, q: Sequence[float]) -> bool:
+    def _touches(self, slot: int, q: NDArray[np.float64]) -> bool:
         data = mujoco.MjData(self._model)
         data.qpos[:] = q
         mujoco.mj_kinematics(self._model, data)

@@ -218,7 +218,7 @@ _MOVES: tuple[Builtin, ...] = (
         "None",
         "how hard the transition into reduced mode and safeguard stop is",
         support=APPROXIMATE,
-        note="kept only; reduced mode and safeguard stop are not modelled",
+        note="hard: the full deceleration of the arm; soft: within 0.25 s",
     ),
 )
 

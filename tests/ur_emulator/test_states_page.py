@@ -1,0 +1,80 @@
+"""docs/states.md and the tables hold together, and the program takes the ways that the page shows."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from states_support import ENDLESS, moving
+
+from protocol.ur_types import ProgramState, SafetyMode
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller import safety_commands as safe
+from ur_emulator.controller import states_page
+from ur_emulator.controller.robot_mode import TRANSITIONS
+from ur_emulator.controller.safety_modes import EVENTS, MODES
+from urscript import compile_program
+
+PAGE = Path(__file__).parents[2] / "docs" / "states.md"
+P = ProgramState
+
+
+def test_the_page_is_the_tables():
+    assert PAGE.read_text() == states_page.render(), "run: make docs"
+
+
+def test_the_page_shows_every_mode_event_and_way():
+    text = states_page.render()
+    for row in MODES:
+        assert f"| {row.mode.name} | {int(row.mode)} |" in text
+    for event in EVENTS:
+        assert text.count(f"\n| {event.value} |") == 2  # what it does, and the matrix
+    for mode, command in TRANSITIONS:
+        assert f"| {mode.name} | {command.value} |" in text
+
+
+PAUSES = [cmd.PauseProgram(), cmd.TriggerProtectiveStop(), safe.SafeguardStop(True)]
+ENDS = [
+    cmd.StopProgram(),
+    safe.PressEmergencyStop(),
+    safe.TriggerViolation(),
+    safe.TriggerFault(),
+]
+START = cmd.StartProgram(compile_program(ENDLESS))
+
+
+def ways_of(*commands):
+    """States that a moving program passes when these commands come, one every 100 cycles but for (n, command)."""
+    bench = moving()
+    seen = [P(bench.now.runtime_state)]
+    for item in commands:
+        ticks, command = item if isinstance(item, tuple) else (100, item)
+        for i in range(ticks):
+            bench.tick(1, *((command,) if i == 0 else ()))
+            if (state := P(bench.now.runtime_state)) is not seen[-1]:
+                seen.append(state)
+    return list(pairwise(seen))
+
+
+def test_every_way_of_the_page_is_taken_and_no_other():
+    taken = set()
+    for pause in PAUSES:
+        taken.update(ways_of(pause))
+    for end in [*ENDS, cmd.PowerOff()]:
+        for before in ([], [cmd.PauseProgram()], [(3, cmd.PauseProgram())]):
+            taken.update(ways_of(*before, end))
+    taken.update(ways_of(cmd.PauseProgram(), cmd.ResumeProgram()))
+    taken.update(ways_of((3, cmd.PauseProgram()), cmd.ResumeProgram()))
+    taken.update(ways_of(safe.SafeguardStop(True), safe.SafeguardStop(False)))
+    taken.update(ways_of(cmd.StopProgram(), START))
+    taken.update(ways_of((3, cmd.StopProgram()), START))
+    assert taken == {(way.state, way.then) for way in states_page.PROGRAM_WAYS}
+
+
+@pytest.mark.parametrize("pause", PAUSES)
+def test_pauses_lead_to_paused(pause):
+    assert ways_of(pause) == [(P.PLAYING, P.PAUSING), (P.PAUSING, P.PAUSED)]
+
+
+def test_every_number_of_the_safety_mode_that_a_cb3_uses_is_on_the_page():
+    unused = {SafetyMode.VALIDATE_JOINT_ID, SafetyMode.UNDEFINED_SAFETY_MODE}
+    assert {row.mode for row in MODES} == set(SafetyMode) - unused

@@ -1,0 +1,273 @@
+"""The page docs/states.md, made from the tables of the state machines.
+
+python -m ur_emulator.controller.states_page > docs/states.md
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+from protocol.rtde_types import SafetyStatusBits
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode
+from ur_emulator.controller.robot_mode import JOINT_MODES, PASSING_TIME, TRANSITIONS
+from ur_emulator.controller.safety_modes import EVENTS, MODES, after, mode_of
+from ur_emulator.controller.status_bits import safety_status_bits
+
+
+class ProgramWay(NamedTuple):
+    """A way of the primary program from state to state.
+
+    Attributes:
+        state: where it begins.
+        event: what makes it begin.
+        then: where it leads.
+    """
+
+    state: ProgramState
+    event: str
+    then: ProgramState
+
+
+_P = ProgramState
+# What `scripting.program_slot` does; a test takes every way.
+PROGRAM_WAYS: tuple[ProgramWay, ...] = (
+    ProgramWay(_P.STOPPED, "a program is started", _P.PLAYING),
+    ProgramWay(_P.PLAYING, "pause, protective stop, safeguard stop", _P.PAUSING),
+    ProgramWay(_P.PAUSING, "the arm rests", _P.PAUSED),
+    ProgramWay(_P.PAUSED, "resume, safeguard closed", _P.RESUMING),
+    ProgramWay(_P.PAUSING, "resume, safeguard closed", _P.RESUMING),
+    ProgramWay(_P.RESUMING, "the arm is on its path", _P.PLAYING),
+    ProgramWay(_P.PLAYING, "end, stop, emergency stop, violation, fault, in motion", _P.STOPPING),
+    ProgramWay(_P.PLAYING, "any of them at rest, power off", _P.STOPPED),
+    ProgramWay(_P.PAUSING, "stop, emergency stop, violation, fault, in motion", _P.STOPPING),
+    ProgramWay(_P.PAUSING, "any of them at rest, power off", _P.STOPPED),
+    ProgramWay(_P.PAUSED, "stop, emergency stop, violation, fault, power off", _P.STOPPED),
+    ProgramWay(_P.STOPPING, "the arm rests", _P.STOPPED),
+    ProgramWay(_P.STOPPING, "a program is started", _P.PLAYING),
+)
+
+_HEAD = """\
+# States of the box
+
+Made from `ur_emulator/controller/safety_modes.py`, `robot_mode.py` and `states_page.py` by `make docs`.
+Letters: D documented, O observed, I inferred, C chosen; see [fidelity.md](fidelity.md).
+
+Commands are those of `ur_emulator.controller.commands` and `safety_commands`; `ControlBox.submit` takes
+them.
+
+## Safety mode
+
+Every mode but NORMAL has a cause: a button, an input, or something that happened and stays until somebody
+deals with it. Several causes may stand at a time; the first of this table counts, and when it ends the next
+one does. `safety_status` is the same number.
+"""
+
+_EVENTS = """
+### What may happen
+
+A mode that latches is not entered from a mode above it in the table. When a mode without power is entered,
+the arm brakes with the deceleration of its model, and 50 ms after it rests the power is cut; releasing the
+button sooner cuts it at once.
+"""
+
+_MATRIX = """
+### From mode to mode
+
+Where only the cause of the mode in the head of the column stands; `.` is no change.
+"""
+
+_SPEEDS = """
+### Reduced and recovery mode
+
+Half the rated joint speeds in reduced mode, 30 °/s in recovery mode: the time on the path runs slower,
+`speed_scaling` shows it. `set_safety_mode_transition_hardness(0)`, which is how a box begins, slows down, and
+stops for the safeguard, with the arm's full deceleration; `(1)` does so gently, within 0.25 s. A joint that
+is above its limit for more than 0.5 s is a protective stop, C191. Recovery begins when the brakes open with a
+joint out of its range, and ends when all are back.
+
+### Safety inputs
+
+Emergency stop and safeguard have inputs of their own (EI, SI): `PressEmergencyStop`, `ReleaseEmergencyStop`,
+`SafeguardStop`. Pairs of configurable inputs can be set up with `AssignSafetyInput(pair, function)` as system
+emergency stop, reduced mode or safeguard reset; low is safe, one low channel is enough.
+"""
+
+_ROBOT = """
+## Robot mode
+
+`power on` and `brake release` are refused, with a word in the log, while the safety mode lets the joints have
+no power.
+"""
+
+_JOINTS = """
+## Joint modes
+
+By robot mode; a safety mode that is named here says more.
+"""
+
+_PROGRAM = """
+## Program state
+
+A program is started or resumed only while the robot is RUNNING and in NORMAL, REDUCED or RECOVERY; otherwise
+a runtime exception on 30001 says why and what to do. PAUSED by a protective stop stays so after the
+unlocking.
+"""
+
+
+def render() -> str:
+    """Return the page."""
+    lines = [
+        _HEAD,
+        *_table(
+            ("mode", "number", "arm", "program", "latches", "way out", "source"),
+            (
+                (
+                    row.mode.name,
+                    int(row.mode),
+                    row.arm.value,
+                    row.program.value,
+                    "yes" if row.latches else "",
+                    row.way_out,
+                    row.why,
+                )
+                for row in MODES
+            ),
+        ),
+        "",
+        *_diagram(_safety_edges()),
+        _EVENTS,
+        *_table(
+            ("event", "brings", "ends", "comes from"),
+            (
+                (
+                    event.value,
+                    row.brings.name if row.brings else "",
+                    ", ".join(mode.name for mode in _ranked(row.takes))
+                    + (", and the power" if row.cuts_power else ""),
+                    row.meaning,
+                )
+                for event, row in EVENTS.items()
+            ),
+        ),
+        _MATRIX,
+        *_matrix(),
+        "",
+        "### Status bits of RTDE",
+        "",
+        *_table(
+            ("mode", "`safety_status_bits`"),
+            (
+                (
+                    row.mode.name,
+                    ", ".join(
+                        str(bit.name)
+                        for bit in SafetyStatusBits
+                        if bit.bit_count() == 1 and bit & safety_status_bits(row.mode)
+                    ),
+                )
+                for row in MODES
+            ),
+        ),
+        _SPEEDS,
+        _ROBOT.strip("\n"),
+        "",
+        *_diagram(_robot_edges()),
+        "",
+        *_table(
+            ("from", "command", "way"),
+            (
+                (
+                    mode.name,
+                    command.value,
+                    " → ".join(
+                        f"{step.name} ({PASSING_TIME[step]:g} s)" if step in PASSING_TIME else step.name
+                        for step in way
+                    ),
+                )
+                for (mode, command), way in TRANSITIONS.items()
+            ),
+        ),
+        _JOINTS,
+        *_table(("robot mode", "joints", "safety modes that say more"), _joint_rows()),
+        _PROGRAM,
+        *_diagram((way.state.name, way.then.name, way.event) for way in PROGRAM_WAYS),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _ranked(modes: Iterable[SafetyMode]) -> list[SafetyMode]:
+    order = [row.mode for row in MODES]
+    return sorted(modes, key=order.index)
+
+
+def _table(head: Iterable[object], rows: Iterable[Iterable[object]]) -> Iterator[str]:
+    names = list(map(str, head))
+    yield f"| {' | '.join(names)} |"
+    yield "|" + "---|" * len(names)
+    for row in rows:
+        yield f"| {' | '.join(map(str, row))} |"
+
+
+def _diagram(edges: Iterable[tuple[str, str, str]]) -> Iterator[str]:
+    yield "```mermaid"
+    yield "stateDiagram-v2"
+    for start, end, label in edges:
+        yield f"    {start} --> {end}: {label}"
+    yield "```"
+
+
+def _safety_edges() -> Iterator[tuple[str, str, str]]:
+    """Give the ways from NORMAL and back; the rest is in the matrix."""
+    for row in reversed(MODES):
+        if row.mode is SafetyMode.NORMAL:
+            continue
+        for event, event_row in EVENTS.items():
+            if event_row.brings is row.mode:
+                yield SafetyMode.NORMAL.name, row.mode.name, event.value
+        ends = [event.value for event, event_row in EVENTS.items() if row.mode in event_row.takes]
+        yield row.mode.name, SafetyMode.NORMAL.name, ", ".join(ends)
+
+
+def _matrix() -> Iterator[str]:
+    order = [row.mode for row in reversed(MODES)]
+    rows = []
+    for event in EVENTS:
+        cells = []
+        for mode in order:
+            causes = frozenset() if mode is SafetyMode.NORMAL else frozenset({mode})
+            then = mode_of(after(causes, event))
+            cells.append("." if then is mode else then.name)
+        rows.append((event.value, *cells))
+    return _table(("event", *(mode.name for mode in order)), rows)
+
+
+def _robot_edges() -> Iterator[tuple[str, str, str]]:
+    """Give each step once: the first of a way with its command, the others with the time before them."""
+    first: dict[tuple[RobotMode, RobotMode], str] = {}
+    later: dict[tuple[RobotMode, RobotMode], str] = {}
+    for (mode, command), way in TRANSITIONS.items():
+        if way[0] is not mode:
+            first.setdefault((mode, way[0]), command.value)
+        for before, step in pairwise(way):
+            label = f"after {PASSING_TIME[before]:g} s" if before in PASSING_TIME else "at once"
+            later.setdefault((before, step), label)
+    for (before, step), label in (later | first).items():
+        yield before.name, step.name, label
+
+
+def _joint_rows() -> Iterator[tuple[str, str, str]]:
+    for robot in RobotMode:
+        plain = JOINT_MODES[robot, SafetyMode.NORMAL]
+        others = [
+            f"{row.mode.name}: {JOINT_MODES[robot, row.mode].name}"
+            for row in MODES
+            if JOINT_MODES[robot, row.mode] is not plain
+        ]
+        yield robot.name, f"{plain.name} ({int(plain)})", ", ".join(others)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(render())
