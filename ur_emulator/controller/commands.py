@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from protocol.rtde_types import RtdeValue
 from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
+from ur_emulator.controller.obstacles import AddObstacle, RemoveObstacle
 from ur_emulator.controller.operator import Answer
 from ur_emulator.controller.safety_commands import SafetyCommand
 from urscript import CompiledProgram
@@ -148,4 +149,6 @@ Command = (
     | Push
     | HangLoad
     | SafetyCommand
+    | AddObstacle
+    | RemoveObstacle
 )

@@ -21,6 +21,7 @@ from ur_emulator.controller.events import (
     ScriptFailed,
 )
 from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
+from ur_emulator.controller.obstacles import AddObstacle, RemoveObstacle
 from ur_emulator.controller.port_map import write_range
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
@@ -36,6 +37,7 @@ from ur_emulator.controller.safety_system import SafetySystem
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.controller.watchdogs import WatchdogAction
+from ur_emulator.errors import PlantError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
@@ -223,6 +225,13 @@ class Controller:
                 self.plant.push(force, point)
             case HangLoad(mass, cog):
                 self.plant.hang(mass, cog)
+            case AddObstacle(name, shape, size, pose):
+                try:
+                    self.plant.put_obstacle(name, shape, size, pose)
+                except PlantError as error:
+                    state.events.append(ErrorReported(0, 0, ReportLevel.INFO, str(error)))
+            case RemoveObstacle(name):
+                self.plant.remove_obstacle(name)
             case cmd.ReleaseBrakes():
                 state.compliance.by_client = False
                 self._power(ModeCommand.BRAKE_RELEASE)
