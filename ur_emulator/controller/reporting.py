@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from ur_emulator.controller.cycle import controller_time
 from ur_emulator.controller.external_sensor import VARIABLE
 from ur_emulator.controller.force_sense import moved_wrench
-from ur_emulator.controller.robot_mode import JOINT_MODES, POWERED
+from ur_emulator.controller.robot_mode import JOINT_VECTORS, POWERED
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.target import ZERO6, JointTarget
@@ -62,7 +62,7 @@ def make_snapshot(
         joint_temperatures=sensed.joint_temperatures,
         actual_execution_time=0.0,
         robot_mode=int(mode),
-        joint_mode=(int(JOINT_MODES[mode, safety_mode]),) * 6,
+        joint_mode=JOINT_VECTORS[mode, safety_mode],
         safety_mode=int(safety_mode),
         actual_tool_accelerometer=sensed.tool_accelerometer,
         speed_scaling=state.speed_slider if limiter is None else limiter.scale,

@@ -102,6 +102,8 @@ def _joint_mode(robot: RobotMode, safety: SafetyMode) -> JointMode:
 JOINT_MODES = {
     (robot, safety): _joint_mode(robot, safety) for robot in _BY_ROBOT_MODE for safety in SafetyMode
 }
+# The same for all six joints, as it is published in every cycle.
+JOINT_VECTORS = {modes: (int(joint),) * 6 for modes, joint in JOINT_MODES.items()}
 
 
 class RobotModeMachine:
