@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 
 from protocol.primary_messages import ReportLevel
 from protocol.ur_types import RobotMode, SafetyMode
@@ -50,9 +51,14 @@ class LogEntry:
 
 
 class BoxLog:
-    """The last entries, and those who want to hear of new ones."""
+    """The last entries, and those who want to hear of new ones.
+
+    Attributes:
+        count: entries written so far, those that are forgotten included.
+    """
 
     def __init__(self) -> None:
+        self.count = 0
         self._entries: deque[LogEntry] = deque(maxlen=MAX_ENTRIES)
         self._followers: list[Callable[[LogEntry], None]] = []
 
@@ -60,6 +66,11 @@ class BoxLog:
     def entries(self) -> tuple[LogEntry, ...]:
         """The last entries, the oldest first; from any thread: to Python the copying is one step."""
         return tuple(self._entries)
+
+    def since(self, count: int) -> list[LogEntry]:
+        """Return what is kept of all entries but the first `count`; in the loop's thread."""
+        new = max(0, self.count - count)
+        return list(islice(self._entries, max(0, len(self._entries) - new), None))
 
     def follow(self, follower: Callable[[LogEntry], None]) -> None:
         """Call `follower` with every entry from now on; it must not block and must not raise."""
@@ -78,6 +89,7 @@ class BoxLog:
             text = text[: MAX_TEXT - 3] + "..."
         entry = LogEntry(tick, level, source, text.rstrip("\r\n"), code)
         self._entries.append(entry)
+        self.count += 1
         for follower in self._followers:
             follower(entry)
 

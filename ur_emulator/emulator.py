@@ -11,20 +11,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self, Unpack
+from typing import TYPE_CHECKING, Any, Self, Unpack
 
 from protocol.ur_types import Ports, RobotMode, SoftwareVersion, simulated_serial
 from ur_emulator.box_log import LogEntry
+from ur_emulator.control.box_operations import BoxOperations
+from ur_emulator.control.desk import ControlDesk, Surroundings
 from ur_emulator.controller.commands import Command
 from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.hands import HangLoad, Push
 from ur_emulator.errors import EmulatorError, PortPermissionError
 from ur_emulator.models.fidelity import fidelity_by_name
-from ur_emulator.models.robot_model import Vector3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.realtime.event_loop import EventLoop
@@ -50,14 +51,18 @@ if TYPE_CHECKING:
     from ur_emulator.rack import BoxOptions, BoxRack
 
 DEFAULT_VERSION = "3.15.8"
+MAX_PORT = 65535
 
 
-class ControlBox:
+class ControlBox(BoxOperations):
     """An emulated control box, powered on with its brakes released.
+
+    What can be done to it beside connecting a client stands in `BoxOperations`.
 
     Attributes:
         host: address that it listens on.
         ports: numbers of its ports; that for Modbus is 0 if it is not open.
+        control_port: number of the port for the control API over HTTP, 0 if it is not open.
         port_base: what was added to the standard ones.
         serial_number: as the dashboard gives it; simulated boxes are recognisable by it.
         notices: what a user should know although the box runs, one line each.
@@ -75,6 +80,7 @@ class ControlBox:
         fidelity: str = "typical",
         port_base: int | None = 0,
         programs: str | PathLike[str] | None = None,
+        control_port: int | None = None,
         *,
         loop: EventLoop | None = None,
         phase: float = 0.0,
@@ -91,6 +97,8 @@ class ControlBox:
             fidelity: "ideal", "typical" or "poor".
             port_base: offset added to all standard ports; None takes free ports.
             programs: folder of programs and installations, for the dashboard's `load`; None for none.
+            control_port: number of the port for the control API over HTTP, docs/control.md; 0 takes a free one,
+                None opens none.
             loop: shared with other boxes, see `BoxRack`, which runs it; None gives the box its own.
             phase: which part of a period its cycles lie after those of the first box of the loop.
 
@@ -109,6 +117,10 @@ class ControlBox:
             raise EmulatorError("no host given: name an address, 127.0.0.1 keeps other machines out")
         if programs is not None and not Path(programs).is_dir():
             raise EmulatorError(f"programs folder {programs} given: there is no such folder, make it first")
+        if not 0 <= (control_port or 0) <= MAX_PORT:
+            raise EmulatorError(
+                f"control port {control_port} given: 1 to {MAX_PORT} are ports, 0 takes a free one"
+            )
         self.host = host
         self.port_base = port_base or 0
         self.ports = Ports.standard(self.port_base)
@@ -127,7 +139,7 @@ class ControlBox:
         self._intake = ProgramIntake(self._loop, software, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
-        folder = ProgramFolder(None if programs is None else Path(programs))
+        desk = ProgramDesk(self._access, ProgramFolder(None if programs is None else Path(programs)))
         states = StateEncoder(software, controller.state.arm)
         # In the order in which they hear of a cycle: first those whose clients act on it.
         self._port_objects: dict[str, Port] = {
@@ -137,13 +149,30 @@ class ControlBox:
             "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
             "dashboard": DashboardPort(
                 self._access,
-                DashboardAnswers(self._access, ProgramDesk(self._access, folder), self._shut_down),
+                DashboardAnswers(self._access, desk, self._shut_down),
             ),
             "modbus": ModbusPort(controller, self._box.submit, modbus),
             "realtime_ro": RealtimePort(software, None),
             "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
             "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),
         }
+        self.control_port = 0
+        self._facts = {
+            "software": str(identity.version),
+            "robot": identity.model,
+            "serial_number": identity.serial_number,
+            "pace": named_pace.value,
+            "speed": speed,
+            "seed": seed,
+            "fidelity": fidelity,
+        }
+        around = Surroundings(self._access, desk, time.monotonic, self._identity_now)
+        self._desk = ControlDesk(self._loop, around)
+        self._wanted_control_port = control_port
+        if control_port is not None:
+            from ur_emulator.servers.control_port import ControlPort
+
+            self._port_objects["control"] = ControlPort(self._desk, host)
         self._listeners: dict[str, Listener] = {}
         self._reserve = Reserve()
         self.notices: list[str] = []
@@ -188,29 +217,12 @@ class ControlBox:
         """
         self._loop.call_soon_threadsafe(lambda: self._box.submit(command))
 
-    def push(self, force: Vector3, point: Vector3 = (0.0, 0.0, 0.0)) -> None:
-        """Push the flange as a hand would, from the next cycle on, from any thread; a zero force ends it.
+    def _perform(self, name: str, arguments: Mapping[str, Any]) -> Any:
+        return self._desk.perform(name, arguments)
 
-        Args:
-            force: in base axes [N].
-            point: where it acts, in the flange frame [m].
-
-        Raises:
-            PlantError: no hand pushes like that.
-        """
-        self.submit(Push(force, point))
-
-    def hang(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
-        """Hang a load on the flange that no program has declared, from the next cycle on, from any thread.
-
-        Args:
-            mass: [kg].
-            cog: centre of gravity in the flange frame [m].
-
-        Raises:
-            PlantError: that is no load.
-        """
-        self.submit(HangLoad(mass, cog))
+    def _identity_now(self) -> dict[str, Any]:
+        ports = {**dataclasses.asdict(self.ports), "control": self.control_port}
+        return {**self._facts, "host": self.host, "ports": {name: n for name, n in ports.items() if n}}
 
     # --- life
 
@@ -230,13 +242,18 @@ class ControlBox:
             self.close()
             raise
         numbers = {name: item.number for name, item in self._listeners.items()}
+        self.control_port = numbers.pop("control", 0)
         self.ports = dataclasses.replace(self.ports, **{"modbus": 0, **numbers})
         for port in self._port_objects.values():
             self._box.attach(port)  # type: ignore[arg-type]
+        self._box.attach(self._desk)
         self._loop.add(self._box)
 
     def _listen_on(self, name: str, port: Port) -> None:
         """Open one port; of all, only Modbus may be missing: its number is one that needs privileges."""
+        if name == "control":
+            self._listen_for_control(port)
+            return
         number = 0 if self._free_ports else getattr(self.ports, name)
         if name == "modbus" and not (number or self._free_ports):
             return
@@ -255,6 +272,13 @@ class ControlBox:
             if name != "modbus":
                 raise
             self.notices.append(f"no Modbus server: {error}")
+
+    def _listen_for_control(self, port: Port) -> None:
+        """Open the control port; lockstep does not wait for its clients, and they do not fill the log."""
+        number = self._wanted_control_port or 0
+        self._listeners["control"] = Listener(
+            self._loop, self.host, number, port, set(), lambda text: None, "control", self._reserve
+        )
 
     def serve_forever(self) -> None:
         """Run in the calling thread until `stop`; the ports must be open."""
@@ -292,6 +316,7 @@ class ControlBox:
     def close(self) -> None:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
         self._loop.remove(self._box)
+        self._desk.close()
         self._intake.close()
         self._access.close()
         self._network.close()

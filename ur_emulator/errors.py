@@ -6,6 +6,11 @@ EmulatorError
 ├── PlantError        the physics cannot go on: a target that is no number, or a diverged simulation
 ├── ProgramFileError  a program or installation file cannot be used
 │   └── FileMissingError      there is no such file
+├── ControlError      an operation of the control API was not done
+│   ├── ArgumentError         it was given something that it does not take
+│   ├── RefusedError          the state of the box stands against it
+│   │   └── WaitTimeoutError  what was waited for did not come (a TimeoutError as well)
+│   └── NotRunningError       the box does not run, or has ended before it was done
 └── PortError         a TCP port of the box cannot be opened
     └── PortPermissionError   because this user may not
 
@@ -46,6 +51,26 @@ class ProgramFileError(EmulatorError):
 
 class FileMissingError(ProgramFileError):
     """There is no such program or installation file among those that the box may use."""
+
+
+class ControlError(EmulatorError):
+    """An operation of the control API was not done."""
+
+
+class ArgumentError(ControlError):
+    """An operation was given something that it does not take."""
+
+
+class RefusedError(ControlError):
+    """The state of the box stands against an operation."""
+
+
+class WaitTimeoutError(RefusedError, TimeoutError):
+    """What was waited for did not come in time."""
+
+
+class NotRunningError(ControlError):
+    """The box does not run, or it ended before the operation was done."""
 
 
 class PortError(EmulatorError):

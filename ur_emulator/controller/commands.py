@@ -9,6 +9,7 @@ from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
 from ur_emulator.controller.obstacles import AddObstacle, RemoveObstacle
 from ur_emulator.controller.operator import Answer
 from ur_emulator.controller.safety_commands import SafetyCommand
+from ur_emulator.controller.wires import WireCommand
 from urscript import CompiledProgram
 
 
@@ -151,4 +152,5 @@ Command = (
     | SafetyCommand
     | AddObstacle
     | RemoveObstacle
+    | WireCommand
 )

@@ -37,6 +37,7 @@ from ur_emulator.controller.safety_system import SafetySystem
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.controller.watchdogs import WatchdogAction
+from ur_emulator.controller.wires import SetAnalogInput, SetDigitalInput, set_wire
 from ur_emulator.errors import PlantError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
@@ -86,6 +87,7 @@ class Controller:
         self._mode = mode
         self._saturated_s = 0.0
         self._settle = 0
+        self._push_left = 0
         self.state = ControllerState(
             robot=robot,
             arm=arm,
@@ -117,6 +119,7 @@ class Controller:
             or self.state.mode.is_changing
             or self._safety.is_stopping
             or self._settle > 0
+            or self._push_left > 0
         )
 
     @property
@@ -141,6 +144,8 @@ class Controller:
         state = self.state
         state.tick += 1
         n_events = len(state.events)
+        if self._push_left:
+            self._push_on()
         for command in commands:
             self._apply(command)
         state.mode.step()
@@ -221,8 +226,13 @@ class Controller:
                 self._safety.cut_power()
             case GuideByHand():
                 state.compliance.guide(by_client=True)
-            case Push(force, point):
+            case Push(force, point, duration):
                 self.plant.push(force, point)
+                if duration is not None:
+                    self._push_left = round(duration / self.period_s) + 1
+                    self._push_on()
+                else:
+                    self._push_left = 0
             case HangLoad(mass, cog):
                 self.plant.hang(mass, cog)
             case AddObstacle(name, shape, size, pose):
@@ -254,8 +264,17 @@ class Controller:
                 state.events.append(PopupShown("Popup", text, False, False, False))
             case cmd.RestartSafety():
                 self._safety.happen(SafetyEvent.RESTART)
+            case SetDigitalInput() | SetAnalogInput():
+                set_wire(state.io, command)
             case _:
                 self._safety.obey(command)
+
+    def _push_on(self) -> None:
+        """Count a cycle of a push that lasts for a while; end it after the last."""
+        self._push_left -= 1
+        if not self._push_left:
+            self.plant.push((0.0, 0.0, 0.0))
+            self._settle = SETTLE_CYCLES
 
     def _power(self, command: ModeCommand) -> None:
         """Give the joints power or open their brakes, if the safety system lets them have it."""

@@ -15,6 +15,7 @@ from ur_emulator.models.robot_model import Vector3
 # What an arm is made to stand: the largest force limit of the safety settings [N], about a tool's length [m].
 MAX_PUSH, MAX_LEVER = 250.0, 0.3
 MAX_LOAD = 20.0  # kg
+MAX_PUSH_TIME = 600.0  # s
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,7 @@ class Push:
     Attributes:
         force: in base axes [N], up to MAX_PUSH.
         point: where it acts, in the flange frame [m], up to MAX_LEVER away.
+        duration: for so long [s], up to MAX_PUSH_TIME; None until the next push.
 
     Raises:
         PlantError: for anything else.
@@ -31,8 +33,11 @@ class Push:
 
     force: Vector3
     point: Vector3 = (0.0, 0.0, 0.0)
+    duration: float | None = None
 
     def __post_init__(self) -> None:
+        if self.duration is not None and not 0.0 <= self.duration <= MAX_PUSH_TIME:
+            raise PlantError(f"push of {self.duration:g} s given: allowed are 0 to {MAX_PUSH_TIME:g} s")
         _check("push", "N", self.force, MAX_PUSH)
         _check("push at", "m", self.point, MAX_LEVER)
 

@@ -11,6 +11,7 @@ import gc
 import select
 import selectors
 import socket
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -45,7 +46,11 @@ class Service(Protocol):
 
 
 class EventLoop:
-    """A selector, deadlines, and calls from other threads."""
+    """A selector, deadlines, and calls from other threads.
+
+    Attributes:
+        is_running: `run` has been called, or somebody is about to; it has not returned.
+    """
 
     def __init__(self, *, precise: bool = True) -> None:
         """Make the loop.
@@ -57,6 +62,8 @@ class EventLoop:
         self._services: list[Service] = []
         self._calls: deque[Callable[[], None]] = deque()
         self._stopping = False
+        self.is_running = False
+        self._thread = 0
         self._expects_soon = False
         self._pause = 1
         self._skip = 0
@@ -105,6 +112,11 @@ class EventLoop:
 
     # --- other threads
 
+    @property
+    def is_own_thread(self) -> bool:
+        """True in the thread that runs the loop."""
+        return threading.get_ident() == self._thread
+
     def call_soon_threadsafe(self, call: Callable[[], None]) -> None:
         """Run `call` in the loop's thread, soon; beside `stop` the only method for other threads."""
         self._calls.append(call)
@@ -122,12 +134,18 @@ class EventLoop:
         gc.collect()
         gc.freeze()
         gc.set_threshold(*_GC_THRESHOLD)
-        while not self._stopping:
-            now = time.monotonic()
-            deadline = now + 1.0
-            for service in tuple(self._services):
-                deadline = min(deadline, service.advance(now))
-            self._dispatch(deadline)
+        self.is_running = True
+        self._thread = threading.get_ident()
+        try:
+            while not self._stopping:
+                now = time.monotonic()
+                deadline = now + 1.0
+                for service in tuple(self._services):
+                    deadline = min(deadline, service.advance(now))
+                self._dispatch(deadline)
+        finally:
+            self.is_running = False
+            self._thread = 0
 
     def close(self) -> None:
         """Release the selector and the wake-up pipe; the loop must not run any more."""

@@ -38,6 +38,7 @@ class LoopRunner:
 
     def start(self, name: str) -> None:
         """Run in a thread of its own, called `name`."""
+        self._loop.is_running = True
         self._thread = threading.Thread(target=self._run_and_keep_failure, name=name, daemon=True)
         self._thread.start()
 

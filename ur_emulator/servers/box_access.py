@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.box_log import LogEntry
+from ur_emulator.box_log import BoxLog, LogEntry
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
@@ -51,13 +51,13 @@ class BoxAccess:
     Attributes:
         identity: names and numbers of the box.
         network: opens sockets that the box dials out with.
-        wake: called in the loop when a job has ended, so that somebody looks before the next cycle.
+        on_job_done: called in the loop when a job has ended, so that somebody looks before the next cycle.
     """
 
     def __init__(self, identity: BoxIdentity, box: ServedBox, loop: EventLoop, network: Network) -> None:
         self.identity = identity
         self.network = network
-        self.wake: Callable[[], None] = lambda: None
+        self.on_job_done: list[Callable[[], None]] = []
         self._box = box
         self._loop = loop
         self._worker: ThreadPoolExecutor | None = None
@@ -76,6 +76,11 @@ class BoxAccess:
     def log(self) -> tuple[LogEntry, ...]:
         """The last entries of the log."""
         return self._box.log.entries
+
+    @property
+    def box_log(self) -> BoxLog:
+        """The log itself, for those who read on where they left off."""
+        return self._box.log
 
     def announce(self, event: Event) -> None:
         """Publish an event that needs no cycle."""
@@ -103,10 +108,14 @@ class BoxAccess:
         if self._worker is None:
             self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="dashboard")
         future = self._worker.submit(job)
-        future.add_done_callback(lambda _: self._loop.call_soon_threadsafe(self.wake))
+        future.add_done_callback(lambda _: self._loop.call_soon_threadsafe(self._tell_of_job))
         while not future.done():
             yield
         return future.result()
+
+    def _tell_of_job(self) -> None:
+        for tell in self.on_job_done:
+            tell()
 
     def close(self) -> None:
         """End the worker; what is still queued is dropped."""

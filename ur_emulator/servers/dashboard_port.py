@@ -32,7 +32,7 @@ class DashboardPort:
         """Serve a box.
 
         Args:
-            access: of the box; it is told whom to wake.
+            access: of the box; it is told whom to tell of jobs.
             answers: to the commands.
         """
         self._access = access
@@ -41,7 +41,7 @@ class DashboardPort:
         # Clients with lines that are not answered yet, and steps that nobody waits for any more.
         self._busy: dict[Connection, _Session] = {}
         self._detached: list[Steps] = []
-        access.wake = self.go_on
+        access.on_job_done.append(self.go_on)
 
     @property
     def clients(self) -> tuple[Connection, ...]:

@@ -1,0 +1,135 @@
+"""What a box is doing, as people want to read it: names instead of numbers, lists instead of bits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from protocol.primary_messages import RequestedType
+from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
+from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.cycle import controller_time
+from ur_emulator.controller.wires import DIGITAL_GROUPS
+from ur_emulator.models.robot_model import Vector3, Vector6
+
+# Slower than this counts as standing still [rad/s]: more than what the sensors make of an arm at rest.
+STANDING_SPEED = 0.01
+
+Levels = dict[str, tuple[bool, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A question of a program: its number, the type of the answer (RequestedType), its text."""
+
+    id: int
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoxState:
+    """The state of a box at the end of a cycle; SI units, base frame.
+
+    Attributes:
+        tick: number of the cycle.
+        time: seconds since controller start.
+        robot_mode: name of a RobotMode.
+        safety_mode: name of a SafetyMode.
+        program_state: name of a ProgramState.
+        program: name of the program that runs, "" without one.
+        joint_modes: names of the JointModes.
+        steady: nothing moves the arm and it stands still.
+        q: measured joint angles [rad].
+        qd: measured joint speeds [rad/s].
+        target_q: where the joints are asked to be [rad].
+        tcp_pose: measured [m, rotation vector in rad].
+        tcp_speed: measured [m/s, rad/s].
+        tcp_force: estimated wrench at the TCP [N, Nm].
+        speed: the speed slider, 0 to 1.
+        payload: mass that the controller believes in [kg].
+        payload_cog: its centre of gravity in the flange frame [m].
+        digital_inputs: levels by group.
+        digital_outputs: levels by group.
+        analog_inputs: of the box [V or A].
+        analog_outputs: of the box [V or A].
+        tool_analog_inputs: [V or A].
+        tool_voltage: supply of the tool [V].
+        popups: texts of the popups on the screen.
+        questions: of programs, which wait for an answer.
+    """
+
+    tick: int
+    time: float
+    robot_mode: str
+    safety_mode: str
+    program_state: str
+    program: str
+    joint_modes: tuple[str, ...]
+    steady: bool
+    q: Vector6
+    qd: Vector6
+    target_q: Vector6
+    tcp_pose: Vector6
+    tcp_speed: Vector6
+    tcp_force: Vector6
+    speed: float
+    payload: float
+    payload_cog: Vector3
+    digital_inputs: Levels
+    digital_outputs: Levels
+    analog_inputs: tuple[float, ...]
+    analog_outputs: tuple[float, ...]
+    tool_analog_inputs: tuple[float, ...]
+    tool_voltage: int
+    popups: tuple[str, ...]
+    questions: tuple[Question, ...]
+
+
+def is_steady(controller: Controller) -> bool:
+    """Return whether nothing moves the arm and it stands still."""
+    moves = controller.state.motion.is_moving
+    return not moves and max(map(abs, controller.snapshot.actual_qd)) < STANDING_SPEED
+
+
+def take_state(controller: Controller) -> BoxState:
+    """Return the state of a box; in the thread of its loop, or when it does not run."""
+    now, operator = controller.snapshot, controller.state.operator
+    popups = tuple(r.text for r in operator.requests if r.kind is RequestedType.NONE)
+    return BoxState(
+        tick=now.tick,
+        time=controller_time(now.tick),
+        robot_mode=RobotMode(now.robot_mode).name,
+        safety_mode=SafetyMode(now.safety_mode).name,
+        program_state=ProgramState(now.runtime_state).name,
+        program=now.program_name,
+        joint_modes=tuple(JointMode(mode).name for mode in now.joint_mode),
+        steady=is_steady(controller),
+        q=now.actual_q,
+        qd=now.actual_qd,
+        target_q=now.target_q,
+        tcp_pose=now.actual_tcp_pose,
+        tcp_speed=now.actual_tcp_speed,
+        tcp_force=now.actual_tcp_force,
+        speed=now.target_speed_fraction,
+        payload=now.payload,
+        payload_cog=now.payload_cog,
+        digital_inputs=_levels(now.actual_digital_input_bits),
+        digital_outputs=_levels(now.actual_digital_output_bits),
+        analog_inputs=now.analog_values[:2],
+        analog_outputs=now.analog_values[2:4],
+        tool_analog_inputs=now.analog_values[4:],
+        tool_voltage=now.tool_output_voltage,
+        popups=(*operator.shown, *popups),
+        questions=tuple(
+            Question(r.request_id, r.kind.name, r.text)
+            for r in operator.requests
+            if r.kind is not RequestedType.NONE
+        ),
+    )
+
+
+def _levels(word: int) -> Levels:
+    return {
+        group: tuple(bool(word >> (shift + n) & 1) for n in range(count))
+        for group, (shift, count) in DIGITAL_GROUPS.items()
+    }

@@ -1,0 +1,179 @@
+"""What an operation of the control API may be given: types, ranges, and one line for what does not fit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from itertools import islice
+from math import hypot, isfinite
+from typing import Any
+
+from ur_emulator.errors import ArgumentError
+
+# Characters of a text such as a log line or a popup, and of a program.
+MAX_TEXT, MAX_SCRIPT = 1000, 500_000
+_WORDS = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
+
+
+class Kind(Enum):
+    """Type of a parameter, as people read it."""
+
+    NUMBER = "number"
+    INTEGER = "integer"
+    BOOLEAN = "true or false"
+    CHOICE = "word"
+    TEXT = "text"
+    SCRIPT = "URScript"
+    VECTOR = "three numbers"
+    ANSWER = "true, false, number or text"
+
+
+class _Required:
+    def __repr__(self) -> str:
+        return "required"
+
+
+REQUIRED = _Required()
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter of an operation.
+
+    Attributes:
+        name: as in Python, JSON and on the command line.
+        kind: its type.
+        meaning: what it is, as a phrase.
+        unit: of numbers.
+        low: least number.
+        high: greatest number; of a vector, its greatest length.
+        choices: of a CHOICE.
+        default: taken when it is not given; None where leaving it out means something of its own.
+    """
+
+    name: str
+    kind: Kind
+    meaning: str
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[str, ...] = ()
+    default: Any = REQUIRED
+
+    @property
+    def is_required(self) -> bool:
+        """True if it must be given."""
+        return self.default is REQUIRED
+
+    @property
+    def allowed(self) -> str:
+        """What is allowed, as a phrase."""
+        unit = f" {self.unit}" if self.unit else ""
+        match self.kind:
+            case Kind.CHOICE:
+                return " or ".join((", ".join(self.choices[:-1]), self.choices[-1]))
+            case Kind.VECTOR if self.high is not None:
+                return f"three numbers, together at most {self.high:g}{unit}"
+            case Kind.NUMBER | Kind.INTEGER if self.high is not None and self.low is not None:
+                return f"{self.low:g} to {self.high:g}{unit}"
+            case Kind.NUMBER | Kind.INTEGER if self.low is not None:
+                return f"{self.kind.value} from {self.low:g}{unit}"
+            case Kind.TEXT | Kind.SCRIPT:
+                return f"text of at most {self._max_length} characters"
+            case _:
+                return f"{self.kind.value}{unit}"
+
+    def check(self, value: Any) -> Any:
+        """Return a value as operations want it.
+
+        Raises:
+            ArgumentError: it does not fit.
+        """
+        if value is None and self.default is None:
+            return None
+        checked = self._checked(value)
+        if checked is None:
+            raise ArgumentError(f"{self.name} {_short(value)} given: allowed is {self.allowed}")
+        return checked
+
+    def parse(self, text: str) -> Any:
+        """Return what a word of a command line or a query means; `check` still has to look at it."""
+        match self.kind:
+            case Kind.BOOLEAN:
+                return _WORDS.get(text.lower(), text)
+            case Kind.NUMBER:
+                return _or_text(float, text)
+            case Kind.INTEGER:
+                return _or_text(int, text)
+            case Kind.VECTOR:
+                return [_or_text(float, word) for word in text.replace(",", " ").split()]
+            case Kind.ANSWER:
+                value = _or_text(json.loads, text)
+                return value if isinstance(value, bool | int | float | str) else text
+            case _:
+                return text
+
+    @property
+    def _max_length(self) -> int:
+        return MAX_SCRIPT if self.kind is Kind.SCRIPT else MAX_TEXT
+
+    def _checked(self, value: Any) -> Any:
+        """Return the value, or None if it does not fit."""
+        match self.kind:
+            case Kind.BOOLEAN:
+                return bool(value) if value in (True, False) and isinstance(value, int) else None
+            case Kind.INTEGER:
+                return value if _is_integer(value) and self._is_in_range(value) else None
+            case Kind.NUMBER:
+                return float(value) if _is_number(value) and self._is_in_range(value) else None
+            case Kind.CHOICE:
+                return value if isinstance(value, str) and value in self.choices else None
+            case Kind.TEXT | Kind.SCRIPT:
+                return value if _is_text(value) and len(value) <= self._max_length else None
+            case Kind.VECTOR:
+                return self._vector(value)
+            case Kind.ANSWER:
+                fits = isinstance(value, bool) or _is_number(value) or _is_text(value)
+                return value if fits and (not isinstance(value, str) or len(value) <= MAX_TEXT) else None
+
+    def _is_in_range(self, value: float) -> bool:
+        return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
+
+    def _vector(self, value: Any) -> tuple[float, float, float] | None:
+        if not isinstance(value, Iterable) or isinstance(value, str | bytes | Mapping):
+            return None
+        numbers = tuple(islice(value, 4))
+        if len(numbers) != 3 or not all(map(_is_number, numbers)):
+            return None
+        x, y, z = map(float, numbers)
+        return (x, y, z) if self.high is None or hypot(x, y, z) <= self.high else None
+
+
+def _is_integer(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    except OverflowError:
+        return False
+
+
+def _is_text(value: Any) -> bool:
+    """A lone surrogate is no text: nothing can send it on."""
+    return isinstance(value, str) and not any("\ud800" <= c <= "\udfff" for c in value)
+
+
+def _short(value: Any) -> str:
+    text = ascii(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _or_text(kind: Any, text: str) -> Any:
+    try:
+        return kind(text)
+    except (ValueError, RecursionError):
+        return text
