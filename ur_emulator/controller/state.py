@@ -40,8 +40,8 @@ HISTORY_CYCLES = 125
 class Payload:
     """What the controller believes to hang at the flange: mass [kg], centre of gravity [m] in its frame.
 
-    `at_tcp`: the centre of gravity was never given; it is the TCP, wherever that will be. `inertia`: as stated,
-    Ixx Iyy Izz Ixy Ixz Iyz [kg m^2]; it is only reported.
+    `at_tcp`: the centre of gravity was never given; it is the TCP, wherever that will be.
+    `inertia`: as stated, Ixx Iyy Izz Ixy Ixz Iyz [kg m^2]; it is only reported.
     """
 
     mass: float = 0.0
