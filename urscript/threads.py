@@ -185,6 +185,9 @@ class Scheduler:
                     thread.wait = wait
                     thread.budget = cast(int, namespace["_b"])
                     break
+                if 2 * namespace["_b"] < budget:
+                    thread.slice_used = True
+                    break
         except StopIteration:
             self._end(thread)
         except ThreadKilled:

@@ -34,5 +34,10 @@ class Blocked:
         self.outside = outside
 
 
+GIVE_WAY: Final = Blocked(lambda: True)
+"""For a call that takes time by its nature and happens not to: the thread goes on at once, unless it has used
+much of its budget; then this call takes up the rest of the cycle. A program that reads what a peer floods it
+with is so never found to have used too much time, however much of it comes at once."""
+
 Wait = _NextCycle | Blocked
 """Everything a thread may yield."""

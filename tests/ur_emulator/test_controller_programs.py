@@ -273,3 +273,29 @@ def test_a_new_tcp_counts_at_once(bench):
         "  textmsg(point_dist(a, get_target_tcp_pose()))\nend\n"
     )
     assert float(said[0]) == pytest.approx(0.1)
+
+
+def test_a_program_reads_whatever_comes_at_once_without_using_too_much_time():
+    bench = Bench(fidelity="ideal")
+    n = 20_000
+    bench.start(f"""def prog():
+      socket_open("127.0.0.1", 5000)
+      sync()
+      i = 0
+      while i < {n}:
+        v = socket_read_binary_integer(1)
+        if v[1] != i:
+          textmsg("wrong ", i)
+          halt
+        end
+        i = i + 1
+      end
+      textmsg("all")
+    end""")
+    bench.network.sockets[0].inbox += b"".join(i.to_bytes(4, "big") for i in range(n))
+    cycles = 0
+    while bench.controller.is_active and cycles < 100:
+        bench.tick()
+        cycles += 1
+    assert [event.text for event in bench.events if type(event).__name__ == "TextPrinted"] == ["all"]
+    assert not [event for event in bench.events if type(event).__name__ == "ScriptFailed"]

@@ -87,13 +87,32 @@ def test_a_condition_that_holds_at_once_costs_no_cycle():
     assert running.step() is ProgramStatus.FINISHED
 
 
-def test_a_thread_that_waits_keeps_what_is_left_of_its_budget():
+def test_calls_that_never_have_to_wait_give_way_before_the_budget_is_used_up():
+    reads = []
+
     def read(thread, number, name, timeout):
         yield Blocked(lambda: True, outside=True)
+        reads.append(number)
         return [1, 5]
 
     program = compile_program("while True:\n  x = socket_read_binary_integer(1)\nend")
     running = program.start(Host(socket_read_binary_integer=read))
+    per_cycle = []
+    for _ in range(3):
+        assert running.step() is ProgramStatus.RUNNING
+        per_cycle.append(len(reads))
+        reads.clear()
+    assert 1_000 < min(per_cycle) <= max(per_cycle) < Dialect().statement_budget
+    running.kill()
+
+
+def test_what_a_program_does_between_such_calls_still_counts():
+    def read(thread, number, name, timeout):
+        yield Blocked(lambda: True, outside=True)
+        return [1, 5]
+
+    text = "while True:\n  x = socket_read_binary_integer(1)\n  i = 0\n  while i < 200000:\n    i = i + 1\n  end\nend"
+    running, _ = start(text, socket_read_binary_integer=read)
     assert running.step() is ProgramStatus.FAILED
     assert "too much time" in running.error.message
 
