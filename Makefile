@@ -42,6 +42,7 @@ format: $(STAMP) ## put the code into its canonical layout
 docs: $(STAMP) ## rewrite the generated pages
 	$(BIN)/python -m urscript.catalogue.coverage > docs/urscript-coverage.md
 	$(BIN)/python -m ur_emulator.controller.port_map_page > docs/protocol/modbus.md
+	$(BIN)/python -m ur_emulator.control.page > docs/control.md
 	$(BIN)/python -m ur_emulator.controller.states_page > docs/states.md
 	$(BIN)/python -m protocol.dashboard_page > docs/protocol/dashboard.md
 

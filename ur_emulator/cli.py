@@ -58,6 +58,12 @@ def serve(
             help="Folder of programs (.urp, .script) and installations, for the dashboard's load and play."
         ),
     ] = None,
+    control_port: Annotated[
+        int | None,
+        typer.Option(
+            help="Open the control API over HTTP on this port, for `ur-emulator ctl` (its default: 29900)."
+        ),
+    ] = None,
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
@@ -86,6 +92,7 @@ def serve(
             fidelity=fidelity,
             port_base=port_base,
             programs=programs,
+            control_port=control_port,
         )
         for name in (signal.SIGINT, signal.SIGTERM):
             signal.signal(name, lambda number, frame: rack.stop())
@@ -108,7 +115,8 @@ def serve(
             f"seed {seed + k}, serial {box.serial_number}: "
             f"dashboard {box.ports.dashboard}, primary {box.ports.primary}, "
             f"secondary {box.ports.secondary}, realtime {box.ports.realtime}, rtde {box.ports.rtde}"
-            + (f", modbus {box.ports.modbus}" if box.ports.modbus else ""),
+            + (f", modbus {box.ports.modbus}" if box.ports.modbus else "")
+            + (f", control {box.control_port}" if box.control_port else ""),
             flush=True,
         )
     try:
@@ -116,6 +124,21 @@ def serve(
     except EmulatorError as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(1) from None
+
+
+@app.command(
+    context_settings={
+        "allow_extra_args": True,
+        "ignore_unknown_options": True,
+        "allow_interspersed_args": False,
+    },
+    add_help_option=False,
+)
+def ctl(context: typer.Context) -> None:
+    """Do something to a box that runs with --control-port: set inputs, push, stop, answer, read the log."""
+    from ur_emulator.control.command_line import main as control
+
+    raise typer.Exit(control(context.args))
 
 
 def _print_entry(prefix: str, entry: LogEntry) -> None:
@@ -130,7 +153,12 @@ def _write_ready_file(path: Path, rack: Sequence[ControlBox]) -> None:
     It says of the first box what most readers look for, and of all boxes, the first included, in `boxes`.
     """
     boxes = [
-        {"host": box.host, "ports": dataclasses.asdict(box.ports), "serial_number": box.serial_number}
+        {
+            "host": box.host,
+            "ports": dataclasses.asdict(box.ports),
+            "serial_number": box.serial_number,
+            "control_port": box.control_port,
+        }
         for box in rack
     ]
     facts = {**boxes[0], "boxes": boxes}

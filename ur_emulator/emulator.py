@@ -97,8 +97,8 @@ class ControlBox(BoxOperations):
             fidelity: "ideal", "typical" or "poor".
             port_base: offset added to all standard ports; None takes free ports.
             programs: folder of programs and installations, for the dashboard's `load`; None for none.
-            control_port: number of the port for the control API over HTTP, docs/control.md; 0 takes a free one,
-                None opens none.
+            control_port: number of the port for the control API over HTTP (docs/control.md); 0: a free one,
+                None: none.
             loop: shared with other boxes, see `BoxRack`, which runs it; None gives the box its own.
             phase: which part of a period its cycles lie after those of the first box of the loop.
 

@@ -41,6 +41,7 @@ class BoxOptions(TypedDict, total=False):
     fidelity: str
     port_base: int | None
     programs: str | PathLike[str] | None
+    control_port: int | None
 
 
 class BoxRack(Sequence[ControlBox]):
