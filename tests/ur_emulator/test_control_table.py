@@ -1,0 +1,161 @@
+"""The table of operations, and everything that must follow it: methods, actions, page, JSON."""
+
+import inspect
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ur_emulator.control.box_operations import BoxOperations
+from ur_emulator.control.conditions import CONDITIONS
+from ur_emulator.control.operations import BY_NAME, OPERATIONS, describe
+from ur_emulator.control.page import render
+from ur_emulator.control.parameters import Kind
+from ur_emulator.emulator import ControlBox
+from ur_emulator.errors import ArgumentError
+
+ROOT = Path(__file__).parents[2]
+EVERY = pytest.mark.parametrize("operation", OPERATIONS, ids=lambda operation: operation.name)
+# A value of each kind that must fit, beside ranges.
+FITTING = {Kind.BOOLEAN: True, Kind.TEXT: "text", Kind.SCRIPT: "text", Kind.VECTOR: (0.0, 0.0, 0.1), Kind.ANSWER: 7}
+
+
+def fitting(parameter):
+    if parameter.kind is Kind.CHOICE:
+        return parameter.choices[-1]
+    return FITTING.get(parameter.kind, 1 if parameter.high is None else parameter.high)
+
+
+@EVERY
+def test_an_operation_that_acts_is_a_method_with_the_same_parameters_and_meaning(operation):
+    method = getattr(ControlBox, operation.name)
+    if operation.only_reads:
+        assert isinstance(method, property)
+        return
+    parameters = list(inspect.signature(method).parameters.values())[1:]
+    assert [p.name for p in parameters] == [p.name for p in operation.parameters]
+    for mine, row in zip(parameters, operation.parameters, strict=True):
+        # Left out in both, or the same default; run_program decides between its two by leaving one out.
+        assert (mine.default is inspect.Parameter.empty) == row.is_required
+        if not row.is_required:
+            assert mine.default == row.default
+    assert inspect.getdoc(method).splitlines()[0] == operation.meaning
+
+
+@EVERY
+def test_a_method_hands_all_its_arguments_on(operation):
+    asked = {}
+
+    class Recorder(BoxOperations):
+        def _perform(self, name, arguments):
+            asked[name] = arguments
+            return {"tick": 3}
+
+    values = {p.name: fitting(p) for p in operation.parameters}
+    if operation.only_reads:
+        return
+    getattr(Recorder(), operation.name)(**values)
+    assert asked == {operation.name: values}
+
+
+def test_no_method_is_without_an_operation():
+    public = {name for name in vars(BoxOperations) if not name.startswith("_")}
+    assert public == set(BY_NAME) - {"log"}  # the log is read without the loop
+
+
+def test_conditions_are_those_of_wait_until():
+    names = {p.name for p in BY_NAME["wait_until"].parameters}
+    assert names == set(CONDITIONS) | {"log", "after", "timeout"}
+
+
+@EVERY
+def test_what_fits_is_taken_and_defaults_are_filled_in(operation):
+    required = {p.name: fitting(p) for p in operation.parameters if p.is_required}
+    checked = operation.check(required)
+    assert list(checked) == [p.name for p in operation.parameters]
+    everything = {p.name: fitting(p) for p in operation.parameters}
+    assert operation.check(everything) == everything
+
+
+@EVERY
+def test_what_is_missing_or_unknown_is_named(operation):
+    with pytest.raises(ArgumentError, match="no parameter 'colour'"):
+        operation.check({p.name: fitting(p) for p in operation.parameters} | {"colour": 1})
+    for parameter in operation.parameters:
+        if parameter.is_required:
+            others = {p.name: fitting(p) for p in operation.parameters if p is not parameter}
+            with pytest.raises(ArgumentError, match=f"{operation.name} needs {parameter.name}"):
+                operation.check(others)
+
+
+ODD = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20) | st.binary(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=2),
+)
+
+
+@EVERY
+@given(data=st.data())
+def test_whatever_comes_fits_or_is_refused_in_one_line(operation, data):
+    for parameter in operation.parameters:
+        value = data.draw(ODD)
+        try:
+            checked = parameter.check(value)
+        except ArgumentError as error:
+            assert "\n" not in str(error)
+            assert str(error).startswith(parameter.name)
+            continue
+        numbers = checked if isinstance(checked, tuple) else [checked]
+        for number in numbers:
+            if isinstance(number, float):
+                assert math.isfinite(number)
+                assert parameter.low is None or number >= parameter.low
+                assert parameter.high is None or number <= parameter.high
+        json.dumps(checked).encode()
+
+
+@pytest.mark.parametrize(
+    ("operation", "name", "text", "value"),
+    [
+        ("set_digital_input", "level", "ON", True),
+        ("set_digital_input", "level", "false", False),
+        ("set_digital_input", "level", "up", "up"),
+        ("set_digital_input", "n", "3", 3),
+        ("set_digital_input", "n", "three", "three"),
+        ("set_speed", "fraction", "0.5", 0.5),
+        ("push", "force", "1 2 -3", [1.0, 2.0, -3.0]),
+        ("push", "force", "1,2,x", [1.0, 2.0, "x"]),
+        ("answer", "value", "true", True),
+        ("answer", "value", "3", 3),
+        ("answer", "value", "3.5", 3.5),
+        ("answer", "value", '"3"', "3"),
+        ("answer", "value", "some words", "some words"),
+        ("answer", "value", "[" * 100_000, "[" * 100_000),
+        ("add_to_log", "text", "3", "3"),
+    ],
+)
+def test_words_of_a_command_line_become_values(operation, name, text, value):
+    parameter = {p.name: p for p in BY_NAME[operation].parameters}[name]
+    parsed = parameter.parse(text)
+    assert (parsed, type(parsed)) == (value, type(value))
+
+
+def test_the_table_is_json():
+    rows = json.loads(json.dumps(describe(), allow_nan=False))
+    assert [row["name"] for row in rows] == [operation.name for operation in OPERATIONS]
+    assert all(row["meaning"].endswith(".") for row in rows)
+
+
+def test_the_page_is_up_to_date():
+    assert (ROOT / "docs" / "control.md").read_text() == render(), "run `make docs`"
+
+
+def test_the_command_line_loads_no_physics():
+    code = "import sys, ur_emulator.control.command_line; print(*sorted({'mujoco', 'numpy', 'lark'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.strip() == ""

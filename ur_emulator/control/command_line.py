@@ -1,0 +1,164 @@
+"""`ur-emulator ctl`: every operation of the table as a sub-command, done by a box that runs.
+
+Exit codes: 0 done; 1 the box refused, or none answers; 2 wrong usage. Errors are one line.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from ur_emulator.control.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
+from ur_emulator.control.operations import BY_NAME, OPERATIONS, Operation
+from ur_emulator.control.parameters import Kind, Parameter
+from ur_emulator.errors import ArgumentError, ControlError
+
+PROGRAM = "ur-emulator ctl"
+# How often a log that is followed is asked for [s].
+_FOLLOW_PERIOD = 0.2
+
+
+class _Parser(argparse.ArgumentParser):
+    """Complains in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{PROGRAM}: {message}; `{self.prog} --help` shows what there is\n")
+
+
+def main(words: Sequence[str]) -> int:
+    """Do what the command line says; return the exit code."""
+    given = vars(make_parser().parse_args(words))
+    operation = BY_NAME[given.pop("operation")]
+    client = ControlClient(given.pop("host", DEFAULT_HOST), given.pop("control_port", DEFAULT_PORT))
+    as_json, follow = given.pop("json", False), given.pop("follow", False)
+    try:
+        arguments = _arguments(operation, given)
+        if follow:
+            _follow(client, arguments, as_json)
+        result = client.perform(operation.name, arguments)
+    except KeyboardInterrupt:
+        return 0
+    except (ArgumentError, OSError, UnicodeError) as error:
+        return _complain(error, 2)
+    except ControlError as error:
+        return _complain(error, 1)
+    print(json.dumps(result) if as_json else plain(result), flush=True)
+    return 0
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the parser of all sub-commands."""
+    common = _Parser(add_help=False, argument_default=argparse.SUPPRESS)
+    common.add_argument("--host", help=f"address of the box ({DEFAULT_HOST})")
+    common.add_argument("--control-port", type=int, metavar="N", help=f"its control port ({DEFAULT_PORT})")
+    common.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser = _Parser(prog=PROGRAM, description="Do something to a box that runs.", parents=[common])
+    commands = parser.add_subparsers(dest="operation", required=True, metavar="OPERATION")
+    for operation in OPERATIONS:
+        command = commands.add_parser(
+            operation.name,
+            help=operation.meaning,
+            description=operation.meaning,
+            parents=[common],
+            argument_default=argparse.SUPPRESS,
+            allow_abbrev=False,
+        )
+        for parameter in operation.parameters:
+            _add_option(command, parameter)
+        if operation.name == "log":
+            command.add_argument("--follow", action="store_true", help="go on with what comes, until Ctrl-C")
+    return parser
+
+
+def plain(result: Mapping[str, Any]) -> str:
+    """Return a result for people."""
+    if set(result) == {"tick"}:
+        return f"done in cycle {result['tick']}"
+    if "entries" in result:
+        return "\n".join(map(_log_line, result["entries"]))
+    lines = list(_lines("", result))
+    width = max((len(name) for name, _ in lines), default=0)
+    return "\n".join(f"{name:<{width}}  {value}".rstrip() for name, value in lines)
+
+
+def _add_option(command: argparse.ArgumentParser, parameter: Parameter) -> None:
+    need = "" if not parameter.is_required else "; required"
+    default = (
+        "" if parameter.is_required or parameter.default is None else f"; default {_text(parameter.default)}"
+    )
+    about = f"{parameter.meaning} ({parameter.allowed}{default}{need})".replace("%", "%%")
+    words: dict[str, Any] = {"help": about, "metavar": "X"}
+    if parameter.kind is Kind.VECTOR:
+        words |= {"nargs": 3, "metavar": ("X", "Y", "Z")}
+    command.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **words)
+    if parameter.kind is Kind.SCRIPT:
+        command.add_argument(
+            f"--{parameter.name}-file", metavar="FILE", help=f"{parameter.name} from a file of this machine"
+        )
+
+
+def _arguments(operation: Operation, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what was given as JSON has it.
+
+    Raises:
+        ArgumentError: it does not fit.
+    """
+    arguments: dict[str, Any] = {}
+    for parameter in operation.parameters:
+        if (path := given.get(f"{parameter.name}_file")) is not None:
+            arguments[parameter.name] = Path(path).read_text(encoding="utf-8")
+        elif parameter.name in given:
+            value = given[parameter.name]
+            arguments[parameter.name] = parameter.parse(value if isinstance(value, str) else " ".join(value))
+    operation.check(arguments)
+    return arguments
+
+
+def _follow(client: ControlClient, arguments: dict[str, Any], as_json: bool) -> NoReturn:
+    """Print the log and what is added to it until somebody ends this."""
+    while True:
+        result = client.perform("log", arguments)
+        for entry in result["entries"]:
+            print(json.dumps(entry) if as_json else _log_line(entry), flush=True)
+        arguments["after"] = result["next"]
+        time.sleep(_FOLLOW_PERIOD)
+
+
+def _log_line(entry: Mapping[str, Any]) -> str:
+    code = f"{entry['code']} " if entry["code"] else ""
+    return f"{entry['time']:.3f} {entry['level']} {entry['source']}: {code}{entry['text']}"
+
+
+def _lines(prefix: str, values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    lines: list[tuple[str, str]] = []
+    for name, value in values.items():
+        if isinstance(value, dict):
+            lines += _lines(f"{prefix}{name}.", value)
+        else:
+            lines.append((f"{prefix}{name}", _text(value)))
+    return lines
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{round(value, 5):g}"
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_text(item)}" for name, item in value.items())
+    if isinstance(value, list | tuple):
+        if all(isinstance(item, bool) for item in value):
+            return " ".join(str(int(item)) for item in value)
+        is_numeric = all(isinstance(item, int | float) for item in value)
+        return (" " if is_numeric else "; ").join(map(_text, value))
+    return str(value)
+
+
+def _complain(error: Exception, code: int) -> int:
+    sys.stderr.write(f"{PROGRAM}: {' '.join(str(error).split())}\n")
+    return code

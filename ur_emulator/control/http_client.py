@@ -1,0 +1,65 @@
+"""Asks the control port of a box that runs somewhere; for the command line and for tests."""
+
+from __future__ import annotations
+
+import http.client
+import json
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import urlencode
+
+from ur_emulator.control.operations import BY_NAME
+from ur_emulator.errors import ArgumentError, ControlError, RefusedError
+
+DEFAULT_HOST = "127.0.0.1"
+DEFAULT_PORT = 29900
+# How long an answer may take beyond what is waited for [s]: compiling a long program takes seconds.
+PATIENCE = 60.0
+
+
+class ControlClient:
+    """One box, one connection for every question."""
+
+    def __init__(self, host: str = DEFAULT_HOST, port: int = DEFAULT_PORT) -> None:
+        self.host = host
+        self.port = port
+
+    def perform(self, name: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+        """Have an operation done; return its result.
+
+        Raises:
+            ArgumentError: it was given something that it does not take.
+            RefusedError: the state of the box stands against it.
+            ControlError: it was not done for another reason, such as that no box answers.
+        """
+        operation = BY_NAME[name]
+        operation.check(arguments)
+        given = {key: value for key, value in arguments.items() if value is not None}
+        patience = PATIENCE + float(given.get("timeout", 0.0))
+        connection = http.client.HTTPConnection(self.host, self.port, timeout=patience)
+        try:
+            if operation.only_reads:
+                query = f"?{urlencode(given)}" if given else ""
+                connection.request("GET", f"/v1/{name}{query}")
+            else:
+                connection.request(
+                    "POST", f"/v1/{name}", json.dumps(given), {"Content-Type": "application/json"}
+                )
+            response = connection.getresponse()
+            result = json.loads(response.read())
+        except (OSError, http.client.HTTPException, ValueError) as error:
+            raise ControlError(
+                f"no box answers at {self.host}:{self.port} ({_reason(error)}): "
+                "start one with `ur-emulator serve --control-port N`"
+            ) from None
+        finally:
+            connection.close()
+        if response.status == 200 and isinstance(result, dict):
+            return result
+        text = str(result.get("error", result)) if isinstance(result, dict) else str(result)
+        raise {400: ArgumentError, 409: RefusedError}.get(response.status, ControlError)(text)
+
+
+def _reason(error: Exception) -> str:
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return " ".join(str(text).split())

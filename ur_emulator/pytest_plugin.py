@@ -1,0 +1,173 @@
+"""pytest plug-in: control boxes as fixtures. Comes with the package; docs/control.md and the README show it.
+
+    def test_my_driver(ur_box):                     # a fresh UR3 in lockstep, on free ports
+        connect_my_driver(ur_box.host, ur_box.ports)
+
+    @pytest.mark.ur(robot="ur5", version="3.4.0", standard_ports=True)
+    def test_the_old_software(ur_box): ...
+
+Boxes end with their test; a test that fails shows their logs. Nothing heavy is imported before a fixture is
+used, so that a test-suite without boxes pays nothing.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from ur_emulator import ControlBox
+
+# What `@pytest.mark.ur(...)` and `ur_box_factory(...)` take.
+OPTIONS = (
+    "robot",
+    "version",
+    "pace",
+    "speed",
+    "fidelity",
+    "seed",
+    "host",
+    "port_base",
+    "programs",
+    "control_port",
+    "standard_ports",
+)
+DEFAULTS: dict[str, Any] = {"pace": "lockstep", "port_base": None}
+# Entries of a log that a failing test shows.
+MAX_SHOWN = 200
+# How many addresses are tried for a box with the standard ports.
+MAX_ADDRESSES = 100
+
+BoxFactory = Callable[..., "ControlBox"]
+_BOXES = pytest.StashKey[list["ControlBox"]]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the defaults of all boxes to the command line."""
+    group = parser.getgroup("ur-emulator", "emulated control boxes (fixtures ur_box, ur_box_factory)")
+    group.addoption(
+        "--ur-robot", default="ur3", metavar="NAME", help="type of the arm, unless a test names one"
+    )
+    group.addoption("--ur-version", default=None, metavar="X.Y.Z", help="software, unless a test names one")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the marker known."""
+    config.addinivalue_line(
+        "markers", f"ur({', '.join(f'{name}=...' for name in OPTIONS)}): how ur_box shall be"
+    )
+
+
+@pytest.fixture
+def ur_box_factory(request: pytest.FixtureRequest) -> Iterator[BoxFactory]:
+    """Makes boxes that run until the test ends: `ur_box_factory(robot="ur5", seed=3)`.
+
+    It takes the arguments of `ControlBox` and `standard_ports=True`: a loopback address of its own with the
+    vendor's port numbers. Without any, it is a box in lockstep on free ports.
+    """
+    boxes = request.node.stash.setdefault(_BOXES, [])
+    with ExitStack() as stack:
+
+        def make(**options: Any) -> ControlBox:
+            box = _start({**_defaults(request.config), **_checked(options, request.path.parent)}, stack)
+            boxes.append(box)
+            return box
+
+        yield make
+
+
+@pytest.fixture
+def ur_box(request: pytest.FixtureRequest, ur_box_factory: BoxFactory) -> ControlBox:
+    """A fresh box for one test, as `@pytest.mark.ur(...)` wants it; it runs until the test ends."""
+    options: dict[str, Any] = {}
+    for mark in reversed(list(request.node.iter_markers("ur"))):  # the nearest mark last: it wins
+        if mark.args:
+            pytest.fail(f"@pytest.mark.ur takes keywords only, {mark.args!r} given", pytrace=False)
+        options |= mark.kwargs
+    return ur_box_factory(**options)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Show the logs of a failing test's boxes."""
+    report = yield
+    if report.failed:
+        for box in item.stash.get(_BOXES, []):
+            entries = box.log
+            left_out = [f"... {len(entries) - MAX_SHOWN} entries before"] if len(entries) > MAX_SHOWN else []
+            text = "\n".join([*left_out, *map(str, entries[-MAX_SHOWN:])])
+            report.sections.append((f"log of the box at {box.host}:{box.ports.primary}", text or "(empty)"))
+    return report
+
+
+def _defaults(config: pytest.Config) -> dict[str, Any]:
+    defaults = {**DEFAULTS, "robot": config.getoption("--ur-robot")}
+    version = config.getoption("--ur-version")
+    return defaults if version is None else {**defaults, "version": version}
+
+
+def _checked(options: dict[str, Any], folder: Path) -> dict[str, Any]:
+    unknown = [name for name in options if name not in OPTIONS]
+    if unknown:
+        pytest.fail(f"a box has no {', '.join(unknown)}: choose from {', '.join(OPTIONS)}", pytrace=False)
+    if options.get("programs") is not None:  # relative to the test's own file
+        return {**options, "programs": folder / options["programs"]}
+    return options
+
+
+def _start(options: dict[str, Any], stack: ExitStack) -> ControlBox:
+    """Start a box that ends with the stack."""
+    from ur_emulator.emulator import ControlBox
+    from ur_emulator.errors import EmulatorError, PortError
+
+    own_address = options.pop("standard_ports", False)
+    try:
+        if not own_address:
+            return stack.enter_context(ControlBox(**options))
+        options["port_base"] = 0
+        for host in _own_addresses() if "host" not in options else [options["host"]]:
+            if not _is_free(host):
+                continue
+            with suppress(PortError):  # somebody else was quicker
+                return stack.enter_context(ControlBox(**{**options, "host": host}))
+        raise PortError(
+            "no loopback address has the standard ports free: run fewer tests at once, or leave out "
+            "standard_ports (on macOS only 127.0.0.1 exists until others are added with ifconfig)"
+        )
+    except EmulatorError as error:
+        pytest.fail(f"no box: {error}", pytrace=False)
+
+
+def _own_addresses() -> Iterator[str]:
+    """Yield loopback addresses that no other worker and hardly another run on this machine will want."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "")
+    number = int(worker.removeprefix("gw")) if worker.removeprefix("gw").isdecimal() else -1
+    block = 1 + (number + 1) % 200
+    for k in range(MAX_ADDRESSES):
+        yield f"127.{block}.{1 + os.getpid() % 250}.{1 + k}"
+
+
+def _is_free(host: str) -> bool:
+    """Return whether all standard ports of an address can be opened, save that for Modbus."""
+    import socket
+    from dataclasses import astuple
+
+    from protocol.ur_types import Ports
+
+    with ExitStack() as stack:
+        try:
+            for port in astuple(Ports.standard())[1:]:
+                sock = stack.enter_context(socket.socket())
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                sock.bind((host, port))
+                sock.listen(1)
+        except OSError:
+            return False
+    return True
