@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from protocol.filled import Filled
 from protocol.ur_types import RobotMode, SafetyMode
 from protocol.wire_record import ALWAYS, Since, since, wire
 
@@ -40,6 +41,8 @@ __all__ = [
 
 NO_TIME = 2**64 - 1
 """Timestamp of a package that has none: all ones."""
+
+_MEASURED, _MODELLED, _PROPERTY, _CONSTANT, _ZERO = Filled
 
 _SINCE_3_1 = since((3, 1))
 _SINCE_3_2 = since((3, 2))
@@ -68,20 +71,26 @@ class RobotModeData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 0
 
-    timestamp: int = wire("Q", "since controller start, a multiple of the cycle", unit="us")
-    is_real_robot_connected: bool = wire("?", "control box and arm talk", default=True)
-    is_real_robot_enabled: bool = wire("?", "true from POWER_ON to RUNNING (inferred)", default=False)
-    is_robot_power_on: bool = wire("?", "true from POWER_ON to RUNNING (inferred)", default=False)
-    is_emergency_stopped: bool = wire("?", default=False)
-    is_protective_stopped: bool = wire("?", default=False)
-    is_program_running: bool = wire("?", default=False)
-    is_program_paused: bool = wire("?", default=False)
-    robot_mode: int = wire("b", "RobotMode; signed, so that NO_CONTROLLER fits", default=RobotMode.POWER_OFF)
-    control_mode: int = wire("B", "ControlMode")
-    target_speed_fraction: float = wire("d", "speed slider, 0 to 1", default=1.0)
-    speed_scaling: float = wire("d", "resulting scaling, 0 to 1", default=1.0)
-    target_speed_fraction_limit: float = wire("d", default=1.0, since=_SINCE_3_2)
-    reserved: int = wire("B", since=_SINCE_3_5)
+    timestamp: int = wire("Q", "since controller start, a multiple of the cycle", unit="us", filled=_MODELLED)
+    is_real_robot_connected: bool = wire("?", "control box and arm talk", default=True, filled=_MODELLED)
+    is_real_robot_enabled: bool = wire(
+        "?", "true from POWER_ON to RUNNING (inferred)", default=False, filled=_MODELLED
+    )
+    is_robot_power_on: bool = wire(
+        "?", "true from POWER_ON to RUNNING (inferred)", default=False, filled=_MODELLED
+    )
+    is_emergency_stopped: bool = wire("?", default=False, filled=_MODELLED)
+    is_protective_stopped: bool = wire("?", default=False, filled=_MODELLED)
+    is_program_running: bool = wire("?", default=False, filled=_MODELLED)
+    is_program_paused: bool = wire("?", default=False, filled=_MODELLED)
+    robot_mode: int = wire(
+        "b", "RobotMode; signed, so that NO_CONTROLLER fits", default=RobotMode.POWER_OFF, filled=_MODELLED
+    )
+    control_mode: int = wire("B", "ControlMode", filled=_MODELLED)
+    target_speed_fraction: float = wire("d", "speed slider, 0 to 1", default=1.0, filled=_MODELLED)
+    speed_scaling: float = wire("d", "resulting scaling, 0 to 1", default=1.0, filled=_MODELLED)
+    target_speed_fraction_limit: float = wire("d", default=1.0, since=_SINCE_3_2, filled=_CONSTANT)
+    reserved: int = wire("B", since=_SINCE_3_5, filled=_ZERO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,18 +99,30 @@ class JointData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 1
 
-    q_actual: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="joint", default=0.0)
-    q_target: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="joint", default=0.0)
-    qd_actual: tuple[float, ...] = wire("d", count=6, unit="rad/s", interleaved="joint", default=0.0)
-    current_actual: tuple[float, ...] = wire("f", count=6, unit="A", interleaved="joint", default=0.0)
+    q_actual: tuple[float, ...] = wire(
+        "d", count=6, unit="rad", interleaved="joint", default=0.0, filled=_MEASURED
+    )
+    q_target: tuple[float, ...] = wire(
+        "d", count=6, unit="rad", interleaved="joint", default=0.0, filled=_MODELLED
+    )
+    qd_actual: tuple[float, ...] = wire(
+        "d", count=6, unit="rad/s", interleaved="joint", default=0.0, filled=_MEASURED
+    )
+    current_actual: tuple[float, ...] = wire(
+        "f", count=6, unit="A", interleaved="joint", default=0.0, filled=_MEASURED
+    )
     voltage_actual: tuple[float, ...] = wire(
-        "f", "0 on simulators", count=6, unit="V", interleaved="joint", default=0.0
+        "f", "0 on simulators", count=6, unit="V", interleaved="joint", default=0.0, filled=_MEASURED
     )
-    temperature_motor: tuple[float, ...] = wire("f", count=6, unit="degC", interleaved="joint", default=25.0)
+    temperature_motor: tuple[float, ...] = wire(
+        "f", count=6, unit="degC", interleaved="joint", default=25.0, filled=_MEASURED
+    )
     temperature_micro: tuple[float, ...] = wire(
-        "f", "obsolete", count=6, unit="degC", interleaved="joint", default=0.0
+        "f", "obsolete", count=6, unit="degC", interleaved="joint", default=0.0, filled=_ZERO
     )
-    joint_mode: tuple[int, ...] = wire("B", "JointMode", count=6, interleaved="joint", default=239)
+    joint_mode: tuple[int, ...] = wire(
+        "B", "JointMode", count=6, interleaved="joint", default=239, filled=_MODELLED
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,15 +131,15 @@ class ToolData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 2
 
-    analog_input_range2: int = wire("B", "0 current, 1 voltage")
-    analog_input_range3: int = wire("B", "0 current, 1 voltage")
-    analog_input2: float = wire("d", unit="A or V", default=0.0)
-    analog_input3: float = wire("d", unit="A or V", default=0.0)
-    tool_voltage_48v: float = wire("f", unit="V", default=48.0)
-    tool_output_voltage: int = wire("B", "0, 12 or 24", unit="V")
-    tool_current: float = wire("f", unit="A", default=0.0)
-    tool_temperature: float = wire("f", unit="degC", default=25.0)
-    tool_mode: int = wire("B", "JointMode, the tool's subset", default=239)
+    analog_input_range2: int = wire("B", "0 current, 1 voltage", filled=_MODELLED)
+    analog_input_range3: int = wire("B", "0 current, 1 voltage", filled=_MODELLED)
+    analog_input2: float = wire("d", unit="A or V", default=0.0, filled=_MODELLED)
+    analog_input3: float = wire("d", unit="A or V", default=0.0, filled=_MODELLED)
+    tool_voltage_48v: float = wire("f", unit="V", default=48.0, filled=_MEASURED)
+    tool_output_voltage: int = wire("B", "0, 12 or 24", unit="V", filled=_MODELLED)
+    tool_current: float = wire("f", unit="A", default=0.0, filled=_MODELLED)
+    tool_temperature: float = wire("f", unit="degC", default=25.0, filled=_MEASURED)
+    tool_mode: int = wire("B", "JointMode, the tool's subset", default=239, filled=_MODELLED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,31 +148,37 @@ class MasterboardData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 3
 
-    digital_input_bits: int = wire("i", "0-7 standard, 8-15 configurable, 16-17 tool")
-    digital_output_bits: int = wire("i", "as the inputs")
-    analog_input_range0: int = wire("B", "0 current, 1 voltage", default=1)
-    analog_input_range1: int = wire("B", "0 current, 1 voltage", default=1)
-    analog_input0: float = wire("d", unit="A or V", default=0.0)
-    analog_input1: float = wire("d", unit="A or V", default=0.0)
-    analog_output_domain0: int = wire("b", "0 current, 1 voltage")
-    analog_output_domain1: int = wire("b", "0 current, 1 voltage")
-    analog_output0: float = wire("d", unit="A or V", default=0.004)
-    analog_output1: float = wire("d", unit="A or V", default=0.004)
-    masterboard_temperature: float = wire("f", unit="degC", default=24.0)
-    robot_voltage_48v: float = wire("f", unit="V", default=48.0)
-    robot_current: float = wire("f", unit="A", default=0.0)
-    master_io_current: float = wire("f", unit="A", default=0.0)
-    safety_mode: int = wire("B", "SafetyMode", default=SafetyMode.NORMAL)
-    in_reduced_mode: bool = wire("?", default=False)
-    euromap67_installed: bool = wire("?", "true: the next four fields are there", default=False)
-    euromap67_input_bits: int = wire("I", only_if="euromap67_installed")
-    euromap67_output_bits: int = wire("I", only_if="euromap67_installed")
-    euromap67_voltage_24v: float = wire("f", unit="V", default=0.0, only_if="euromap67_installed")
-    euromap67_current: float = wire("f", unit="A", default=0.0, only_if="euromap67_installed")
-    safety_checksum: int = wire("I", "internal; repeats in SafetyData")
-    operational_mode_selector_input: int = wire("B", default=1, since=_SINCE_3_2)
-    three_position_enabling_device_input: int = wire("B", default=1, since=_SINCE_3_2)
-    reserved: int = wire("B", default=1, since=_SINCE_3_10)
+    digital_input_bits: int = wire("i", "0-7 standard, 8-15 configurable, 16-17 tool", filled=_MODELLED)
+    digital_output_bits: int = wire("i", "as the inputs", filled=_MODELLED)
+    analog_input_range0: int = wire("B", "0 current, 1 voltage", default=1, filled=_MODELLED)
+    analog_input_range1: int = wire("B", "0 current, 1 voltage", default=1, filled=_MODELLED)
+    analog_input0: float = wire("d", unit="A or V", default=0.0, filled=_MODELLED)
+    analog_input1: float = wire("d", unit="A or V", default=0.0, filled=_MODELLED)
+    analog_output_domain0: int = wire("b", "0 current, 1 voltage", filled=_MODELLED)
+    analog_output_domain1: int = wire("b", "0 current, 1 voltage", filled=_MODELLED)
+    analog_output0: float = wire("d", unit="A or V", default=0.004, filled=_MODELLED)
+    analog_output1: float = wire("d", unit="A or V", default=0.004, filled=_MODELLED)
+    masterboard_temperature: float = wire("f", unit="degC", default=24.0, filled=_MODELLED)
+    robot_voltage_48v: float = wire("f", unit="V", default=48.0, filled=_MODELLED)
+    robot_current: float = wire("f", unit="A", default=0.0, filled=_MODELLED)
+    master_io_current: float = wire("f", unit="A", default=0.0, filled=_MODELLED)
+    safety_mode: int = wire("B", "SafetyMode", default=SafetyMode.NORMAL, filled=_MODELLED)
+    in_reduced_mode: bool = wire("?", default=False, filled=_MODELLED)
+    euromap67_installed: bool = wire(
+        "?", "true: the next four fields are there", default=False, filled=_CONSTANT
+    )
+    euromap67_input_bits: int = wire("I", only_if="euromap67_installed", filled=_CONSTANT)
+    euromap67_output_bits: int = wire("I", only_if="euromap67_installed", filled=_CONSTANT)
+    euromap67_voltage_24v: float = wire(
+        "f", unit="V", default=0.0, only_if="euromap67_installed", filled=_CONSTANT
+    )
+    euromap67_current: float = wire(
+        "f", unit="A", default=0.0, only_if="euromap67_installed", filled=_CONSTANT
+    )
+    safety_checksum: int = wire("I", "internal; repeats in SafetyData", filled=_PROPERTY)
+    operational_mode_selector_input: int = wire("B", default=1, since=_SINCE_3_2, filled=_CONSTANT)
+    three_position_enabling_device_input: int = wire("B", default=1, since=_SINCE_3_2, filled=_CONSTANT)
+    reserved: int = wire("B", default=1, since=_SINCE_3_10, filled=_CONSTANT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,9 +187,9 @@ class CartesianInfo(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 4
 
-    tcp_pose: tuple[float, ...] = wire("d", "in base", count=6, unit="m, rad", default=0.0)
+    tcp_pose: tuple[float, ...] = wire("d", "in base", count=6, unit="m, rad", default=0.0, filled=_MODELLED)
     tcp_offset: tuple[float, ...] = wire(
-        "d", "in flange", count=6, unit="m, rad", default=0.0, since=_SINCE_3_1
+        "d", "in flange", count=6, unit="m, rad", default=0.0, since=_SINCE_3_1, filled=_MODELLED
     )
 
 
@@ -173,12 +200,14 @@ class KinematicsInfo(SubPackage):
     SUB_TYPE: ClassVar[int] = 5
     FIRST_STATE_ONLY: ClassVar[bool] = True
 
-    checksum: tuple[int, ...] = wire("I", "all ones on simulators", count=6, default=0xFFFFFFFF)
-    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0)
-    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0)
-    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0)
-    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0)
-    calibration_status: int = wire("I")
+    checksum: tuple[int, ...] = wire(
+        "I", "all ones on simulators", count=6, default=0xFFFFFFFF, filled=_PROPERTY
+    )
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
+    calibration_status: int = wire("I", filled=_CONSTANT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,25 +217,33 @@ class ConfigurationData(SubPackage):
     SUB_TYPE: ClassVar[int] = 6
     FIRST_STATE_ONLY: ClassVar[bool] = True
 
-    joint_min_limit: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="limits", default=0.0)
-    joint_max_limit: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="limits", default=0.0)
-    joint_max_speed: tuple[float, ...] = wire("d", count=6, unit="rad/s", interleaved="rates", default=0.0)
-    joint_max_acceleration: tuple[float, ...] = wire(
-        "d", count=6, unit="rad/s2", interleaved="rates", default=40.0
+    joint_min_limit: tuple[float, ...] = wire(
+        "d", count=6, unit="rad", interleaved="limits", default=0.0, filled=_PROPERTY
     )
-    v_joint_default: float = wire("d", unit="rad/s", default=1.0471975511965976)
-    a_joint_default: float = wire("d", unit="rad/s2", default=1.3962634015954636)
-    v_tool_default: float = wire("d", unit="m/s", default=0.25)
-    a_tool_default: float = wire("d", unit="m/s2", default=1.2)
-    eq_radius: float = wire("d", unit="m", default=0.25)
-    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0)
-    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0)
-    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0)
-    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0)
-    masterboard_version: int = wire("i", "6 in a UR5e capture; the CB3 value is unknown", default=6)
-    controller_box_type: int = wire("i", "4 UR5, 5 UR10, 6 UR3", default=6)
-    robot_type: int = wire("i", "RobotType", default=3)
-    robot_sub_type: int = wire("i", "1 CB2, 2 CB3, 3 e-Series", default=2)
+    joint_max_limit: tuple[float, ...] = wire(
+        "d", count=6, unit="rad", interleaved="limits", default=0.0, filled=_PROPERTY
+    )
+    joint_max_speed: tuple[float, ...] = wire(
+        "d", count=6, unit="rad/s", interleaved="rates", default=0.0, filled=_PROPERTY
+    )
+    joint_max_acceleration: tuple[float, ...] = wire(
+        "d", count=6, unit="rad/s2", interleaved="rates", default=40.0, filled=_CONSTANT
+    )
+    v_joint_default: float = wire("d", unit="rad/s", default=1.0471975511965976, filled=_CONSTANT)
+    a_joint_default: float = wire("d", unit="rad/s2", default=1.3962634015954636, filled=_CONSTANT)
+    v_tool_default: float = wire("d", unit="m/s", default=0.25, filled=_CONSTANT)
+    a_tool_default: float = wire("d", unit="m/s2", default=1.2, filled=_CONSTANT)
+    eq_radius: float = wire("d", unit="m", default=0.25, filled=_CONSTANT)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
+    masterboard_version: int = wire(
+        "i", "6 in a UR5e capture; the CB3 value is unknown", default=6, filled=_CONSTANT
+    )
+    controller_box_type: int = wire("i", "4 UR5, 5 UR10, 6 UR3", default=6, filled=_PROPERTY)
+    robot_type: int = wire("i", "RobotType", default=3, filled=_PROPERTY)
+    robot_sub_type: int = wire("i", "1 CB2, 2 CB3, 3 e-Series", default=2, filled=_PROPERTY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,8 +252,10 @@ class ForceModeData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 7
 
-    wrench: tuple[float, ...] = wire("d", "in base axes", count=6, unit="N, Nm", default=0.0)
-    robot_dexterity: float = wire("d", "squared determinant of the Jacobian", default=0.0)
+    wrench: tuple[float, ...] = wire(
+        "d", "in base axes", count=6, unit="N, Nm", default=0.0, filled=_MODELLED
+    )
+    robot_dexterity: float = wire("d", "squared determinant of the Jacobian", default=0.0, filled=_MODELLED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,10 +264,10 @@ class AdditionalInfo(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 8
 
-    teach_button_state: int = wire("B")
-    freedrive_button_enabled: bool = wire("?", default=True)
-    io_enabled_freedrive: bool = wire("?", default=False, since=since((3, 3)))
-    reserved: int = wire("B", default=1, since=_SINCE_3_10)
+    teach_button_state: int = wire("B", filled=_MODELLED)
+    freedrive_button_enabled: bool = wire("?", default=True, filled=_MODELLED)
+    io_enabled_freedrive: bool = wire("?", default=False, since=since((3, 3)), filled=_MODELLED)
+    reserved: int = wire("B", default=1, since=_SINCE_3_10, filled=_CONSTANT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +276,7 @@ class CalibrationData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 9
 
-    wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", default=0.0)
+    wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", default=0.0, filled=_ZERO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,10 +286,12 @@ class SafetyData(SubPackage):
     SUB_TYPE: ClassVar[int] = 10
     SINCE: ClassVar[Since] = _SINCE_3_5
 
-    safety_checksum: int = wire("I", "repeats in MasterboardData")
-    flag0: int = wire("B", default=1)
-    flag1: int = wire("B", default=1)
-    elbow_sphere: tuple[float, ...] = wire("d", "x y z in base, radius", count=4, unit="m", default=0.0)
+    safety_checksum: int = wire("I", "repeats in MasterboardData", filled=_PROPERTY)
+    flag0: int = wire("B", default=1, filled=_CONSTANT)
+    flag1: int = wire("B", default=1, filled=_CONSTANT)
+    elbow_sphere: tuple[float, ...] = wire(
+        "d", "x y z in base, radius", count=4, unit="m", default=0.0, filled=_MODELLED
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,12 +301,12 @@ class ToolCommunicationInfo(SubPackage):
     SUB_TYPE: ClassVar[int] = 11
     SINCE: ClassVar[Since] = since(None, (5, 0))
 
-    is_enabled: bool = wire("?", default=False)
-    baud_rate: int = wire("i", default=115200)
-    parity: int = wire("i", "0 none, 1 odd, 2 even")
-    stop_bits: int = wire("i", default=1)
-    rx_idle_chars: float = wire("f", default=1.5)
-    tx_idle_chars: float = wire("f", default=3.5)
+    is_enabled: bool = wire("?", default=False, filled=_CONSTANT)
+    baud_rate: int = wire("i", default=115200, filled=_CONSTANT)
+    parity: int = wire("i", "0 none, 1 odd, 2 even", filled=_CONSTANT)
+    stop_bits: int = wire("i", default=1, filled=_CONSTANT)
+    rx_idle_chars: float = wire("f", default=1.5, filled=_CONSTANT)
+    tx_idle_chars: float = wire("f", default=3.5, filled=_CONSTANT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,9 +316,9 @@ class ToolModeInfo(SubPackage):
     SUB_TYPE: ClassVar[int] = 12
     SINCE: ClassVar[Since] = since(None, (5, 1))
 
-    output_mode: int = wire("B", "0 digital, 1 dual-pin power")
-    digital_output_mode0: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1)
-    digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1)
+    output_mode: int = wire("B", "0 digital, 1 dual-pin power", filled=_CONSTANT)
+    digital_output_mode0: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, filled=_CONSTANT)
+    digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, filled=_CONSTANT)
 
 
 SUB_PACKAGES: tuple[type[SubPackage], ...] = (

@@ -13,24 +13,11 @@ bits, see their row.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import Enum
 
+from protocol.filled import Filled
 from protocol.ur_types import SoftwareVersion
 
 __all__ = ["CB2_COLUMNS", "COLUMNS", "VERSIONS", "Filled", "RealtimeColumn"]
-
-
-class Filled(Enum):
-    """Where the emulated box takes a value from."""
-
-    MEASURED = "measured"
-    """From the simulated arm through its simulated sensors: delay, noise and dead band included."""
-    MODELLED = "modelled"
-    """Computed in the box: set-points, kinematics of measured joints, estimates, states of its machines."""
-    CONSTANT = "constant"
-    """A plausible fixed value; nothing is simulated behind it."""
-    INTERNAL_ZERO = "internal, zero"
-    """Meaning unpublished; always sent as 0, and clients ignore it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +49,12 @@ class RealtimeColumn:
 
 
 _C = RealtimeColumn
-_MEASURED, _MODELLED, _CONSTANT, _ZERO = Filled
+_MEASURED, _MODELLED, _CONSTANT, _ZERO = (
+    Filled.MEASURED,
+    Filled.MODELLED,
+    Filled.CONSTANT,
+    Filled.INTERNAL_ZERO,
+)
 
 _DIGITAL_BITS = (
     "UR realtime sheet ('encoded as int64_t' but typed double); UR forum 1811: every field is a double"

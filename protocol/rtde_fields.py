@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
 
-from protocol.realtime_columns import Filled
+from protocol.filled import Filled
 from protocol.rtde_types import RtdeType
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import Since, since
@@ -53,7 +53,7 @@ class RtdeField:
     source: str = "UR RTDE guide"
 
 
-_MEASURED, _MODELLED, _CONSTANT, _INTERNAL = Filled
+_MEASURED, _MODELLED, _CONSTANT = Filled.MEASURED, Filled.MODELLED, Filled.CONSTANT
 _BOOL, _U8, _U32, _I32, _U64, _F64, _VEC3, _VEC6, _VEC6I, _VEC6U = RtdeType
 
 _BASE = since((3, 2))

@@ -19,6 +19,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
+from protocol.filled import Filled
 from protocol.ur_types import SoftwareVersion
 
 __all__ = ["ALWAYS", "OLDEST", "Since", "WireField", "since", "wire", "wire_fields"]
@@ -69,6 +70,7 @@ class WireField:
         unit: SI unit, "enum", or "".
         note: meaning.
         record: table of the records of a `*`.
+        filled: how the emulated box fills it; None where it is what an event says.
     """
 
     name: str
@@ -80,6 +82,7 @@ class WireField:
     unit: str
     note: str
     record: type[Any] | None = None
+    filled: Filled | None = None
 
 
 _METADATA_KEY = "wire"
@@ -96,9 +99,10 @@ def wire(
     only_if: str = "",
     since: Since = ALWAYS,
     record: type[Any] | None = None,
+    filled: Filled | None = None,
 ) -> Any:
     """Declare a field of a record; see `WireField`. The default of a vector is `count` times `default`."""
-    row = WireField("", code, count, interleaved, only_if, since, unit, note, record)
+    row = WireField("", code, count, interleaved, only_if, since, unit, note, record, filled)
     value = (default,) * count if count > 1 else default
     return dataclasses.field(default=value, metadata={_METADATA_KEY: row})
 

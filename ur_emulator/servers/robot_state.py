@@ -18,7 +18,9 @@ from protocol.primary_layout import (
     RobotModeData,
     SafetyData,
     SubPackage,
+    ToolCommunicationInfo,
     ToolData,
+    ToolModeInfo,
 )
 from protocol.primary_packages import encode_state
 from protocol.rtde_types import RobotStatusBits
@@ -134,6 +136,8 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
             io_enabled_freedrive=snap.is_guided_by_input,
         ),
         SafetyData(safety_checksum=checksum, elbow_sphere=(*snap.elbow_position, ELBOW_RADIUS)),
+        ToolCommunicationInfo(),
+        ToolModeInfo(),
     )
 
 

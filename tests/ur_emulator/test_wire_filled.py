@@ -1,0 +1,79 @@
+"""What the tables say of where values come from is true: what is measured or modelled changes, constants do not."""
+
+import pytest
+from wire_story import Story
+
+from protocol.filled import Filled
+from protocol.primary_layout import SUB_PACKAGES
+from protocol.primary_packages import decode_package, state_types
+from protocol.realtime_columns import COLUMNS
+from protocol.realtime_layout import layout_for_version
+from protocol.rtde_fields import OUTPUTS, output_fields
+from protocol.rtde_recipe import Recipe, snapshot_encoder
+from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import wire_fields
+from ur_emulator.servers.robot_state import StateEncoder
+
+V3_15 = SoftwareVersion(3, 15, 8)
+ALIVE = (Filled.MEASURED, Filled.MODELLED)
+# Vectors are looked at element by element, but for these: the last of them is a radius; and a motor that does
+# little stays as warm as it is.
+ANY_ELEMENT = {"elbow_sphere", "joint_temperatures", "temperature_motor"}
+
+
+@pytest.fixture(scope="module")
+def story():
+    return Story()
+
+
+def check(name, filled, values):
+    """Check one mark against all values that were sent."""
+    columns = list(zip(*(value if isinstance(value, tuple) else (value,) for value in values), strict=True))
+    changes = [len(set(column)) > 1 for column in columns]
+    if filled in ALIVE:
+        assert any(changes) if name in ANY_ELEMENT else all(changes), f"{name} is {filled.value}: {changes}"
+    else:
+        assert not any(changes), f"{name} is {filled.value}, but changes: {changes}"
+        if filled is Filled.INTERNAL_ZERO:
+            assert not any(map(any, columns)), name
+
+
+def test_every_output_of_rtde_is_what_the_table_says(story):
+    fields = tuple(output_fields(V3_15).values())
+    recipe = Recipe((f.name for f in fields), (f.type for f in fields))
+    encode = snapshot_encoder(fields, b"")
+    packages = [recipe.decode(encode(snapshot)) for snapshot, _ in story.moments]
+    for field, *values in zip(fields, *packages, strict=True):
+        check(field.name, field.filled, values)
+
+
+def test_every_column_of_a_frame_is_what_the_table_says(story):
+    layout = layout_for_version(SoftwareVersion(5, 12))  # the longest frame
+    encode = layout.encoder()
+    frames = [layout.decode(encode(snapshot)) for snapshot, _ in story.moments]
+    for column in layout.columns:
+        values = [getattr(frame, column.attribute) for frame in frames]
+        check(column.name, column.filled, [tuple(v) if column.count > 1 else v for v in values])
+
+
+@pytest.mark.parametrize("version", [V3_15, SoftwareVersion(3, 2), SoftwareVersion(5, 12)])
+def test_every_field_of_a_state_is_what_the_table_says(story, version):
+    encoder = StateEncoder(version, story.controller.state.arm)
+    states = [decode_package(encoder.encode_first(s), version).sub_packages for s, _ in story.moments]
+    for record, *sent in zip(state_types(version, first=True), *states, strict=True):
+        for field in wire_fields(record):
+            if field.since.covers(version) and not field.only_if:
+                check(f"{field.name}", field.filled, [getattr(one, field.name) for one in sent])
+
+
+def test_every_field_of_the_tables_has_a_mark():
+    assert all(field.filled for record in SUB_PACKAGES for field in wire_fields(record))
+    assert all(column.filled for column in COLUMNS)
+    assert all(field.filled for field in OUTPUTS if field.since.cb3)
+
+
+def test_what_is_constant_is_little():
+    constants = {f.name for f in output_fields(V3_15).values() if f.filled is Filled.CONSTANT}
+    assert constants == {
+        "actual_execution_time", "actual_main_voltage", "euromap67_24V_voltage", "euromap67_24V_current"
+    }  # fmt: skip
