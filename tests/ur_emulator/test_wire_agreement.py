@@ -1,0 +1,168 @@
+"""The ports of a box say the same of a cycle: every package of a busy box, decoded and compared."""
+
+import math
+
+import pytest
+from wire_story import Story
+
+from protocol import primary_layout as L
+from protocol.primary_packages import decode_package
+from protocol.realtime_layout import layout_for_version
+from protocol.rtde_fields import output_fields
+from protocol.rtde_recipe import Recipe, snapshot_encoder
+from protocol.rtde_types import RobotStatusBits, SafetyStatusBits
+from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
+from ur_emulator.controller.cycle import PERIOD_US
+from ur_emulator.servers.robot_state import StateEncoder
+
+V3_15 = SoftwareVersion(3, 15, 8)
+FIELDS = tuple(output_fields(V3_15).values())
+STOPS = SafetyStatusBits.STOPPED_DUE_TO_SAFETY
+
+
+def f32(value):
+    return pytest.approx(value, rel=1e-6, abs=1e-7)
+
+
+@pytest.fixture(scope="module")
+def moments():
+    """All packages of all moments: (RTDE by name, realtime frame, sub-packages by class, Modbus registers)."""
+    story = Story()
+    layout = layout_for_version(V3_15)
+    frame, rtde = layout.encoder(), snapshot_encoder(FIELDS, b"")
+    recipe = Recipe((f.name for f in FIELDS), (f.type for f in FIELDS))
+    states = StateEncoder(V3_15, story.controller.state.arm)
+    names = [f.name for f in FIELDS]
+    return [
+        (
+            dict(zip(names, recipe.decode(rtde(snapshot)), strict=True)),
+            layout.decode(frame(snapshot)),
+            {type(s): s for s in decode_package(states.encode_first(snapshot), V3_15).sub_packages},
+            modbus,
+        )
+        for snapshot, modbus in story.moments
+    ]
+
+
+def test_the_story_passes_through_the_modes(moments):
+    assert {m[0]["safety_mode"] for m in moments} == {1, 2, 3, 5, 7, 8}
+    assert {m[0]["robot_mode"] for m in moments} == {-1, 0, 2, 3, 4, 5, 6, 7}
+    assert {m[0]["runtime_state"] for m in moments} >= {1, 2, 3, 4}
+
+
+def test_frames_and_rtde_say_the_same(moments):
+    for rtde, frame, _, _ in moments:
+        for column in frame.layout.columns:
+            if column.name in rtde:
+                value = getattr(frame, column.attribute)
+                value = tuple(value) if column.count > 1 else value
+                assert value == rtde[column.name], column.name
+
+
+def test_states_and_rtde_say_the_same(moments):
+    for rtde, _, state, _ in moments:
+        mode, joints = state[L.RobotModeData], state[L.JointData]
+        assert mode.timestamp == round(rtde["timestamp"] * 1e6)
+        assert mode.timestamp % PERIOD_US == 0
+        assert mode.robot_mode == rtde["robot_mode"]
+        bits = RobotStatusBits(rtde["robot_status_bits"])
+        assert mode.is_robot_power_on == (RobotStatusBits.POWER_ON in bits)
+        assert mode.is_program_running == (RobotStatusBits.PROGRAM_RUNNING in bits)
+        assert mode.is_program_paused == (rtde["runtime_state"] == ProgramState.PAUSED)
+        assert mode.target_speed_fraction == rtde["target_speed_fraction"]
+        assert mode.speed_scaling == rtde["speed_scaling"]
+        safety = SafetyStatusBits(rtde["safety_status_bits"])
+        assert mode.is_emergency_stopped == (SafetyStatusBits.EMERGENCY_STOPPED in safety)
+        assert mode.is_protective_stopped == (SafetyStatusBits.PROTECTIVE_STOPPED in safety)
+        assert joints.q_actual == rtde["actual_q"]
+        assert joints.q_target == rtde["target_q"]
+        assert joints.qd_actual == rtde["actual_qd"]
+        assert joints.current_actual == f32(rtde["actual_current"])
+        assert joints.voltage_actual == f32(rtde["actual_joint_voltage"])
+        assert joints.temperature_motor == f32(rtde["joint_temperatures"])
+        assert joints.joint_mode == rtde["joint_mode"]
+        assert state[L.CartesianInfo].tcp_pose == rtde["actual_TCP_pose"]
+        assert state[L.CartesianInfo].tcp_offset == rtde["tcp_offset"]
+        assert state[L.ForceModeData].wrench == rtde["actual_TCP_force"]
+        assert math.hypot(*state[L.ForceModeData].wrench[:3]) == pytest.approx(rtde["tcp_force_scalar"])
+        assert state[L.SafetyData].elbow_sphere[:3] == rtde["elbow_position"]
+        assert state[L.AdditionalInfo].teach_button_state == bool(bits & RobotStatusBits.TEACH_BUTTON_PRESSED)
+
+
+def test_lines_and_supplies_are_the_same_in_states_and_rtde(moments):
+    for rtde, _, state, _ in moments:
+        board, tool = state[L.MasterboardData], state[L.ToolData]
+        assert board.digital_input_bits == rtde["actual_digital_input_bits"]
+        assert board.digital_output_bits == rtde["actual_digital_output_bits"]
+        assert board.analog_input0 == rtde["standard_analog_input0"]
+        assert board.analog_input1 == rtde["standard_analog_input1"]
+        assert board.analog_output0 == rtde["standard_analog_output0"]
+        assert board.analog_output1 == rtde["standard_analog_output1"]
+        ranges = (board.analog_input_range0, board.analog_input_range1)
+        domains = (board.analog_output_domain0, board.analog_output_domain1)
+        assert sum(bit << i for i, bit in enumerate((*ranges, *domains))) == rtde["analog_io_types"]
+        assert board.robot_voltage_48v == f32(rtde["actual_robot_voltage"])
+        assert board.robot_current == f32(rtde["actual_robot_current"])
+        assert board.master_io_current == f32(rtde["io_current"])
+        assert board.safety_mode == rtde["safety_mode"] == rtde["safety_status"]
+        assert board.in_reduced_mode == (rtde["safety_mode"] == SafetyMode.REDUCED)
+        assert board.safety_checksum == state[L.SafetyData].safety_checksum != 0
+        assert tool.analog_input2 == rtde["tool_analog_input0"]
+        assert tool.analog_input3 == rtde["tool_analog_input1"]
+        types = tool.analog_input_range2 | tool.analog_input_range3 << 1
+        assert types == rtde["tool_analog_input_types"]
+        assert tool.tool_output_voltage == rtde["tool_output_voltage"]
+        assert tool.tool_current == f32(rtde["tool_output_current"])
+        assert tool.tool_temperature == f32(rtde["tool_temperature"])
+        assert tool.tool_mode == rtde["tool_mode"]
+        assert tool.tool_voltage_48v == f32(rtde["actual_joint_voltage"][5])
+
+
+def word(value):
+    return round(value) & 0xFFFF
+
+
+def box_word(bits):
+    """Standard lines 0-7 and the tool's as 8 and 9, the order of Modbus."""
+    return bits & 0xFF | (bits >> 16 & 3) << 8
+
+
+def test_modbus_says_the_same_in_its_units(moments):
+    for rtde, _, _, modbus in moments:
+        digital_in, digital_out = rtde["actual_digital_input_bits"], rtde["actual_digital_output_bits"]
+        assert (modbus[0], modbus[1]) == (box_word(digital_in), box_word(digital_out))
+        assert (modbus[21], modbus[22]) == (digital_in >> 16 & 3, digital_out >> 16 & 3)
+        assert (modbus[30], modbus[31]) == (digital_in >> 8 & 0xFF, digital_out >> 8 & 0xFF)
+        assert modbus[20] == rtde["tool_output_voltage"]
+        assert modbus[24] == rtde["euromap67_input_bits"] & 0xFFFF
+        assert modbus[26] == rtde["euromap67_output_bits"] & 0xFFFF
+        assert modbus[258] == word(rtde["robot_mode"])
+        assert modbus[266] == rtde["safety_mode"]
+        assert modbus[450] == word(rtde["actual_robot_current"] * 1e3)
+        assert modbus[451] == word(rtde["io_current"] * 1e3)
+        assert modbus[768] == rtde["tool_mode"]
+        assert modbus[769] == word(rtde["tool_temperature"])
+        assert modbus[770] == word(rtde["tool_output_current"] * 1e3)
+        for i in range(6):
+            assert modbus[280 + i] == word(rtde["actual_qd"][i] * 1e3)
+            assert modbus[300 + i] == word(rtde["joint_temperatures"][i])
+            assert modbus[310 + i] == rtde["joint_mode"][i]
+        for i in range(3):
+            assert modbus[400 + i] == word(rtde["actual_TCP_pose"][i] * 1e4)
+            assert modbus[420 + i] == word(rtde["tcp_offset"][i] * 1e3)
+
+
+def test_every_safety_mode_sets_its_bits(moments):
+    for rtde, _, _, _ in moments:
+        bits = SafetyStatusBits(rtde["safety_status_bits"])
+        mode = SafetyMode(rtde["safety_mode"])
+        assert (SafetyStatusBits.NORMAL_MODE in bits) == (mode is SafetyMode.NORMAL)
+        assert (STOPS in bits) == (mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED))
+
+
+def test_voltage_and_power_go_together(moments):
+    for rtde, _, _, _ in moments:
+        has_power = bool(rtde["robot_status_bits"] & RobotStatusBits.POWER_ON)
+        assert (rtde["actual_robot_voltage"] > 40) == has_power
+        assert all((v > 40) == has_power for v in rtde["actual_joint_voltage"])
+        assert (rtde["actual_robot_current"] > 0) == has_power
