@@ -6,6 +6,9 @@ and nested functions share them. `runtime` provides the other names the code use
 
 Statements are counted where control turns back or enters a function, not one by one: the count of a block
 is known before it runs (of an `if`, its longest arm).
+
+Python compiles a function in one go and nothing else runs meanwhile, so each one is compiled alone, and a
+long program body in parts (`long_blocks`): the control cycle must not wait for it.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from dataclasses import dataclass
 from types import CodeType
 from typing import Any
 
-from urscript import nodes
+from urscript import long_blocks, nodes
 from urscript.catalogue import Catalogue
 from urscript.dialect import Dialect
 from urscript.errors import ScriptContextError
@@ -29,14 +32,15 @@ from urscript.source import Span
 
 @dataclass(frozen=True, slots=True)
 class Compiled:
-    """A code object that defines the functions of a program.
+    """The functions of a program.
 
     Attributes:
+        codes: Each defines one function when it is executed.
         constants: Values the code refers to by name.
         function_names: Python function -> function of the script.
     """
 
-    code: CodeType
+    codes: tuple[CodeType, ...]
     constants: dict[str, Any]
     function_names: dict[str, str]
 
@@ -51,15 +55,13 @@ def compile_resolved(
     """
     types = StaticTypes(program, catalogue)
     expressions = ExpressionCompiler(program, types, catalogue, dialect)
-    body: list[ast.FunctionDef] = []
+    codes: list[CodeType] = []
     function_names: dict[str, str] = {}
-    for scope in program.scopes():
-        made = _FunctionCompiler(program, types, expressions, scope).compile()
-        function_names.update((function.name, scope.name) for function in made)
-        body.extend(made)
-    module = ast.Module([*body], [])
     try:
-        code = compile(module, file_name, "exec", dont_inherit=True)
+        for scope in program.scopes():
+            for made in _FunctionCompiler(program, types, expressions, scope).compile():
+                function_names[made.name] = scope.name
+                codes.append(compile(ast.Module([made], []), file_name, "exec", dont_inherit=True))
     except SyntaxError as error:
         raise ScriptContextError(
             f"the program cannot be compiled: {error.msg}",
@@ -67,7 +69,7 @@ def compile_resolved(
             column=(error.offset or 0) + 1,
             source=program.source,
         ) from None
-    return Compiled(code, expressions.constants, function_names)
+    return Compiled(tuple(codes), expressions.constants, function_names)
 
 
 def _cost(block: Block) -> int:
@@ -100,9 +102,10 @@ class _FunctionCompiler:
         self._expressions = expressions
         self._scope = scope
         self._globals_stored: set[str] = {"_b"}
+        self._parts: list[ast.FunctionDef] = []
 
     def compile(self) -> list[ast.FunctionDef]:
-        """The Python function, after those that compute its defaults."""
+        """The Python function, after those that compute its defaults and the parts of a long body."""
         scope = self._scope
         parameters: list[str] = []
         defaults: list[ast.FunctionDef] = []
@@ -127,7 +130,8 @@ class _FunctionCompiler:
         if scope.recursive:
             body = self._with_depth(body, span)
         declared = ast.Global(sorted(self._globals_stored), **place(span))
-        return [*defaults, function(scope.python_name, parameters, [declared, *prologue, *body], span)]
+        whole = function(scope.python_name, parameters, [declared, *prologue, *body], span)
+        return [*defaults, *self._parts, whole]
 
     def _default(self, name: str, value: Expression) -> ast.FunctionDef:
         """A function of its own for each default: it runs in the call, but sees globals only."""
@@ -155,9 +159,24 @@ class _FunctionCompiler:
 
     def _block(self, block: Block) -> list[ast.stmt]:
         result: list[ast.stmt] = []
-        for statement in block:
-            result.extend(self._statement(statement))
+        # Only the variables of the program body are the same in another function: they are global.
+        for piece in long_blocks.pieces(block) if self._scope is self._program.main else [block]:
+            if len(piece) > 1 and piece is not block:
+                result.append(self._part(piece))
+                continue
+            for statement in piece:
+                result.extend(self._statement(statement))
         return result or [ast.Pass(**place(_first_span(block)))]
+
+    def _part(self, piece: Block) -> ast.stmt:
+        """A function of its own for a piece of the program body; returns the call of it."""
+        stored, self._globals_stored = self._globals_stored, {"_b"}
+        body = [made for statement in piece for made in self._statement(statement)]
+        declared = ast.Global(sorted(self._globals_stored), **place(piece[0].span))
+        self._globals_stored = stored
+        name = f"{long_blocks.PART}{len(self._parts)}"
+        self._parts.append(long_blocks.part(name, [declared, *body], piece[0].span))
+        return long_blocks.call_of(name)
 
     def _statement(self, statement: Statement) -> list[ast.stmt]:
         span, scope = statement.span, self._scope

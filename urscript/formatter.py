@@ -16,6 +16,7 @@ from urscript.errors import ScriptSyntaxError
 from urscript.parser import parse
 from urscript.printer import INDENT
 from urscript.source import BLANKS, Source
+from urscript.walk import same_tree
 
 _OPERATORS: Final = frozenset({"OR", "XOR", "AND", "PLUS", "MINUS", "TIMES", "COMPARE"})
 _OPENERS: Final = frozenset({"LPAR", "LSQB"})
@@ -40,7 +41,7 @@ def format_program(source: Source) -> str:
     tree = parse(source)
     try:
         formatted = _render(_Layout(source.text).lines(read_rows(source)))
-        unchanged = parse(Source(formatted, source.name)) == tree
+        unchanged = same_tree(parse(Source(formatted, source.name)), tree)
     except RecursionError:
         message = "the program is nested too deeply"
         raise ScriptSyntaxError(message, line=1, column=1, source=source) from None

@@ -21,7 +21,7 @@ from urscript.metering import Meter
 from urscript.parser import find_syntax_errors, parse
 from urscript.resolver import resolve
 from urscript.scopes import ResolvedProgram
-from urscript.source import Source
+from urscript.source import Source, as_bytes
 from urscript.threads import ProgramHalted, Scheduler, ScriptThread
 from urscript.variables import UNDEFINED
 
@@ -52,7 +52,7 @@ def compile_program(
         ScriptCompileError: The first error in the text, with line, column, wire_text and render().
     """
     dialect = dialect or dialect_for(catalogue.version)
-    program, errors = _resolve(Source(_as_bytes(text), name), catalogue, dialect)
+    program, errors = _resolve(Source(as_bytes(text), name), catalogue, dialect)
     if errors:
         try:
             raise errors[0]
@@ -71,7 +71,7 @@ def check_program(
     """
     from urscript.lint import find_warnings
 
-    source = Source(_as_bytes(text), name)
+    source = Source(as_bytes(text), name)
     dialect = dialect or dialect_for(catalogue.version)
     program, errors = _resolve(source, catalogue, dialect)
     if program is None:
@@ -113,7 +113,7 @@ def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -
         source=program.source,
         dialect=dialect,
         catalogue=catalogue,
-        code=compiled.code,
+        codes=compiled.codes,
         constants=compiled.constants,
         builtins=frozenset(program.builtins),
         globals=frozenset(program.globals),
@@ -125,15 +125,6 @@ def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -
 
 def _too_deep(source: Source) -> ScriptSyntaxError:
     return ScriptSyntaxError("the program is nested too deeply", line=1, column=1, source=source)
-
-
-def _as_bytes(text: str) -> str:
-    """Text as a controller sees it, one character a byte."""
-    try:
-        text.encode("latin-1")
-    except UnicodeEncodeError:
-        return text.encode("utf-8", "surrogateescape").decode("latin-1")
-    return text
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +144,7 @@ class CompiledProgram:
     source: Source
     dialect: Dialect
     catalogue: Catalogue
-    code: CodeType
+    codes: tuple[CodeType, ...]
     constants: dict[str, Any]
     builtins: frozenset[str]
     globals: frozenset[str]
@@ -197,7 +188,8 @@ class RunningProgram:
         self._namespace.update(runtime.builtin_namespace(program.builtins, program.catalogue, host, meter))
         self._namespace.update(program.constants)
         self._namespace.update(dict.fromkeys((f"g_{name}" for name in program.globals), UNDEFINED))
-        exec(program.code, self._namespace)
+        for code in program.codes:
+            exec(code, self._namespace)
         self._main = self._scheduler.start(self._namespace["main"], program.name, None)
 
     @property

@@ -24,6 +24,7 @@ from urscript.catalogue import Catalogue
 from urscript.dialect import Dialect
 from urscript.errors import ScriptBudgetError, ScriptRuntimeError, StackEntry
 from urscript.host import Handle, Host
+from urscript.long_blocks import PART
 from urscript.metering import COSTS, HOST_COST, PURE_COST, START_COST, Meter
 from urscript.source import Source
 from urscript.threads import ProgramHalted, Scheduler, ScriptThread, join
@@ -266,6 +267,8 @@ def _stack(
         innermost = traceback.tb_frame
         code = innermost.f_code
         if code.co_filename == file_name:
+            if stack and code.co_name.startswith(PART):
+                stack.pop()  # the call of a piece of the program body is no call of the script
             line, column = _position(code, traceback.tb_lasti)
             stack.append(StackEntry(names.get(code.co_name, code.co_name), line, column))
         else:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
+from functools import cache
+from typing import Any
 
 from urscript import nodes
 from urscript.nodes import Block, Expression, Statement
@@ -74,6 +77,30 @@ def all_expressions(expression: Expression) -> Iterator[Expression]:
     yield expression
     for part in child_expressions(expression):
         yield from all_expressions(part)
+
+
+def same_tree(first: Block, second: Block) -> bool:
+    """Whether two trees mean the same, as `==` says, however deep they are."""
+    todo: list[tuple[Any, Any]] = [(first, second)]
+    while todo:
+        one, other = todo.pop()
+        if type(one) is not type(other):
+            return False
+        if isinstance(one, nodes.Node):
+            todo += [(getattr(one, name), getattr(other, name)) for name in _meaning(type(one))]
+        elif isinstance(one, tuple):
+            if len(one) != len(other):
+                return False
+            todo += zip(one, other, strict=True)
+        elif one != other:
+            return False
+    return True
+
+
+@cache
+def _meaning(kind: Any) -> tuple[str, ...]:
+    """The fields of a node that count when trees are compared."""
+    return tuple(item.name for item in fields(kind) if item.compare)
 
 
 def falls_through(block: Block) -> bool:

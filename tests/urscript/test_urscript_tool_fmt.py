@@ -14,6 +14,7 @@ from urscript.formatter import format_program
 from urscript.parser import parse
 from urscript.printer import print_program
 from urscript.source import Source
+from urscript.walk import same_tree
 
 ROOT = Path(__file__).parents[2]
 SCRIPTS = sorted(
@@ -21,10 +22,12 @@ SCRIPTS = sorted(
     for folder in ("urscript", "ur_emulator", "pc_client", "examples", "tests", "docs")
     for file in (ROOT / folder).rglob("*.script")
 )
+COMMENTS = []
 LEXER = Lark(
     (ROOT / "urscript" / "grammar.lark").read_text(encoding="utf-8"),
     parser="lalr",
     lexer="basic",
+    lexer_callbacks={"COMMENT": COMMENTS.append},
     keep_all_tokens=True,
 )
 
@@ -35,12 +38,9 @@ def formatted(text):
 
 def comments_of(text):
     """Every comment, in order, found in another way than the formatter does: by the lexer."""
-    found = []
-    lexer = Lark(
-        LEXER.source_grammar, parser="lalr", lexer="basic", lexer_callbacks={"COMMENT": found.append}
-    )
-    list(lexer.lex(text))
-    return [str(comment).rstrip(" \t\r\f\v") for comment in found]
+    COMMENTS.clear()
+    list(LEXER.lex(text))
+    return [str(comment).rstrip(" \t\r\f\v") for comment in COMMENTS]
 
 
 def assert_is_canonical(result):
@@ -94,7 +94,7 @@ def test_all_scripts_of_the_tree_stay_what_they_are(file):
             continue
         n_programs += 1
         result = formatted(text)
-        assert parse(Source(result)) == tree
+        assert same_tree(parse(Source(result)), tree)
         assert comments_of(result) == comments_of(text)
         assert_is_canonical(result)
     assert n_programs
@@ -220,3 +220,9 @@ def test_check_and_diff_write_nothing(folder):
 
 def test_fmt_of_a_missing_file_is_wrong_use(folder):
     assert call("nowhere.script").exit_code == 2
+
+
+@given(trees, trees)
+def test_same_tree_is_equality(first, second):
+    assert same_tree(first, second) == (first == second)
+    assert same_tree(first, parse(Source(print_program(first))))
