@@ -87,7 +87,8 @@ def same_tree(first: Block, second: Block) -> bool:
         if type(one) is not type(other):
             return False
         if isinstance(one, nodes.Node):
-            todo += [(getattr(one, name), getattr(other, name)) for name in _meaning(type(one))]
+            names = _meaning(type(one).__name__)
+            todo += [(getattr(one, name), getattr(other, name)) for name in names]
         elif isinstance(one, tuple):
             if len(one) != len(other):
                 return False
@@ -98,9 +99,9 @@ def same_tree(first: Block, second: Block) -> bool:
 
 
 @cache
-def _meaning(kind: Any) -> tuple[str, ...]:
-    """The fields of a node that count when trees are compared."""
-    return tuple(item.name for item in fields(kind) if item.compare)
+def _meaning(kind: str) -> tuple[str, ...]:
+    """The fields of a node of that kind that count when trees are compared."""
+    return tuple(item.name for item in fields(getattr(nodes, kind)) if item.compare)
 
 
 def falls_through(block: Block) -> bool:
