@@ -1,0 +1,259 @@
+"""Ports 30001, 30002 and their twins without sockets: greeting, rate, what is told again, what is ignored."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from box_support import Bench
+
+from protocol import primary_layout as L
+from protocol import primary_messages as M
+from protocol.frame_buffer import FrameBuffer
+from protocol.primary_packages import (
+    MAX_PACKAGE_SIZE,
+    MIN_PACKAGE_SIZE,
+    RobotState,
+    SafetyTolerances,
+    decode_package,
+    state_size,
+)
+from protocol.primary_program import ProgramStateMessage
+from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller import events
+from ur_emulator.controller import safety_commands as safe
+from ur_emulator.controller.safety import hardest_joint
+from ur_emulator.models.calibration import calibrated_dh
+from ur_emulator.models.robots import robot_by_name
+from ur_emulator.servers.event_messages import message_for
+from ur_emulator.servers.primary_port import PrimaryPort
+from ur_emulator.servers.robot_state import StateEncoder, dexterity, setup_records
+
+V3_15 = SoftwareVersion(3, 15, 8)
+VERSIONS = [SoftwareVersion(3, minor) for minor in range(16)]
+
+
+class Client:
+    """A connection as the port sees it."""
+
+    is_open = True
+
+    def __init__(self, port):
+        self.segments = []
+        self.port = port
+        port.opened(self)
+
+    def send(self, data):
+        self.segments.append(data)
+        return True
+
+    def take(self, version):
+        """All packages since the last call, with their sizes."""
+        buffer = FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
+        buffer.feed(b"".join(self.segments))
+        self.segments.clear()
+        return [(decode_package(frame, version), len(frame)) for frame in iter(buffer.next_frame, None)]
+
+
+class PortBench(Bench):
+    """A controller with its four primary and secondary ports; `intake` notes what would be run."""
+
+    def __init__(self, version=V3_15, **kwargs):
+        super().__init__(**kwargs)
+        self.version = version
+        self.taken = []
+        states = StateEncoder(version, self.controller.state.arm)
+        self.primary, self.secondary, self.primary_ro, self.secondary_ro = self.ports = [
+            PrimaryPort(version, self.controller, intake, states, all_messages=every)
+            for intake in (self, None)
+            for every in (True, False)
+        ]
+
+    def take(self, sender, items):
+        self.taken += items
+
+    def tick(self, n=1, *commands):
+        for _ in range(n):
+            super().tick(1, *commands)
+            commands = ()
+            for port in self.ports:
+                for event in self.events:
+                    port.say(event)
+                port.publish(self.now)
+            self.events.clear()
+        return self.now
+
+
+@pytest.mark.parametrize("version", VERSIONS, ids=str)
+def test_the_greeting_of_every_version(version):
+    bench = PortBench(version)
+    for port, is_primary in zip(bench.ports, (True, False) * 2, strict=True):
+        client = Client(port)
+        first_segment = client.segments[0]
+        assert isinstance(decode_package(first_segment, version), M.VersionMessage)
+        packages = client.take(version)
+        expected = [
+            (M.VersionMessage, 55 if version >= SoftwareVersion(3, 3) else 51),
+            (M.StartupMessage, 24),
+            *([(SafetyTolerances, 181)] if version >= SoftwareVersion(3, 10) else []),
+            (RobotState, state_size(version, first=True)),
+        ]
+        assert [(type(package), size) for package, size in packages[: len(expected)]] == expected
+        rest = packages[len(expected) :]
+        assert all(isinstance(package, ProgramStateMessage) for package, _ in rest)
+        assert bool(rest) == is_primary
+        assert state_size(version, first=True) < 2000  # python-urx holds no longer ones
+
+
+@pytest.mark.parametrize("version", [SoftwareVersion(3, 0), SoftwareVersion(3, 4), V3_15], ids=str)
+def test_ten_states_a_second_without_the_setup(version):
+    bench = PortBench(version)
+    client = Client(bench.secondary)
+    client.take(version)
+    bench.tick(125)
+    states = client.take(version)
+    assert len(states) == 10
+    assert {size for _, size in states} == {state_size(version, first=False)}
+    stamps = [state.find(L.RobotModeData).timestamp for state, _ in states]
+    assert all(95_000 <= b - a <= 105_000 for a, b in pairwise(stamps))
+
+
+def test_all_ports_send_the_same_states():
+    bench = PortBench()
+    clients = [Client(port) for port in bench.ports]
+    for client in clients:
+        client.take(V3_15)
+    bench.tick(50)
+    states = [[p for p, _ in client.take(V3_15) if isinstance(p, RobotState)] for client in clients]
+    assert len(states[0]) == 4
+    assert all(other == states[0] for other in states)
+
+
+def test_setup_comes_again_when_the_brakes_open():
+    bench = PortBench(mode=RobotMode.POWER_OFF)
+    client = Client(bench.secondary)
+    client.take(V3_15)
+    bench.tick(1, cmd.ReleaseBrakes())
+    bench.tick(600)
+    states = [state for state, _ in client.take(V3_15)]
+    running = [state.find(L.RobotModeData).robot_mode == RobotMode.RUNNING for state in states]
+    has_setup = [state.find(L.ConfigurationData) is not None for state in states]
+    assert has_setup.count(True) == 1
+    assert has_setup.index(True) == running.index(True)
+
+
+def test_messages_go_to_the_primary_ports_only():
+    bench = PortBench()
+    clients = [Client(port) for port in bench.ports]
+    for client in clients:
+        client.take(V3_15)
+    bench.start('def p():\n  textmsg("hello")\n  popup("text", "title", blocking=False)\nend\n')
+    bench.tick(20)
+    told = [[type(p) for p, _ in client.take(V3_15) if isinstance(p, M.RobotMessage)] for client in clients]
+    assert told[0] == told[2] == [M.KeyMessage, M.TextMessage, M.PopupMessage, M.KeyMessage]
+    assert told[1] == told[3] == []
+
+
+def test_read_only_ports_take_no_script():
+    bench = PortBench()
+    for port in bench.ports:
+        client = Client(port)
+        port.received(client, b"stop program\ntextmsg(1)\n")
+    assert len(bench.taken) == 4  # two lines on 30001, two on 30002
+
+
+@pytest.mark.parametrize(
+    ("command", "mode", "level"),
+    [
+        (safe.PressEmergencyStop("robot"), SafetyMode.ROBOT_EMERGENCY_STOP, None),
+        (safe.PressEmergencyStop("system"), SafetyMode.SYSTEM_EMERGENCY_STOP, None),
+        (safe.SafeguardStop(True), SafetyMode.SAFEGUARD_STOP, None),
+        (safe.ReducedMode(True), SafetyMode.REDUCED, None),
+        (cmd.TriggerProtectiveStop(), SafetyMode.PROTECTIVE_STOP, M.ReportLevel.WARNING),
+        (safe.TriggerViolation(), SafetyMode.VIOLATION, M.ReportLevel.VIOLATION),
+        (safe.TriggerFault(), SafetyMode.FAULT, M.ReportLevel.FAULT),
+    ],
+)
+def test_every_safety_mode_has_its_message_and_level(command, mode, level):
+    bench = PortBench()
+    client = Client(bench.primary)
+    client.take(V3_15)
+    bench.tick(2, command)
+    bench.tick(13)
+    packages = [package for package, _ in client.take(V3_15)]
+    messages = [p for p in packages if isinstance(p, M.SafetyModeMessage)]
+    assert [message.safety_mode for message in messages] == [mode]
+    assert all(message.timestamp % 8000 == 0 for message in messages)
+    levels = [p.report_level for p in packages if isinstance(p, M.ErrorCodeMessage)]
+    assert levels == ([] if level is None else [level])
+    state = next(p for p in reversed(packages) if isinstance(p, RobotState))
+    assert state.find(L.MasterboardData).safety_mode == mode
+    assert state.find(L.MasterboardData).in_reduced_mode == (mode is SafetyMode.REDUCED)
+
+
+@pytest.mark.parametrize("kind", list(M.RequestedType)[:-1])
+def test_a_question_says_what_it_wants(kind):
+    message = message_for(events.ValueRequested(7, kind, "How many?"), 8000)
+    assert (message.request_id, message.requested_type, message.text) == (7, kind, "How many?")
+
+
+def test_a_collision_names_the_joint_that_strains():
+
+    robot = robot_by_name("ur3")
+    currents = [
+        0.5 * limit / constant for limit, constant in zip(robot.tau_max, robot.torque_constant, strict=True)
+    ]
+    for joint in range(6):
+        strained = list(currents)
+        strained[joint] *= -1.1
+        assert hardest_joint(robot, tuple(strained)) == joint
+
+
+# --- what states say of the arm
+
+
+def dh_jacobian(rows, q):
+    """Jacobian of the flange by the textbook, from a table of DhRow."""
+    T, frames = np.eye(4), [np.eye(4)]
+    for row, angle in zip(rows, q, strict=True):
+        ct, st = np.cos(angle + row.theta), np.sin(angle + row.theta)
+        ca, sa = np.cos(row.alpha), np.sin(row.alpha)
+        T = T @ [[ct, -st * ca, st * sa, row.a * ct], [st, ct * ca, -ct * sa, row.a * st], [0, sa, ca, row.d],
+                 [0, 0, 0, 1]]  # fmt: skip
+        frames.append(T)
+    columns = [np.r_[np.cross(F[:3, 2], T[:3, 3] - F[:3, 3]), F[:3, 2]] for F in frames[:6]]
+    return np.array(columns).T
+
+
+def test_dexterity_is_the_squared_determinant_of_the_jacobian():
+    bench = Bench()
+    arm = bench.controller.state.arm
+    rows = calibrated_dh(arm.robot, arm.calibration)
+    expected = np.linalg.det(dh_jacobian(rows, bench.now.actual_q)) ** 2
+    assert dexterity(arm, bench.now) == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_captured_dexterity_is_that_of_the_captured_pose():
+    class Row:
+        def __init__(self, a, d, alpha):
+            self.a, self.d, self.alpha, self.theta = a, d, alpha, 0.0
+
+    half = np.pi / 2
+    ur5e = [Row(0, 0.1625, half), Row(-0.425, 0, 0), Row(-0.3922, 0, 0), Row(0, 0.1333, half),
+            Row(0, 0.0997, -half), Row(0, 0.0996, 0)]  # fmt: skip
+    q = (-1.6007, -1.7271, -2.203, -0.808, 1.5951, -0.031)
+    assert np.linalg.det(dh_jacobian(ur5e, q)) ** 2 == pytest.approx(0.0035351144, rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "robot_type", "box_type"), [("ur3", 3, 6), ("ur5", 1, 4), ("ur10", 2, 5)])
+def test_configuration_is_that_of_the_model(name, robot_type, box_type):
+    robot = robot_by_name(name)
+    configuration = next(
+        record for record in setup_records(robot, robot.dh, 1) if isinstance(record, L.ConfigurationData)
+    )
+    assert configuration.robot_type == robot_type
+    assert configuration.controller_box_type == box_type
+    assert configuration.robot_sub_type == 2
+    assert configuration.joint_max_speed == robot.qd_max
+    assert configuration.dh_a == tuple(row.a for row in robot.dh)
+    assert configuration.dh_d == tuple(row.d for row in robot.dh)
