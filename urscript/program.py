@@ -53,13 +53,15 @@ def compile_program(
     """
     dialect = dialect or dialect_for(catalogue.version)
     program, errors = _resolve(Source(as_bytes(text), name), catalogue, dialect)
-    if errors:
-        try:
+    try:
+        if errors:
             raise errors[0]
-        finally:
-            del errors  # or the error's traceback and this frame would keep each other alive
-    assert program is not None
-    return _compile(program, catalogue, dialect)
+        assert program is not None
+        return _compile(program, catalogue, dialect)
+    finally:
+        del errors  # or the error's traceback and this frame would keep each other alive
+        if program is not None:
+            program.dissolve()
 
 
 def check_program(

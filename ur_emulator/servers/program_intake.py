@@ -19,6 +19,7 @@ from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
 from ur_emulator.controller.hands import GuideByHand
 from ur_emulator.controller.safety_commands import ConfirmSafety
 from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.realtime.garbage import collection_put_off
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.errors import ScriptError, ScriptTypeError
@@ -93,7 +94,8 @@ class ProgramIntake:
     def _process(self, item: ScriptItem, sender: object, cost: int) -> None:
         """Compile or translate one item; runs in the worker, hands the result to the loop."""
         try:
-            result = self._translate(item)
+            with collection_put_off():
+                result = self._translate(item)
         except Exception as error:  # a defect of ours must not swallow the program without a word
             result = ScriptFailed(1, 1, f"the program cannot be compiled: {error!r}")
         self._loop.call_soon_threadsafe(lambda: self._finish(result, sender, cost))
