@@ -17,7 +17,7 @@ from ur_emulator.control.box_state import take_state
 from ur_emulator.control.conditions import holds, unmet
 from ur_emulator.control.desk import Surroundings
 from ur_emulator.controller import commands as cmd
-from ur_emulator.controller import hands, operator, wires
+from ur_emulator.controller import hands, obstacles, operator, wires
 from ur_emulator.controller import safety_commands as safety
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.io import ANALOG_RANGE
@@ -47,6 +47,8 @@ class Actions:
             "set_analog_input": self._set_analog_input,
             "push": partial(self._apply, hands.Push),
             "attach_payload": partial(self._apply, hands.HangLoad),
+            "add_obstacle": self._add_obstacle,
+            "remove_obstacle": self._remove_obstacle,
             "emergency_stop": partial(self._apply, safety.PressEmergencyStop),
             "release_emergency_stop": partial(self._apply, safety.ReleaseEmergencyStop),
             "safeguard_stop": partial(self._apply, safety.SafeguardStop),
@@ -122,6 +124,26 @@ class Actions:
                 f"{'V' if line.domain else 'A'} now"
             )
         return (yield from self._applied(command))
+
+    # --- surroundings
+
+    def _add_obstacle(self, name: str, **shape: Any) -> Steps:
+        before = self._access.box_log.count
+        result = yield from self._apply(obstacles.AddObstacle, name, **shape)
+        refusals = [
+            e.text for e in self._access.box_log.since(before) if e.text.startswith(f"obstacle {name}:")
+        ]
+        if refusals:
+            raise RefusedError(refusals[0])
+        return result
+
+    def _remove_obstacle(self, name: str) -> Steps:
+        known = self._access.controller.plant.obstacles
+        if name not in known:
+            raise RefusedError(
+                f"there is no obstacle {name!r}: there {'are ' + ', '.join(known) if known else 'is none'}"
+            )
+        return (yield from self._applied(obstacles.RemoveObstacle(name)))
 
     # --- safety
 

@@ -7,7 +7,7 @@ and `NotRunningError` when the box does not run; all of them are `EmulatorError`
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -26,8 +26,8 @@ class BoxOperations:
         """Have an operation of the table done; return its result."""
         raise NotImplementedError
 
-    def _tick(self, name: str, **arguments: Any) -> int:
-        tick: int = self._perform(name, arguments)["tick"]
+    def _tick(self, operation: str, /, **arguments: Any) -> int:
+        tick: int = self._perform(operation, arguments)["tick"]
         return tick
 
     # --- what is going on
@@ -132,6 +132,37 @@ class BoxOperations:
             cog: centre of gravity in the flange frame [m].
         """
         return self._tick("attach_payload", mass=mass, cog=cog)
+
+    def add_obstacle(
+        self,
+        name: str,
+        shape: Literal["box", "sphere", "capsule", "plane"],
+        size: Sequence[float],
+        pose: Sequence[float],
+    ) -> int:
+        """Put a fixed obstacle somewhere; one of the same name gives way.
+
+        Args:
+            name: to remove it by.
+            shape: what it is; a plane has no end.
+            size: box: three edges; sphere: radius; capsule: radius, length; plane: () [m].
+            pose: of its middle in the base frame [m, rotation vector in rad].
+
+        Raises:
+            RefusedError: the arm is there, or there are too many.
+        """
+        return self._tick("add_obstacle", name=name, shape=shape, size=size, pose=pose)
+
+    def remove_obstacle(self, name: str) -> int:
+        """Take an obstacle away.
+
+        Args:
+            name: of the obstacle.
+
+        Raises:
+            RefusedError: there is none of that name.
+        """
+        return self._tick("remove_obstacle", name=name)
 
     # --- safety
 

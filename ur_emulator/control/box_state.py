@@ -54,6 +54,7 @@ class BoxState:
         analog_outputs: of the box [V or A].
         tool_analog_inputs: [V or A].
         tool_voltage: supply of the tool [V].
+        obstacles: names of those that were added.
         popups: texts of the popups on the screen.
         questions: of programs, which wait for an answer.
     """
@@ -81,6 +82,7 @@ class BoxState:
     analog_outputs: tuple[float, ...]
     tool_analog_inputs: tuple[float, ...]
     tool_voltage: int
+    obstacles: tuple[str, ...]
     popups: tuple[str, ...]
     questions: tuple[Question, ...]
 
@@ -119,6 +121,7 @@ def take_state(controller: Controller) -> BoxState:
         analog_outputs=now.analog_values[2:4],
         tool_analog_inputs=now.analog_values[4:],
         tool_voltage=now.tool_output_voltage,
+        obstacles=controller.plant.obstacles,
         popups=(*operator.shown, *popups),
         questions=tuple(
             Question(r.request_id, r.kind.name, r.text)

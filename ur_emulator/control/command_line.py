@@ -94,7 +94,8 @@ def _add_option(command: argparse.ArgumentParser, parameter: Parameter) -> None:
     about = f"{parameter.meaning} ({parameter.allowed}{default}{need})".replace("%", "%%")
     words: dict[str, Any] = {"help": about, "metavar": "X"}
     if parameter.kind is Kind.VECTOR:
-        words |= {"nargs": 3, "metavar": ("X", "Y", "Z")}
+        least, most = parameter.lengths
+        words |= {"nargs": most if least == most else "*"}
     command.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **words)
     if parameter.kind is Kind.SCRIPT:
         command.add_argument(

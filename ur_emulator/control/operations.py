@@ -185,6 +185,32 @@ OPERATIONS: tuple[Operation, ...] = (
         "Hang a load on the flange that no program has declared.",
         (Parameter("mass", Kind.NUMBER, "of the load", "kg", 0.0, MAX_LOAD), _COG),
     ),
+    Operation(
+        "add_obstacle",
+        "Put a fixed obstacle somewhere; one of the same name gives way.",
+        (
+            Parameter("name", Kind.TEXT, "to remove it by"),
+            _choice("shape", "what it is; a plane has no end", ("box", "sphere", "capsule", "plane")),
+            Parameter(
+                "size",
+                Kind.VECTOR,
+                "box: three edges; sphere: radius; capsule: radius, length; plane: none",
+                "m",
+                lengths=(0, 3),
+            ),
+            Parameter(
+                "pose",
+                Kind.VECTOR,
+                "of its middle in the base frame, position in m and rotation vector in rad",
+                lengths=(6, 6),
+            ),
+        ),
+    ),
+    Operation(
+        "remove_obstacle",
+        "Take an obstacle away.",
+        (Parameter("name", Kind.TEXT, "of the obstacle"),),
+    ),
     # --- safety
     Operation(
         "emergency_stop",

@@ -26,8 +26,11 @@ class Kind(Enum):
     CHOICE = "word"
     TEXT = "text"
     SCRIPT = "URScript"
-    VECTOR = "three numbers"
+    VECTOR = "numbers"
     ANSWER = "true, false, number or text"
+
+
+_COUNTS = {(3, 3): "three", (6, 6): "six", (0, 3): "up to three"}
 
 
 class _Required:
@@ -50,6 +53,7 @@ class Parameter:
         low: least number.
         high: greatest number; of a vector, its greatest length.
         choices: of a CHOICE.
+        lengths: of a VECTOR: least and greatest number of numbers.
         default: taken when it is not given; None where leaving it out means something of its own.
     """
 
@@ -60,6 +64,7 @@ class Parameter:
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
+    lengths: tuple[int, int] = (3, 3)
     default: Any = REQUIRED
 
     @property
@@ -74,8 +79,9 @@ class Parameter:
         match self.kind:
             case Kind.CHOICE:
                 return " or ".join((", ".join(self.choices[:-1]), self.choices[-1]))
-            case Kind.VECTOR if self.high is not None:
-                return f"three numbers, together at most {self.high:g}{unit}"
+            case Kind.VECTOR:
+                most = f", together at most {self.high:g}{unit}" if self.high is not None else ""
+                return f"{_COUNTS[self.lengths]} numbers{most}"
             case Kind.NUMBER | Kind.INTEGER if self.high is not None and self.low is not None:
                 return f"{self.low:g} to {self.high:g}{unit}"
             case Kind.NUMBER | Kind.INTEGER if self.low is not None:
@@ -141,14 +147,15 @@ class Parameter:
     def _is_in_range(self, value: float) -> bool:
         return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
 
-    def _vector(self, value: Any) -> tuple[float, float, float] | None:
+    def _vector(self, value: Any) -> tuple[float, ...] | None:
         if not isinstance(value, Iterable) or isinstance(value, str | bytes | Mapping):
             return None
-        numbers = tuple(islice(value, 4))
-        if len(numbers) != 3 or not all(map(_is_number, numbers)):
+        least, most = self.lengths
+        numbers = tuple(islice(value, most + 1))
+        if not (least <= len(numbers) <= most and all(map(_is_number, numbers))):
             return None
-        x, y, z = map(float, numbers)
-        return (x, y, z) if self.high is None or hypot(x, y, z) <= self.high else None
+        vector = tuple(map(float, numbers))
+        return vector if self.high is None or hypot(*vector) <= self.high else None
 
 
 def _is_integer(value: Any) -> bool:

@@ -274,7 +274,7 @@ class Controller:
         self._push_left -= 1
         if not self._push_left:
             self.plant.push((0.0, 0.0, 0.0))
-            self._settle = SETTLE_CYCLES
+            self._settle = max(self._settle, SETTLE_CYCLES)
 
     def _power(self, command: ModeCommand) -> None:
         """Give the joints power or open their brakes, if the safety system lets them have it."""

@@ -1,0 +1,479 @@
+"""What the operations do to a box, called as methods from another thread."""
+
+import threading
+from pathlib import Path
+
+import pytest
+from box_support import Bench, connect
+from control_support import control_box
+
+from ur_emulator import ControlBox
+from ur_emulator.controller.commands import Push, StopProgram
+from ur_emulator.controller.wires import SetAnalogInput, SetDigitalInput
+from ur_emulator.errors import (
+    ArgumentError,
+    ControlError,
+    EmulatorError,
+    NotRunningError,
+    PlantError,
+    RefusedError,
+    WaitTimeoutError,
+)
+
+MOVE = "def move():\n  movej([0.5, -1.5, -1.8, 0, 1.2, 1.5])\nend\n"
+LOOP = "def loop():\n  while True:\n    sync()\n  end\nend\n"
+
+
+@pytest.fixture
+def box():
+    with control_box(control_port=None) as box:
+        yield box
+
+
+# --- state, log, waiting
+
+
+def test_the_state_is_a_frozen_view_of_the_last_cycle(box):
+    state = box.state
+    assert (state.robot_mode, state.safety_mode, state.program_state) == ("RUNNING", "NORMAL", "STOPPED")
+    assert state.steady
+    assert len(state.q) == len(state.tcp_pose) == len(state.joint_modes) == 6
+    with pytest.raises(AttributeError):
+        state.tick = 0
+    assert box.state == state  # in lockstep nothing happens by itself
+
+
+def test_an_operation_tells_its_cycle_and_time_goes_on_by_one(box):
+    before = box.state.tick
+    assert box.set_digital_input("standard", 0, True) == before + 1
+    assert box.state.tick == before + 1
+
+
+def test_waiting_ends_in_the_cycle_in_which_all_holds(box):
+    box.run_program(MOVE)
+    state = box.wait_until(program_state="STOPPED", steady=True)
+    assert state.q == pytest.approx([0.5, -1.5, -1.8, 0, 1.2, 1.5], abs=0.01)
+
+
+def test_waiting_in_vain_says_for_what(box):
+    with pytest.raises(WaitTimeoutError, match="robot_mode is RUNNING, not IDLE, no log entry with 'x'"):
+        box.wait_until(robot_mode="IDLE", steady=True, log="x", timeout=0.01)
+    with pytest.raises(TimeoutError):
+        box.wait_until(popup=True, timeout=0)
+
+
+def test_waiting_for_nothing_is_refused(box):
+    with pytest.raises(ArgumentError, match="needs a condition"):
+        box.wait_until()
+
+
+def test_the_log_can_be_waited_for_also_what_is_there_already(box):
+    box.add_to_log("here it is")
+    box.wait_until(log="here it")
+    seen = len(box.log)
+    with pytest.raises(WaitTimeoutError):
+        box.wait_until(log="here it", after=seen, timeout=0.01)
+
+
+def test_what_is_done_is_logged_and_what_is_asked_is_not(box):
+    before = len(box.log)
+    _ = box.state, box.identity
+    assert len(box.log) == before
+    box.push((1, 0, 0), duration=0.1)
+    box.run_program(MOVE)
+    texts = [entry.text for entry in box.log[before:] if entry.source == "Control"]
+    assert texts[0] == "push force=(1, 0, 0) point=(0.0, 0.0, 0.0) duration=0.1"
+    assert texts[1].startswith("run_program script=def move(): movej([0.5")
+    assert len(texts[1]) < 100
+
+
+def test_the_identity_says_what_the_box_is(box):
+    facts = box.identity
+    assert (facts["robot"], facts["software"], facts["pace"], facts["seed"]) == (
+        "UR3",
+        "3.15.8",
+        "lockstep",
+        7,
+    )
+    assert facts["ports"]["primary"] == box.ports.primary
+
+
+# --- wires
+
+
+@pytest.mark.parametrize(
+    ("group", "count", "shift"), [("standard", 8, 0), ("configurable", 8, 8), ("tool", 2, 16)]
+)
+def test_digital_inputs_are_set_one_by_one(box, group, count, shift):
+    for n in range(count):
+        box.set_digital_input(group, n, True)
+        assert box.state.digital_inputs[group] == tuple(k == n for k in range(count))
+        box.set_digital_input(group, n, False)
+    with pytest.raises(ArgumentError):
+        box.set_digital_input(group, count, True)
+
+
+def test_a_program_sees_inputs(box):
+    box.set_digital_input("standard", 3, True)
+    box.set_analog_input("standard", 1, 2.5)
+    box.set_analog_input("tool", 0, 10.0)
+    box.run_program(
+        "def see():\n  textmsg(get_standard_digital_in(3), get_standard_digital_in(2))\n"
+        "  textmsg(get_standard_analog_in(1))\n  textmsg(get_tool_analog_in(0))\nend\n"
+    )
+    box.wait_until(log="Program stopped")
+    texts = [entry.text for entry in box.log if entry.source == "Program"]
+    assert "TrueFalse" in texts
+    assert "2.5" in texts
+    assert "10" in "".join(texts)
+
+
+def test_a_value_beyond_the_range_of_the_line_is_refused(box):
+    box.run_program("def f():\n  set_standard_analog_input_domain(0, 0)\nend\n")
+    box.wait_until(program_state="STOPPED")
+    box.set_analog_input("standard", 0, 0.012)
+    assert box.state.analog_inputs[0] == 0.012
+    with pytest.raises(RefusedError, match=r"0\.004 to 0\.02 A"):
+        box.set_analog_input("standard", 0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments"),
+    [
+        (SetDigitalInput, ("standard", 8, True)),
+        (SetDigitalInput, ("tool", -1, True)),
+        (SetDigitalInput, ("nowhere", 0, True)),
+        (SetAnalogInput, ("standard", 2, 1.0)),
+        (SetAnalogInput, ("configurable", 0, 1.0)),
+        (SetAnalogInput, ("standard", 0, float("nan"))),
+        (SetAnalogInput, ("standard", 0, -0.1)),
+        (SetAnalogInput, ("tool", 0, 1e300)),
+    ],
+)
+def test_absurd_wires_cannot_even_be_made(kind, arguments):
+    with pytest.raises(EmulatorError):
+        kind(*arguments)
+
+
+# --- hands
+
+
+@pytest.mark.parametrize("cycles", [0, 1, 3, 50])
+def test_a_push_lasts_as_long_as_it_was_given(cycles):
+    bench = Bench(fidelity="ideal")
+    bench.tick(1, Push((0.0, 0.0, -20.0), duration=cycles * 0.008))
+    felt = [bench.now.actual_tcp_force[2] < -10.0]
+    for _ in range(90):
+        felt.append(bench.tick().actual_tcp_force[2] < -10.0)
+    assert sum(felt) == cycles
+    assert not bench.controller.is_active
+
+
+def test_the_last_push_counts():
+    bench = Bench(fidelity="ideal")
+    bench.tick(1, Push((0.0, 0.0, -20.0), duration=0.04))
+    bench.tick(1, Push((0.0, 0.0, -20.0)))
+    bench.tick(30)
+    assert bench.now.actual_tcp_force[2] < -10.0
+    bench.tick(1, Push((0.0, 0.0, 0.0)))
+    bench.tick(5)
+    assert bench.now.actual_tcp_force[2] == pytest.approx(0.0, abs=1.0)
+
+
+@pytest.mark.parametrize("duration", [-1.0, float("nan"), float("inf"), 1e9])
+def test_an_absurd_duration_is_refused(duration):
+    with pytest.raises(PlantError):
+        Push((1.0, 0.0, 0.0), duration=duration)
+
+
+def test_a_strong_push_is_a_protective_stop_that_can_be_unlocked(box):
+    box.push((0, 0, 250), duration=1)
+    assert box.wait_until(safety_mode="PROTECTIVE_STOP").robot_mode == "RUNNING"
+    box.wait_until(steady=True)
+    box.push((0, 0, 0))
+    box.unlock_protective_stop()
+    assert box.state.safety_mode == "NORMAL"
+    with pytest.raises(RefusedError, match="no protective stop"):
+        box.unlock_protective_stop()
+
+
+def test_a_load_that_nobody_declared_is_felt(box):
+    before = box.state.tcp_force[2]
+    box.attach_payload(3.0)
+    box.push((0, 0, 0), duration=1)
+    state = box.wait_until(steady=True)
+    assert state.tcp_force[2] - before < -10.0
+    assert state.payload == 0.0
+
+
+# --- surroundings
+
+
+def test_an_obstacle_stands_in_the_way_until_it_is_removed(box):
+    box.add_obstacle("wall", "plane", (), (0.0, -0.28, 0.0, -1.5708, 0.0, 0.0))
+    assert box.state.obstacles == ("wall",)
+    box.run_program("def f():\n  movej([-1.2, -1.7645, -2.0996, -0.103, 1.295, 1.857])\nend\n")
+    box.wait_until(safety_mode="PROTECTIVE_STOP")
+    box.remove_obstacle("wall")
+    assert box.state.obstacles == ()
+    with pytest.raises(RefusedError, match="no obstacle 'wall': there is none"):
+        box.remove_obstacle("wall")
+
+
+def test_an_obstacle_cannot_be_put_into_the_arm_nor_be_absurd(box):
+    with pytest.raises(RefusedError, match="the arm is where it should stand"):
+        box.add_obstacle("ball", "sphere", (0.2,), (*box.state.tcp_pose[:3], 0, 0, 0))
+    with pytest.raises(ArgumentError, match="needs 1 numbers"):
+        box.add_obstacle("ball", "sphere", (0.2, 0.1), (1, 0, 0, 0, 0, 0))
+    with pytest.raises(ArgumentError, match="size"):
+        box.add_obstacle("ball", "sphere", (float("inf"),), (1, 0, 0, 0, 0, 0))
+    with pytest.raises(ArgumentError, match="six numbers"):
+        box.add_obstacle("ball", "sphere", (0.1,), (1, 0, 0))
+    assert box.state.obstacles == ()
+
+
+# --- safety and power
+
+
+def test_an_emergency_stop_is_left_step_by_step(box):
+    box.emergency_stop()
+    state = box.wait_until(robot_mode="POWER_OFF")
+    assert state.safety_mode == "ROBOT_EMERGENCY_STOP"
+    with pytest.raises(RefusedError, match="not started"):
+        box.run_program(MOVE)
+    box.release_emergency_stop()
+    box.power_on()
+    box.wait_until(robot_mode="IDLE")
+    box.release_brakes()
+    box.wait_until(robot_mode="RUNNING", safety_mode="NORMAL")
+    box.emergency_stop("system")
+    assert box.state.safety_mode == "SYSTEM_EMERGENCY_STOP"
+
+
+def test_a_safeguard_stop_pauses_the_program_until_it_is_closed(box):
+    box.run_program(LOOP)
+    box.safeguard_stop()
+    box.wait_until(safety_mode="SAFEGUARD_STOP", program_state="PAUSED")
+    box.safeguard_stop(False)
+    box.wait_until(safety_mode="NORMAL", program_state="PLAYING")
+
+
+def test_reduced_mode_goes_on_and_off(box):
+    box.reduced_mode()
+    assert box.state.safety_mode == "REDUCED"
+    box.reduced_mode(active=False)
+    assert box.state.safety_mode == "NORMAL"
+
+
+@pytest.mark.parametrize(("name", "mode"), [("trigger_violation", "VIOLATION"), ("trigger_fault", "FAULT")])
+def test_violation_and_fault_are_left_by_a_restart(box, name, mode):
+    getattr(box, name)("the guard dog bit")
+    box.wait_until(safety_mode=mode, robot_mode="POWER_OFF", log="the guard dog bit")
+    box.restart_safety()
+    box.wait_until(safety_mode="NORMAL", robot_mode="POWER_OFF")
+
+
+def test_a_protective_stop_on_request(box):
+    box.protective_stop()
+    assert box.state.safety_mode == "PROTECTIVE_STOP"
+    box.power_off()
+    box.wait_until(robot_mode="POWER_OFF")
+
+
+# --- programs
+
+
+def test_a_program_that_does_not_compile_says_where(box):
+    with pytest.raises(ArgumentError, match="does not compile") as caught:
+        box.run_program("def f():\n  x = = 1\nend\n")
+    assert "\n" not in str(caught.value)
+    with pytest.raises(ArgumentError, match="either"):
+        box.run_program()
+    with pytest.raises(ArgumentError, match="either"):
+        box.run_program(MOVE, file="move")
+
+
+def test_a_program_is_paused_resumed_and_stopped(box):
+    for wrong in (box.pause_program, box.resume_program):
+        with pytest.raises(RefusedError, match="STOPPED"):
+            wrong()
+    box.run_program(LOOP)
+    box.pause_program()
+    box.wait_until(program_state="PAUSED")
+    with pytest.raises(RefusedError, match="PAUSED"):
+        box.pause_program()
+    box.resume_program()
+    box.wait_until(program_state="PLAYING")
+    box.stop_program()
+    box.wait_until(program_state="STOPPED")
+    box.stop_program()
+
+
+def test_a_paused_program_stays_so_while_the_robot_is_stopped(box):
+    box.run_program(LOOP)
+    box.protective_stop()
+    box.wait_until(program_state="PAUSED")
+    with pytest.raises(RefusedError, match="stays paused"):
+        box.resume_program()
+
+
+def test_a_secondary_program_runs_beside_the_other(box):
+    box.run_program(LOOP)
+    box.run_program("sec beside():\n  set_standard_digital_out(2, True)\nend\n")
+    state = box.state
+    assert state.program_state == "PLAYING"
+    assert state.digital_outputs["standard"][2]
+
+
+def test_a_program_comes_from_a_file_of_this_machine_or_of_the_box(tmp_path):
+    (tmp_path / "greet.script").write_text('textmsg("hello from a file")\n')
+    with control_box(programs=tmp_path) as box:
+        box.run_program(LOOP)
+        box.run_program(file="greet.script")
+        box.wait_until(log="hello from a file")
+        with pytest.raises(RefusedError, match="nowhere"):
+            box.run_program(file="nowhere.script")
+        (tmp_path / "sent.script").write_text('def f():\n  textmsg("sent as text")\nend\n')
+        box.run_program(Path(tmp_path / "sent.script"))
+        box.wait_until(log="sent as text")
+
+
+def test_the_speed_slider(box):
+    box.set_speed(0.25)
+    assert box.state.speed == 0.25
+
+
+# --- the operator
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "said"),
+    [("integer", 7, "7"), ("float", 2.5, "2.5"), ("boolean", True, "True"), ("string", "abc", "abc")],
+)
+def test_questions_are_answered_with_what_they_ask_for(box, kind, value, said):
+    program = f'def ask():\n  textmsg("said ", request_{kind}_from_primary_client("how?"))\nend\n'
+    wrong = object if kind == "string" else "words"
+    with connect(box, "primary"):
+        box.run_program(program)
+        state = box.wait_until(question=True)
+        assert [q.text for q in state.questions] == ["how?"]
+        if wrong == "words":
+            with pytest.raises(RefusedError, match="how"):
+                box.answer("words")
+        box.answer(value, id=state.questions[0].id)
+        box.wait_until(log=f"said {said}", question=False)
+
+
+def test_answers_without_a_question_are_refused(box):
+    with pytest.raises(RefusedError, match="none is open"):
+        box.answer(1)
+    with pytest.raises(ArgumentError):
+        box.answer([1])
+
+
+def test_popups_are_seen_and_closed(box):
+    box.run_program('def pop():\n  popup("mind your head", blocking=True)\n  textmsg("closed")\nend\n')
+    assert box.wait_until(popup=True).popups == ("mind your head",)
+    box.close_popups()
+    box.wait_until(popup=False, log="closed")
+
+
+@pytest.mark.parametrize("text", ["", "snow ☃ and 🤖", "two\nlines", "x" * 1000, "\x00\x07"])
+def test_any_text_can_be_logged(box, text):
+    with connect(box, "primary"):
+        box.add_to_log(text)
+    assert box.log[-2].text == text.rstrip("\r\n") or text.rstrip("\r\n") in [e.text for e in box.log]
+
+
+def test_a_text_that_nobody_can_send_on_is_refused(box):
+    for text in ("\ud800", "x" * 1001, None, 3):
+        with pytest.raises(ArgumentError):
+            box.add_to_log(text)
+
+
+# --- threads and life
+
+
+def test_a_box_that_does_not_run_says_so():
+    box = ControlBox(pace="lockstep", port_base=None)
+    with pytest.raises(NotRunningError, match="start it"):
+        box.power_on()
+    with box:
+        box.power_on()
+    with pytest.raises(NotRunningError, match="ended"):
+        box.power_on()
+    assert "power_on" in box.log[0].text
+
+
+def test_who_waits_when_the_box_ends_is_told():
+    outcome = []
+    with ControlBox(pace="lockstep", port_base=None) as box:
+        box.run_program(LOOP)
+
+        def wait():
+            try:
+                box.wait_until(robot_mode="IDLE", timeout=3600)
+            except ControlError as error:
+                outcome.append(error)
+
+        thread = threading.Thread(target=wait)
+        thread.start()
+        box.submit(StopProgram())
+    thread.join(20)
+    assert [type(error) for error in outcome] == [NotRunningError]
+
+
+def test_the_thread_of_the_box_is_told_not_to_wait_for_itself():
+    outcome = []
+    box = ControlBox(pace="lockstep", port_base=None)
+
+    def follower(entry):
+        if not outcome:
+            try:
+                outcome.append(box.state)
+            except ControlError as error:
+                outcome.append(error)
+
+    box.follow_log(follower)
+    with box:
+        box.add_to_log("go")
+    assert "thread of the box" in str(outcome[0])
+
+
+def test_many_threads_have_their_way_with_one_box(box):
+    ticks, failures = [], []
+
+    def work(n):
+        try:
+            for k in range(20):
+                ticks.append(box.set_digital_input("standard", n, k % 2 == 0))
+        except EmulatorError as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=work, args=(n,)) for n in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert not failures
+    assert len(ticks) == 160
+    assert box.state.digital_inputs["standard"] == (False,) * 8
+
+
+def test_the_boxes_of_a_rack_are_controlled_one_by_one():
+    with ControlBox.many(2, pace="lockstep", port_base=None, control_port=0) as boxes:
+        boxes[1].set_speed(0.5)
+        assert [box.state.speed for box in boxes] == [1.0, 0.5]
+        assert boxes[0].control_port != boxes[1].control_port
+
+
+def test_in_real_time_operations_work_as_well():
+    with ControlBox(port_base=None) as box:
+        box.run_program(MOVE)
+        assert box.wait_until(program_state="STOPPED", timeout=60).tick > 0
+
+
+@pytest.mark.parametrize("port", [-1, 65536])
+def test_a_control_port_that_is_none_is_refused(port):
+    with pytest.raises(EmulatorError, match=str(port)):
+        ControlBox(control_port=port)
