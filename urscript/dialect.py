@@ -26,9 +26,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-STATEMENT_BUDGET: Final = 100_000
-"""Statements a thread may run in one cycle (U). Exported programs run thousands of assignments at their
-start without a sync, so real budgets are at least 10^4 to 10^5 (O)."""
+STATEMENT_BUDGET: Final = 110_000
+"""Statements a thread may run in one cycle (U): a loop of 100,000 rounds and what stands around it. Exported
+programs run thousands of assignments at their start without a sync, so real budgets are at least 10^4 to
+10^5 (O)."""
 
 PROGRAM_BUDGET: Final = 4
 """All threads of a program together may run this many times STATEMENT_BUDGET in one cycle (U)."""

@@ -1,0 +1,105 @@
+"""What scripts cost a box without its ports: threads that wait, a burst of statements, long texts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from ur_emulator.controller.commands import StartProgram
+from ur_emulator.controller.controller import Controller
+from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robots import robot_by_name
+from urscript import CompiledProgram, compile_program
+from urscript.parser import prepare
+
+ROUNDS = 20  # of each measurement; the best one counts, the others were disturbed
+N_THREADS = 20
+CYCLES = 200
+N_LOCALS = 20_000
+
+_THREADS = """
+def p():
+  thread idle():
+    while True:
+      sync()
+    end
+  end
+{runs}
+  while True:
+    sync()
+  end
+end
+"""
+
+_BURST = """
+def p():
+  n = 0
+  sync()
+  while True:
+    n = n + 1
+  end
+end
+"""
+
+
+def measure_script_in_box() -> dict[str, float]:
+    """Everything this module measures, in some five seconds."""
+    prepare()
+    alone, crowded = _box_running(0), _box_running(N_THREADS)
+    # Taking turns: what disturbs one disturbs the other.
+    cycles = [(_cycles(alone), _cycles(crowded)) for _ in range(ROUNDS)]
+    one, all_of_them = (min(times) for times in zip(*cycles, strict=True))
+    statements, seconds = _burst()
+    return {
+        "script_sync_thread_us": 1e6 * (all_of_them - one) / N_THREADS,
+        "statements_in_a_cycle": float(statements),
+        "statement_burst_ms": 1e3 * seconds,
+        "compile_20000_locals_s": min(_timed(lambda: compile_program(_locals())) for _ in range(3)),
+    }
+
+
+def _box() -> Controller:
+    # No network: nothing here opens a socket.
+    return Controller(robot_by_name("ur3"), fidelity_by_name("typical"), 7, None)  # type: ignore[arg-type]
+
+
+def _box_running(n_threads: int) -> Controller:
+    """A box in whose program so many threads, and main, do nothing but sync()."""
+    box = _box()
+    runs = "  run idle()\n" * n_threads
+    box.tick([StartProgram(compile_program(_THREADS.format(runs=runs)))])
+    return box
+
+
+def _cycles(box: Controller) -> float:
+    """Seconds that a cycle takes."""
+
+    def some() -> None:
+        for _ in range(CYCLES):
+            box.tick(())
+
+    return _timed(some) / CYCLES
+
+
+def _burst() -> tuple[int, float]:
+    """How often `n = n + 1` runs in a cycle before the program is stopped, and how long that takes [s]."""
+    program: CompiledProgram = compile_program(_BURST)
+    seconds = []
+    for _ in range(3):
+        box = _box()
+        box.tick([StartProgram(program)])
+        seconds.append(_timed(lambda box=box: box.tick(())))  # type: ignore[misc]
+        assert box.programs.latest is not None
+        statements = int(box.programs.latest.read_global("n"))
+    return statements, min(seconds)
+
+
+def _locals() -> str:
+    lines = "".join(f"    local x{n} = {n}\n" for n in range(N_LOCALS))
+    return f"def p():\n  def f():\n{lines}  end\n  f()\nend\n"
+
+
+def _timed(action: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    action()
+    return time.perf_counter() - began
