@@ -1,103 +1,72 @@
-"""`python -m protocol`: captured bytes to named fields, and the tables as text.
+"""`python -m protocol`: captured bytes to named fields, a look at a box that runs, and the tables as text.
 
-    python -m protocol decode capture.bin      bytes of port 30003 or 30001/30002, `-` reads standard input
+    python -m protocol decode capture.bin                        port 30001 to 30003; `-` is standard input
+    python -m protocol decode rtde capture.bin --names actual_q  what the robot has sent on port 30004
+    python -m protocol decode realtime --live 127.0.0.1          the next frame of a box
     python -m protocol layout --version 3.15.8
 
-Exit status: 0 done, 1 the capture is not what it should be, 2 wrong arguments or file. Prints, nothing else.
+Exit status: 0 done, 1 the bytes are not what they should be, 2 wrong arguments, file or address.
 """
 
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import os
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from protocol.capture import RtdeDecoder, StreamDecoder
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.frame_buffer import FrameBuffer
-from protocol.primary_messages import MESSAGES, ThreadLabel, VersionMessage
-from protocol.primary_packages import (
-    MAX_PACKAGE_SIZE,
-    MIN_PACKAGE_SIZE,
-    PackageType,
-    RobotState,
-    decode_package,
-    state_size,
-    state_types,
-)
-from protocol.primary_values import TypedValue, value_codes
-from protocol.realtime_layout import MAX_FRAME_SIZE, layout_for_size, layout_for_version
+from protocol.live import INTERFACES, watch
+from protocol.primary_messages import MESSAGES
+from protocol.primary_packages import state_size, state_types
+from protocol.primary_values import value_codes
+from protocol.realtime_layout import layout_for_version
+from protocol.rtde_fields import INPUTS, OUTPUTS, RtdeField
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import WireField, wire_fields
 
 _DEFAULT_VERSION = "3.15.8"
+_DEFAULT_NAMES = "timestamp,actual_q,actual_TCP_pose,robot_mode,safety_mode,runtime_state"
 
 
-def decode_capture(data: bytes, version: SoftwareVersion) -> Iterator[str]:
+def decode_capture(
+    data: bytes, version: SoftwareVersion, interface: str = "", names: tuple[str, ...] = ()
+) -> Iterator[str]:
     """Lines of text, one a field, for every package in a capture.
 
     Args:
         data: what a socket gave, from the beginning of a package on.
         version: software of the controller, until its version message says better.
+        interface: one of `INTERFACES`; "" finds out which of the ports 30001 to 30003 it was.
+        names: of the variables in an RTDE capture.
 
     Raises:
-        RemoteProtocolError: the bytes are not those of a realtime, primary or secondary port.
+        RemoteProtocolError: the bytes are not those of such a port.
     """
-    is_primary = len(data) >= MIN_PACKAGE_SIZE and data[4] in PackageType.__members__.values()
-    frames = (
-        FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
-        if is_primary
-        else FrameBuffer(max_size=MAX_FRAME_SIZE)
-    )
-    frames.feed(data)
-    position = 0
-    while (frame := frames.next_frame()) is not None:
-        if is_primary:
-            package = decode_package(frame, version)
-            if isinstance(package, VersionMessage):
-                version = SoftwareVersion(package.major, package.minor, package.bugfix)
-            yield f"byte {position}: {type(package).__name__}, {len(frame)} bytes"
-            yield from _describe(package)
-        else:
-            realtime = layout_for_size(len(frame)).decode(frame)
-            yield f"byte {position}: realtime frame, {len(frame)} bytes"
-            for column in realtime.layout.columns:
-                yield f"  {column.name:<28} {_number(getattr(realtime, column.attribute))} {column.unit}"
-        position += len(frame)
-    if frames.pending:
-        yield f"byte {position}: {frames.pending} bytes of a package that is not complete"
+    decoder = _decoder(interface, version, names)
+    yield from decoder.feed(data)
+    yield from decoder.end()
 
 
-def _describe(package: Any) -> Iterator[str]:
-    if isinstance(package, RobotState):
-        for sub_package in package.sub_packages:
-            yield f"  {type(sub_package).__name__}"
-            yield from (f"  {line}" for line in _describe(sub_package))
-        return
-    units = {field.name: field.unit for field in wire_fields(type(package))}
-    for field in dataclasses.fields(package):
-        value = getattr(package, field.name)
-        text = value.hex(" ") if isinstance(value, bytes) else _number(value)
-        yield f"  {field.name:<28} {text} {units.get(field.name, '')}".rstrip()
+def _decoder(interface: str, version: SoftwareVersion, names: tuple[str, ...]) -> StreamDecoder | RtdeDecoder:
+    return RtdeDecoder(names) if interface == "rtde" else StreamDecoder(version)
 
 
-def _number(value: Any) -> str:
-    if isinstance(value, str | bool):
-        return repr(value)
-    if isinstance(value, TypedValue):
-        return f"{value.type.value} {value}"
-    if isinstance(value, ThreadLabel):
-        return f"{value.thread_name!r}: {value.label_id} {value.text!r}"
-    if isinstance(value, float | int):
-        return f"{value:.10g}" if isinstance(value, float) else str(value)
-    return "[" + ", ".join(_number(item) for item in list(value)) + "]"
+def describe_layouts(version: SoftwareVersion, interface: str = "") -> Iterator[str]:
+    """The tables of one software version as lines of text; of one interface, or of all."""
+    layout_for_version(version)  # says so if there is no such software
+    parts = {"realtime": _realtime_layout, "primary": _primary_layout, "rtde": _rtde_layout}
+    chosen = [parts["primary" if interface == "secondary" else interface]] if interface else parts.values()
+    for number, part in enumerate(chosen):
+        if number and version.major >= 3:
+            yield ""
+        yield from part(version)
 
 
-def describe_layouts(version: SoftwareVersion) -> Iterator[str]:
-    """The tables of one software version as lines of text."""
+def _realtime_layout(version: SoftwareVersion) -> Iterator[str]:
     layout = layout_for_version(version)
     yield f"Realtime interface, port 30003, software {version}: {layout.size} bytes"
     yield f"{'byte':>5} {'floats':>6}  {'name':<28} {'unit':<12} {'box':<16} meaning"
@@ -106,9 +75,11 @@ def describe_layouts(version: SoftwareVersion) -> Iterator[str]:
             f"{layout.offset(column):>5} {column.count:>6}  {column.name:<28} {column.unit:<12} "
             f"{column.filled.value:<16} {column.meaning}"
         )
+
+
+def _primary_layout(version: SoftwareVersion) -> Iterator[str]:
     if version.major < 3:
         return
-    yield ""
     yield (
         f"Robot state, ports 30001 and 30002, software {version}: "
         f"first {state_size(version, first=True)} bytes, later {state_size(version, first=False)}"
@@ -125,6 +96,20 @@ def describe_layouts(version: SoftwareVersion) -> Iterator[str]:
     yield "Types of global variables in program state messages, port 30001"
     for kind, code in value_codes(version).items():
         yield f"      {code:<8} {kind.value}"
+
+
+def _rtde_layout(version: SoftwareVersion) -> Iterator[str]:
+    tables: tuple[tuple[str, tuple[RtdeField, ...]], ...] = (("outputs", OUTPUTS), ("inputs", INPUTS))
+    for number, (title, table) in enumerate(tables):
+        fields = [field for field in table if field.since.covers(version)]
+        if number:
+            yield ""
+        yield f"RTDE {title}, port 30004, software {version}: {len(fields)} variables"
+        for field in fields:
+            filled = field.filled.value if field.filled else ""
+            yield (
+                f"  {field.name:<36} {field.type.value:<14} {field.unit:<12} {filled:<16} {field.meaning}"
+            ).rstrip()
 
 
 def _describe_fields(record: type[Any], version: SoftwareVersion) -> Iterator[str]:
@@ -145,26 +130,54 @@ def _type_name(field: WireField) -> str:
     return _TYPE_NAMES[field.code] + (f" x{field.count}" if field.count > 1 else "")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit status."""
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m protocol", description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
-    decode = commands.add_parser(
-        "decode", help="captured bytes of port 30001, 30002 or 30003 to named fields"
+    decode = commands.add_parser("decode", help="bytes of a port to named fields")
+    decode.add_argument(
+        "source",
+        nargs="+",
+        metavar="[INTERFACE] [FILE]",
+        help=f"{', '.join(INTERFACES)}; then a capture, - for standard input; without an interface, "
+        "which of the ports 30001 to 30003 it was is found out",
     )
-    decode.add_argument("file", help="capture, or - for standard input")
+    decode.add_argument("--live", metavar="HOST[:PORT]", help="look at a box that runs, instead of a file")
+    decode.add_argument("--count", type=int, default=1, help="packages to wait for with --live (%(default)s)")
+    decode.add_argument(
+        "--names",
+        default=_DEFAULT_NAMES,
+        help="variables of an RTDE recipe, with commas between (%(default)s)",
+    )
     layout = commands.add_parser("layout", help="print the tables")
+    layout.add_argument("interface", nargs="?", default="", choices=["", *INTERFACES], help="only this one")
     for command in (decode, layout):
         command.add_argument("--version", default=_DEFAULT_VERSION, help="controller software (%(default)s)")
-    options = parser.parse_args(arguments)
+    return parser
+
+
+def _lines(options: argparse.Namespace) -> Iterator[str]:
+    version = SoftwareVersion.parse(options.version)
+    if options.command == "layout":
+        return describe_layouts(version, options.interface)
+    interface, *files = options.source if options.source[0] in INTERFACES else ("", *options.source)
+    names = tuple(filter(None, options.names.split(",")))
+    if options.live is not None:
+        if not interface or files:
+            raise LocalProtocolError(f"with --live, name one interface and no file: {', '.join(INTERFACES)}")
+        return watch(interface, options.live, _decoder(interface, version, names), options.count, names)
+    if len(files) != 1:
+        raise LocalProtocolError(
+            f"{len(files)} files given: one capture, - for standard input, or --live HOST"
+        )
+    data = sys.stdin.buffer.read() if files[0] == "-" else Path(files[0]).read_bytes()
+    return decode_capture(data, version, interface, names)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit status."""
+    options = _parser().parse_args(arguments)
     try:
-        version = SoftwareVersion.parse(options.version)
-        if options.command == "layout":
-            lines = describe_layouts(version)
-        else:
-            data = sys.stdin.buffer.read() if options.file == "-" else Path(options.file).read_bytes()
-            lines = decode_capture(data, version)
-        for line in lines:
+        for line in _lines(options):
             print(line)
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -20,6 +20,7 @@ MAY_IMPORT = {
 # Modules of the standard library that a layer must not touch, and the folders in which it may.
 EFFECTS = {"socket", "threading", "time", "selectors", "select", "subprocess", "asyncio"}
 MAY_HAVE_EFFECTS = {
+    "protocol": {"live.py"},
     "ur_emulator": {"realtime", "servers", "control", "emulator.py", "cli.py", "pytest_plugin.py"},
     "pc_client": {"driver", "experiment", "commands", "cli.py"},
 }

@@ -1,0 +1,208 @@
+"""Captured bytes as lines of text, one a field: what `python -m protocol decode` prints.
+
+A decoder takes the bytes that one side has sent on one connection, from its beginning, in pieces of any size.
+`feed` gives the lines of the packages that have become whole, `end` those of what is left over.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from protocol.dashboard_connection import Role
+from protocol.errors import RemoteProtocolError
+from protocol.frame_buffer import FrameBuffer
+from protocol.primary_layout import NO_TIME
+from protocol.primary_messages import ThreadLabel, VersionMessage
+from protocol.primary_packages import (
+    MAX_PACKAGE_SIZE,
+    MIN_PACKAGE_SIZE,
+    PackageType,
+    RobotState,
+    decode_package,
+)
+from protocol.primary_values import TypedValue
+from protocol.realtime_layout import MAX_FRAME_SIZE, layout_for_size
+from protocol.rtde_codec import HEADER_SIZE, decode_message
+from protocol.rtde_messages import DataPackage, RequestProtocolVersionReply, SetupOutputsReply
+from protocol.rtde_recipe import Recipe
+from protocol.rtde_types import REFUSALS, RtdeType
+from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import wire_fields
+
+__all__ = ["RtdeDecoder", "StreamDecoder"]
+
+_WIDTH = 28
+
+
+class StreamDecoder:
+    """Ports 30001 to 30003 and their twins; which of them shows in the first bytes.
+
+    Args:
+        version: software of the controller, until its version message says better.
+
+    Attributes:
+        count: whole packages so far.
+    """
+
+    def __init__(self, version: SoftwareVersion) -> None:
+        self._version = version
+        self._frames: FrameBuffer | None = None
+        self._is_primary = False
+        self._head = b""
+        self._position = 0
+        self.count = 0
+
+    def feed(self, data: bytes) -> Iterator[str]:
+        """Lines of the packages that these bytes complete.
+
+        Raises:
+            RemoteProtocolError: the bytes are not those of a realtime, primary or secondary port.
+        """
+        if self._frames is None:
+            self._head += data
+            if len(self._head) < MIN_PACKAGE_SIZE:
+                return
+            self._begin()
+        else:
+            self._frames.feed(data)
+        assert self._frames is not None
+        while (frame := self._frames.next_frame()) is not None:
+            self.count += 1
+            yield from self._primary(frame) if self._is_primary else self._realtime(frame)
+            self._position += len(frame)
+
+    def end(self) -> Iterator[str]:
+        """A line about the bytes that are left over."""
+        if self._frames is None and self._head:
+            self._begin()
+            yield from self.feed(b"")  # a frame this short is no frame
+        if self._frames is not None and self._frames.pending:
+            yield f"byte {self._position}: {self._frames.pending} bytes of a package that is not complete"
+
+    def _begin(self) -> None:
+        head = self._head
+        self._is_primary = len(head) >= MIN_PACKAGE_SIZE and head[4] in PackageType.__members__.values()
+        self._frames = (
+            FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
+            if self._is_primary
+            else FrameBuffer(MAX_FRAME_SIZE)
+        )
+        self._frames.feed(head)
+
+    def _primary(self, frame: bytes) -> Iterator[str]:
+        package = decode_package(frame, self._version)
+        if isinstance(package, VersionMessage):
+            self._version = SoftwareVersion(package.major, package.minor, package.bugfix)
+        yield f"byte {self._position}: {type(package).__name__}, {len(frame)} bytes"
+        yield from _describe(package)
+
+    def _realtime(self, frame: bytes) -> Iterator[str]:
+        realtime = layout_for_size(len(frame)).decode(frame)
+        yield f"byte {self._position}: realtime frame, {len(frame)} bytes"
+        for column in realtime.layout.columns:
+            yield f"  {column.name:<{_WIDTH}} {_text(getattr(realtime, column.attribute))} {column.unit}"
+
+
+class RtdeDecoder:
+    """What a robot has sent on port 30004.
+
+    Args:
+        names: of the variables that the client asked for; the robot repeats only their types. Numbers stand
+            for those that are missing.
+
+    Attributes:
+        count: whole packages so far.
+        refused: words that the robot gave instead of types, by name.
+    """
+
+    def __init__(self, names: Sequence[str] = ()) -> None:
+        self._names = tuple(names)
+        self._buffer = bytearray()
+        self._protocol = 1
+        self._position = 0
+        self._recipe: Recipe | None = None
+        self.count = 0
+        self.refused: dict[str, str] = {}
+
+    def feed(self, data: bytes) -> Iterator[str]:
+        """Lines of the packages that these bytes complete.
+
+        Raises:
+            RemoteProtocolError: the bytes are not those of a robot's RTDE port.
+        """
+        self._buffer += data
+        while len(self._buffer) >= HEADER_SIZE:
+            size, kind = int.from_bytes(self._buffer[:2], "big"), self._buffer[2]
+            if size < HEADER_SIZE:
+                raise RemoteProtocolError(
+                    f"an RTDE package of {size} bytes: at least {HEADER_SIZE} are possible"
+                )
+            if len(self._buffer) < size:
+                return
+            payload = bytes(self._buffer[HEADER_SIZE:size])
+            del self._buffer[:size]
+            self.count += 1
+            yield from self._package(kind, payload, size)
+            self._position += size
+
+    def end(self) -> Iterator[str]:
+        """A line about the bytes that are left over."""
+        if self._buffer:
+            yield f"byte {self._position}: {len(self._buffer)} bytes of a package that is not complete"
+
+    def _package(self, kind: int, payload: bytes, size: int) -> Iterator[str]:
+        message = decode_message(kind, payload, Role.ROBOT, self._protocol)
+        if message is None:
+            raise RemoteProtocolError(f"the robot sent an RTDE package of the unknown type {kind}")
+        yield f"byte {self._position}: {type(message).__name__}, {size} bytes"
+        match message:
+            case DataPackage(values, _) if self._recipe is not None:
+                for name, value in zip(self._recipe.names, self._recipe.decode(values), strict=True):
+                    yield f"  {name:<{_WIDTH}} {_text(value)}"
+                return
+            case RequestProtocolVersionReply(True):
+                self._protocol = 2  # nobody asks for the first: a connection begins in it
+            case SetupOutputsReply(types):
+                self._take_types(types)
+        yield from _describe(message)
+
+    def _take_types(self, types: tuple[str, ...]) -> None:
+        names = tuple(self._names[i] if i < len(self._names) else f"value {i + 1}" for i in range(len(types)))
+        self.refused = {name: word for name, word in zip(names, types, strict=True) if word in REFUSALS}
+        try:
+            self._recipe = None if self.refused else Recipe(names, map(RtdeType, types))
+        except ValueError as problem:
+            raise RemoteProtocolError(f"the robot answered with an unknown type: {problem}") from None
+
+
+def _describe(package: Any) -> Iterator[str]:
+    if isinstance(package, RobotState):
+        for sub_package in package.sub_packages:
+            yield f"  {type(sub_package).__name__}"
+            yield from (f"  {line}" for line in _describe(sub_package))
+        return
+    units = {field.name: field.unit for field in wire_fields(type(package))}
+    for field in dataclasses.fields(package):
+        value = getattr(package, field.name)
+        text = "none" if value == NO_TIME else _text(value)
+        yield f"  {field.name:<{_WIDTH}} {text} {units.get(field.name, '')}".rstrip()
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bytes):
+        return value.hex(" ")
+    if isinstance(value, str | bool):
+        return repr(value)
+    if isinstance(value, TypedValue):
+        return f"{value.type.value} {value}"
+    if isinstance(value, ThreadLabel):
+        return f"{value.thread_name!r}: {value.label_id} {value.text!r}"
+    if isinstance(value, SoftwareVersion):
+        return str(value)
+    if isinstance(value, float | int):
+        return f"{value:.10g}" if isinstance(value, float) else str(value)
+    if value is None:
+        return "none"
+    return "[" + ", ".join(_text(item) for item in list(value)) + "]"

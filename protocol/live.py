@@ -1,0 +1,76 @@
+"""Look at a box that runs: connect, let a decoder read what comes, for `python -m protocol decode --live`.
+
+The one place of this package that opens a socket.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+
+from protocol.capture import RtdeDecoder, StreamDecoder
+from protocol.dashboard_connection import Role
+from protocol.errors import LocalProtocolError
+from protocol.rtde_codec import encode_message
+from protocol.rtde_messages import Request, RequestProtocolVersion, SetupOutputs, Start
+from protocol.ur_types import Ports
+
+__all__ = ["INTERFACES", "watch"]
+
+INTERFACES = {"realtime": "realtime_ro", "primary": "primary_ro", "secondary": "secondary_ro", "rtde": "rtde"}
+"""What can be looked at, and the port for it: the read-only twins where there are some."""
+
+_TIMEOUT = 3.0  # s; every port sends ten times a second or more
+
+
+def watch(
+    interface: str,
+    address: str,
+    decoder: StreamDecoder | RtdeDecoder,
+    count: int,
+    names: tuple[str, ...] = (),
+    frequency: float = 10.0,
+) -> Iterator[str]:
+    """Lines of what a box sends.
+
+    Args:
+        interface: one of `INTERFACES`.
+        address: host, or host:port where it is not the vendor's.
+        decoder: for that interface.
+        count: packages to wait for, after the replies of the set-up on RTDE.
+        names: variables to ask RTDE for.
+        frequency: packages a second to ask RTDE for.
+
+    Raises:
+        LocalProtocolError: the address is none, or the box lacks a variable.
+        OSError: nobody answers there.
+        RemoteProtocolError: what answers is no box.
+    """
+    host, _, number = address.partition(":")
+    port = number or str(getattr(Ports(), INTERFACES[interface]))
+    if not host or not port.isdecimal() or not 0 < int(port) < 1 << 16:
+        raise LocalProtocolError(f"{address!r} is no address: give a host such as 127.0.0.1, or host:port")
+    with socket.create_connection((host, int(port)), timeout=_TIMEOUT) as sock:
+        if isinstance(decoder, RtdeDecoder):
+            requests: tuple[Request, ...] = (
+                RequestProtocolVersion(2),
+                SetupOutputs(names, frequency),
+                Start(),
+            )
+            for n_replies, request in enumerate(requests, 1):
+                version = 1 if n_replies == 1 else 2
+                sock.sendall(encode_message(request, Role.PC, version))
+                yield from _until(sock, decoder, n_replies)
+                if decoder.refused:
+                    unknown = ", ".join(decoder.refused)
+                    raise LocalProtocolError(f"this box has no {unknown}: `layout rtde` lists what there is")
+            count += len(requests)
+        yield from _until(sock, decoder, count)
+
+
+def _until(sock: socket.socket, decoder: StreamDecoder | RtdeDecoder, count: int) -> Iterator[str]:
+    while decoder.count < count:
+        data = sock.recv(65536)
+        if not data:
+            raise LocalProtocolError("the box has closed the connection")
+        yield from decoder.feed(data)

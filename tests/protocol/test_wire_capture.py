@@ -1,0 +1,160 @@
+"""Captures in pieces, RTDE captures, and a look at a box that runs."""
+
+import pytest
+
+from protocol import rtde_messages as R
+from protocol.__main__ import main
+from protocol.capture import RtdeDecoder, StreamDecoder
+from protocol.dashboard_connection import Role
+from protocol.errors import RemoteProtocolError
+from protocol.primary_layout import RobotModeData
+from protocol.primary_messages import version_message
+from protocol.primary_packages import encode_message_package, encode_state
+from protocol.rtde_codec import data_header, encode_message
+from protocol.rtde_connection import RtdeConnection
+from protocol.rtde_recipe import Recipe
+from protocol.rtde_types import RtdeType
+from protocol.ur_types import SoftwareVersion
+from ur_emulator import ControlBox
+
+VERSION = SoftwareVersion(3, 15, 8)
+NAMES = ("timestamp", "actual_q")
+RECIPE = Recipe(NAMES, (RtdeType.DOUBLE, RtdeType.VECTOR6D))
+
+
+def robot_says(*requests, version=2):
+    """Everything a robot answers, and one data package."""
+    pc, robot = RtdeConnection(Role.PC), RtdeConnection(Role.ROBOT, VERSION)
+    data = b""
+    for request in requests:
+        robot.receive_data(pc.send(request))
+        robot.next_event()
+        data += (reply := robot.reply())
+        pc.receive_data(reply)
+        pc.next_event()
+    values = RECIPE.encode((60.0, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)))
+    return data + data_header(len(values), 1 if version == 2 else None) + values
+
+
+SESSION = robot_says(
+    R.RequestProtocolVersion(2), R.GetControllerVersion(), R.SetupOutputs(NAMES, 125.0), R.Start()
+)
+
+
+def lines_of(decoder, data, step):
+    lines = []
+    for start in range(0, len(data), step):
+        lines += decoder.feed(data[start : start + step])
+    return [*lines, *decoder.end()]
+
+
+@pytest.mark.parametrize("step", [1, 7, 1000])
+def test_an_rtde_session_in_pieces(step):
+    lines = lines_of(RtdeDecoder(NAMES), SESSION + b"\0", step)
+    assert lines == [
+        "byte 0: RequestProtocolVersionReply, 4 bytes",
+        "  accepted                     True",
+        "byte 4: GetControllerVersionReply, 19 bytes",
+        "  version                      3.15.8",
+        "byte 23: SetupOutputsReply, 19 bytes",
+        "  types                        ['DOUBLE', 'VECTOR6D']",
+        "  recipe_id                    1",
+        "byte 42: StartReply, 4 bytes",
+        "  accepted                     True",
+        "byte 46: DataPackage, 60 bytes",
+        "  timestamp                    60",
+        "  actual_q                     [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]",
+        "byte 106: 1 bytes of a package that is not complete",
+    ]
+
+
+def test_a_session_in_version_1_without_names():
+    data = robot_says(R.SetupOutputs(NAMES), R.Start(), version=1)
+    lines = lines_of(RtdeDecoder(), data, 1000)
+    assert "  recipe_id                    none" in lines
+    assert lines[-2:] == [
+        "  value 1                      60",
+        "  value 2                      [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]",
+    ]
+
+
+def test_refused_variables_are_noted_and_what_follows_has_no_names():
+    reply = encode_message(R.SetupOutputsReply(("DOUBLE", "NOT_FOUND")), Role.ROBOT, 1)
+    decoder = RtdeDecoder(("timestamp", "nonsense"))
+    list(decoder.feed(reply))
+    assert decoder.refused == {"nonsense": "NOT_FOUND"}
+
+
+@pytest.mark.parametrize("data", [b"\0\2S", b"\0\3?", b"GE", encode_message(
+    R.SetupOutputsReply(("DUOBLE",)), Role.ROBOT, 1)], ids=["size", "type", "half", "word"])  # fmt: skip
+def test_what_is_no_rtde_is_refused_or_waited_for(data):
+    decoder = RtdeDecoder()
+    if data == b"GE":
+        assert lines_of(decoder, data, 1) == ["byte 0: 2 bytes of a package that is not complete"]
+    else:
+        with pytest.raises(RemoteProtocolError):
+            lines_of(decoder, data, 1000)
+
+
+@pytest.mark.parametrize("step", [1, 3, 60, 10_000])
+def test_a_primary_stream_in_pieces(step):
+    data = encode_message_package(version_message(VERSION), VERSION)
+    data += encode_state([RobotModeData(timestamp=60_000_000)], VERSION)
+    lines = lines_of(StreamDecoder(SoftwareVersion(3, 0)), data, step)
+    assert lines[0] == "byte 0: VersionMessage, 55 bytes"
+    assert lines[1] == "  timestamp                    none"
+    assert "    timestamp                    60000000 us" in lines
+
+
+@pytest.mark.parametrize(
+    ("interface", "port", "expected"),
+    [
+        ("realtime", "realtime_ro", "byte 0: realtime frame, 1140 bytes"),
+        ("primary", "primary_ro", "byte 0: VersionMessage, 55 bytes"),
+        ("secondary", "secondary", "byte 0: VersionMessage, 55 bytes"),
+        ("rtde", "rtde", "byte 0: RequestProtocolVersionReply, 4 bytes"),
+    ],
+)
+def test_a_look_at_a_box_that_runs(interface, port, expected, capsys):
+    with ControlBox(pace="lockstep", port_base=None) as box:
+        where = f"{box.host}:{getattr(box.ports, port)}"
+        assert main(["decode", interface, "--live", where, "--count", "2"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == expected
+    assert sum(line.startswith("byte") for line in lines) >= 2
+
+
+def test_a_variable_that_the_box_lacks_is_named(capsys):
+    with ControlBox(pace="lockstep", port_base=None) as box:
+        where = f"{box.host}:{box.ports.rtde}"
+        assert main(["decode", "rtde", "--live", where, "--names", "timestamp,actual_Q"]) == 2
+    assert capsys.readouterr().err == "error: this box has no actual_Q: `layout rtde` lists what there is\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["decode", "--live", "127.0.0.1", "capture.bin"], "error: with --live, name one interface and no"),
+        (["decode", "rtde", "capture.bin", "--live", "127.0.0.1"], "error: with --live, name one interface"),
+        (["decode", "rtde"], "error: 0 files given"),
+        (["decode", "a", "b"], "error: 2 files given"),
+        (["decode", "rtde", "--live", "127.0.0.1:port"], "error: '127.0.0.1:port' is no address"),
+        (["decode", "rtde", "--live", "127.0.0.1:70000"], "error: '127.0.0.1:70000' is no address"),
+        (["decode", "rtde", "--live", ":30004"], "error: ':30004' is no address"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, message, capsys):
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith(message)
+    assert captured.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("interface", ["realtime", "primary", "rtde"])
+def test_the_layout_of_one_interface(interface, capsys):
+    assert main(["layout", interface, "--version", "3.4"]) == 0
+    out = capsys.readouterr().out
+    assert ("1060 bytes" in out) == (interface == "realtime")
+    assert ("first 1306 bytes, later 636" in out) == (interface == "primary")
+    assert ("RTDE inputs, port 30004, software 3.4.0" in out) == (interface == "rtde")
+    assert ("input_int_register_24" in out) is False
