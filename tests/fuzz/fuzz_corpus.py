@@ -1,0 +1,217 @@
+"""Valid messages of every port, from the project's own encoders, and what is done to them on the way."""
+
+import json
+import struct
+
+from protocol.controller_words import CONTROLLER_WORDS
+from protocol.dashboard_commands import COMMANDS
+from protocol.dashboard_connection import Role
+from protocol.rtde_codec import encode_message
+from protocol.rtde_fields import input_fields, output_fields
+from protocol.rtde_messages import (
+    GetControllerVersion,
+    Pause,
+    RequestProtocolVersion,
+    SetupInputs,
+    SetupOutputs,
+    Start,
+    TextMessage,
+)
+from protocol.ur_types import SoftwareVersion
+from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.control.parameters import Kind
+
+VERSION = SoftwareVersion(3, 15, 8)
+# Words and operations by which something else than a program may move the arm.
+MOVING_WORDS = {"set robotmode freedrive"}
+MOVING_OPERATIONS = {"push", "attach_payload"}
+
+STILL_PROGRAMS = (
+    'def hello():\n  textmsg("hello ", get_actual_joint_positions())\nend\n',
+    "def wait():\n  while True:\n    sync()\n  end\nend\n",
+    "def count():\n  global n = 0\n  while n < 20:\n    n = n + 1\n    sleep(0.02)\n  end\nend\n",
+    "def threads():\n  thread t():\n    while True:\n      set_digital_out(2, True)\n      sync()\n"
+    "    end\n  end\n  k = run t\n  sleep(0.1)\n  kill k\nend\n",
+    "sec beside():\n  set_standard_digital_out(1, True)\nend\n",
+    'def ask():\n  popup("really?", "title", blocking=True)\nend\n',
+    "def rtde():\n  write_output_integer_register(3, read_input_integer_register(3) + 1)\n"
+    "  write_output_float_register(3, read_input_float_register(3))\nend\n",
+    "def bad():\n  x = 1 / 0\nend\n",
+    "def list():\n  a = [1, 2, 3]\n  i = 0\n  while True:\n    a[i] = i\n    i = i + 1\n  end\nend\n",
+    'set_digital_out(0, True)\n',
+    'textmsg("line")\n',
+    "def labels():\n  $ 1 \"one\"\n  sleep(0.01)\n  $ 2 \"two\"\n  sleep(0.01)\nend\n",
+    "def halts():\n  halt\nend\n",
+)  # fmt: skip
+MOVING_PROGRAMS = (
+    "movej([0, -1.57, 1.57, 0, 0, 0], a=1.4, v=1.05)\n",
+    "speedj([0.1, 0, 0, 0, 0, 0.1], 1, 0.1)\n",
+    "speedl([0, 0, 0.05, 0, 0, 0], 1, 0.1)\n",
+    "stopj(2)\n",
+    "def move():\n  q = get_actual_joint_positions()\n  q[5] = q[5] + 0.2\n  movej(q, a=2, v=1)\n"
+    "  q[5] = q[5] - 0.2\n  movej(q, a=2, v=1, r=0.0)\nend\n",
+    "def servo():\n  q = get_actual_joint_positions()\n  i = 0\n  while i < 50:\n    q[5] = q[5] + 0.002\n"
+    "    servoj(q, t=0.008, lookahead_time=0.1, gain=300)\n    i = i + 1\n  end\n  stopj(2)\nend\n",
+    "def line():\n  p = get_actual_tcp_pose()\n  p[2] = p[2] + 0.02\n  movel(p, a=1, v=0.2)\nend\n",
+    "freedrive_mode()\n",
+    "def force():\n  force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,5,0,0,0], 2, [0.1,0.1,0.1,0.2,0.2,0.2])\n"
+    "  sleep(0.2)\n  end_force_mode()\nend\n",
+)
+
+
+def script_message(rng, lively):
+    if rng.random() < 0.35:
+        word = rng.choice([w for w in CONTROLLER_WORDS if lively or w.text not in MOVING_WORDS])
+        numbers = ("0.5", "1", "0", "-1", "nan", "1e999", "0.01")
+        return (word.text + (f" {rng.choice(numbers)}" if word.takes_number else "") + "\n").encode()
+    programs = STILL_PROGRAMS + (MOVING_PROGRAMS if lively else ())
+    return rng.choice(programs).encode()
+
+
+_OUTPUTS = [*output_fields(VERSION), "nope", ""]
+_INPUTS = [*input_fields(VERSION), "nope", "timestamp"]
+_NASTY = (b"\x7f\xf8", b"\x7f\xf0", b"\xff\xf0", b"\0\0", b"\xff\xff", b"\x80\0", b"\x3f\xf0")
+
+
+def rtde_message(rng, lively):
+    version = rng.choice((1, 2, 2, 2))
+    kind = rng.randrange(11)
+    if kind < 3:
+        names = tuple(rng.choice(_OUTPUTS) for _ in range(rng.choice((0, 1, 2, 5, 20))))
+        rate = rng.choice((125.0, 10.0, 1.0, 1000.0, 0.0, -1.0, float("nan"), float("inf"), 1e-300))
+        message = SetupOutputs(names, rate if version == 2 else None)
+    elif kind < 5:
+        message = SetupInputs(tuple(rng.choice(_INPUTS) for _ in range(rng.choice((0, 1, 2, 5)))))
+    elif kind == 5:
+        message = Start()
+    elif kind == 6:
+        message = Pause()
+    elif kind == 7:
+        message = RequestProtocolVersion(rng.choice((1, 2, 2, 3, 0, 65535)))
+    elif kind == 8:
+        message = GetControllerVersion()
+    elif kind == 9 and rng.random() < 0.2:
+        message = TextMessage("text", "fuzz" if version == 2 else "", 1)
+    else:
+        values = bytes([rng.choice((1, 1, 2, 3, 0, 255))]) + b"".join(
+            rng.choice(_NASTY) + rng.randbytes(rng.choice((2, 6))) for _ in range(rng.randrange(6))
+        )
+        return struct.pack(">HB", len(values) + 3, ord("U")) + values
+    try:
+        return encode_message(message, Role.PC, version)
+    except Exception:  # what our client would not send: names that no list can carry
+        return encode_message(Start(), Role.PC, version)
+
+
+_ARGUMENTS = ("wait.urp", "hello.urp", "strange.urp", "broken.script", "cell/count me.script", "../../etc/passwd",
+              "other.installation", "odd.installation", "", "x" * 300, "\xe9\x00", "programmer", "none")  # fmt: skip
+
+
+def dashboard_message(rng, lively):
+    row = rng.choice(COMMANDS)
+    argument = f" {rng.choice(_ARGUMENTS)}" if row.argument or rng.random() < 0.1 else ""
+    if row.name in ("generate support file", "generate flight report"):
+        return b"robotmode\n"  # they write files for a second and more
+    return (row.name + argument + rng.choice(("\n", "\r\n"))).encode("latin-1")
+
+
+def modbus_message(rng, lively):
+    function = rng.choice((1, 2, 3, 4, 5, 6, 15, 16, 7, 0, 23, 43, 128, 255))
+    address = rng.choice((0, 1, 16, 30, 128, 255, 256, 258, 270, 300, 400, 65535, rng.randrange(1024)))
+    count = rng.choice((0, 1, 2, 8, 16, 123, 125, 126, 2000, 2001, 65535))
+    if function in (15, 16):
+        size = rng.choice((0, 1, 2, (count + 7) // 8, 2 * count)) % 256
+        pdu = struct.pack(">BHHB", function, address, count, size) + rng.randbytes(min(size, 246))
+    else:
+        pdu = struct.pack(">BHH", function, address, rng.choice((count, 0, 0xFF00)))
+    return struct.pack(">HHHB", rng.randrange(65536), 0, len(pdu) + 1, rng.choice((0, 1, 255))) + pdu
+
+
+def _argument(rng, parameter):
+    if rng.random() < 0.15:
+        return rng.choice((None, 1e999, -1, 10**400, "x", [], {}, [1, 2, 3], True, "\ud800"))
+    match parameter.kind:
+        case Kind.CHOICE:
+            return rng.choice(parameter.choices)
+        case Kind.NUMBER:
+            return rng.choice((0, 0.5, 1.0, parameter.low or 0))
+        case Kind.INTEGER:
+            return rng.choice((0, 1, 7, -1, 8))
+        case Kind.BOOLEAN:
+            return rng.random() < 0.5
+        case Kind.VECTOR:
+            return [rng.uniform(-5, 5) for _ in range(3)]
+        case Kind.SCRIPT:
+            return rng.choice(STILL_PROGRAMS)
+        case _:
+            return rng.choice(("text", "1", "\n\r\x00", "wait.urp"))
+
+
+def control_message(rng, lively):
+    usable = [o for o in OPERATIONS if lively or o.name not in MOVING_OPERATIONS]
+    operation = rng.choice(usable)
+    arguments = {
+        p.name: _argument(rng, p) for p in operation.parameters if p.is_required or rng.random() < 0.5
+    }
+    host = rng.choice(("127.0.0.1", "localhost", "127.0.0.1", "evil.example", ""))
+    if operation.only_reads and rng.random() < 0.8:
+        query = "&".join(f"{k}={v}" for k, v in arguments.items() if v is not None)
+        query = "".join(c if 32 < ord(c) < 127 else "%20" for c in query)
+        return f"GET /v1/{operation.name}?{query} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode()
+    body = json.dumps(arguments).encode()
+    extra = rng.choice(("", "", "", "Expect: 100-continue\r\n", "Connection: close\r\n"))
+    if rng.random() < 0.2:
+        head = f"POST /v1/{operation.name} HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\n{extra}Transfer-Encoding: chunked\r\n\r\n"
+        return head.encode() + b"%x\r\n%s\r\n0\r\n\r\n" % (len(body), body)
+    head = f"POST /v1/{operation.name} HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\n{extra}Content-Length: {len(body)}\r\n\r\n"
+    return head.encode() + body
+
+
+MESSAGES = {
+    "realtime": script_message,
+    "realtime_ro": script_message,
+    "primary": script_message,
+    "primary_ro": script_message,
+    "secondary": script_message,
+    "secondary_ro": script_message,
+    "rtde": rtde_message,
+    "dashboard": dashboard_message,
+    "modbus": modbus_message,
+    "control": control_message,
+}
+_LENGTHS = (0, 1, 2, 3, 5, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
+
+
+def mutate(rng, data, others):
+    """Return data with something wrong with it; `others` makes a message of any port."""
+    data = bytearray(data)
+    for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
+        if not data:
+            break
+        at = rng.randrange(len(data))
+        match rng.randrange(11):
+            case 0:
+                data[at] ^= 1 << rng.randrange(8)
+            case 1:
+                del data[at:]
+            case 2:
+                data[at:at] = data[at : at + rng.randrange(1, 40)]
+            case 3:
+                data[at:at] = rng.randbytes(rng.randrange(1, 20))
+            case 4:
+                del data[at : at + rng.randrange(1, 10)]
+            case 5:
+                size = rng.choice((2, 4))
+                place = rng.choice((0, 2, 4, at))
+                data[place : place + size] = (rng.choice(_LENGTHS) & (256**size - 1)).to_bytes(size, "big")
+            case 6:
+                data[min(rng.choice((2, 7, at)), len(data) - 1)] = rng.randrange(256)
+            case 7:
+                data = data[at:] + data[:at]
+            case 8:
+                data += data * rng.choice((1, 1, 2, 30)) if len(data) < 2000 else b""
+            case 9:
+                data[at:at] = others()
+            case 10:
+                data = data.replace(b"\n", rng.choice((b"\r", b"", b"\n\n", b"\0")))
+    return bytes(data)

@@ -1,0 +1,179 @@
+"""What a port says, checked byte by byte: every reader takes a stream in pieces and fails on what is not whole."""
+
+import json
+import re
+
+from box_support import VERSION
+
+from protocol.dashboard_commands import GREETING
+from protocol.dashboard_connection import MAX_LINE, Role
+from protocol.frame_buffer import FrameBuffer
+from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
+from protocol.realtime_layout import layout_for_version
+from protocol.rtde_codec import decode_message
+from protocol.rtde_messages import PackageType
+from ur_emulator.servers.modbus_codec import ModbusCodec
+
+REALTIME = layout_for_version(VERSION)
+CODEC = ModbusCodec()
+
+
+class RealtimeReader:
+    """Counts frames, decodes every tenth."""
+
+    def __init__(self):
+        self.buffer = FrameBuffer(2000)
+        self.n_frames = 0
+
+    def feed(self, data):
+        self.buffer.feed(data)
+        while (frame := self.buffer.next_frame()) is not None:
+            self.n_frames += 1
+            if self.n_frames % 10 == 1:
+                REALTIME.decode(frame)
+
+    def finish(self):
+        assert not self.buffer.pending
+
+
+class PrimaryReader:
+    """Decodes every package."""
+
+    def __init__(self):
+        self.buffer = FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
+        self.n_states = 0
+        self.messages = []
+
+    def feed(self, data):
+        self.buffer.feed(data)
+        while (frame := self.buffer.next_frame()) is not None:
+            package = decode_package(frame, VERSION)
+            if isinstance(package, RobotState):
+                self.n_states += 1
+            else:
+                self.messages.append(package)
+                del self.messages[:-50]
+
+    def finish(self):
+        assert not self.buffer.pending
+
+
+class RtdeReader:
+    """Takes packages apart without knowing what was asked."""
+
+    def __init__(self):
+        self.buffer = bytearray()
+        self.n_replies = 0
+
+    def feed(self, data):
+        self.buffer += data
+        while len(self.buffer) >= 3:
+            size = int.from_bytes(self.buffer[:2], "big")
+            assert size >= 3, "an RTDE package without a header"
+            if len(self.buffer) < size:
+                return
+            kind, payload = self.buffer[2], bytes(self.buffer[3:size])
+            del self.buffer[:size]
+            PackageType(kind)
+            if kind != PackageType.DATA_PACKAGE:
+                self.n_replies += 1
+                assert any(_decodes(kind, payload, version) for version in (1, 2)), (kind, payload)
+
+    def finish(self):
+        assert not self.buffer
+
+
+def _decodes(kind, payload, version):
+    try:
+        return decode_message(kind, payload, Role.ROBOT, version) is not None
+    except Exception:
+        return False
+
+
+class DashboardReader:
+    """Keeps the last lines after the greeting."""
+
+    def __init__(self):
+        self.buffer = b""
+        self.lines = []
+        self.n_lines = 0
+
+    def feed(self, data):
+        *lines, self.buffer = (self.buffer + data).split(b"\n")
+        for line in lines:
+            assert len(line) <= MAX_LINE
+            assert b"\r" not in line
+            if not self.n_lines:
+                assert line.decode() == GREETING
+            else:
+                self.lines.append(line.decode("latin-1"))
+                del self.lines[:-50]
+            self.n_lines += 1
+
+    def finish(self):
+        assert not self.buffer
+
+
+class ModbusReader:
+    """Takes answers apart; every one is a value, an echo or an exception."""
+
+    def __init__(self):
+        self.buffer = bytearray()
+        self.answers = []
+
+    def feed(self, data):
+        self.buffer += data
+        while (frame := CODEC.take_frame(self.buffer)) is not None:
+            function = frame.pdu[0]
+            assert function & 0x80 or function in (1, 2, 3, 4, 5, 6, 15, 16), frame
+            assert len(frame.pdu) == 2 if function & 0x80 else CODEC.answer(frame.pdu) is not None, frame
+            self.answers.append(frame)
+            del self.answers[:-50]
+
+    def finish(self):
+        assert not self.buffer
+
+
+_STATUS = re.compile(rb"HTTP/1\.1 (\d{3}) [\x20-\x7e]*\r\n")
+
+
+class HttpReader:
+    """Takes responses apart; each is JSON, or says that the rest may be sent."""
+
+    def __init__(self):
+        self.buffer = b""
+        self.answers = []
+
+    def feed(self, data):
+        self.buffer += data
+        while b"\r\n\r\n" in self.buffer:
+            head, _, rest = self.buffer.partition(b"\r\n\r\n")
+            match = _STATUS.match(head + b"\r\n")
+            assert match, head
+            status = int(match[1])
+            size = int(re.search(rb"(?i)content-length: *(\d+)", head)[1]) if status != 100 else 0
+            if len(rest) < size:
+                return
+            body, self.buffer = rest[:size], rest[size:]
+            if status == 100:
+                continue
+            assert status < 500 or status == 501, (status, body)  # 501: an encoding that does not exist
+            self.answers.append((status, json.loads(body)))
+            del self.answers[:-20]
+
+    def finish(self):
+        assert not self.buffer
+
+
+READERS = {
+    "realtime": RealtimeReader,
+    "realtime_ro": RealtimeReader,
+    "primary": PrimaryReader,
+    "primary_ro": PrimaryReader,
+    "secondary": PrimaryReader,
+    "secondary_ro": PrimaryReader,
+    "rtde": RtdeReader,
+    "dashboard": DashboardReader,
+    "modbus": ModbusReader,
+    "control": HttpReader,
+}

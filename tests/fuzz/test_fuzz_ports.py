@@ -1,0 +1,125 @@
+"""A short fuzz run of every port on every test run, Hypothesis's own sequences, and the same bytes over sockets.
+
+The long run is `python tests/fuzz/campaign.py --cases 1000000`.
+"""
+
+import random
+
+import pytest
+from box_support import FrameReader, connect
+from dashboard_support import Dashboard, write_programs
+from fuzz_box import FuzzBox, run
+from fuzz_corpus import MESSAGES, mutate
+from fuzz_replies import READERS
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
+
+from ur_emulator import ControlBox
+
+PORTS = sorted(MESSAGES)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_programs(tmp_path_factory.mktemp("programs"))
+
+
+def repeat(do, n_times):
+    for _ in range(n_times):
+        do()
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_no_bytes_move_the_arm_or_harm_others(folder, seed):
+    cases = run(random.Random(seed), folder, 2000, lively=False)
+    assert set(cases) == set(PORTS)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_no_bytes_harm_a_box_that_works(folder, seed):
+    run(random.Random(seed), folder, 2000, lively=True)
+
+
+def test_the_harness_notices_an_arm_that_moves(folder):
+    fuzz = FuzzBox(random.Random(1), folder, lively=False)
+    client = fuzz._connect("secondary")
+    fuzz.hostile["secondary"][client] = READERS["secondary"]()
+    fuzz.send("secondary", client, b"movej([0, -1.57, 1.57, 0, 0, 0])\n")
+    with pytest.raises(AssertionError, match="the arm moved"):
+        repeat(fuzz.cycle, 200)
+    fuzz.close()
+
+
+def test_the_harness_notices_an_error_of_a_port(folder, monkeypatch):
+    fuzz = FuzzBox(random.Random(1), folder, lively=False)
+    monkeypatch.setattr(fuzz.ports["rtde"], "_answer", lambda *args: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        repeat(lambda: fuzz.attack("rtde"), 2000)
+    fuzz.close()
+
+
+class Sessions(RuleBasedStateMachine):
+    """Sequences that Hypothesis finds, and makes short when one fails."""
+
+    fuzz = None
+
+    @initialize()
+    def begin(self):
+        self.fuzz = FuzzBox(random.Random(1), None, lively=False)
+
+    @rule(port=st.sampled_from(PORTS), seed=st.integers(0, 2**32))
+    def attack(self, port, seed):
+        self.fuzz.rng = random.Random(seed)
+        self.fuzz.attack(port)
+
+    @rule(port=st.sampled_from(PORTS), data=st.binary(max_size=60))
+    def bytes(self, port, data):
+        for wire in tuple(self.fuzz.hostile[port])[:1]:
+            self.fuzz.send(port, wire, data)
+
+    @rule()
+    def cycle(self):
+        self.fuzz.cycle()
+
+    @rule()
+    def heartbeat(self):
+        self.fuzz.heartbeat()
+
+    def teardown(self):
+        if self.fuzz is not None:
+            try:
+                self.fuzz.settle()
+            finally:
+                self.fuzz.close()
+
+
+Sessions.TestCase.settings = settings(
+    max_examples=15, stateful_step_count=40, deadline=None, derandomize=True
+)
+TestSessions = Sessions.TestCase
+
+
+@pytest.mark.parametrize("port", [port for port in PORTS if port != "control"])
+def test_the_same_over_sockets(folder, port):
+    rng = random.Random(port)
+    with (
+        ControlBox(pace="lockstep", port_base=None, programs=folder) as box,
+        connect(box, "realtime") as honest,
+        Dashboard(box) as dashboard,
+    ):
+        frames = FrameReader(honest)
+        first = frames.next()
+        for _ in range(60):
+            with connect(box, port) as sock:
+                sock.setblocking(False)
+                for _ in range(5):
+                    data = mutate(rng, MESSAGES[port](rng, False), lambda: MESSAGES[port](rng, False))
+                    try:
+                        sock.send(data)
+                    except OSError:
+                        break
+        answer = dashboard.ask("robotmode")
+        assert answer.startswith("Robotmode: ")
+        last = frames.next()
+        assert abs(last.target_q - first.target_q).max() < 0.02
