@@ -6,7 +6,9 @@ from contextlib import suppress
 import pytest
 from integration_support import HELLO_PROGRAM, STARTED, Frames, Messages, connect, send
 
+from protocol.primary_layout import RobotModeData
 from protocol.primary_messages import ErrorCodeMessage, KeyMessage, RuntimeExceptionMessage, TextMessage
+from protocol.primary_state import RobotState
 from protocol.ur_types import ProgramState
 
 RTDE_GARBAGE = {
@@ -160,7 +162,7 @@ def test_a_speed_that_is_no_fraction_changes_nothing(lockstep_box, line):
         frames.next()
         send(lockstep_box, "secondary", line + "\n")
         hello_still_runs(lockstep_box, primary, frames)
-        assert frames.next().speed_scaling == 1.0
+        assert primary.message(RobotState).find(RobotModeData).target_speed_fraction == 1.0
 
 
 def test_a_running_program_is_replaced_only_by_one_that_compiles(lockstep_box):

@@ -65,7 +65,7 @@ def make_snapshot(
         joint_mode=JOINT_VECTORS[mode, safety_mode],
         safety_mode=int(safety_mode),
         actual_tool_accelerometer=sensed.tool_accelerometer,
-        speed_scaling=state.speed_slider if limiter is None else limiter.scale,
+        speed_scaling=1.0 if limiter is None else limiter.share(state.speed_slider),
         actual_momentum=arm.momentum(),
         actual_main_voltage=BUS_VOLTAGE,
         actual_robot_voltage=BUS_VOLTAGE if powered else 0.0,

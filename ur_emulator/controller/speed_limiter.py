@@ -74,6 +74,10 @@ class SpeedLimiter:
         self.scale = scale
         return scale
 
+    def share(self, slider: float) -> float:
+        """Return what the limits leave of the speed that the slider asks for, 0..1."""
+        return min(1.0, self.scale / slider) if slider > 0.0 else 1.0
+
     def find_violation(self, actual_qd: Vector6, dt: float) -> Violation | None:
         """Return the protective stop for a joint that has been too fast for too long, or None."""
         excess = [abs(qd) - limit for qd, limit in zip(actual_qd, self._limits, strict=True)]

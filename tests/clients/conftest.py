@@ -1,0 +1,43 @@
+"""Boxes in processes of their own, for clients that hard-code the ports."""
+
+import pytest
+from clients_support import served_box
+
+
+@pytest.fixture(scope="session")
+def box(tmp_path_factory):
+    """A CB3 with software 3.15 in real time, shared: a test leaves it able to run the next one."""
+    with served_box(tmp_path_factory.mktemp("box")) as served:
+        yield served
+
+
+@pytest.fixture(scope="session")
+def old_box(tmp_path_factory):
+    """A CB3 with software 3.4."""
+    with served_box(tmp_path_factory.mktemp("old_box"), "--version", "3.4.0") as served:
+        yield served
+
+
+@pytest.fixture
+def fresh_box(tmp_path):
+    """A box for one test alone."""
+    with served_box(tmp_path) as served:
+        yield served
+
+
+@pytest.fixture(scope="session")
+def ur_rtde_interfaces(box):
+    """ur_rtde's control and receive interfaces, connected once for all tests."""
+    from ur_rtde_support import Arm, RTDEControl, RTDEReceive
+
+    arm = Arm(box=box, receive=RTDEReceive(box.host), control=RTDEControl(box.host))
+    yield arm
+    arm.control.disconnect()
+    arm.receive.disconnect()
+
+
+@pytest.fixture
+def arm(ur_rtde_interfaces):
+    """The same with the control script running and the arm at its start."""
+    ur_rtde_interfaces.get_ready()
+    return ur_rtde_interfaces

@@ -1,0 +1,227 @@
+"""ur_rtde's RTDEReceiveInterface: every getter, and that they fit together."""
+
+import csv
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+from primary_wire import calibrated_dh, forward, rotation, twist
+from ur_rtde_support import HOME, PERIOD, RTDEReceive, connected, sample, wait_until
+
+RUNNING_ROBOT, NORMAL_SAFETY, RUNNING_JOINT, PLAYING = 7, 1, 253, 2
+GRAVITY = 9.81  # m/s^2
+
+
+def within(low, high):
+    return lambda value: (
+        np.all(np.isfinite(value)) and np.all((np.asarray(value) >= low) & (np.asarray(value) <= high))
+    )
+
+
+def vector(low, high, size=6):
+    return lambda value: len(value) == size and within(low, high)(value)
+
+
+def exactly(wanted):
+    return lambda value: value == wanted
+
+
+# What an arm at rest shows while the control script runs: every getter that CB3 software 3.15 can fill.
+AT_REST = {
+    "Timestamp": within(40.0, 1e6),  # s; above 40, or URCL takes the box for one that boots
+    "TargetQ": vector(-6.3, 6.3),
+    "TargetQd": exactly([0.0] * 6),
+    "TargetQdd": exactly([0.0] * 6),
+    "TargetCurrent": vector(-4, 4),
+    "TargetMoment": vector(-20, 20),
+    "ActualQ": vector(-6.3, 6.3),
+    "ActualQd": vector(-2e-3, 2e-3),
+    "ActualCurrent": vector(-4, 4),
+    "JointControlOutput": vector(-4, 4),
+    "ActualTCPPose": vector(-3.2, 3.2),
+    "ActualTCPSpeed": vector(-2e-3, 2e-3),
+    "ActualTCPForce": vector(-25, 25),
+    "TargetTCPPose": vector(-3.2, 3.2),
+    "TargetTCPSpeed": vector(-1e-9, 1e-9),
+    "ActualDigitalInputBits": exactly(0),
+    "JointTemperatures": vector(15, 60),
+    "ActualExecutionTime": within(0, 8),
+    "RobotMode": exactly(RUNNING_ROBOT),
+    "JointMode": exactly([RUNNING_JOINT] * 6),
+    "SafetyMode": exactly(NORMAL_SAFETY),
+    "ActualToolAccelerometer": vector(-12, 12, 3),
+    "SpeedScaling": exactly(1.0),
+    "TargetSpeedFraction": exactly(1.0),
+    "SpeedScalingCombined": exactly(1.0),
+    "ActualMomentum": within(0, 0.1),
+    "ActualMainVoltage": within(46, 50),
+    "ActualRobotVoltage": within(46, 50),
+    "ActualRobotCurrent": within(0.1, 4),
+    "ActualJointVoltage": vector(44, 50),
+    "ActualDigitalOutputBits": exactly(0),
+    "RuntimeState": exactly(PLAYING),
+    "StandardAnalogInput0": within(0, 10),
+    "StandardAnalogInput1": within(0, 10),
+    "StandardAnalogOutput0": within(0, 10),
+    "StandardAnalogOutput1": within(0, 10),
+    "RobotStatus": exactly(0b11),  # power is on, a program runs
+    "SafetyStatusBits": exactly(0b1),  # normal
+    "Payload": exactly(0.0),
+    "PayloadCog": exactly([0.0] * 3),
+    "PayloadInertia": exactly([0.0] * 6),
+}
+
+
+def test_every_getter_is_plausible_at_rest(arm):
+    assert arm.control.setPayload(0.0, [0.0, 0.0, 0.0])
+    assert arm.is_at(HOME)
+    odd = {
+        name: value
+        for name, fits in AT_REST.items()
+        if not fits(value := getattr(arm.receive, "get" + name)())
+    }
+    assert odd == {}
+    known = {name[3:] for name in dir(arm.receive) if name.startswith("get")}
+    # e-Series only; the others take an argument
+    assert known - AT_REST.keys() == {
+        "FtRawWrench",
+        "DigitalInState",
+        "DigitalOutState",
+        "OutputIntRegister",
+        "OutputDoubleRegister",
+    }
+    with pytest.raises(RuntimeError):
+        arm.receive.getFtRawWrench()
+
+
+def test_values_at_rest_hold_the_arm_against_gravity(arm):
+    arm.still()
+    names = (
+        "TargetCurrent",
+        "ActualCurrent",
+        "JointControlOutput",
+        "ActualToolAccelerometer",
+        "ActualTCPForce",
+    )
+    rows = []
+    for _ in range(60):
+        arm.after(PERIOD)
+        rows.append(np.concatenate(sample(arm.receive, *names)[1]))
+    mean = np.mean(rows, axis=0)
+    target, actual, control, acceleration = mean[:6], mean[6:12], mean[12:18], mean[18:21]
+    assert np.allclose(actual, target, atol=0.15)
+    assert np.allclose(control, target, atol=0.15)
+    assert np.linalg.norm(acceleration) == pytest.approx(GRAVITY, abs=0.3)
+    _, r = forward(calibrated_dh(arm.box), arm.receive.getActualQ())
+    assert np.allclose(acceleration, r.T @ [0, 0, GRAVITY], atol=0.3) or np.allclose(
+        acceleration, r.T @ [0, 0, -GRAVITY], atol=0.3
+    )
+
+
+def test_getters_of_one_cycle_agree_while_the_arm_moves(arm):
+    dh = calibrated_dh(arm.box)
+    names = (
+        "ActualQ",
+        "ActualQd",
+        "ActualTCPPose",
+        "ActualTCPSpeed",
+        "TargetQ",
+        "TargetQd",
+        "TargetTCPPose",
+        "TargetTCPSpeed",
+    )
+    assert arm.control.moveJ([0.9, -1.5, -1.8, -0.4, 1.0, 1.2], 1.5, 4.0, True)
+    arm.until(lambda r: any(r.getTargetQd()))
+    stamps, *columns = arm.trace(lambda: any(arm.receive.getTargetQd()), *names)
+    cycles = stamps / PERIOD
+    assert np.allclose(cycles, np.round(cycles), atol=1e-4)
+    steps = np.diff(np.round(cycles)).astype(int)
+    assert steps.min() >= 1
+    assert len(stamps) >= 30
+    top = 0.0
+    for q, qd, pose, speed, target_q, target_qd, target_pose, target_speed in zip(*columns, strict=True):
+        for joints, rates, x, v, exact in (
+            (q, qd, pose, speed, 1e-6),
+            (target_q, target_qd, target_pose, target_speed, 1e-6),
+        ):
+            at, turned = forward(dh, joints)
+            assert np.allclose(at, x[:3], atol=exact)
+            assert np.allclose(turned, rotation(x[3:]), atol=exact)
+            assert np.allclose(twist(dh, joints, rates), v, atol=1e-4)
+        top = max(top, np.abs(target_qd).max())
+        assert np.abs(q - target_q).max() < 0.05
+        assert np.abs(qd - target_qd).max() < 0.3
+    assert top > 0.3
+    # Set-points are what their velocities say.
+    target_q, target_qd = columns[4], columns[5]
+    one = steps == 1
+    moved = np.diff(target_q, axis=0)[one]
+    expected = (target_qd[:-1] + target_qd[1:])[one] / 2 * PERIOD
+    assert one.sum() > 10
+    assert np.allclose(moved, expected, atol=3e-4)
+
+
+def test_a_slower_stream_comes_in_whole_multiples_of_a_cycle(box):
+    with connected(RTDEReceive, box.host, 25.0) as receive:
+        seen = {receive.getTimestamp()}
+        wait_until(lambda: seen.add(receive.getTimestamp()) or len(seen) >= 12)
+    gaps = np.diff(sorted(seen)) / (5 * PERIOD)
+    assert np.allclose(gaps, np.round(gaps), atol=1e-3)
+    assert np.round(gaps).min() >= 1
+
+
+def test_recording_has_a_row_for_what_was_asked(arm, tmp_path):
+    path = tmp_path / "arm.csv"
+    assert arm.receive.startFileRecording(
+        str(path), ["timestamp", "actual_q", "actual_TCP_pose", "robot_mode"]
+    )
+    arm.after(0.5)
+    assert arm.receive.stopFileRecording()
+    header, *rows = list(csv.reader(path.read_text().splitlines()))
+    assert header[:2] == ["timestamp", "actual_q_0"]
+    assert len(header) == 14
+    stamps = np.array([float(row[0]) for row in rows[:-1]])
+    assert len(set(stamps)) > 10
+    assert (np.diff(stamps) >= 0).all()
+    assert {row[13] for row in rows[:-1]} == {"7"}
+
+
+def test_a_recipe_of_ones_own(box):
+    names = ["timestamp", "actual_tool_accelerometer", "target_q", "robot_mode"]
+    with connected(RTDEReceive, box.host, -1.0, names) as receive:
+        assert receive.getRobotMode() == RUNNING_ROBOT
+        assert len(receive.getTargetQ()) == 6
+        with pytest.raises(RuntimeError):
+            receive.getActualQ()
+
+
+def test_an_unknown_variable_is_named(box):
+    with pytest.raises(RuntimeError, match="actual_nothing"):
+        RTDEReceive(box.host, -1.0, ["timestamp", "actual_nothing"])
+
+
+def test_registers_in_both_ranges(box):
+    with (
+        connected(RTDEReceive, box.host) as lower,
+        connected(RTDEReceive, box.host, 125.0, [], False, True) as upper,
+    ):
+        for n in range(12, 20):
+            assert isinstance(lower.getOutputIntRegister(n), int)
+            assert np.isfinite(lower.getOutputDoubleRegister(n))
+            assert isinstance(upper.getOutputIntRegister(n + 24), int)
+            assert np.isfinite(upper.getOutputDoubleRegister(n + 24))
+        with pytest.raises((RuntimeError, ValueError, IndexError)):
+            upper.getOutputIntRegister(12)
+
+
+def test_five_receivers_and_a_reconnect(box):
+    with ExitStack() as stack:
+        receivers = [stack.enter_context(connected(RTDEReceive, box.host)) for _ in range(5)]
+        before = [r.getTimestamp() for r in receivers]
+        wait_until(lambda: all(r.getTimestamp() > t for r, t in zip(receivers, before, strict=True)))
+        receivers[0].disconnect()
+        assert not receivers[0].isConnected()
+        assert receivers[0].reconnect()
+        assert receivers[0].isConnected()
+        stamp = receivers[0].getTimestamp()
+        wait_until(lambda: receivers[0].getTimestamp() > stamp)

@@ -1,0 +1,143 @@
+"""ur_rtde from PyPI, as it is, and what its tests share."""
+
+import sys
+import time
+from contextlib import contextmanager
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+REASON = f"ur_rtde 1.6.5 has no wheel for Python {sys.version_info[0]}.{sys.version_info[1]} on this machine"
+rtde_control = pytest.importorskip("rtde_control", reason=REASON)
+rtde_receive = pytest.importorskip("rtde_receive", reason=REASON)
+rtde_io = pytest.importorskip("rtde_io", reason=REASON)
+dashboard_client = pytest.importorskip("dashboard_client", reason=REASON)
+
+RTDEControl = rtde_control.RTDEControlInterface
+RTDEReceive = rtde_receive.RTDEReceiveInterface
+RTDEIO = rtde_io.RTDEIOInterface
+Dashboard = dashboard_client.DashboardClient
+
+HOME = (0.3944, -1.7645, -2.0996, -0.1030, 1.2950, 1.8570)  # rad
+PERIOD = 0.008  # s
+SPEED, ACCELERATION = 3.0, 12.0  # rad/s, rad/s^2; no test is about slowness
+CLOSE_Q = 5e-4  # rad; backlash and sag of the arm at rest
+CLOSE_X = 1e-3  # m, and rad for a rotation vector
+PATIENCE = 20.0  # s; a limit for hangs
+
+
+def wait_until(condition, what="what was waited for"):
+    """Ask again and again, without hurry: the client's own threads need the processor."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, f"{what} did not come"
+        time.sleep(0.002)
+
+
+@contextmanager
+def connected(interface, *arguments):
+    """Connect one of ur_rtde's interfaces and disconnect it: one that outlives its box ends the whole process."""
+    client = interface(*arguments)
+    try:
+        yield client
+    finally:
+        client.disconnect()
+
+
+class Arm(SimpleNamespace):
+    """The control and receive interfaces of one arm."""
+
+    def get_ready(self):
+        """Run the control script, unlock the arm if need be, and bring it to its start."""
+        if self.receive.isProtectiveStopped():
+            self.unlock()
+        if not self.control.isProgramRunning():
+            self.restart()
+        self.control.isSteady()  # a call that a test may have cost
+        self.go_home()
+
+    def restart(self):
+        assert self.control.reuploadScript()
+        wait_until(self.control.isProgramRunning, "the control script")
+
+    def unlock(self):
+        """Unlock a protective stop on the dashboard, which refuses it for the first seconds."""
+        dashboard = Dashboard(self.box.host)
+        dashboard.connect()
+        refusals = set()
+
+        def is_unlocked():
+            try:
+                dashboard.unlockProtectiveStop()
+            except RuntimeError as refusal:
+                refusals.add(str(refusal))
+                return False
+            return True
+
+        wait_until(is_unlocked, "the end of the protective stop")
+        self.until(lambda r: not r.isProtectiveStopped())
+        dashboard.stop()
+        dashboard.disconnect()
+        return refusals
+
+    def go_home(self):
+        wait_until(lambda: self.control.moveJ(list(HOME), SPEED, ACCELERATION), "the start")
+
+    def until(self, condition):
+        """Wait until the receive interface shows it."""
+        wait_until(lambda: condition(self.receive))
+
+    def still(self):
+        """Wait until the arm rests."""
+        self.until(lambda r: not any(r.getTargetQd()) and np.abs(r.getActualQd()).max() < 2e-3)
+
+    def after(self, seconds):
+        """Wait until so much robot time has passed."""
+        start = self.receive.getTimestamp()
+        self.until(lambda r: r.getTimestamp() >= start + seconds - 1e-4)
+
+    def is_at(self, q):
+        """Tell whether the arm comes to rest at these joint angles."""
+        self.still()
+        return np.allclose(self.receive.getActualQ(), q, rtol=0, atol=CLOSE_Q)
+
+    def is_at_pose(self, pose):
+        """Tell whether the arm comes to rest at this pose."""
+        self.still()
+        return np.allclose(self.receive.getActualTCPPose(), pose, rtol=0, atol=CLOSE_X)
+
+    def trace(self, running, *names):
+        """Return what the getters gave in the cycles in which `running()` held: an array for each."""
+        rows = [sample(self.receive, "Timestamp", *names)[1]]
+        while running():
+            assert len(rows) < 100_000
+            row = sample(self.receive, "Timestamp", *names)[1]
+            if row[0] > rows[-1][0]:
+                rows.append(row)
+            time.sleep(0.001)
+        return [np.array(column) for column in zip(*rows, strict=True)]
+
+
+def home(*delta):
+    """Return the start's angles with some of the first changed."""
+    q = np.array(HOME)
+    q[: len(delta)] += delta
+    return q.tolist()
+
+
+def shifted(pose, *delta):
+    """Return a pose displaced along the base's axes."""
+    moved = np.array(pose)
+    moved[: len(delta)] += delta
+    return moved.tolist()
+
+
+def sample(receive, *names):
+    """Return timestamp and values of one cycle."""
+    for _ in range(1000):
+        stamp = receive.getTimestamp()
+        values = [getattr(receive, "get" + name)() for name in names]
+        if receive.getTimestamp() == stamp:
+            return stamp, values
+    raise AssertionError("no cycle lasted as long as reading it")
