@@ -129,6 +129,10 @@ class ControlDesk:
             self._jobs.remove(job)
             job.steps.close()
 
+    def complain(self, text: str) -> None:
+        """Write into the log what went wrong here."""
+        self._around.access.announce(LogAdded("Control", text))
+
     def publish(self, snapshot: Snapshot) -> None:
         """Look at what is under way after a cycle."""
         if self._jobs:

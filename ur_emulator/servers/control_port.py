@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, is_dataclass
 from ipaddress import ip_address
 from typing import Any
-from urllib.parse import parse_qsl, unquote, urlsplit
+from urllib.parse import parse_qsl, urlsplit
 
 import h11
 
@@ -53,6 +53,7 @@ class _Session:
     body: bytearray = field(default_factory=bytearray)
     job: Job | None = None
     is_busy: bool = False
+    is_waiting: bool = False
     n_ahead: int = 0
     in_serve: bool = False
 
@@ -99,9 +100,11 @@ class ControlPort:
         self._serve(connection, session)
 
     def ended(self, connection: Connection) -> None:
-        """A client says no more; it may wait for an answer still."""
+        """A client says no more; it may wait for an answer still, but not for what may take an hour."""
         session = self._sessions.get(connection)
-        if session is not None:
+        if session is not None and session.is_waiting:
+            connection.close()
+        elif session is not None:
             session.http.receive_data(b"")
             self._serve(connection, session)
 
@@ -131,6 +134,9 @@ class ControlPort:
             self._reject(connection, session, error.error_status_hint, f"not understood: {error}")
         except _HttpError as error:
             self._reject(connection, session, error.status, str(error))
+        except Exception as error:  # a defect of ours must not end the box
+            self._desk.complain(f"a request of {connection.peer} could not be answered: {error!r}")
+            connection.close()
         finally:
             session.in_serve = False
 
@@ -139,6 +145,7 @@ class ControlPort:
         event = session.http.next_event()
         if isinstance(event, h11.Request):
             session.request = event
+            _check_head(event)
             if session.http.they_are_waiting_for_100_continue:
                 self._send(connection, session, h11.InformationalResponse(status_code=100, headers=[]))
         elif isinstance(event, h11.Data):
@@ -172,7 +179,7 @@ class ControlPort:
             return
 
         def done(result: Any, error: EmulatorError | None) -> None:
-            session.job = None
+            session.job, session.is_waiting = None, False
             if error is None:
                 self._finish(connection, session, 200, result)
             else:
@@ -180,17 +187,20 @@ class ControlPort:
             self._serve(connection, session)
 
         session.job = self._desk.begin(operation.name, arguments, done)
+        session.is_waiting = session.job is not None and operation.name == "wait_until"
+        if session.is_waiting and connection.has_ended:
+            connection.close()
 
     def _understand(self, request: h11.Request, body: bytes) -> tuple[Operation | None, Mapping[str, Any]]:
         """Return the operation that a request asks for, None for the table, and what it is given."""
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in request.headers}
         self._check_origin(headers)
-        target = urlsplit(request.target.decode("latin-1"))
-        name = unquote(target.path.removeprefix(PREFIX)) if target.path.startswith(PREFIX) else ""
+        path, _, query = request.target.decode("latin-1").partition("?")
+        name = path.removeprefix(PREFIX) if path.startswith(PREFIX) else ""
         operation = BY_NAME.get(name)
         if operation is None and name != "operations":
             raise _HttpError(
-                404, f"there is no {ascii(target.path)[:60]}: GET {PREFIX}operations lists what there is"
+                404, f"there is no {ascii(path)[:60]}: GET {PREFIX}operations lists what there is"
             )
         method, allowed = request.method.decode("latin-1"), _methods(operation)
         if method not in allowed:
@@ -200,7 +210,7 @@ class ControlPort:
         if operation is None:
             return None, {}
         if method == "GET":
-            return operation, _from_query(operation, target.query)
+            return operation, _from_query(operation, query)
         return operation, _from_body(headers.get("content-type", ""), body)
 
     def _check_origin(self, headers: Mapping[str, str]) -> None:
@@ -210,7 +220,7 @@ class ControlPort:
                 403, f"host {ascii(host)[:60]} given: name the box by its address or as localhost"
             )
         origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        if origin is not None and origin != f"http://{host}":
             raise _HttpError(403, f"pages of {ascii(origin)[:60]} may not control this box")
 
     def _is_own(self, host: str) -> bool:
@@ -265,14 +275,23 @@ class ControlPort:
             headers.append(("Allow", allow))
         if close:
             headers.append(("Connection", "close"))
-        response = h11.Response(status_code=status, headers=headers)
-        self._send(connection, session, response, h11.Data(data=body), h11.EndOfMessage())
+        events: list[h11.Event] = [h11.Response(status_code=status, headers=headers)]
+        if session.request is None or session.request.method != b"HEAD":
+            events.append(h11.Data(data=body))
+        self._send(connection, session, *events, h11.EndOfMessage())
 
     def _send(self, connection: Connection, session: _Session, *events: h11.Event) -> None:
         """Send events in one package; a client that does not read its answers is closed."""
         data = b"".join(session.http.send(event) or b"" for event in events)
         if not connection.send(data):
             connection.close()
+
+
+def _check_head(request: h11.Request) -> None:
+    if request.http_version not in (b"1.0", b"1.1"):
+        raise _HttpError(505, f"HTTP {request.http_version.decode('latin-1')} given: this port speaks 1.1")
+    if len(request.target) + sum(len(name) + len(value) for name, value in request.headers) > MAX_HEADER:
+        raise _HttpError(431, f"the header is longer than {MAX_HEADER} bytes")
 
 
 def _status_of(error: EmulatorError) -> int:

@@ -1,0 +1,422 @@
+"""The control port: every answer, and everything that a client may do wrong or with bad intent."""
+
+import json
+import random
+import socket
+import struct
+
+import pytest
+from control_support import Http, control_box
+
+from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.servers.control_port import MAX_BODY, MAX_CLIENTS, MAX_HEADER
+
+JSON = "Content-Type: application/json"
+
+
+@pytest.fixture(scope="module")
+def box():
+    """One box for all: whatever is done to it, it must go on."""
+    with control_box() as box:
+        yield box
+
+
+@pytest.fixture
+def http(box):
+    with Http(box) as http:
+        yield http
+
+
+@pytest.fixture(autouse=True)
+def the_box_answers_afterwards(box):
+    yield
+    with Http(box) as http:
+        status, state = http.ask("GET", "/v1/state")
+    assert (status, state["robot_mode"]) == (200, "RUNNING")
+    assert state["safety_mode"] == "NORMAL"
+
+
+# --- what it is for
+
+
+def test_the_state_is_that_of_the_box(box, http):
+    status, state = http.ask("GET", "/v1/state")
+    assert status == 200
+    assert http.headers["content-type"] == "application/json"
+    assert state["q"] == pytest.approx(box.state.q)
+    assert state["tick"] == box.state.tick
+    assert state["digital_inputs"]["tool"] == [False, False]
+
+
+def test_operations_describe_themselves(http):
+    status, table = http.ask("GET", "/v1/operations")
+    assert status == 200
+    assert [row["name"] for row in table["operations"]] == [operation.name for operation in OPERATIONS]
+
+
+def test_an_operation_is_done_when_it_is_answered(box, http):
+    status, result = http.ask("POST", "/v1/set_digital_input", {"group": "tool", "n": 1, "level": True})
+    assert status == 200
+    assert result == {"tick": box.state.tick}
+    assert box.state.digital_inputs["tool"] == (False, True)
+
+
+def test_without_a_body_all_defaults_are_taken(box, http):
+    assert http.ask("POST", "/v1/close_popups")[0] == 200
+    assert http.ask("POST", "/v1/close_popups", b"", headers=[JSON])[0] == 200
+
+
+def test_the_log_is_read_on_where_it_was_left_off(http):
+    http.ask("POST", "/v1/add_to_log", {"text": "first"})
+    _, log = http.ask("GET", "/v1/log")
+    assert log["entries"][-1]["text"] == "first"
+    assert log["entries"][-1]["source"] == "Control"
+    http.ask("POST", "/v1/add_to_log", {"text": "second"})
+    _, more = http.ask("GET", f"/v1/log?after={log['next']}")
+    assert [entry["text"] for entry in more["entries"]] == ["second"]
+    assert more["next"] == log["next"] + 1
+    assert http.ask("GET", f"/v1/log?after={more['next']}")[1] == {"entries": [], "next": more["next"]}
+    assert http.ask("GET", "/v1/log?level=FAULT&after=999999")[1] == {"entries": [], "next": 999_999}
+
+
+def test_a_wait_is_answered_when_it_is_over_and_others_are_served_meanwhile(box, http):
+    http.send(http.request("POST", "/v1/wait_until", {"log": "the end of all waiting", "timeout": 60}))
+    with Http(box) as other:
+        assert other.ask("GET", "/v1/state")[0] == 200
+        other.ask("POST", "/v1/add_to_log", {"text": "the end of all waiting"})
+    assert http.answer()[0] == 200
+
+
+def test_a_whole_program_goes_through(http):
+    script = "def f():\n" + "  # " + "x" * 1000 + "\n  textmsg(1)\n" * 20 + "end\n"
+    status, result = http.ask("POST", "/v1/run_program", {"script": script})
+    assert (status, result["program"]) == (200, "f")
+    assert http.ask("POST", "/v1/wait_until", {"program_state": "STOPPED"})[0] == 200
+
+
+# --- errors
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body", "status", "words"),
+    [
+        ("POST", "/v1/push", {}, 400, "needs force"),
+        ("POST", "/v1/push", {"force": [0, 0, 1e9]}, 400, "at most 250 N"),
+        ("POST", "/v1/push", {"force": "up"}, 400, "three numbers"),
+        ("POST", "/v1/push", {"force": [0, 0, True]}, 400, "three numbers"),
+        ("POST", "/v1/push", {"force": [0, 0, 1], "strength": 2}, 400, "strength"),
+        ("POST", "/v1/push", b'{"force": [0, 0, NaN]}', 400, "NaN is no number"),
+        ("POST", "/v1/push", b'{"force": [0, 0, 1e999]}', 400, "three numbers"),
+        ("POST", "/v1/push", b'{"force": [0, 0, 1' + b"0" * 4000 + b"]}", 400, "three numbers"),
+        ("POST", "/v1/push", b'{"force": [0, 0, 1' + b"0" * 5000 + b"]}", 400, "no JSON"),
+        ("POST", "/v1/push", b"force=1", 400, "no JSON"),
+        ("POST", "/v1/push", b"[1, 2]", 400, "JSON object"),
+        ("POST", "/v1/push", b"\xff\xfe", 400, "no JSON"),
+        ("POST", "/v1/push", b"[" * 100_000, 400, "no JSON"),
+        ("POST", "/v1/add_to_log", b'{"text": "\\ud800"}', 400, "text"),
+        ("POST", "/v1/set_digital_input", {"group": "tool", "n": 5, "level": True}, 400, "0 to 1"),
+        ("POST", "/v1/run_program", {"script": "def f("}, 400, "does not compile"),
+        ("POST", "/v1/unlock_protective_stop", {}, 409, "no protective stop"),
+        ("POST", "/v1/answer", {"value": 3}, 409, "none is open"),
+        ("POST", "/v1/wait_until", {"robot_mode": "IDLE", "timeout": 0}, 409, "in vain"),
+        ("POST", "/v1/wait_until", {"robot_mode": "idle"}, 400, "RUNNING"),
+        ("GET", "/v1/log?after=-1", None, 400, "after -1"),
+        ("GET", "/v1/log?after=x", None, 400, "after 'x'"),
+        ("GET", "/v1/log?before=3", None, 400, "before"),
+        ("GET", "/v1/log?" + "a=1&" * 50, None, 400, "too many"),
+        ("GET", "/v1/state?x=1", None, 400, "it takes none"),
+        ("GET", "/", None, 404, "/v1/operations"),
+        ("GET", "/v1/", None, 404, "no"),
+        ("GET", "/v1/nope", None, 404, "nope"),
+        ("GET", "/v2/state", None, 404, "v2"),
+        ("GET", "/v1/../state", None, 404, "state"),
+        ("GET", "/v1/%00", None, 404, "no"),
+        ("GET", "*", None, 404, "no"),
+        ("GET", "http://[/v1/state", None, 404, "http://["),
+        ("GET", "/v1/push", None, 405, "POST"),
+        ("POST", "/v1/state", {}, 405, "GET"),
+        ("DELETE", "/v1/state", None, 405, "GET"),
+        ("OPTIONS", "/v1/push", None, 405, "POST"),
+        ("X" * 200, "/v1/push", None, 405, "POST"),
+    ],
+)
+def test_a_mistake_is_answered_in_one_line_and_the_connection_stays(http, method, path, body, status, words):
+    got, answer = http.ask(method, path, body)
+    assert got == status
+    assert list(answer) == ["error"]
+    assert words in answer["error"]
+    assert "\n" not in answer["error"]
+    assert len(answer["error"]) < 400
+    if status == 405:
+        assert http.headers["allow"] in ("GET", "POST")
+    assert http.ask("GET", "/v1/state")[0] == 200
+
+
+def test_head_is_refused_without_a_body(http):
+    http.send(http.request("HEAD", "/v1/state"))
+    assert b"405" in http.stream.readline()
+
+
+def test_a_body_must_say_that_it_is_json(http):
+    for kind in ("text/plain", "application/x-www-form-urlencoded", ""):
+        status, answer = http.ask("POST", "/v1/power_off", {}, headers=[f"Content-Type: {kind}"])
+        assert status == 400
+        assert "application/json" in answer["error"]
+    assert (
+        http.ask("POST", "/v1/close_popups", {}, headers=["Content-Type: Application/JSON; charset=utf-8"])[0]
+        == 200
+    )
+
+
+# --- pages in somebody's browser
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "evil.example",
+        "evil.example:80",
+        "127.0.0.1.evil.example",
+        "localhost.evil.example",
+        "0.0.0.0",
+        "127.0.0.2",
+        "",
+        "[",
+        "[::1]",
+    ],
+)
+def test_a_name_that_was_bent_to_this_machine_is_refused(http, host):
+    status, answer = http.ask("POST", "/v1/power_off", {}, host=host)
+    assert status == 403
+    assert "host" in answer["error"]
+    assert http.ask("GET", "/v1/state", host=host)[0] == 403
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "LOCALHOST:1234", "127.0.0.1:80"])
+def test_the_own_address_and_localhost_are_taken(http, host):
+    assert http.ask("GET", "/v1/state", host=host)[0] == 200
+
+
+def test_a_box_on_all_addresses_takes_any_address_but_no_name():
+    with control_box(host="0.0.0.0") as box, Http(box) as http:
+        assert http.ask("GET", "/v1/state", host="192.168.7.7:80")[0] == 200
+        assert http.ask("GET", "/v1/state", host="evil.example")[0] == 403
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1:1", "http://[", ""])
+def test_a_page_of_another_origin_is_refused(http, origin):
+    status, answer = http.ask("POST", "/v1/power_off", headers=[f"Origin: {origin}"])
+    assert status == 403
+    assert "pages" in answer["error"]
+
+
+def test_a_request_without_a_host_is_refused(http):
+    http.send(b"GET /v1/state HTTP/1.1\r\n\r\n")
+    assert http.answer()[0] == 400
+    assert http.is_closed()
+
+
+# --- bytes
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\x00" * 100,
+        b"hello\r\n\r\n",
+        b"GET /v1/state\r\n\r\n",
+        b"GET /v1/state HTTP/9.9\r\nHost: localhost\r\n\r\n",
+        b"GET  /v1/state HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        b"GET /v1/state HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n",
+        b"GET /v1/state HTTP/1.1\r\nHost : localhost\r\n\r\n",
+        b"POST /v1/push HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n",
+        b"POST /v1/push HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\nxx",
+        b"POST /v1/push HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
+        b"POST /v1/push HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: gzip\r\n\r\n",
+        b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + b"\x11" * 100,
+        b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
+    ],
+)
+def test_what_is_no_http_is_answered_and_closed(http, data):
+    http.send(data)
+    status, answer = http.answer()
+    assert status in (400, 501, 505)
+    assert "HTTP " in answer["error"] or answer["error"].startswith("not understood")
+    assert http.is_closed()
+
+
+def test_random_bytes_do_no_harm(box):
+    chance = random.Random(7)
+    whole = (
+        b"POST /v1/set_speed HTTP/1.1\r\nHost: localhost\r\nContent-Length: 17\r\n"
+        + JSON.encode()
+        + b'\r\n\r\n{"fraction": 1.0}'
+    )
+    for _ in range(200):
+        data = bytearray(whole)
+        for _ in range(chance.randint(1, 6)):
+            data[chance.randrange(len(data))] = chance.randrange(256)
+        with Http(box) as http:
+            http.send(bytes(data))
+            http.sock.shutdown(socket.SHUT_WR)
+            while http.sock.recv(65536):
+                pass
+
+
+@pytest.mark.parametrize("end", [b"", b"\r\n\r\n"])
+def test_a_huge_header_is_refused(http, end):
+    http.send(b"GET /v1/state HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * (2 * MAX_HEADER) + end)
+    status, answer = http.answer()
+    assert status == 431
+    assert "error" in answer
+    assert http.is_closed()
+
+
+@pytest.mark.parametrize(
+    "how", ["Content-Length: 99999999999", "Content-Length: 1048577", "Transfer-Encoding: chunked"]
+)
+def test_a_body_that_is_too_long_is_refused(http, how):
+    http.send(f"POST /v1/add_to_log HTTP/1.1\r\nHost: localhost\r\n{JSON}\r\n{how}\r\n\r\n".encode())
+    block = b"x" * 65536
+    try:
+        for _ in range(MAX_BODY // len(block) + 4):
+            http.send(b"10000\r\n" + block + b"\r\n" if "chunked" in how else block)
+    except (BrokenPipeError, ConnectionResetError):
+        return  # it was closed already
+    try:
+        status, answer = http.answer()
+    except (ConnectionResetError, IndexError):
+        return  # closed while the rest was on its way
+    assert status == 413
+    assert str(MAX_BODY) in answer["error"]
+
+
+def test_a_request_that_trickles_in_is_understood_and_holds_up_nobody(box, http):
+    data = http.request("POST", "/v1/set_speed", {"fraction": 0.5})
+    for k in range(len(data)):
+        http.send(data[k : k + 1])
+        if k % 40 == 0:
+            with Http(box) as other:
+                assert other.ask("GET", "/v1/state")[0] == 200
+    assert http.answer()[0] == 200
+    assert http.ask("POST", "/v1/set_speed", {"fraction": 1})[0] == 200
+
+
+def test_half_a_request_and_then_nothing_is_forgotten(box):
+    half = b'POST /v1/power_off HTTP/1.1\r\nHost: localhost\r\nContent-Length: 30\r\n\r\n{"a'
+    for k in range(1, len(half), 7):
+        with Http(box) as http:
+            http.send(half[:k])
+            http.sock.shutdown(socket.SHUT_WR)
+            while http.sock.recv(65536):
+                pass
+        with Http(box) as http:
+            http.send(half[:k])
+            http.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # reset
+
+
+def test_who_says_no_more_still_gets_its_answers(http):
+    http.send(http.request("GET", "/v1/state") + http.request("POST", "/v1/close_popups", {}))
+    http.sock.shutdown(socket.SHUT_WR)
+    assert http.answer()[0] == 200
+    assert http.answer()[0] == 200
+    assert http.is_closed()
+
+
+def test_requests_sent_ahead_are_answered_in_order(http):
+    texts = [f"line {n}" for n in range(50)]
+    http.send(b"".join(http.request("POST", "/v1/add_to_log", {"text": text}) for text in texts))
+    assert [http.answer()[0] for _ in texts] == [200] * 50
+    _, log = http.ask("GET", "/v1/log")
+    assert [e["text"] for e in log["entries"] if e["text"].startswith("line ")] == texts
+
+
+def test_who_sends_ahead_without_end_is_closed(http):
+    http.send(http.request("POST", "/v1/wait_until", {"robot_mode": "IDLE", "timeout": 60}))
+    block = http.request("GET", "/v1/state") * 1000
+    with pytest.raises((BrokenPipeError, ConnectionResetError)):
+        http.send(block * 1000)
+
+
+def test_who_goes_while_it_waits_is_forgotten(box):
+    for _ in range(10):
+        with Http(box) as http:
+            http.send(http.request("POST", "/v1/wait_until", {"robot_mode": "IDLE", "timeout": 60}))
+    with Http(box) as http:
+        for _ in range(1000):
+            assert http.ask("GET", "/v1/state")[0] == 200
+            if not box._desk._jobs:
+                return
+    raise AssertionError("they are waited for still")
+
+
+def test_a_client_that_reads_nothing_does_not_hold_up_time(box):
+    with Http(box) as http:
+        http.sock.settimeout(2)
+        asked = http.request("GET", "/v1/operations")
+        try:
+            for _ in range(200):
+                http.send(asked * 20)
+        except OSError:
+            pass
+        before = box.state.tick
+        box.run_program("def f():\n  sleep(1)\nend\n")
+        assert box.wait_until(program_state="STOPPED").tick > before + 100
+
+
+def test_a_client_asks_before_it_sends_its_body(http):
+    body = json.dumps({"fraction": 1}).encode()
+    head = http.request("POST", "/v1/set_speed", body, headers=["Expect: 100-continue", JSON])
+    http.send(head.removesuffix(body))
+    assert http.answer()[0] == 100
+    http.send(body)
+    assert http.answer()[0] == 200
+
+
+def test_http_1_0_and_close_are_answered_and_closed(box):
+    with Http(box) as http:
+        http.send(b"GET /v1/state HTTP/1.0\r\nHost: localhost\r\n\r\n")
+        assert http.answer()[0] == 200
+        assert http.is_closed()
+    with Http(box) as http:
+        assert http.ask("GET", "/v1/state", headers=["Connection: close"])[0] == 200
+        assert http.is_closed()
+
+
+def test_other_protocols_are_not_offered(http):
+    upgrade = ["Connection: Upgrade", "Upgrade: websocket"]
+    assert http.ask("GET", "/v1/state", headers=upgrade)[0] == 200
+    assert http.ask("CONNECT", "localhost:22")[0] in (404, 405)
+
+
+def test_the_most_silent_client_makes_room_for_a_new_one(box):
+    clients = [Http(box) for _ in range(MAX_CLIENTS)]
+    try:
+        for client in (*clients, clients[0]):
+            assert client.ask("GET", "/v1/state")[0] == 200
+        # Now the second is the most silent one.
+        with Http(box) as late:
+            assert late.ask("GET", "/v1/state")[0] == 200
+        assert clients[1].is_closed()
+        assert clients[0].ask("GET", "/v1/state")[0] == 200
+    finally:
+        for client in clients:
+            client.__exit__()
+
+
+def test_clients_of_a_box_that_ends_are_told():
+    with control_box() as box:
+        http = Http(box)
+        http.send(http.request("POST", "/v1/wait_until", {"robot_mode": "IDLE", "timeout": 60}))
+        with Http(box) as other:  # so that the wait has begun
+            other.ask("GET", "/v1/state")
+    with http:
+        status, answer = http.answer()
+        assert status == 503
+        assert "ended" in answer["error"]
+
+
+def test_there_is_no_port_unless_it_is_asked_for(box):
+    with control_box(control_port=None) as other:
+        assert other.control_port == 0
+        assert "control" not in other.identity["ports"]
