@@ -5,7 +5,7 @@ from box_support import Bench
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
-from states_support import BRAKING, COMMANDS, ENDLESS, check_wires, failures
+from states_support import BRAKING, COMMANDS, ENDLESS, WAY_IN, check_wires, failures
 
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.controller import commands as cmd
@@ -47,6 +47,7 @@ ANYTHING = (
 # What wakes an arm up, three times as likely: else most boxes would sleep.
 LIKELY = (*ANYTHING, *3 * (safe.ReleaseEmergencyStop(), cmd.RestartSafety(), safe.SafeguardStop(False)))
 LIKELY += 3 * (cmd.UnlockProtectiveStop(), cmd.ReleaseBrakes(), cmd.StartProgram(PROGRAMS[0]))
+STOPS = tuple(COMMANDS[event] for mode, event in WAY_IN.items() if mode not in MOVING_MODES)
 RESTING = 0.03  # rad/s, what sensors may say of an arm at rest
 
 
@@ -88,6 +89,18 @@ class AnyBox(RuleBasedStateMachine):
     def do(self, commands, ticks):
         self.tick(*commands)
         for _ in range(ticks - 1):
+            self.tick()
+
+    @rule(program=st.sampled_from(PROGRAMS[:3]), ticks=st.integers(1, 40), stop=st.sampled_from(STOPS))
+    def stop_at_work(self, program, ticks, stop):
+        """A program is at work, and something stops it."""
+        self.the_way_back_is_always_open()
+        self.tick(cmd.StartProgram(program))
+        for _ in range(ticks):
+            self.tick()
+        self.tick(stop)
+        assert self.bench.now.safety_mode not in MOVING_MODES
+        for _ in range(ticks):
             self.tick()
 
     @rule(ticks=st.integers(150, 250))
@@ -145,8 +158,8 @@ class AnyBox(RuleBasedStateMachine):
 
 
 AnyBox.TestCase.settings = settings(
-    max_examples=25,
-    stateful_step_count=25,
+    max_examples=20,
+    stateful_step_count=20,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
