@@ -11,7 +11,9 @@ from ur_emulator import ControlBox
 
 @contextmanager
 def control_box(**options):
-    with ControlBox(**{"pace": "lockstep", "seed": 7, "port_base": None, "control_port": 0, **options}) as box:
+    with ControlBox(
+        **{"pace": "lockstep", "seed": 7, "port_base": None, "control_port": 0, **options}
+    ) as box:
         yield box
 
 

@@ -38,13 +38,14 @@ def main(words: Sequence[str]) -> int:
     as_json, follow = given.pop("json", False), given.pop("follow", False)
     try:
         arguments = _arguments(operation, given)
+    except (ArgumentError, OSError, UnicodeError) as error:
+        return _complain(error, 2)
+    try:
         if follow:
             _follow(client, arguments, as_json)
         result = client.perform(operation.name, arguments)
     except KeyboardInterrupt:
         return 0
-    except (ArgumentError, OSError, UnicodeError) as error:
-        return _complain(error, 2)
     except ControlError as error:
         return _complain(error, 1)
     print(json.dumps(result) if as_json else plain(result), flush=True)

@@ -1,0 +1,184 @@
+"""The pytest plug-in, tried on small test-suites of its own."""
+
+import subprocess
+import sys
+
+import pytest
+
+from ur_emulator.pytest_plugin import OPTIONS, _own_addresses
+from ur_emulator.rack import BoxOptions
+
+pytest_plugins = ["pytester"]
+
+
+@pytest.fixture
+def suite(pytester, monkeypatch):
+    """Run the tests of a text in a process of their own."""
+    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
+
+    def run(text, *words):
+        pytester.makepyfile(text)
+        return pytester.runpytest_subprocess("-p", "no:cacheprovider", *words, timeout=100)
+
+    return run
+
+
+def test_a_test_gets_a_fresh_box_in_lockstep_on_free_ports(suite):
+    result = suite(
+        """
+        ports = []
+        def test_one(ur_box):
+            assert ur_box.identity["pace"] == "lockstep"
+            assert ur_box.identity["robot"] == "UR3"
+            ports.append(ur_box.ports)
+            ur_box.set_speed(0.5)
+        def test_two(ur_box):
+            assert ur_box.state.speed == 1.0
+            assert ur_box.ports.primary != 30001
+        """
+    )
+    result.assert_outcomes(passed=2)
+
+
+def test_a_mark_says_how_the_box_shall_be_and_the_nearest_wins(suite, pytester):
+    pytester.mkdir("programs").joinpath("hello.script").write_text('textmsg("hello")\n')
+    result = suite(
+        """
+        import pytest
+        pytestmark = pytest.mark.ur(seed=5, version="3.4.0")
+
+        @pytest.mark.ur(robot="ur5", seed=6, pace="realtime", fidelity="ideal", programs="programs")
+        def test_marked(ur_box):
+            facts = ur_box.identity
+            assert (facts["robot"], facts["software"], facts["seed"]) == ("UR5", "3.4.0", 6)
+            assert (facts["pace"], facts["fidelity"]) == ("realtime", "ideal")
+            ur_box.run_program(file="hello.script")
+            ur_box.wait_until(log="hello")
+        """,
+        "--strict-markers",
+    )
+    result.assert_outcomes(passed=1)
+
+
+def test_the_factory_makes_as_many_as_are_wanted_and_ends_them(suite):
+    result = suite(
+        """
+        boxes = []
+        def test_three(ur_box_factory):
+            boxes.extend(ur_box_factory(seed=k) for k in range(3))
+            assert len({box.serial_number for box in boxes}) == 3
+            assert len({box.ports.primary for box in boxes}) == 3
+        def test_they_have_ended():
+            import pytest
+            from ur_emulator.errors import NotRunningError
+            for box in boxes:
+                with pytest.raises(NotRunningError):
+                    box.power_on()
+        """
+    )
+    result.assert_outcomes(passed=2)
+
+
+def test_a_failing_test_shows_the_log_of_its_box(suite):
+    result = suite(
+        """
+        def test_fails(ur_box):
+            ur_box.add_to_log("the last words of the box")
+            assert False
+        def test_passes(ur_box):
+            ur_box.add_to_log("nobody wants to know")
+        """
+    )
+    result.assert_outcomes(failed=1, passed=1)
+    result.stdout.fnmatch_lines(
+        ["*log of the box at 127.0.0.1:*", "*INFO Control: the last words of the box"]
+    )
+    result.stdout.no_fnmatch_line("*nobody wants to know*")
+
+
+@pytest.mark.parametrize(
+    ("mark", "words"),
+    [
+        ('robot="ur9"', "*no box: *ur9*"),
+        ("colour=1", "*a box has no colour: choose from robot, version*"),
+        ('"ur5"', "*takes keywords only*"),
+        ('programs="nowhere"', "*no box: *nowhere*"),
+    ],
+)
+def test_a_wrong_mark_is_one_line(suite, mark, words):
+    result = suite(
+        f"""
+        import pytest
+        @pytest.mark.ur({mark})
+        def test_never(ur_box):
+            pass
+        """
+    )
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines([words])
+    result.stdout.no_fnmatch_line("*Traceback*")
+
+
+def test_the_command_line_names_defaults(suite):
+    result = suite(
+        """
+        import pytest
+        def test_default(ur_box):
+            assert (ur_box.identity["robot"], ur_box.identity["software"]) == ("UR10", "3.5.0")
+        @pytest.mark.ur(robot="ur3")
+        def test_named(ur_box):
+            assert (ur_box.identity["robot"], ur_box.identity["software"]) == ("UR3", "3.5.0")
+        """,
+        "--ur-robot=ur10",
+        "--ur-version=3.5.0",
+    )
+    result.assert_outcomes(passed=2)
+
+
+needs_loopback = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has all of 127.0.0.0/8")
+
+STANDARD = """
+    import socket, pytest
+    @pytest.mark.ur(standard_ports=True)
+    @pytest.mark.parametrize("k", range(6))
+    def test_standard(ur_box, ur_box_factory, k):
+        other = ur_box_factory(standard_ports=True)
+        assert ur_box.host != other.host
+        for box in (ur_box, other):
+            assert (box.ports.dashboard, box.ports.primary, box.ports.rtde) == (29999, 30001, 30004)
+            with socket.create_connection((box.host, 29999), timeout=20) as sock:
+                assert sock.recv(100).startswith(b"Connected")
+    """
+
+
+@needs_loopback
+def test_boxes_with_standard_ports_have_addresses_of_their_own(suite):
+    suite(STANDARD).assert_outcomes(passed=6)
+
+
+@needs_loopback
+def test_parallel_workers_never_collide(suite):
+    pytest.importorskip("xdist")
+    suite(STANDARD, "-n", "2").assert_outcomes(passed=6)
+
+
+def test_workers_look_for_addresses_in_blocks_of_their_own(monkeypatch):
+    blocks = set()
+    for worker in ("", *(f"gw{n}" for n in range(150))):
+        monkeypatch.setenv("PYTEST_XDIST_WORKER", worker)
+        addresses = list(_own_addresses())
+        assert len(set(addresses)) == len(addresses)
+        blocks.add(addresses[0].split(".")[1])
+    assert len(blocks) == 151
+
+
+def test_a_mark_takes_what_a_box_takes():
+    assert set(OPTIONS) == set(BoxOptions.__annotations__) | {"standard_ports"}
+
+
+def test_the_plug_in_loads_nothing_heavy():
+    heavy = {"mujoco", "numpy", "lark", "protocol", "ur_emulator.emulator"}
+    code = f"import sys, ur_emulator.pytest_plugin; print(*sorted({heavy!r} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
