@@ -33,8 +33,8 @@ class RtdeField:
         type: its data type.
         unit: SI unit, "enum", "bits" or "-".
         since: first software of each generation that has it.
-        filled: how the emulated box fills an output; None for an input, and for an output that no software
-            of the emulated generation has.
+        filled: how the emulated box fills an output; None for an input, and for an output of late e-Series
+            software that it does not answer.
         meaning: what the value says, and its frame of reference.
         comes_from: attribute of the snapshot, such as "actual_q" or "registers.output_integers[3]"; empty if
             `constant` is what the box sends.
@@ -100,13 +100,14 @@ def _fixed(
     constant: float | int,
     meaning: str,
     source: str = "UR RTDE guide",
+    since: Since = _BASE,
 ) -> RtdeField:
     """An output behind which nothing is simulated."""
-    return RtdeField(name, kind, unit, _BASE, _CONSTANT, meaning, "", constant, source)
+    return RtdeField(name, kind, unit, since, _CONSTANT, meaning, "", constant, source)
 
 
 def _e_series(name: str, kind: RtdeType, unit: str, meaning: str, since: Since = _UNPUBLISHED) -> RtdeField:
-    """An output that no CB3 has."""
+    """An output that no CB3 has and this box never answers."""
     return RtdeField(name, kind, unit, since, None, meaning)
 
 
@@ -222,9 +223,9 @@ OUTPUTS: tuple[RtdeField, ...] = (
     _out("tcp_force_scalar", _F64, "N", _MODELLED, "norm of the force part of actual_TCP_force"),
     *_register_outputs("output", _BASE),
     *_register_outputs("input", _REGISTERS_SINCE),
-    _e_series("tool_output_mode", _U8, "enum", "0 digital, 1 dual-pin power", _E_TOOL_SINCE),
-    _e_series("tool_digital_output0_mode", _U8, "enum", "1 sink, 2 source, 3 push-pull", _E_TOOL_SINCE),
-    _e_series("tool_digital_output1_mode", _U8, "enum", "1 sink, 2 source, 3 push-pull", _E_TOOL_SINCE),
+    _fixed("tool_output_mode", _U8, "enum", 0, "0 digital, 1 dual-pin power", since=_E_TOOL_SINCE),
+    _fixed("tool_digital_output0_mode", _U8, "enum", 1, "1 sink, 2 source, 3 push-pull", since=_E_TOOL_SINCE),
+    _fixed("tool_digital_output1_mode", _U8, "enum", 1, "1 sink, 2 source, 3 push-pull", since=_E_TOOL_SINCE),
     _out("payload", _F64, "kg", _MODELLED, "mass of the payload", since=_PAYLOAD_SINCE),
     _out("payload_cog", _VEC3, "m", _MODELLED, "x y z of its centre of gravity in the flange frame",
          since=_PAYLOAD_SINCE),
@@ -232,7 +233,8 @@ OUTPUTS: tuple[RtdeField, ...] = (
          since=_INERTIA_SINCE),
     _out("script_control_line", _U32, "-", _MODELLED, "line of the main thread of the program, 0 without one",
          since=_SCRIPT_LINE_SINCE),
-    _e_series("ft_raw_wrench", _VEC6, "N, Nm", "force sensor without compensation", since(None, (5, 9))),
+    _out("ft_raw_wrench", _VEC6, "N, Nm", _MODELLED, "force sensor, here as actual_TCP_force",
+         since=since(None, (5, 9)), comes_from="actual_tcp_force"),
     _e_series("actual_robot_energy_consumed", _F64, "J", "energy consumed"),
     _e_series("actual_robot_braking_energy_dissipated", _F64, "J", "energy dissipated in braking"),
     _e_series("encoder0_raw", _I32, "-", "tick count of conveyor encoder 0"),
@@ -283,8 +285,10 @@ INPUTS: tuple[RtdeField, ...] = (
 
 @cache
 def output_fields(version: SoftwareVersion) -> Mapping[str, RtdeField]:
-    """Outputs that software `version` has, by name."""
-    return MappingProxyType({field.name: field for field in OUTPUTS if field.since.covers(version)})
+    """Outputs that a box with software `version` answers, by name."""
+    return MappingProxyType(
+        {field.name: field for field in OUTPUTS if field.filled and field.since.covers(version)}
+    )
 
 
 @cache

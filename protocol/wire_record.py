@@ -39,7 +39,7 @@ class Since:
 
     def __str__(self) -> str:
         return " / ".join(
-            f"{first.major}.{first.minor}" if first else "-" for first in (self.cb3, self.e_series)
+            str(first).removesuffix(".0") if first else "-" for first in (self.cb3, self.e_series)
         )
 
 

@@ -248,6 +248,6 @@ def test_a_snapshot_that_does_not_fit_is_explained():
 
 
 def test_variables_that_nothing_fills_have_no_encoder():
-    field = next(field for field in OUTPUTS if field.name == "ft_raw_wrench")
-    with pytest.raises(LocalProtocolError, match="ft_raw_wrench"):
+    field = next(field for field in OUTPUTS if field.name == "control_step")
+    with pytest.raises(LocalProtocolError, match="control_step"):
         snapshot_encoder([field], b"")

@@ -151,8 +151,8 @@ class Story(Bench):
         self.tick(20, Push((0.0, 0.0, 0.0)))
 
     def be_stopped(self):
-        self.tick(50, safe.ReducedMode(True))
-        self.start(ENDLESS)
+        self.tick(50, safe.ReducedMode(True), cmd.SetSpeedSlider(1.0))
+        self.start(ENDLESS.replace("a=3, v=1.5", "a=8, v=3"))  # more than reduced mode allows
         self.tick(60)
         self.tick(50, safe.SafeguardStop(True))
         self.tick(20, safe.SafeguardStop(False))

@@ -1,0 +1,195 @@
+"""The page docs/protocol/primary.md, made from the tables of sub-packages and messages.
+
+python -m protocol.primary_page > docs/protocol/primary.md
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+from protocol.capture import StreamDecoder
+from protocol.layout_text import type_name
+from protocol.page_parts import MARKS, example, table
+from protocol.primary_layout import SUB_PACKAGES
+from protocol.primary_messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
+from protocol.primary_packages import (
+    SECONDARY_MESSAGES,
+    encode_message_package,
+    state_size,
+)
+from protocol.primary_values import value_codes
+from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import ALWAYS, WireField, wire_fields
+
+_V3_15 = SoftwareVersion(3, 15, 8)
+# The first software of each size of a state.
+_SIZES = tuple(
+    SoftwareVersion(*pair)
+    for pair in ((3, 0), (3, 1), (3, 2), (3, 3), (3, 5), (3, 10), (5, 0), (5, 1), (5, 4))
+)
+
+_INTRODUCTION = """\
+# Primary and secondary interface: ports 30001, 30002, 30011 and 30012
+
+Made from `protocol/primary_layout.py` and `protocol/primary_messages.py` by `make docs`.
+
+What the teach pendant itself listens to: ten times a second the whole state of the robot in sub-packages, and
+between the states, on 30001 only, messages: what programs print, when they start, pause, end and fail, error
+codes, changes of the safety mode, popups and questions, global variables. All four ports send states;
+30001 and 30002 take scripts ([scripts.md](scripts.md)), 30011 and 30012 ignore what they are sent. urx
+lives on 30002, ur_modern_driver and the maker's client library on 30001.
+
+A package is its size (32 bits, itself included), a type byte and a body, all big-endian. A state is a row of
+sub-packages with a header like that of a package. Readers skip what they do not know by its size.
+
+## On connect
+
+| | package | bytes in 3.15 | from |
+|---|---|---|---|
+| 1 | version message, a segment of its own: some clients read only once | {version} | |
+| 2 | startup message, undocumented | 24 | |
+| 3 | safety tolerances, undocumented: type 24, 22 floats | 181 | 3.10 |
+| 4 | the first state, with kinematics and configuration | {first} | |
+| 5 | 30001 and 30011: names and values of the running program's global variables | from 16 on | |
+
+Then states without kinematics and configuration ({later} bytes). These two come again in the first state
+after the brakes have opened.
+"""
+
+_MESSAGES = """\
+## Messages
+
+Package type 20: time stamp in microseconds since the controller started (a multiple of the cycle, all ones
+for none), source, message type, fields. On the secondary ports only {secondary}.
+
+* Sources: {sources}.
+* Levels of errors: {levels}. Codes print as `C<code>A<argument>`.
+* Wanted answers: {wanted}.
+"""
+
+# When the box sends each message, by its name.
+_WHEN = {
+    "TextMessage": "`textmsg`",
+    "ProgramLabelMessage": "up to 3.2: a `$` line was passed",
+    "PopupMessage": "`popup`, and the dashboard's",
+    "VersionMessage": "on connect",
+    "SafetyModeMessage": "the safety mode has changed",
+    "ErrorCodeMessage": "a protective stop, a violation, a fault, a warning, a refused command",
+    "KeyMessage": "a program has started, paused or stopped; a `sec` program has failed",
+    "RequestValueMessage": "`request_..._from_primary_client`",
+    "RuntimeExceptionMessage": "a program did not compile, died or could not be started",
+    "StartupMessage": "on connect",
+    "ProgramThreadsMessage": "from 3.3: a thread has passed a `$` line",
+}
+
+_VARIABLES = """\
+## Global variables
+
+Package type 25, on 30001 and 30011. Sub-type 0 gives the names of a program's `global` variables when it
+starts, sub-type 1 the values that have changed, ten times a second and at the end. A value is a type code
+and then: strings a length of 16 bits and the text; a pose six 32-bit floats; a list its length and its
+values; a matrix its rows, its columns and its values. Codes:
+"""
+
+
+def render() -> str:
+    """Return the page."""
+    greeting = encode_message_package(version_message(_V3_15), _V3_15)
+    introduction = _INTRODUCTION.format(
+        version=len(greeting), first=state_size(_V3_15, first=True), later=state_size(_V3_15, first=False)
+    )
+    decoded = StreamDecoder(_V3_15).feed(greeting)
+    messages = _MESSAGES.format(
+        secondary=" and ".join(message.__name__ for message in SECONDARY_MESSAGES),
+        sources=_numbers(MessageSource),
+        levels=_numbers(ReportLevel),
+        wanted=_numbers(RequestedType),
+    )
+    return "\n".join(
+        (
+            introduction,
+            "## Try it\n",
+            example("python -m protocol decode primary --live 127.0.0.1", decoded),
+            "\n`--count 4` shows the first state too; `decode FILE` reads captured bytes.\n",
+            "## Sizes of a state\n",
+            *table(("from software", "first", "later"), map(_size_row, _SIZES)),
+            "\n## Sub-packages of a state\n",
+            MARKS,
+            "In the order of the wire.\n",
+            *_sub_packages(),
+            messages,
+            *_message_rows(),
+            "",
+            _VARIABLES,
+            *_codes(),
+            "",
+        )
+    )
+
+
+def _size_row(version: SoftwareVersion) -> tuple[object, ...]:
+    first, later = state_size(version, first=True), state_size(version, first=False)
+    return f"{version.major}.{version.minor}", first, later
+
+
+def _sub_packages() -> Iterator[str]:
+    for record in SUB_PACKAGES:
+        notes = [_first_line(record)]
+        if record.FIRST_STATE_ONLY:
+            notes.append("In the first state, and after the brakes have opened.")
+        if record.SINCE.cb3 != SoftwareVersion(3, 0):
+            notes.append(f"From {record.SINCE}.")
+        yield f"### {record.SUB_TYPE} {record.__name__}\n"
+        yield " ".join(notes) + "\n"
+        yield from table(
+            ("field", "type", "unit", "filled", "meaning", "from"),
+            (
+                (f"`{f.name}`", type_name(f), f.unit, f.filled.value if f.filled else "", f.note, _since(f))
+                for f in wire_fields(record)
+            ),
+        )
+        yield ""
+
+
+def _since(field: WireField) -> str:
+    """First software of a field that came after its record."""
+    return "" if field.since == ALWAYS else str(field.since)
+
+
+def _message_rows() -> Iterator[str]:
+    yield from table(
+        ("type", "message", "sent when", "fields (from software)"),
+        (
+            (message.MESSAGE_TYPE, message.__name__, _WHEN[message.__name__], _fields(message))
+            for message in MESSAGES
+        ),
+    )
+
+
+def _fields(record: type[Any]) -> str:
+    return ", ".join(
+        f"`{field.name}` {type_name(field)}" + (f" ({_since(field)})" * bool(_since(field)))
+        for field in wire_fields(record)
+    )
+
+
+def _codes() -> Iterator[str]:
+    columns = [value_codes(SoftwareVersion(3, minor)) for minor in (2, 3, 14)]
+    yield from table(
+        ("type", "up to 3.2", "from 3.3", "from 3.14"),
+        ((kind.value, *(codes.get(kind, "-") for codes in columns)) for kind in columns[-1]),
+    )
+
+
+def _numbers(names: Any) -> str:
+    return ", ".join(f"{int(one)} {one.name}" for one in names)
+
+
+def _first_line(record: type[Any]) -> str:
+    return (record.__doc__ or "").strip().splitlines()[0]
+
+
+if __name__ == "__main__":
+    sys.stdout.write(render())

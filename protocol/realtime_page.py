@@ -1,0 +1,92 @@
+"""The page docs/protocol/realtime.md, made from the table of columns.
+
+python -m protocol.realtime_page > docs/protocol/realtime.md
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+
+from protocol.page_parts import MARKS, example, table
+from protocol.realtime_columns import COLUMNS, VERSIONS, RealtimeColumn
+from protocol.realtime_layout import layout_for_version
+from protocol.ur_types import SoftwareVersion
+
+_NEWEST = SoftwareVersion(5, 10)  # its frame is the longest: all columns
+
+_INTRODUCTION = """\
+# Realtime interface: ports 30003 and 30013
+
+Made from `protocol/realtime_columns.py` by `make docs`.
+
+The oldest way to watch a robot at full rate, and still the simplest: connect, and a frame comes in every
+control cycle (125 a second; nothing is greeted, nothing has to be asked for). Drivers of the first
+generation, data loggers and MATLAB read it, and they write script lines into the same socket
+([scripts.md](scripts.md)); nothing is answered there. Port 30013 sends the same and ignores what it is sent.
+
+A frame is its size in bytes (a 32-bit integer, itself included) and then 64-bit floats, all big-endian. There
+is no type and no version: the size is the only hint. A frame of an older version is the beginning of a newer
+one. A client that does not read loses whole frames, never parts, and holds up nobody.
+"""
+
+_SAMPLE = (
+    "byte 0: realtime frame, 1140 bytes",
+    "  timestamp                    60.968 s",
+    "  target_q                     [0.3944, -1.7645, -2.0996, -0.103, 1.295, 1.857] rad",
+    "  target_qd                    [0, 0, 0, 0, 0, 0] rad/s",
+    "  target_qdd                   [0, 0, 0, 0, 0, 0] rad/s2",
+    "  ...",
+)
+
+_NOTES = """\
+* The two words of digital bits travel as floats: 5.0 is bits 0 and 2. Three public clients read them as
+  integers and get nonsense, as they do from a real robot.
+* Gnuplot columns, as in the maker's sheets, count floats from 1.
+* Frames before 3.0 hold the same values in another order, `python -m protocol layout realtime --version 1.8`
+  prints it.
+"""
+
+
+def render() -> str:
+    """Return the page."""
+    sizes = ((f"{v.major}.{v.minor}", size) for v, size in VERSIONS)
+    return "\n".join(
+        (
+            _INTRODUCTION,
+            "## Try it\n",
+            example("python -m protocol decode realtime --live 127.0.0.1", _SAMPLE),
+            "\n`decode FILE` does the same with captured bytes.\n",
+            "## Sizes\n",
+            *table(("from software", "bytes"), sizes),
+            "\n## Columns\n",
+            MARKS,
+            *table(("byte", "column", "name", "floats", "unit", "filled", "meaning", "from"), _rows()),
+            "",
+            _NOTES.rstrip() + "\n",
+        )
+    )
+
+
+def _rows() -> Iterator[tuple[object, ...]]:
+    layout = layout_for_version(_NEWEST)
+    column = 1
+    for row in COLUMNS:
+        yield (
+            layout.offset(row), column, f"`{row.name}`", row.count, row.unit, row.filled.value, row.meaning,
+            _first(row),
+        )  # fmt: skip
+        column += row.count
+
+
+def _first(row: RealtimeColumn) -> str:
+    """First software of each generation whose frames hold the column."""
+    firsts = (
+        next((v for v, size in VERSIONS if v.major in majors and size >= row.since_size), None)
+        for majors in ((3,), (5,))
+    )
+    return " / ".join(f"{first.major}.{first.minor}" if first else "-" for first in firsts)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(render())

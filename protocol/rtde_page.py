@@ -1,0 +1,150 @@
+"""The page docs/protocol/rtde.md, made from the tables of variables, states and types.
+
+python -m protocol.rtde_page > docs/protocol/rtde.md
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from itertools import groupby
+
+from protocol.capture import RtdeDecoder
+from protocol.dashboard_connection import Role
+from protocol.page_parts import MARKS, example, table
+from protocol.rtde_codec import MAX_NAMES_SIZE, data_header
+from protocol.rtde_connection import MAX_REQUEST_SIZE, RtdeConnection
+from protocol.rtde_fields import INPUTS, OUTPUTS, RtdeField
+from protocol.rtde_messages import PackageType, Request, RequestProtocolVersion, SetupOutputs, Start
+from protocol.rtde_recipe import Recipe
+from protocol.rtde_types import RobotStatusBits, RtdeType, SafetyStatusBits
+from protocol.ur_types import SoftwareVersion
+
+_INTRODUCTION = f"""\
+# RTDE: port 30004
+
+Made from `protocol/rtde_fields.py` and `protocol/rtde_types.py` by `make docs`.
+
+The interface for programs of today: a client names the variables that it wants and how often, and gets just
+these in binary packages; it may also write inputs, which programs on the robot read. ur_rtde, the maker's
+client library and its Python client, fieldbus gateways and loggers use it.
+
+A package is its size (16 bits, itself included), a type byte and a payload, all big-endian. A connection
+begins in protocol version 1; `V` asks for version 2, which every client of today does.
+
+| type | client to robot | robot to client |
+|---|---|---|
+| `V` | wanted protocol version | accepted or not |
+| `v` | | software: major, minor, bugfix, build |
+| `O` | rate (version 2 only) and names of outputs | recipe number (version 2 only), a type for each name |
+| `I` | names of inputs | recipe number, a type for each name |
+| `S`, `P` | start, pause | accepted |
+| `U` | recipe number, values of inputs | recipe number (version 2 only), values of outputs |
+| `M` | text | text; only before the box ends a connection |
+
+* Every request gets exactly one reply, in order; nothing is said unasked before the reply to `S`.
+* Rates are whole divisions of 125 a second: 60 asked for are 62.5, 1 to 125 are possible.
+* One output recipe a connection, the last one counts. Input recipes: up to 255, numbered from 1.
+* A name that the software does not have is answered `NOT_FOUND`, an input that another connection has taken
+  `IN_USE`; either makes the whole recipe void (number 0). Inputs are free again as soon as their owner's
+  connection ends.
+* Inputs are taken at any time, also before `S`, and act in the next control cycle; the last value stays. A
+  package that is too long or too short is used as far as whole leading values go.
+* Data that a client does not read is dropped in whole packages. Names take {MAX_NAMES_SIZE} bytes at most,
+  a package {MAX_REQUEST_SIZE}; what cannot be RTDE ends the connection, with a text that says why.
+* A program may watch that an input is written often enough (`rtde_set_watchdog`), and may take
+  `external_force_torque` in place of the estimated force (`enable_external_ft_sensor`).
+"""
+assert {chr(kind) for kind in PackageType} == set("VvOISPUM")
+
+_OUTPUTS = """\
+## Outputs
+
+*From* gives the first software of CB3 and e-Series; before it, and where it is "-", the answer is
+`NOT_FOUND`. Variables of late e-Series software that are not listed are not answered in any version.
+"""
+
+_INPUTS = """\
+## Inputs
+
+Masks say which of the values act; those that they leave out are never looked at. The registers are read by
+programs (`read_input_integer_register` and its kin) and can be read back as outputs.
+"""
+
+
+def render() -> str:
+    """Return the page."""
+    return "\n".join(
+        (
+            _INTRODUCTION,
+            "## Try it\n",
+            _example(),
+            "\nOf a box that runs; `decode rtde FILE --names ...` reads what was captured from one.\n",
+            _OUTPUTS,
+            MARKS,
+            *table(("name", "type", "unit", "filled", "meaning", "from"), _output_rows()),
+            "",
+            *_bits("robot_status_bits", RobotStatusBits),
+            *_bits("safety_status_bits", SafetyStatusBits),
+            "",
+            _INPUTS,
+            *table(("name", "type", "unit", "meaning", "from"), _input_rows()),
+            "",
+        )
+    )
+
+
+def _output_rows() -> Iterator[tuple[object, ...]]:
+    for name, field in _grouped(OUTPUTS):
+        if field.filled:
+            yield f"`{name}`", field.type.value, field.unit, field.filled.value, field.meaning, field.since
+
+
+def _input_rows() -> Iterator[tuple[object, ...]]:
+    for name, field in _grouped(INPUTS):
+        yield f"`{name}`", field.type.value, field.unit, field.meaning, field.since
+
+
+def _grouped(fields: tuple[RtdeField, ...]) -> Iterator[tuple[str, RtdeField]]:
+    """Rows, the many registers of one kind as one."""
+
+    def kind(field: RtdeField) -> tuple[object, ...]:
+        return re.sub(r"_\d+$", "", field.name), field.type, field.since, field.meaning
+
+    for (stem, *_), group in groupby(fields, kind):
+        first, *others = group
+        last = re.search(r"\d+$", others[-1].name) if others else None
+        yield f"{first.name} ... {last[0]}" if last else first.name, first
+        assert last or stem
+
+
+def _bits(name: str, bits: type[RobotStatusBits] | type[SafetyStatusBits]) -> Iterator[str]:
+    names = ", ".join(
+        f"{bit.bit_length() - 1} {bit.name.lower().replace('_', ' ')}" for bit in bits if bit.name
+    )
+    yield f"* `{name}`: {names}."
+
+
+def _example() -> str:
+    """A session as `decode` prints it; the robot's side is our own."""
+    names = ("timestamp", "actual_q", "safety_status")
+    recipe = Recipe(names, (RtdeType.DOUBLE, RtdeType.VECTOR6D, RtdeType.INT32))
+    pc, robot = RtdeConnection(Role.PC), RtdeConnection(Role.ROBOT, SoftwareVersion(3, 15, 8))
+    requests: tuple[Request, ...] = (RequestProtocolVersion(2), SetupOutputs(names, 10.0), Start())
+    sent = b""
+    for request in requests:
+        robot.receive_data(pc.send(request))
+        robot.next_event()
+        reply = robot.reply()
+        pc.receive_data(reply)
+        pc.next_event()
+        sent += reply
+    sent += data_header(recipe.size, 1)
+    sent += recipe.encode((63.536, (0.3944052, -1.7645076, -2.0996064, -0.1029924, 1.295028, 1.857006), 1))
+    command = f"python -m protocol decode rtde --live 127.0.0.1 --names {','.join(names)}"
+    return example(command, RtdeDecoder(names).feed(sent))
+
+
+if __name__ == "__main__":
+    sys.stdout.write(render())
