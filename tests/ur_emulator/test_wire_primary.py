@@ -8,6 +8,7 @@ from box_support import Bench
 
 from protocol import primary_layout as L
 from protocol import primary_messages as M
+from protocol.controller_words import CONTROLLER_WORDS
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary_packages import (
     MAX_PACKAGE_SIZE,
@@ -27,6 +28,7 @@ from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.servers.event_messages import message_for
 from ur_emulator.servers.primary_port import PrimaryPort
+from ur_emulator.servers.program_intake import SPEED_WORD, WORDS
 from ur_emulator.servers.robot_state import StateEncoder, dexterity, setup_records
 
 V3_15 = SoftwareVersion(3, 15, 8)
@@ -207,6 +209,10 @@ def test_a_collision_names_the_joint_that_strains():
         strained = list(currents)
         strained[joint] *= -1.1
         assert hardest_joint(robot, tuple(strained)) == joint
+
+
+def test_every_word_of_the_table_is_known_to_the_box():
+    assert {word.text for word in CONTROLLER_WORDS} == {*WORDS, SPEED_WORD}
 
 
 # --- what states say of the arm

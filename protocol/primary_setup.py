@@ -1,0 +1,112 @@
+"""Sub-packages of the robot state that do not change while a box lives, in the form of `primary_layout`.
+
+Two of them, the first, come in the first state of a connection only and after the brakes have opened.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from protocol.filled import Filled
+from protocol.primary_sub_package import SubPackage
+from protocol.wire_record import Since, since, wire
+
+__all__ = [
+    "CalibrationData",
+    "ConfigurationData",
+    "KinematicsInfo",
+    "ToolCommunicationInfo",
+    "ToolModeInfo",
+]
+
+_PROPERTY, _CONSTANT, _ZERO = Filled.PROPERTY, Filled.CONSTANT, Filled.INTERNAL_ZERO
+
+
+@dataclass(frozen=True, slots=True)
+class KinematicsInfo(SubPackage):
+    """Denavit-Hartenberg parameters of this very arm; clients make their calibration check from it."""
+
+    SUB_TYPE: ClassVar[int] = 5
+    FIRST_STATE_ONLY: ClassVar[bool] = True
+
+    checksum: tuple[int, ...] = wire(
+        "I", "all ones on simulators", count=6, default=0xFFFFFFFF, filled=_PROPERTY
+    )
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
+    calibration_status: int = wire("I", filled=_CONSTANT)
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigurationData(SubPackage):
+    """Limits, defaults and nominal kinematics; the order of the DH columns differs from KinematicsInfo."""
+
+    SUB_TYPE: ClassVar[int] = 6
+    FIRST_STATE_ONLY: ClassVar[bool] = True
+
+    joint_min_limit: tuple[float, ...] = wire(
+        "d", count=6, unit="rad", interleaved="limits", default=0.0, filled=_PROPERTY
+    )
+    joint_max_limit: tuple[float, ...] = wire(
+        "d", count=6, unit="rad", interleaved="limits", default=0.0, filled=_PROPERTY
+    )
+    joint_max_speed: tuple[float, ...] = wire(
+        "d", count=6, unit="rad/s", interleaved="rates", default=0.0, filled=_PROPERTY
+    )
+    joint_max_acceleration: tuple[float, ...] = wire(
+        "d", count=6, unit="rad/s2", interleaved="rates", default=40.0, filled=_CONSTANT
+    )
+    v_joint_default: float = wire("d", unit="rad/s", default=1.0471975511965976, filled=_CONSTANT)
+    a_joint_default: float = wire("d", unit="rad/s2", default=1.3962634015954636, filled=_CONSTANT)
+    v_tool_default: float = wire("d", unit="m/s", default=0.25, filled=_CONSTANT)
+    a_tool_default: float = wire("d", unit="m/s2", default=1.2, filled=_CONSTANT)
+    eq_radius: float = wire("d", unit="m", default=0.25, filled=_CONSTANT)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
+    masterboard_version: int = wire(
+        "i", "6 in a UR5e capture; the CB3 value is unknown", default=6, filled=_CONSTANT
+    )
+    controller_box_type: int = wire("i", "4 UR5, 5 UR10, 6 UR3", default=6, filled=_PROPERTY)
+    robot_type: int = wire("i", "RobotType", default=3, filled=_PROPERTY)
+    robot_sub_type: int = wire("i", "1 CB2, 2 CB3, 3 e-Series", default=2, filled=_PROPERTY)
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationData(SubPackage):
+    """Internal."""
+
+    SUB_TYPE: ClassVar[int] = 9
+
+    wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", default=0.0, filled=_ZERO)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolCommunicationInfo(SubPackage):
+    """Serial line at the tool, e-Series."""
+
+    SUB_TYPE: ClassVar[int] = 11
+    SINCE: ClassVar[Since] = since(None, (5, 0))
+
+    is_enabled: bool = wire("?", default=False, filled=_CONSTANT)
+    baud_rate: int = wire("i", default=115200, filled=_CONSTANT)
+    parity: int = wire("i", "0 none, 1 odd, 2 even", filled=_CONSTANT)
+    stop_bits: int = wire("i", default=1, filled=_CONSTANT)
+    rx_idle_chars: float = wire("f", default=1.5, filled=_CONSTANT)
+    tx_idle_chars: float = wire("f", default=3.5, filled=_CONSTANT)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolModeInfo(SubPackage):
+    """Digital outputs at the tool, e-Series."""
+
+    SUB_TYPE: ClassVar[int] = 12
+    SINCE: ClassVar[Since] = since(None, (5, 1))
+
+    output_mode: int = wire("B", "0 digital, 1 dual-pin power", filled=_CONSTANT)
+    digital_output_mode0: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, filled=_CONSTANT)
+    digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, filled=_CONSTANT)
