@@ -10,6 +10,9 @@ All errors of a program are collected, the first one in the text is raised.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Final
+
 from urscript import nodes
 from urscript.assignment import find_unsure
 from urscript.call_graph import mark_recursion, spread_blocking
@@ -27,6 +30,9 @@ from urscript.nodes import Block, Expression, Statement
 from urscript.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Source, Span
 from urscript.walk import all_expressions, all_statements, child_expressions, own_blocks, own_expressions
+
+MOST_SUGGESTIONS: Final = 40
+"""Unknown names of one program for which another one is suggested."""
 
 
 def resolve(
@@ -75,6 +81,7 @@ class _Resolver:
         self.catalogue = catalogue
         self.dialect = dialect
         self.errors: list[ScriptCompileError] = []
+        self._n_unknown = 0
 
     def resolve(self, block: Block) -> ResolvedProgram:
         self.program = program = self._open(block)
@@ -218,7 +225,9 @@ class _Resolver:
             hint = f"'{name}' is a function, call it as {name}(...)"
             self._error(ScriptNameError(name, hint=hint), span)
         else:
-            self._unknown(name, span, [*scope.locals, *self.program.globals, *self.catalogue.variables])
+            self._unknown(
+                name, span, lambda: [*scope.locals, *self.program.globals, *self.catalogue.variables]
+            )
 
     def _call(self, call: nodes.Call, scope: FunctionScope, runs_in: FunctionScope) -> None:
         if not self._argument_order(call.arguments):
@@ -230,8 +239,9 @@ class _Resolver:
             return
         builtin = self.catalogue.lookup(call.function)
         if builtin is None:
-            known = [*scope.visible_functions(), *self.catalogue.names]
-            self._unknown(call.function, call.span, known)
+            self._unknown(
+                call.function, call.span, lambda: [*scope.visible_functions(), *self.catalogue.names]
+            )
             return
         self.program.builtins.add(call.function)
         runs_in.blocks = runs_in.blocks or builtin.may_wait
@@ -243,7 +253,7 @@ class _Resolver:
     def _run(self, run: nodes.Run, scope: FunctionScope) -> None:
         callee = scope.find_function(run.thread)
         if callee is None:
-            self._unknown(run.thread, run.span, list(scope.visible_functions()))
+            self._unknown(run.thread, run.span, lambda: list(scope.visible_functions()))
         elif callee.node is not None and callee.node.parameters:
             self._error(ScriptTypeError(f"cannot run {run.thread}: a thread takes no parameters"), run.span)
 
@@ -270,8 +280,10 @@ class _Resolver:
 
     # --- reporting ---------------------------------------------------------------------------------------
 
-    def _unknown(self, name: str, span: Span, known: list[str]) -> None:
-        alike = self.catalogue.suggest(name, known)
+    def _unknown(self, name: str, span: Span, known: Callable[[], list[str]]) -> None:
+        self._n_unknown += 1
+        # Looking for names that look alike takes a while; who has so many wrong ones has another problem.
+        alike = self.catalogue.suggest(name, known()) if self._n_unknown <= MOST_SUGGESTIONS else None
         hint = f"did you mean '{alike}'?" if alike else None
         name_only = Span(span.line, span.column, span.line, span.column + len(name))
         self._error(ScriptNameError(name, hint=hint), name_only)
