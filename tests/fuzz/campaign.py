@@ -18,7 +18,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "ur_emulator"))
 from dashboard_support import write_programs
 from fuzz_box import run
 
-CASES_OF_A_BOX = 5000
+# Kinds of boxes, one after the other: most cases between few cycles, some with time for programs and stops.
+BOXES = (
+    (4000, {"lively": False}),
+    (20_000, {"lively": False, "cycle_share": 0.015}),
+    (4000, {"lively": True}),
+    (20_000, {"lively": True, "cycle_share": 0.015}),
+)
 
 
 def main():
@@ -36,13 +42,14 @@ def main():
             if cases.total() >= options.cases or time.monotonic() - started > options.minutes * 60:
                 break
             try:
-                cases += run(random.Random(seed), folder, CASES_OF_A_BOX, lively=bool(seed % 2))
+                n_cases, kind = BOXES[seed % len(BOXES)]
+                cases += run(random.Random(seed), folder, n_cases, **kind)
             except Exception:
                 n_failures += 1
                 print(f"box {seed} failed:\n{traceback.format_exc()}", flush=True)
                 if not options.keep_on:
                     break
-            if seed % 20 == 19:
+            if seed % 4 == 3:
                 memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
                 took = time.monotonic() - started
                 print(f"{seed}: {cases.total()} cases, {took:.0f} s, {memory} MB at most", flush=True)

@@ -8,6 +8,7 @@ import math
 import time
 from collections import Counter, deque
 from concurrent.futures import Future
+from functools import lru_cache
 from types import SimpleNamespace
 
 from box_support import FakeNetwork
@@ -23,9 +24,14 @@ from protocol.rtde_messages import RequestProtocolVersion, SetupOutputs, Start
 from protocol.script_channel import MAX_LINE, MAX_PROGRAM
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator import ControlBox
+from ur_emulator.controller import commands as cmd
+from ur_emulator.controller import safety_commands as safe
+from ur_emulator.controller.hands import HangLoad, Push
 from ur_emulator.servers.connection import OUTBOX_LIMIT
 from ur_emulator.servers.modbus_codec import ModbusCodec
 from ur_emulator.servers.modbus_server import MAX_INBOX
+from ur_emulator.servers.rtde_port import MAX_WAITING as MAX_RTDE_WAITING
+from urscript import compile_program
 
 # Hostile clients of one port at a time.
 MAX_HOSTILE = 5
@@ -34,6 +40,9 @@ _PERIOD = 0.008  # s
 _GIVES_WAY = 0.02
 # Cycles in which an honest question has to be answered.
 _PATIENCE = 200
+# Looks at a box that does not work until it is repaired.
+_OUT_OF_WORK = 15
+SIGN_OF_LIFE = compile_program("def alive():\n  sync()\nend\n")
 _CHECK_EVERY = 40  # cycles between the slower checks
 ASK_MODBUS = bytes.fromhex("000700000006010301020001")  # register 258, robot mode
 ASK_HTTP = b"GET /v1/state HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
@@ -91,15 +100,16 @@ class FuzzBox:
         trail: the last steps, for the report of a failure.
     """
 
-    def __init__(self, rng, folder, *, lively):
+    def __init__(self, rng, folder, *, lively, cycle_share=0.1):
         """Make a box.
 
         Args:
             rng: decides everything.
             folder: of program files.
             lively: programs may move the arm; False: nothing that is sent may.
+            cycle_share: how many of the steps are cycles; these cost the time.
         """
-        self.rng, self.lively = rng, lively
+        self.rng, self.lively, self.cycle_share = rng, lively, cycle_share
         self.cases, self.trail = Counter(), deque(maxlen=300)
         self.now = 0.0
         self.box = box = ControlBox(
@@ -108,6 +118,8 @@ class FuzzBox:
         box._loop._wake = lambda: None
         box._intake.close()
         box._intake._worker = _AtOnce()
+        # Most of the time would go into compiling the same programs again and again.
+        box._intake._translate = lru_cache(maxsize=300)(box._intake._translate)
         box._access._worker = _AtOnce()
         box.on_shut_down = lambda: None
         self.served, self.pacer = box._box, _Pacer()
@@ -124,7 +136,7 @@ class FuzzBox:
         self.numbers = itertools.count(50_000)
         self.hostile = {name: {} for name in self.ports}
         self.sent_lines = Counter()
-        self.n_published = 0
+        self.n_published = self.n_out_of_work = self.n_repairs = 0
         self.witnesses = {name: self._connect(name) for name in self.ports}
         self.readers = {name: READERS[name]() for name in self.ports}
         for name in ("primary", "primary_ro", "secondary", "secondary_ro"):
@@ -135,6 +147,12 @@ class FuzzBox:
 
     def _connect(self, name):
         return Wire(self.loop, self.ports[name], self.served.backlog, next(self.numbers))
+
+    def join(self, name):
+        """Add a hostile client of a port; return it and the reader of what it gets."""
+        wire = self._connect(name)
+        reader = self.hostile[name][wire] = READERS[name]()
+        return wire, reader
 
     def close(self):
         for wires in self.hostile.values():
@@ -148,9 +166,13 @@ class FuzzBox:
     def step(self):
         """Let something happen."""
         kind = self.rng.random()
-        if kind < 0.06:
+        if kind < self.cycle_share:
             self.cycle()
-        elif kind < 0.07:
+            works = self.controller.snapshot.robot_mode == RobotMode.RUNNING
+            self.n_out_of_work = 0 if works else self.n_out_of_work + 1
+            if self.n_out_of_work > _OUT_OF_WORK:
+                self.repair()
+        elif kind < 1.1 * self.cycle_share:
             self.heartbeat()
         else:
             self.attack(self.rng.choice(tuple(self.ports)))
@@ -159,8 +181,7 @@ class FuzzBox:
         """Let a client of a port do something."""
         rng, wires = self.rng, self.hostile[name]
         if not wires or (len(wires) < MAX_HOSTILE and rng.random() < 0.1):
-            wire = self._connect(name)
-            wires[wire] = READERS[name]()
+            wire, _ = self.join(name)
             self._did(name, "open", wire)
             return
         wire = rng.choice(tuple(wires))
@@ -194,6 +215,8 @@ class FuzzBox:
         else:
             pieces = [data[i : i + 1] for i in range(len(data))]
         for piece in pieces:
+            if not piece or not wire.is_open or wire.connection.has_ended:
+                return
             wire.send(piece)
             self._did(name, piece, wire)
 
@@ -211,7 +234,51 @@ class FuzzBox:
 
     def cycle(self):
         """A control cycle, or several, and a look at everything."""
-        for _ in range(self.rng.choice((1, 1, 1, 1, 5))):
+        for _ in range(self.rng.choice((1, 1, 1, 1, 1, 12))):
+            self._advance(ticks=True)
+        self._look()
+
+    def repair(self):
+        """Do what an operator does until the arm works again, and let a program run."""
+        self.n_out_of_work = 0
+        self.n_repairs += 1
+        for name in (
+            "dashboard",
+            "control",
+            "modbus",
+        ):  # a thousand lines that wait to be obeyed are not over yet
+            for wire in self.hostile[name]:
+                wire.reset()
+        self.turn()
+        commands = [
+            safe.ReleaseEmergencyStop(),
+            safe.SafeguardStop(False),
+            cmd.StopProgram(),
+            Push((0.0, 0.0, 0.0)),
+            HangLoad(0.0, (0.0, 0.0, 0.0)),
+        ]
+        self._order(20, *commands)
+        if self.controller.snapshot.safety_mode == SafetyMode.PROTECTIVE_STOP:
+            self._order(640)
+            self._order(20, cmd.UnlockProtectiveStop())
+        if self.controller.snapshot.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
+            self._order(200, cmd.RestartSafety())
+        self._order(300, cmd.PowerOn())
+        self._order(100, cmd.ReleaseBrakes())
+        if not self.lively:  # a moved arm may stand where it cannot work
+            now = self.controller.snapshot
+            assert now.robot_mode == RobotMode.RUNNING, (
+                f"it cannot be repaired: {RobotMode(now.robot_mode).name}, {SafetyMode(now.safety_mode).name}, "
+                f"{[entry.text for entry in self.served.log.entries[-8:]]}"
+            )
+            self._order(1, cmd.StartProgram(SIGN_OF_LIFE))
+            assert self.controller.programs.latest.program is SIGN_OF_LIFE, "no program starts any more"
+
+    def _order(self, n_cycles, *commands):
+        for command in commands:
+            self.trail.append(("order", command))
+            self.served.submit(command)
+        for _ in range(n_cycles):
             self._advance(ticks=True)
         self._look()
 
@@ -319,7 +386,8 @@ class FuzzBox:
                 assert connection._pending <= OUTBOX_LIMIT + 4096, name
         assert all(connection.is_open for connection in self.served.backlog)
         for session in self.ports["rtde"]._sessions.values():
-            assert session.is_lost or len(session.protocol._buffer) <= MAX_REQUEST_SIZE
+            assert session.is_lost or len(session.protocol._buffer) <= 2 * MAX_REQUEST_SIZE
+            assert len(session.inbox) <= MAX_RTDE_WAITING
             assert len(session.protocol.input_recipes) <= 255
             assert len(session.protocol._outputs) <= 255
         assert set(self.ports["rtde"]._owners.values()) <= set(self.ports["rtde"].clients)
@@ -363,9 +431,9 @@ class FuzzBox:
         assert len(self.loop.watched) == len(self.ports)  # those of the honest clients
 
 
-def run(rng, folder, n_cases, *, lively):
+def run(rng, folder, n_cases, **options):
     """Fuzz one box; return the cases by port. An error has the last steps as a note."""
-    fuzz = FuzzBox(rng, folder, lively=lively)
+    fuzz = FuzzBox(rng, folder, **options)
     try:
         while fuzz.cases.total() < n_cases:
             started = time.perf_counter()
@@ -375,7 +443,7 @@ def run(rng, folder, n_cases, *, lively):
         fuzz.settle()
     except BaseException as error:
         lines = [repr(step)[:2000] for step in tuple(fuzz.trail)[-40:]]
-        error.add_note(f"lively={lively} cases={fuzz.cases.total()}; last steps:\n" + "\n".join(lines))
+        error.add_note(f"{options} cases={fuzz.cases.total()}; last steps:\n" + "\n".join(lines))
         raise
     finally:
         fuzz.close()

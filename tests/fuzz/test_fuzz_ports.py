@@ -10,7 +10,6 @@ from box_support import FrameReader, connect
 from dashboard_support import Dashboard, write_programs
 from fuzz_box import FuzzBox, run
 from fuzz_corpus import MESSAGES, mutate
-from fuzz_replies import READERS
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
@@ -43,8 +42,7 @@ def test_no_bytes_harm_a_box_that_works(folder, seed):
 
 def test_the_harness_notices_an_arm_that_moves(folder):
     fuzz = FuzzBox(random.Random(1), folder, lively=False)
-    client = fuzz._connect("secondary")
-    fuzz.hostile["secondary"][client] = READERS["secondary"]()
+    client, _ = fuzz.join("secondary")
     fuzz.send("secondary", client, b"movej([0, -1.57, 1.57, 0, 0, 0])\n")
     with pytest.raises(AssertionError, match="the arm moved"):
         repeat(fuzz.cycle, 200)
@@ -56,6 +54,30 @@ def test_the_harness_notices_an_error_of_a_port(folder, monkeypatch):
     monkeypatch.setattr(fuzz.ports["rtde"], "_answer", lambda *args: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         repeat(lambda: fuzz.attack("rtde"), 2000)
+    fuzz.close()
+
+
+def test_a_flood_of_rtde_requests_is_answered_over_many_cycles(folder):
+    """64 KiB of the shortest request once held the loop for half a second."""
+    fuzz = FuzzBox(random.Random(1), folder, lively=False)
+    (client, reader), n_requests = fuzz.join("rtde"), 2000
+    client.send(b"\x00\x03P" * n_requests)
+    fuzz.turn()
+    reader.feed(client.take())
+    assert 0 < reader.n_replies < 100
+    repeat(fuzz.cycle, n_requests // reader.n_replies + 5)
+    assert reader.n_replies == n_requests
+    fuzz.close()
+
+
+def test_rtde_packages_that_come_faster_than_they_are_looked_at_end_the_connection(folder):
+    fuzz = FuzzBox(random.Random(1), folder, lively=False)
+    client, _ = fuzz.join("rtde")
+    for _ in range(20):
+        client.send(b"\x00\x03P" * 20_000)
+        fuzz.turn()
+    assert not client.is_open
+    fuzz.cycle()
     fuzz.close()
 
 

@@ -23,6 +23,13 @@ from ur_emulator.servers.connection import Connection
 SOURCE = "RTDE"
 # The one variable that costs something to find: only looked up once a client has asked for it.
 _SCRIPT_LINE = "script_control_line"
+# What one client may cost in one go, more would keep the control cycle waiting: about 1 ms. A unit is what a
+# data package costs; bytes that make no sense cost as they are taken apart, in portions.
+_BUDGET = 256
+_REQUEST_COST = 8
+_PORTION, _PORTION_COST = 4 * 1024, 64
+# Bytes of a client that may wait for that; who sends more, and faster, is cut off.
+MAX_WAITING = 256 * 1024
 
 
 class RtdePort:
@@ -44,6 +51,7 @@ class RtdePort:
         self._sessions: dict[Connection, _Session] = {}
         self._streams: tuple[_Session, ...] = ()
         self._owners: dict[str, Connection] = {}
+        self._behind: dict[_Session, None] = {}
 
     @property
     def clients(self) -> tuple[Connection, ...]:
@@ -59,10 +67,30 @@ class RtdePort:
         session = self._sessions[connection]
         if session.is_lost:
             return
-        protocol = session.protocol
-        protocol.receive_data(data)
+        session.inbox += data
+        if len(session.inbox) > MAX_WAITING:
+            connection.close()
+        elif session not in self._behind:
+            self._serve(session)
+
+    def _serve(self, session: _Session) -> None:
+        """Look at some packages; the rest waits for the next cycle."""
+        connection, protocol = session.connection, session.protocol
+        self._behind.pop(session, None)
         try:
-            while connection.is_open and (event := protocol.next_event()) is not None:
+            budget = _BUDGET
+            while budget > 0:
+                if not connection.is_open:
+                    return
+                event = protocol.next_event()
+                if event is None:
+                    if not session.inbox:
+                        return
+                    protocol.receive_data(bytes(session.inbox[:_PORTION]))
+                    del session.inbox[:_PORTION]
+                    budget -= _PORTION_COST
+                    continue
+                budget -= 1
                 match event:
                     case DataReceived(_, names, values):
                         self._submit(WriteInputs(tuple(zip(names, values, strict=True))))
@@ -70,14 +98,20 @@ class RtdePort:
                         pass
                     case _:
                         self._answer(connection, event)
+                        budget -= _REQUEST_COST
+            if connection.is_open:
+                self._behind[session] = None
         except RemoteProtocolError as problem:
             session.is_lost = True
+            session.inbox.clear()
             connection.send(protocol.say(TextMessage(str(problem), SOURCE, TextLevel.ERROR)))
             connection.close_when_sent()
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; its input variables are free at once."""
-        self._sessions.pop(connection, None)
+        session = self._sessions.pop(connection, None)
+        if session is not None:
+            self._behind.pop(session, None)
         self._owners = {name: owner for name, owner in self._owners.items() if owner is not connection}
         self._find_streams()
 
@@ -91,6 +125,9 @@ class RtdePort:
                 if package is None:
                     package = packages[encode] = encode(snapshot)
                 session.connection.send(package)
+        if self._behind:
+            for session in tuple(self._behind):
+                self._serve(session)
 
     def say(self, event: Event) -> None:
         """Nothing is said unasked: clients read one package after a request, whatever it is."""
@@ -120,12 +157,14 @@ class _Session:
 
     Attributes:
         encode: makes its data packages; None while it gets none. Sessions with the same recipe have the same.
+        inbox: bytes that were not looked at yet.
         is_lost: what comes from it makes no sense any more; it is told so, then the connection ends.
     """
 
     def __init__(self, connection: Connection, protocol: RtdeConnection) -> None:
         self.protocol = protocol
         self.encode: Callable[[Snapshot], bytes] | None = None
+        self.inbox = bytearray()
         self.is_lost = False
         self.connection = connection
         self._divisor = 1
