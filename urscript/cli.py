@@ -6,11 +6,12 @@ wrongly. docs/urscript-tool.md shows all of it.
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Iterable
 from difflib import unified_diff
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -30,6 +31,8 @@ from urscript.formatter import format_program
 from urscript.lint_rules import RULES, ScriptWarning
 from urscript.run_command import run
 from urscript.source import Source, as_utf8
+
+_GC_THRESHOLD: Final = (100_000, 20, 100)
 
 app = typer.Typer(
     help="URScript without a robot.", no_args_is_help=True, add_completion=False, rich_markup_mode=None
@@ -148,4 +151,6 @@ def _write_bytes(text: str) -> None:
 
 def main() -> None:
     """Entry point of the console script."""
+    # Trees of long programs are no garbage: a third of the time would go into looking for some.
+    gc.set_threshold(*_GC_THRESHOLD)
     app()
