@@ -14,7 +14,8 @@ OUTBOX_LIMIT = 64 * 1024
 # Kernel buffer for sending: small, so that a slow reader gets fresh data and a silent one costs little
 # memory.
 SEND_BUFFER = 64 * 1024
-_READ_SIZE = 64 * 1024
+# Bytes taken from a client in a turn of the loop: 64 KiB of script lines would hold up a cycle for 100 ms.
+_READ_SIZE = 8 * 1024
 # A peer that is silent is asked whether it is still there, first after a minute; one that lost its power or
 # its cable is forgotten after two. Where the system has no such options, after two hours.
 _KEEP_ALIVE = [
