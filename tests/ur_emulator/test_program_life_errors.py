@@ -153,7 +153,9 @@ def test_the_secondary_port_tells_of_nothing():
             self.sent = (*self.sent, package)
 
     bench, client = Bench(), Client()
-    port = PrimaryPort(VERSION, bench.controller, None, StateEncoder(VERSION), all_messages=False)
+    port = PrimaryPort(
+        VERSION, bench.controller, None, StateEncoder(VERSION, bench.controller.state.arm), all_messages=False
+    )
     port.opened(client)
     greeting = [
         type(decode_package(package[: int.from_bytes(package[:4], "big")], VERSION))

@@ -60,7 +60,11 @@ class PortBench(Bench):
     def __init__(self, version=VERSION, *, all_messages=True):
         super().__init__(fidelity="ideal")
         self.port = PrimaryPort(
-            version, self.controller, None, StateEncoder(version), all_messages=all_messages
+            version,
+            self.controller,
+            None,
+            StateEncoder(version, self.controller.state.arm),
+            all_messages=all_messages,
         )
 
     def tick(self, n=1, *commands):
