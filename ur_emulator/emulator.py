@@ -144,7 +144,9 @@ class ControlBox(BoxOperations):
         # In the order in which they hear of a cycle: first those whose clients act on it.
         self._port_objects: dict[str, Port] = {
             "realtime": RealtimePort(software, self._intake),
-            "rtde": RtdePort(identity.version._replace(build=BUILD), controller, self._box.submit),
+            "rtde": RtdePort(
+                identity.version._replace(build=BUILD), controller, self._box.submit, self._box.announce
+            ),
             "primary": PrimaryPort(software, controller, self._intake, states, all_messages=True),
             "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
             "dashboard": DashboardPort(

@@ -15,7 +15,7 @@ from protocol.rtde_types import TextLevel
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller.commands import Command, WriteInputs
 from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import Event
+from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.servers.connection import Connection
 
@@ -36,7 +36,11 @@ class RtdePort:
     """Streams data packages and takes inputs."""
 
     def __init__(
-        self, version: SoftwareVersion, controller: Controller, submit: Callable[[Command], None]
+        self,
+        version: SoftwareVersion,
+        controller: Controller,
+        submit: Callable[[Command], None],
+        announce: Callable[[Event], None] = lambda event: None,
     ) -> None:
         """Prepare for clients.
 
@@ -44,10 +48,12 @@ class RtdePort:
             version: given to clients that ask; decides which variables there are.
             controller: told when a client wants the script line, otherwise left alone.
             submit: takes a command for the next cycle.
+            announce: takes what clients want in the log.
         """
         self._version = version
         self._controller = controller
         self._submit = submit
+        self._announce = announce
         self._sessions: dict[Connection, _Session] = {}
         self._streams: tuple[_Session, ...] = ()
         self._owners: dict[str, Connection] = {}
@@ -94,8 +100,9 @@ class RtdePort:
                 match event:
                     case DataReceived(_, names, values):
                         self._submit(WriteInputs(tuple(zip(names, values, strict=True))))
-                    case TextMessage():
-                        pass
+                    case TextMessage(text, source):
+                        self._announce(LogAdded(source or SOURCE, " ".join(text.split())))
+                        budget -= _REQUEST_COST
                     case _:
                         self._answer(connection, event)
                         budget -= _REQUEST_COST
