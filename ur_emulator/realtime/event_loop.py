@@ -7,7 +7,6 @@ next.
 
 from __future__ import annotations
 
-import gc
 import select
 import selectors
 import socket
@@ -17,6 +16,8 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
+
+from ur_emulator.realtime.garbage import settled_heap
 
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
 # microseconds.
@@ -30,8 +31,6 @@ _SELECT_LIMIT = 1024
 _EAGER_TIME = 200e-6
 # Most waits in a row that are not tried eagerly after failures.
 _LONGEST_PAUSE = 32
-# Collect garbage rarely: a full collection over a large heap costs more than a cycle has to spare.
-_GC_THRESHOLD = (50_000, 20, 100)
 
 
 _Ready = tuple[selectors.SelectorKey, int]
@@ -131,18 +130,16 @@ class EventLoop:
 
     def run(self) -> None:
         """Run until `stop`. An exception in a callback or a service ends the loop and is raised here."""
-        gc.collect()
-        gc.freeze()
-        gc.set_threshold(*_GC_THRESHOLD)
         self.is_running = True
         self._thread = threading.get_ident()
         try:
-            while not self._stopping:
-                now = time.monotonic()
-                deadline = now + 1.0
-                for service in tuple(self._services):
-                    deadline = min(deadline, service.advance(now))
-                self._dispatch(deadline)
+            with settled_heap():
+                while not self._stopping:
+                    now = time.monotonic()
+                    deadline = now + 1.0
+                    for service in tuple(self._services):
+                        deadline = min(deadline, service.advance(now))
+                    self._dispatch(deadline)
         finally:
             self.is_running = False
             self._thread = 0
