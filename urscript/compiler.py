@@ -162,21 +162,25 @@ class _FunctionCompiler:
         # Only the variables of the program body are the same in another function: they are global.
         for piece in long_blocks.pieces(block) if self._scope is self._program.main else [block]:
             if len(piece) > 1 and piece is not block:
-                result.append(self._part(piece))
+                result.extend(self._part(piece))
                 continue
             for statement in piece:
                 result.extend(self._statement(statement))
         return result or [ast.Pass(**place(_first_span(block)))]
 
-    def _part(self, piece: Block) -> ast.stmt:
+    def _part(self, piece: Block) -> list[ast.stmt]:
         """A function of its own for a piece of the program body; returns the call of it."""
         stored, self._globals_stored = self._globals_stored, {"_b"}
-        body = [made for statement in piece for made in self._statement(statement)]
-        declared = ast.Global(sorted(self._globals_stored), **place(piece[0].span))
-        self._globals_stored = stored
+        made = [(statement.span, self._statement(statement)) for statement in piece]
+        body = [each for _, some in made for each in some]
+        span = next((span for span, some in made if some), None)
+        globals_stored, self._globals_stored = self._globals_stored, stored
+        if span is None:  # definitions only
+            return []
         name = f"{long_blocks.PART}{len(self._parts)}"
-        self._parts.append(long_blocks.part(name, [declared, *body], piece[0].span))
-        return long_blocks.call_of(name)
+        declared = ast.Global(sorted(globals_stored), **place(span))
+        self._parts.append(long_blocks.part(name, [declared, *body], span))
+        return [long_blocks.call_of(name, span)]
 
     def _statement(self, statement: Statement) -> list[ast.stmt]:
         span, scope = statement.span, self._scope

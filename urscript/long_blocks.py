@@ -18,10 +18,6 @@ PART: Final = "main_"
 LONGEST: Final = 60
 """Statements of a piece, those in its blocks included. Python compiles them in less than a millisecond."""
 
-NO_PLACE: Final = Span(-1, 0, -1, 0)
-"""Where the calls of the pieces stand: nowhere, so that tracing does not see them."""
-
-
 def pieces(block: Block) -> Iterator[Block]:
     """The statements of `block` in order, in pieces that can stand alone; the last one never does.
 
@@ -57,10 +53,10 @@ def part(name: str, body: list[ast.stmt], span: Span) -> ast.FunctionDef:
     return function(name, [], [body[0], never, *body[1:]], span)
 
 
-def call_of(name: str) -> ast.stmt:
+def call_of(name: str, span: Span) -> ast.stmt:
     """`yield from name()`."""
-    at = place(NO_PLACE)
-    made = ast.Call(load(name, NO_PLACE), [], [], **at)
+    at = place(span)
+    made = ast.Call(load(name, span), [], [], **at)
     return ast.Expr(ast.YieldFrom(made, **at), **at)
 
 
