@@ -18,8 +18,8 @@ import psutil
 from protocol.ur_types import Ports
 
 START_LIMIT = 30.0  # s
-# Away from the standard ports, so that a box or a simulator that runs there is not disturbed.
-PORT_BASE = 5000
+# Away from the standard ports, where a box may run, and from those that the kernel gives to clients.
+PORT_BASE = 31_100
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 from rich.progress import track
@@ -16,11 +17,15 @@ from protocol.frame_buffer import FrameBuffer
 from protocol.realtime_layout import MAX_FRAME_SIZE, layout_for_size
 
 PERIOD = 0.008  # s
+# What starts and takes memory is a box with everything switched on.
+_PROGRAMS = Path(__file__).parent.parent / "examples" / "scripts"
+_CONTROL_PORT = 31_090
 
 
 def measure_realtime(minutes: float) -> dict[str, float]:
     """Attach one client for so many minutes; compare arrivals with the grid on which the earliest lie."""
-    with box_process("--seed", "7") as box:
+    everything = ("--programs", str(_PROGRAMS), "--control-port", str(_CONTROL_PORT))
+    with box_process("--seed", "7", *everything) as box:
         timer = subprocess.Popen(
             [sys.executable, bare_timer.__file__, str(minutes * 60.0)], stdout=subprocess.PIPE, text=True
         )
