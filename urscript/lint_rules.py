@@ -75,6 +75,9 @@ CALL_WITHOUT_HANDLE: Final = Rule(
     "a method is called where nothing has methods",
     "only what rpc_factory returns has any; lists and texts have functions instead",
 )
+REFUSED_ARGUMENT: Final = Rule(
+    "W116", "a builtin gets an argument that it refuses", "the call fails when it is reached"
+)
 
 RULES: Final = (
     UNUSED_GLOBAL,
@@ -92,6 +95,7 @@ RULES: Final = (
     CALL_OF_PROGRAM,
     UNUSED_VALUE,
     CALL_WITHOUT_HANDLE,
+    REFUSED_ARGUMENT,
 )
 
 

@@ -34,6 +34,7 @@ class WatchedMove:
         end: Seconds at which its instruction ended.
         calls: How many calls it is.
         completed: False when something ended it before it was done.
+        in_main: The thread is the body of the program.
     """
 
     name: str
@@ -44,6 +45,7 @@ class WatchedMove:
     end: float
     calls: int = 1
     completed: bool = True
+    in_main: bool = True
 
     @property
     def duration(self) -> float:
@@ -94,7 +96,9 @@ class MoveWatch:
         line = sys._getframe(1).f_lineno
         start = self._clock()
         arguments = dict(zip(parameters, values, strict=False))
-        move = WatchedMove(name, arguments, thread.name, line, start, start, completed=False)
+        move = WatchedMove(
+            name, arguments, thread.name, line, start, start, completed=False, in_main=thread.parent is None
+        )
         try:
             result = yield from function(thread, *values)
             move.completed = True

@@ -86,7 +86,8 @@ class TextStory:
         where = f" {_rounded(goal)}" if goal is not None else ""
         calls = f" in {move.calls} calls" if move.calls > 1 else ""
         broken = "" if move.completed else ", broken off"
-        what = f"line {move.line}: {move.name}{where}, {move.duration:g} s{calls}{broken}"
+        thread = f" ({move.thread})" if not move.in_main else ""
+        what = f"line {move.line}{thread}: {move.name}{where}, {move.duration:g} s{calls}{broken}"
         show(f"{move.start:9.3f} s  {what}")
 
     def call(self, time: float, thread: str, name: str, arguments: Sequence[Any]) -> None:

@@ -106,6 +106,8 @@ def test_a_stream_ends_where_the_program_stops_calling(run):
 def test_threads_beside_the_moving_one_are_told_in_between(run):
     text = "def p():\n  thread t():\n    sleep(0.1)\n    textmsg(1)\n  end\n  run t()\n"
     lines = run(f"{text}  movej({HOME})\n  textmsg(2)\nend\n").stdout.splitlines()
+    mover = run(f"{text.replace('textmsg(1)', f'movej({HOME})')}  sleep(5)\nend\n").stdout.splitlines()[0]
+    assert "s  line 4 (t): movej " in mover
     assert [lines[0], lines[1][13:27], lines[2]] == ["1", "line 7: movej ", "2"]
 
 

@@ -75,6 +75,14 @@ WARNED = {
         (body("i = 0", "i++", "textmsg(i)"), "3:3 a value is computed and not used"),
         (body('"text"'), "2:3 a value is computed and not used"),
     ],
+    "W116": [
+        (body("movej([0, -1.57, 0 -1.57, 0, 0])"), "2:9 movej: Parameter 'q' must be a Pose on the form p[x,y,z,a,b,c] or a list of 6 joint positions, got a list of 5"),
+        (body("x = 1", "movej([x, x, x], a=1)"), "3:9 movej: Parameter 'q' must be"),
+        (body("set_tcp([0, 0, 0, 0, 0, 0])"), "2:11 set_tcp: Parameter must be a Pose on the form p[x,y,z,a,b,c]"),
+        (body('sleep("1")'), "2:9 sleep: Parameter 't' must be a number"),
+        (body("set_standard_digital_out(9, True)"), "2:28 set_standard_digital_out: Parameter 'n' must be in the range 0 to 7, got 9"),
+        (body("set_standard_digital_out(0, 1)"), "2:31 set_standard_digital_out: Parameter 'b' must be True or False, got the int 1"),
+    ],
     "W115": [(body("x = [1]", "x.append(2)"), "3:3 nothing in this program has a method 'append'")],
     "W113": [("def f():\n  sync()\nend\nf()\n", "4:1 'f' runs when it is defined; this call is a program of its own and fails")],
 }  # fmt: skip
@@ -127,6 +135,11 @@ FINE = {
     "W111": [body("def f():", "def g():", "end", "g()", "end", "def h():", "def g():", "end", "g()", "end", "f()", "h()")],
     "W112": [body("thread t():", "end", "run t()")],
     "W114": [body("x = [1]", "x[0] == 1 textmsg(x)".replace("==", "=")), body("def f():", "return 1", "end", "f()"), body("thread t():", "end", "run t()")],
+    "W116": [
+        body("x = 1", "movej([x, x, x, x, x, x])", "movel(p[x, 0, 0, 0, 0, 0], t=x)", "set_tcp(p[0, 0, 0, 0, 0, 0])"),
+        body("def sleep(t):", "return t", "end", 'sleep("1")'),
+        body("speedl([0, 0, 0, 0, 0, 0], 1, t=0.1)", "set_payload(0.5)", "set_payload(0.5, [0, 0, 0])", "textmsg([[1, 2], [3, 4]])"),
+    ],
     "W115": [body('x = rpc_factory("xmlrpc", "http://a")', "x.append(2)")],
     "W113": ["def f(a):\n  textmsg(a)\nend\nf(1)\n", "def f():\n  sync()\nend\n"],
 }  # fmt: skip
