@@ -4,17 +4,24 @@ import pytest
 from clients_support import served_box
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def box(tmp_path_factory):
     """A CB3 with software 3.15 in real time, shared: a test leaves it able to run the next one."""
     with served_box(tmp_path_factory.mktemp("box")) as served:
         yield served
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def old_box(tmp_path_factory):
     """A CB3 with software 3.4."""
     with served_box(tmp_path_factory.mktemp("old_box"), "--version", "3.4.0") as served:
+        yield served
+
+
+@pytest.fixture
+def lockstep_box(tmp_path):
+    """A box whose time stands still while a program waits for its PC."""
+    with served_box(tmp_path, "--pace", "lockstep") as served:
         yield served
 
 
@@ -25,9 +32,9 @@ def fresh_box(tmp_path):
         yield served
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def ur_rtde_interfaces(box):
-    """ur_rtde's control and receive interfaces, connected once for all tests."""
+    """ur_rtde's control and receive interfaces, connected once for all tests of a file."""
     from ur_rtde_support import Arm, RTDEControl, RTDEReceive
 
     arm = Arm(box=box, receive=RTDEReceive(box.host), control=RTDEControl(box.host))

@@ -134,6 +134,11 @@ class StrictRtde:
         assert reply == b"\1"
         self.is_streaming = False
 
+    def catch_up(self):
+        """Begin the stream anew: what has come meanwhile is thrown away."""
+        self.pause()
+        assert self.start()
+
     def data(self):
         """Return the next data package as values by name; texts are kept aside."""
         while True:

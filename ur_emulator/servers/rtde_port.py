@@ -101,7 +101,7 @@ class RtdePort:
                     case DataReceived(_, names, values):
                         self._submit(WriteInputs(tuple(zip(names, values, strict=True))))
                     case TextMessage(text, source):
-                        self._announce(LogAdded(source or SOURCE, " ".join(text.split())))
+                        self._announce(LogAdded(" ".join(source.split()) or SOURCE, " ".join(text.split())))
                         budget -= _REQUEST_COST
                     case _:
                         self._answer(connection, event)

@@ -1,0 +1,268 @@
+"""Two drivers in C++ that no package index has, as own small programs with their wire formats and habits."""
+
+import socket
+import struct
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from clients_support import TIMEOUT, connect
+from driver_patterns import (
+    CANCELLED,
+    DONE,
+    IDLE,
+    REVERSE,
+    SCALE,
+    SERVOJ,
+    SPEEDJ,
+    SPEEDL,
+    STOP,
+    TRAJECTORY_START,
+    DriverServers,
+    headless_driver,
+)
+from primary_wire import KEY, VERSION_MESSAGE, PrimaryWire
+from strict_rtde import StrictRtde
+
+OUTPUTS = (
+    "timestamp",
+    "target_q",
+    "target_qd",
+    "target_TCP_pose",
+    "target_TCP_speed",
+    "actual_q",
+    "runtime_state",
+    "payload",
+)
+STOPPED, PLAYING = 1, 2
+
+
+@contextmanager
+def driver(box):
+    """A driver as it starts: RTDE, servers, primary client, upload in one write, three connections."""
+    with StrictRtde(box) as rtde, DriverServers() as servers, PrimaryWire(box) as primary:
+        rtde.want(*OUTPUTS)
+        rtde.start()
+        first = primary.package()
+        assert first[0] == 20
+        primary.write(headless_driver("127.0.0.1", *servers.ports))
+        servers.accept()
+        rtde.catch_up()
+        yield rtde, servers
+        servers.send(STOP)
+        assert servers.is_dropped()
+        rtde.until(lambda v: v["runtime_state"] == STOPPED)
+
+
+def test_servo_set_points_are_followed(box):
+    with driver(box) as (rtde, servers):
+        start = np.array(rtde.data()["target_q"])
+        for n in range(125):
+            rtde.data()
+            servers.send(SERVOJ, np.add(start, [0.1 * (1 - np.cos(np.pi * n / 125)) / 2, 0, 0, 0, 0, 0]))
+        goal = np.add(start, [0.1, 0, 0, 0, 0, 0])
+        for _ in range(250):
+            servers.send(SERVOJ, goal)
+            if np.allclose(rtde.data()["target_q"], goal, atol=1e-4):
+                break
+        else:
+            raise AssertionError("the set-point was not reached")
+
+
+def test_joint_and_tool_speeds(box):
+    with driver(box) as (rtde, servers):
+        for _ in range(60):
+            values = rtde.data()
+            servers.send(SPEEDJ, (-0.3, 0, 0, 0, 0, 0.2))
+        assert np.allclose(values["target_qd"], (-0.3, 0, 0, 0, 0, 0.2), atol=1e-6)
+        for _ in range(60):
+            values = rtde.data()
+            servers.send(SPEEDL, (0, 0, 0.05, 0, 0, 0))
+        assert np.allclose(values["target_TCP_speed"], (0, 0, 0.05, 0, 0, 0), atol=1e-3)
+        servers.send(IDLE)
+        rtde.until(lambda v: not any(v["target_qd"]))
+
+
+def test_a_trajectory_with_blends_and_one_that_is_cancelled(box):
+    with driver(box) as (rtde, servers):
+        start = np.array(rtde.data()["target_q"])
+        offsets = (0.1, 0.2, 0.1, 0.0)
+        servers.forward(TRAJECTORY_START, len(offsets))
+        for offset in offsets:
+            servers.point(np.add(start, [0, 0, 0, 0, 0, offset]), 0.2, 0.02)
+        assert servers.result() == DONE
+        values = rtde.until(lambda v: not any(v["target_qd"]))
+        assert np.allclose(values["target_q"], start, atol=1e-5)
+        servers.send(IDLE, timeout_ms=0)
+        servers.forward(TRAJECTORY_START, 1)
+        servers.point(np.add(start, [0, 0, 0, 0, 0, 1.0]), 4.0)
+        rtde.until(lambda v: v["target_qd"][5] > 0.05)
+        servers.send(IDLE, timeout_ms=0)
+        assert servers.result() == CANCELLED
+        values = rtde.until(lambda v: not any(v["target_qd"]))
+        assert 0.0 < values["target_q"][5] - start[5] < 0.9
+
+
+def test_script_commands(box):
+    with driver(box) as (rtde, servers):
+        servers.send(IDLE, timeout_ms=0)
+        servers.tell(1, 750_000, 0, 0, 40_000)
+        rtde.until(lambda v: v["payload"] == 0.75)
+        servers.tell(1, 0)
+        rtde.until(lambda v: v["payload"] == 0.0)
+
+
+@pytest.mark.parametrize("mode", [SERVOJ, SPEEDJ, IDLE])
+def test_silence_ends_the_program(box, mode):
+    """As long as was said with the last message, and not before."""
+    with driver(box) as (rtde, servers):
+        q = rtde.data()["target_q"]
+        servers.send(mode, q if mode == SERVOJ else (0,) * 6, timeout_ms=200)
+        last = rtde.data()["timestamp"]
+        ended = rtde.until(lambda v: v["runtime_state"] == STOPPED)["timestamp"]
+        assert 0.19 < ended - last < 0.45
+        assert servers.is_dropped()
+
+
+def test_unreachable_set_points_leave_the_joints_where_they_are(box):
+    with driver(box) as (rtde, servers):
+        start = rtde.data()["target_q"]
+        for _ in range(10):
+            servers.send(SERVOJ, start, timeout_ms=0)
+            rtde.data()
+        before = rtde.until(lambda v: max(map(abs, v["target_qd"])) < 1e-9)["target_q"]
+        for _ in range(10):
+            servers.send(SERVOJ, [q + 3.0 for q in start], timeout_ms=0)
+            after = rtde.data()["target_q"]
+        assert struct.pack("6f", *after) == struct.pack("6f", *before)
+
+
+def test_a_second_upload_replaces_the_first(box):
+    with driver(box) as (rtde, first), DriverServers() as second:
+        first.send(IDLE, timeout_ms=0)
+        with connect(box, "primary") as sock:
+            sock.sendall(headless_driver("127.0.0.1", *second.ports).encode())
+            second.accept()
+        assert first.is_dropped()
+        second.send(IDLE, timeout_ms=0)
+        rtde.until(lambda v: v["runtime_state"] == PLAYING)
+        second.send(STOP)
+        assert second.is_dropped()
+        first.send = lambda *a, **k: None  # its program is gone
+        rtde.until(lambda v: v["runtime_state"] == STOPPED)
+
+
+# --- the older driver
+
+
+def test_its_first_read_holds_the_version(box):
+    """One read of 512 bytes: the message comes first and whole."""
+    with connect(box, "primary") as sock:
+        data = sock.recv(512)
+        size, kind = struct.unpack_from(">iB", data)
+        assert kind == 20
+        assert size <= len(data)
+        data = data[:size]
+        _, _, number, length = struct.unpack_from(">QbBB", data, 5)
+        assert number == VERSION_MESSAGE
+        name = data[16 : 16 + length]
+        assert name == b"URControl"
+        major, minor, bugfix = struct.unpack_from(">BBi", data, 16 + length)
+        assert (major, minor, bugfix) == (3, 15, 8)
+        assert len(data[16 + length + 10 :]) <= 20
+
+
+@pytest.mark.parametrize(
+    ("version", "port", "size"), [("3.15.8", "realtime", 1140), ("3.4.0", "realtime", 1060)]
+)
+def test_one_read_is_one_realtime_package(box, old_box, version, port, size):
+    served = box if version == "3.15.8" else old_box
+    with connect(served, port) as sock:
+        for _ in range(50):
+            # A read that comes late finds more than one package, but always whole ones.
+            data = sock.recv(1 << 16)
+            assert len(data) % size == 0
+            assert struct.unpack_from(">i", data)[0] == size
+
+
+def test_a_stream_of_one_line_programs_is_one_motion(box):
+    """`speedj` once a cycle on the realtime port: no braking between them."""
+    with StrictRtde(box) as rtde, connect(box, "realtime") as script:
+        rtde.want("timestamp", "target_qd", "target_q")
+        rtde.start()
+        speeds = []
+        for _ in range(125):
+            script.sendall(b"speedj([0.2, 0, 0, 0, 0, -0.1], 4.0, 0.1)\n")
+            speeds.append(rtde.data()["target_qd"])
+        reached = next(n for n, qd in enumerate(speeds) if abs(qd[0] - 0.2) < 1e-9)
+        assert all(abs(qd[0] - 0.2) < 1e-9 and abs(qd[5] + 0.1) < 1e-9 for qd in speeds[reached:])
+        script.sendall(b"stopj(10)\n")
+        rtde.until(lambda v: not any(v["target_qd"]))
+
+
+def test_a_secondary_program_sets_outputs_while_another_moves(box):
+    with StrictRtde(box) as rtde, connect(box, "realtime") as script:
+        rtde.want("timestamp", "target_qd", "actual_digital_output_bits", "runtime_state")
+        rtde.start()
+        script.sendall(
+            b"def turn():\n\twhile True:\n\t\tspeedj([0.1, 0, 0, 0, 0, 0], 1.0, 0.1)\n\tend\nend\n"
+        )
+        rtde.until(lambda v: v["target_qd"][0] > 0.05)
+        for level in ("True", "False"):
+            script.sendall(f"sec setOut():\n\tset_standard_digital_out(5, {level})\nend\n".encode())
+            seen = rtde.until(
+                lambda v, level=level: bool(v["actual_digital_output_bits"] & 32) == (level == "True")
+            )
+            assert seen["runtime_state"] == PLAYING
+            assert seen["target_qd"][0] > 0.05
+        script.sendall(b"stopj(10)\n")
+        rtde.until(lambda v: not any(v["target_qd"]) and v["runtime_state"] == STOPPED)
+
+
+def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_box):
+    """In lockstep: the arm brakes in every cycle without a fresh point, and this PC may be late."""
+    box = lockstep_box
+    with StrictRtde(box) as rtde, socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(TIMEOUT)
+        rtde.want(*OUTPUTS)
+        rtde.start()
+        start = np.array(rtde.data()["target_q"])
+        text = REVERSE.replace("{host}", "127.0.0.1").replace("{port}", str(server.getsockname()[1]))
+        with connect(box, "realtime") as sock:
+            sock.sendall(text.encode())
+            reverse, _ = server.accept()
+        rtde.catch_up()
+        with reverse:
+            reverse.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+            def point(q, keepalive=1):
+                reverse.sendall(struct.pack(">7i", *(round(x * SCALE) for x in q), keepalive))
+
+            track = []
+            for n in range(150):
+                values = rtde.data()
+                track.append(values["target_q"][0] - start[0])
+                for quarter in range(4):
+                    point(
+                        np.add(
+                            start,
+                            [0.1 * np.sin(np.pi / 2 * min(1.0, (n + quarter / 4) / 125)), 0, 0, 0, 0, 0],
+                        )
+                    )
+            moved = np.diff(track)
+            assert track[-1] == pytest.approx(0.1, abs=0.01)
+            assert moved[5:100].min() > 1e-5, "the arm went on, without a stutter"
+            point(np.add(start, [0.1, 0, 0, 0, 0, 0]), 0)
+            rtde.until(lambda v: v["runtime_state"] == STOPPED)
+
+
+def test_a_program_is_told_by_key_messages(box):
+    with PrimaryWire(box) as primary:
+        primary.write("def named():\n\tsync()\nend\n")
+        titles = []
+        while len(titles) < 2:
+            message = primary.message(KEY)
+            length = message.body[8]
+            if message.body[9 + length :] == b"named":
+                titles.append(message.body[9 : 9 + length].decode())
+        assert titles == ["PROGRAM_XXX_STARTED", "PROGRAM_XXX_STOPPED"]
