@@ -68,7 +68,20 @@ def test_effects_stay_at_the_rim(package):
     [
         ("protocol", {"urscript", "ur_emulator", "pc_client", "mujoco", "scipy", "lark"}),
         ("urscript", {"ur_emulator", "pc_client", "mujoco", "scipy"}),
-        ("ur_emulator.emulator", {"pc_client", "scipy", "pinocchio", "matplotlib", "mcap", "pymodbus", "asyncio", "h11", "ur_emulator.control.operations"}),
+        (
+            "ur_emulator.emulator",
+            {
+                "pc_client",
+                "scipy",
+                "pinocchio",
+                "matplotlib",
+                "mcap",
+                "pymodbus",
+                "asyncio",
+                "h11",
+                "ur_emulator.control.operations",
+            },
+        ),
         ("pc_client.experiment.runner", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),
     ],
 )

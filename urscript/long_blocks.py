@@ -18,6 +18,7 @@ PART: Final = "main_"
 LONGEST: Final = 60
 """Statements of a piece, those in its blocks included. Python compiles them in less than a millisecond."""
 
+
 def pieces(block: Block) -> Iterator[Block]:
     """The statements of `block` in order, in pieces that can stand alone; the last one never does.
 

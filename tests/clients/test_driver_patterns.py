@@ -238,10 +238,10 @@ def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_
             def point(q, keepalive=1):
                 reverse.sendall(struct.pack(">7i", *(round(x * SCALE) for x in q), keepalive))
 
-            track = []
+            track = {}
             for n in range(150):
                 values = rtde.data()
-                track.append(values["target_q"][0] - start[0])
+                track[values["timestamp"]] = values["target_q"][0] - start[0]
                 for quarter in range(4):
                     point(
                         np.add(
@@ -249,9 +249,10 @@ def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_
                             [0.1 * np.sin(np.pi / 2 * min(1.0, (n + quarter / 4) / 125)), 0, 0, 0, 0, 0],
                         )
                     )
+            track = list(track.values())
             moved = np.diff(track)
             assert track[-1] == pytest.approx(0.1, abs=0.01)
-            assert moved[5:100].min() > 1e-5, "the arm went on, without a stutter"
+            assert moved[5:90].min() > 1e-5, "the arm went on, without a stutter"
             point(np.add(start, [0.1, 0, 0, 0, 0, 0]), 0)
             rtde.until(lambda v: v["runtime_state"] == STOPPED)
 

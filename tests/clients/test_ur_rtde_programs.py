@@ -49,6 +49,7 @@ def test_another_control_script(arm, tmp_path):
     wait_until(lambda: arm.control.isProgramRunning() and arm.control.moveJ(home(0.05), 3.0, 12.0))
 
 
+@pytest.mark.slow
 def test_a_second_control_interface_in_the_upper_range(arm):
     """Its registers belong to nobody, the force input does: it connects, and its script replaces the first one's."""
     flags = RTDEControl.FLAG_UPPER_RANGE_REGISTERS | RTDEControl.FLAG_UPLOAD_SCRIPT

@@ -214,6 +214,7 @@ def test_registers_in_both_ranges(box):
             upper.getOutputIntRegister(12)
 
 
+@pytest.mark.slow
 def test_five_receivers_and_a_reconnect(box):
     with ExitStack() as stack:
         receivers = [stack.enter_context(connected(RTDEReceive, box.host)) for _ in range(5)]

@@ -81,6 +81,7 @@ def test_servo_l_arrives(arm):
     assert arm.is_at_pose(goal)
 
 
+@pytest.mark.slow
 def test_servo_c_arrives_and_costs_the_next_call(arm):
     """The client does not wait for the script's answer and so loses the call after it, as on the real box."""
     goal = shifted(arm.receive.getTargetTCPPose(), 0, 0, 0.03)
@@ -142,6 +143,7 @@ def test_a_watchdog_that_is_kicked_lets_the_script_live(arm):
     arm.restart()
 
 
+@pytest.mark.slow
 def test_a_protective_stop_and_the_way_out(arm):
     """The script cannot go on; the client says so, and works again after unlocking and uploading."""
     assert arm.control.triggerProtectiveStop()
@@ -158,6 +160,7 @@ def test_a_protective_stop_and_the_way_out(arm):
     assert arm.is_at(home(0.1))
 
 
+@pytest.mark.slow
 def test_a_package_that_is_too_short_is_survived(arm):
     """The client sends external forces with a recipe that has no place for them and needs four bytes more."""
     for _ in range(5):
