@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from urscript import nodes
 from urscript.builtins import PURE
 from urscript.catalogue import Catalogue
-from urscript.catalogue.argument_checks import fits, refusal, type_error
+from urscript.catalogue.argument_checks import compile_check, fits, type_error
 from urscript.catalogue.types import Builtin, Param
+from urscript.errors import ScriptRuntimeError
 from urscript.lint_names import expressions_read
 from urscript.lint_rules import REFUSED_ARGUMENT, ScriptWarning
 from urscript.nodes import Expression
@@ -62,12 +64,14 @@ def _refused(builtin: Builtin, param: Param, argument: Expression) -> str | None
     if literal is None:
         return None
     if literal.whole:
-        error = refusal(builtin, param, literal.value)
-    elif fits(param.type, literal.value):
+        try:
+            compile_check(replace(builtin, params=(param,)))([literal.value])
+        except ScriptRuntimeError as error:
+            return error.message
         return None
-    else:
-        error = type_error(builtin.name, param.name, param.type, literal.value)
-    return error.message if error is not None else None
+    if fits(param.type, literal.value):
+        return None
+    return type_error(builtin.name, param.name, param.type, literal.value).message
 
 
 def _literal(expression: Expression) -> Literal | None:

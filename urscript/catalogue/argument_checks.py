@@ -184,12 +184,6 @@ def _accepts(builtin: Builtin, param: Param) -> Predicate | None:
     return accepts
 
 
-def refusal(builtin: Builtin, param: Param, value: Any) -> ScriptRuntimeError | None:
-    """What a call with `value` for `param` fails with; None if that argument is taken."""
-    accepts = _accepts(builtin, param)
-    return None if accepts is None or accepts(value) else explain(builtin, param, value)
-
-
 def compile_check(builtin: Builtin) -> Callable[[Sequence[Any]], None]:
     """A function that takes bound arguments and raises ScriptRuntimeError for the first that does not fit."""
     tests = [
