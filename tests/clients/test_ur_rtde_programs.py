@@ -1,7 +1,11 @@
 """Programs that users give ur_rtde, its upper range, and its URCap mode."""
 
+import gzip
+import socket
+
 import pytest
-from ur_rtde_support import HOME, RTDEControl, connected, home, wait_until
+from clients_support import served_box
+from ur_rtde_support import HOME, Arm, Dashboard, RTDEControl, RTDEReceive, connected, home, wait_until
 
 STOP = 255  # the client's command for its script to end
 
@@ -70,3 +74,46 @@ def test_a_client_that_left_its_script_running_leaves_the_box_to_the_next(arm):
     assert arm.control.reconnect()
     arm.get_ready()
     assert arm.is_at(HOME)
+
+
+def external_control(port):
+    """A program with one External Control node, as PolyScope would save it, that asks this PC."""
+    data = f'<data key="host_ip" value="127.0.0.1"/><data key="port_nr" value="{port}"/>'
+    node = (
+        '<Contributed strategyClass="com.fzi.externalcontrol.ExternalControlNode" '
+        'strategyProgramNodeType="External Control" strategyURCapName="External Control">'
+        f"<dataModel>{data}</dataModel></Contributed>"
+    )
+    text = (
+        '<?xml version="1.0" encoding="UTF-8"?><URProgram name="external_control" installation="default">'
+        '<children><MainProgram runOnlyOnce="true"><children>'
+        f"{node}</children></MainProgram></children></URProgram>"
+    )
+    return gzip.compress(text.encode(), mtime=0)
+
+
+@pytest.mark.slow
+def test_the_box_fetches_the_control_script_itself(tmp_path):
+    """The URCap's way: the client uploads nothing, the box asks it for its script when its program is played."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    (programs / "external_control.urp").write_bytes(external_control(port))
+    flags = RTDEControl.FLAG_USE_EXT_UR_CAP | RTDEControl.FLAG_NO_WAIT
+    with (
+        served_box(tmp_path, "--programs", programs) as box,
+        connected(RTDEReceive, box.host) as receive,
+        connected(RTDEControl, box.host, -1.0, flags, port) as control,
+    ):
+        dashboard = Dashboard(box.host)
+        dashboard.connect()
+        dashboard.loadURP("external_control.urp")
+        dashboard.play()
+        wait_until(control.isProgramRunning, "the program")
+        assert dashboard.programState() == "PLAYING external_control.urp"
+        arm = Arm(box=box, control=control, receive=receive)
+        assert control.moveJ(home(0.1), 3.0, 12.0)
+        assert arm.is_at(home(0.1))
+        dashboard.stop()
+        dashboard.disconnect()
