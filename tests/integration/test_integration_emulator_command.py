@@ -20,7 +20,7 @@ from integration_support import (
     serving,
 )
 
-from protocol.primary_messages import RuntimeExceptionMessage
+from protocol.primary_messages import KeyMessage, RuntimeExceptionMessage
 from protocol.ur_types import Ports
 from ur_emulator import ControlBox
 from ur_emulator.errors import EmulatorError
@@ -148,7 +148,9 @@ def test_ports_are_free_again_at_once(tmp_path):
 def test_the_log_goes_to_stderr_if_asked_for(tmp_path):
     with serving(tmp_path, "--log", "--pace", "lockstep") as box:
         with Messages(box) as primary:
-            send(box, "secondary", 'def f():\n  textmsg("hello")\nend\ndef g():\n  x = nowhere\nend\n')
+            send(box, "secondary", 'def f():\n  textmsg("hello")\nend\n')
+            primary.message(KeyMessage, title="PROGRAM_XXX_STOPPED")
+            send(box, "secondary", "def g():\n  x = nowhere\nend\n")
             primary.message(RuntimeExceptionMessage)
         box.process.send_signal(signal.SIGINT)
         told = finish(box.process).err
