@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from urscript import nodes
+from urscript.courtesy import give_way
 from urscript.nodes import Block, Expression
 from urscript.scopes import FunctionScope, ResolvedProgram
 from urscript.walk import all_expressions, all_statements, own_expressions
@@ -59,11 +60,14 @@ class _Flow:
         self.known = known
         self.set_before_calls: set[str] | None = None
         self._forgotten: set[str] = set()
+        self._step = give_way()
 
     def block(self, block: Block) -> list[str]:
         """Walk `block`; returns what is known after it and was not before."""
         learnt: list[str] = []
         for statement in block:
+            if self._step is not None:
+                self._step()
             match statement:
                 case nodes.Assign(target=nodes.Name(name=name), value=value):
                     self.expression(value)

@@ -20,6 +20,7 @@ from typing import Any
 
 from urscript import long_blocks, nodes
 from urscript.catalogue import Catalogue
+from urscript.courtesy import give_way
 from urscript.dialect import Dialect
 from urscript.errors import ScriptContextError
 from urscript.expressions import ExpressionCompiler
@@ -103,6 +104,7 @@ class _FunctionCompiler:
         self._scope = scope
         self._globals_stored: set[str] = {"_b"}
         self._parts: list[ast.FunctionDef] = []
+        self._step = give_way()
 
     def compile(self) -> list[ast.FunctionDef]:
         """The Python function, after those that compute its defaults and the parts of a long body."""
@@ -183,6 +185,8 @@ class _FunctionCompiler:
         return [long_blocks.call_of(name, span)]
 
     def _statement(self, statement: Statement) -> list[ast.stmt]:
+        if self._step is not None:
+            self._step()
         span, scope = statement.span, self._scope
         at = place(span)
         match statement:

@@ -13,6 +13,7 @@ from typing import Any
 
 from urscript import dialect, nodes
 from urscript.catalogue import Catalogue
+from urscript.courtesy import give_way
 from urscript.nodes import Expression
 from urscript.scopes import FunctionScope, ResolvedProgram
 from urscript.walk import all_expressions, all_statements, falls_through, own_expressions
@@ -151,8 +152,11 @@ class StaticTypes:
         readers = self._readers(flows)
         queued = [True] * len(flows)
         todo = deque(range(len(flows)))
+        step = give_way()
         while todo:
             number = todo.popleft()
+            if step is not None and not number & 7:
+                step()
             queued[number] = False
             goal, expression, scope = flows[number]
             old = self._types.get(goal, Type.NEVER)
@@ -167,7 +171,10 @@ class StaticTypes:
     def _readers(self, flows: list[Flow]) -> dict[Goal, list[int]]:
         """The flows whose expressions read a variable or the result of a function, by that."""
         readers: dict[Goal, list[int]] = {}
+        step = give_way()
         for number, (_, expression, scope) in enumerate(flows):
+            if step is not None and not number & 7:
+                step()
             for part in all_expressions(expression) if expression is not None else ():
                 goal: Goal
                 if isinstance(part, nodes.Name):
@@ -191,7 +198,10 @@ class _Flows:
                 self._defaults(scope, scope.node, scope.around())
 
     def _statements(self, scope: FunctionScope) -> None:
+        step = give_way()
         for statement in all_statements(scope.body):
+            if step is not None:
+                step()
             match statement:
                 case nodes.Assign(target=nodes.Name(name=name), value=value, scope=qualifier):
                     is_local = name in scope.locals and qualifier != "global"

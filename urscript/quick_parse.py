@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from urscript.courtesy import give_way
 from urscript.errors import ScriptSyntaxError
 from urscript.source import Span
 
@@ -70,6 +71,7 @@ class QuickParser:
         states = [self._start]
         values: list[Any] = []
         line, line_start = 1, 0
+        step = give_way()
         words, feed = self._words, self._feed
         make_span = tuple.__new__  # what Span(...) does, without a call in between
         for match in self._pattern.finditer(text):
@@ -85,6 +87,8 @@ class QuickParser:
                 return None
             if kind == "COMMENT":
                 continue
+            if step is not None and not start & 15:
+                step()
             token = QuickToken(match[0])
             if kind == "NAME":
                 kind = words.get(token, kind)

@@ -18,6 +18,7 @@ from urscript.assignment import find_unsure
 from urscript.call_graph import mark_recursion, spread_blocking
 from urscript.catalogue import Catalogue
 from urscript.catalogue.binding import Shape
+from urscript.courtesy import give_way
 from urscript.dialect import MAX_LOOP_DEPTH, Dialect
 from urscript.errors import (
     ScriptCompileError,
@@ -82,6 +83,7 @@ class _Resolver:
         self.dialect = dialect
         self.errors: list[ScriptCompileError] = []
         self._n_unknown = 0
+        self._step = give_way()
 
     def resolve(self, block: Block) -> ResolvedProgram:
         self.program = program = self._open(block)
@@ -169,6 +171,8 @@ class _Resolver:
                 self._block(inner, scope, inside)
 
     def _statement(self, statement: Statement, scope: FunctionScope, loops: int) -> None:
+        if self._step is not None:
+            self._step()
         match statement:
             case nodes.While() if loops == MAX_LOOP_DEPTH:
                 message = f"loops are nested more than {MAX_LOOP_DEPTH} deep"

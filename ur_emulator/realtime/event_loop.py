@@ -18,6 +18,7 @@ from contextlib import suppress
 from typing import Protocol
 
 from ur_emulator.realtime.garbage import settled_heap
+from ur_emulator.realtime.guests import Guests
 
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
 # microseconds.
@@ -49,6 +50,7 @@ class EventLoop:
 
     Attributes:
         is_running: `run` has been called, or somebody is about to; it has not returned.
+        guests: other threads with long work beside this one.
     """
 
     def __init__(self, *, precise: bool = True) -> None:
@@ -74,6 +76,7 @@ class EventLoop:
         # and kqueue.
         descriptor = getattr(self._selector, "fileno", None)
         self._descriptor: int | None = descriptor() if precise and descriptor is not None else None
+        self.guests = Guests(wait=self._descriptor is not None)
 
     # --- sockets
 
@@ -143,6 +146,7 @@ class EventLoop:
         finally:
             self.is_running = False
             self._thread = 0
+            self.guests.leave_alone()
 
     def close(self) -> None:
         """Release the selector and the wake-up pipe; the loop must not run any more."""
@@ -158,7 +162,9 @@ class EventLoop:
             if self._descriptor is not None and 0.0 < timeout < _COARSE:
                 ready = self._wait_precisely(self._descriptor, deadline)
             else:
+                self.guests.fall_asleep()
                 ready = self._selector.select(timeout)
+                self.guests.wake_up()
         for key, events in ready:
             key.data(events)
         while self._calls:
@@ -168,9 +174,14 @@ class EventLoop:
         """Wait for a deadline to some microseconds: sleep for most of it, watch the clock for the rest."""
         sleep = deadline - time.monotonic() - _WAKE_UP / max(1, len(self._services))
         if sleep > 0.0:
+            ready: list[_Ready] = []
+            self.guests.fall_asleep()
             if descriptor < _SELECT_LIMIT:
                 select.select([descriptor], [], [], sleep)
-            elif ready := self._selector.select((int(sleep * 1e3) - 0.5) * 1e-3):
+            else:
+                ready = self._selector.select((int(sleep * 1e3) - 0.5) * 1e-3)
+            self.guests.wake_up()
+            if ready:
                 return ready
         while not (ready := self._selector.select(0.0)) and time.monotonic() < deadline:
             pass

@@ -22,6 +22,7 @@ from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.garbage import collection_put_off
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
+from urscript.courtesy import giving_way
 from urscript.errors import ScriptError, ScriptTypeError
 from urscript.parser import prepare
 
@@ -94,7 +95,7 @@ class ProgramIntake:
     def _process(self, item: ScriptItem, sender: object, cost: int) -> None:
         """Compile or translate one item; runs in the worker, hands the result to the loop."""
         try:
-            with collection_put_off():
+            with collection_put_off(), self._loop.guests.working() as give_way, giving_way(give_way):
                 result = self._translate(item)
         except Exception as error:  # a defect of ours must not swallow the program without a word
             result = ScriptFailed(1, 1, f"the program cannot be compiled: {error!r}")
