@@ -42,6 +42,7 @@ _EXTRAS = {
     "matplotlib": "report",
     "jinja2": "report",
     "pyarrow": "export",
+    "distributed": "cluster",
 }
 
 

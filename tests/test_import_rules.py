@@ -14,7 +14,7 @@ MAY_IMPORT = {
     "urscript": {"protocol", "lark", "numpy", "typer", "rich"},
     "ur_emulator": {"urscript", "protocol", "mujoco", "numpy", "pymodbus", "h11", "typer", "rich", "pytest"},
     "pc_client": {
-        "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "pyarrow", "mpl_toolkits",
+        "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "pyarrow", "mpl_toolkits", "distributed",
     },
 }  # fmt: skip
 # Modules of the standard library that a layer must not touch, and the folders in which it may.
@@ -22,7 +22,7 @@ EFFECTS = {"socket", "threading", "time", "selectors", "select", "subprocess", "
 MAY_HAVE_EFFECTS = {
     "protocol": {"live.py"},
     "ur_emulator": {"realtime", "servers", "control", "emulator.py", "cli.py", "pytest_plugin.py"},
-    "pc_client": {"driver", "experiment", "commands", "cli.py"},
+    "pc_client": {"driver", "experiment", "commands", "sweep", "executors.py", "cli.py"},
 }
 
 
