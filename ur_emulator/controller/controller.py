@@ -1,7 +1,8 @@
 """The control box as a function of its commands: `tick(commands)` advances one cycle, gives a snapshot.
 
-The order of a cycle is written here and nowhere else: commands, modes, script threads, motion, safety, plant,
-sensors, snapshot. Must not know sockets, threads or a clock: time is the tick.
+The order of a cycle is written in `Controller.tick` and nowhere else: commands, modes, script threads, motion
+with the check of its set-points, plant, sensors, safety, snapshot. Must not know sockets, threads or a clock:
+time is the tick.
 """
 
 from __future__ import annotations
@@ -11,18 +12,13 @@ from collections.abc import Iterable
 from protocol.primary_messages import ReportLevel
 from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.controller import commands as cmd
-from ur_emulator.controller.client_inputs import write_inputs
+from ur_emulator.controller.command_desk import CommandDesk
 from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US
 from ur_emulator.controller.events import (
     ErrorReported,
     Event,
-    PopupShown,
     RobotModeChanged,
-    ScriptFailed,
 )
-from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
-from ur_emulator.controller.obstacles import AddObstacle, RemoveObstacle
-from ur_emulator.controller.port_map import write_range
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (
@@ -32,13 +28,11 @@ from ur_emulator.controller.safety import (
     find_invalid_setpoint,
     find_violation,
 )
-from ur_emulator.controller.safety_modes import ROW, SafetyEvent
+from ur_emulator.controller.safety_modes import SafetyEvent
 from ur_emulator.controller.safety_system import SafetySystem
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.controller.watchdogs import WatchdogAction
-from ur_emulator.controller.wires import SetAnalogInput, SetDigitalInput, set_wire
-from ur_emulator.errors import PlantError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
@@ -47,9 +41,9 @@ from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import UnreachableError
 from ur_emulator.plant.plant import Plant
+from ur_emulator.plant.plant_state import PlantState
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.program_slot import ProgramSlot
-from urscript import CompiledProgram
 
 # After the last activity the arm gets this many cycles to come to rest before time may stand still (0.2 s).
 SETTLE_CYCLES = 25
@@ -87,7 +81,6 @@ class Controller:
         self._mode = mode
         self._saturated_s = 0.0
         self._settle = 0
-        self._push_left = 0
         self.state = ControllerState(
             robot=robot,
             arm=arm,
@@ -101,6 +94,7 @@ class Controller:
         self._payload = self.state.payload
         self.programs = ProgramSlot(self.state, network)
         self._safety = SafetySystem(self.state, self.programs)
+        self._desk = CommandDesk(self.state, self.plant, self.programs, self._safety)
         self.state.mode.command(ModeCommand.BOOT)
         # The first cycle only makes the first snapshot; nothing moves in it.
         self.tick(())
@@ -119,7 +113,7 @@ class Controller:
             or self.state.mode.is_changing
             or self._safety.is_stopping
             or self._settle > 0
-            or self._push_left > 0
+            or self._desk.is_pushing
         )
 
     @property
@@ -144,10 +138,35 @@ class Controller:
         state = self.state
         state.tick += 1
         n_events = len(state.events)
-        if self._push_left:
-            self._push_on()
+        was_pushing = self._desk.is_pushing
+        if was_pushing:
+            self._desk.step()
         for command in commands:
-            self._apply(command)
+            self._desk.obey(command)
+        self._step_modes()
+        self._step_scripts()
+        was_active = was_pushing or self.programs.has_work or state.motion.is_moving or state.mode.is_changing
+        running = state.mode.mode is RobotMode.RUNNING
+        control, target = self._step_motion(running)
+        self.plant.step(target if running else None, control)
+        sensed = self.plant.sense()
+        self._watch(sensed, control, running)
+        settings = state.error_settings
+        if settings.pause_codes and settings.asks_for_pause(state.events[n_events:]):
+            self.programs.pause()
+        is_still = not control and not any(target.qd)
+        state.steady_cycles = state.steady_cycles + 1 if is_still else 0
+        was_active = was_active or (control is _BY_HAND and any(target.qd))
+        self._settle = max(self._settle - 1, SETTLE_CYCLES if was_active else 0)
+        state.snapshot = make_snapshot(state, self.programs, target, sensed)
+        state.q_history.appendleft(sensed.actual_q)
+        return state.snapshot
+
+    # --- the parts of a cycle, in their order
+
+    def _step_modes(self) -> None:
+        """Robot mode and safety mode; watchdogs, encoders and Modbus signals, which scripts will look at."""
+        state = self.state
         state.mode.step()
         if state.mode.mode is not self._mode:
             self._mode = state.mode.mode
@@ -162,33 +181,38 @@ class Controller:
             state.encoders.step(state.io.digital_in)
         if state.modbus.signals:
             state.modbus.step(state.tick)
+
+    def _step_scripts(self) -> None:
+        """All threads of all programs, and what they have asked of the box."""
+        state = self.state
         self.programs.step()
         if state.power_off_requested:
             state.power_off_requested = False
-            self._apply(cmd.PowerOff())
-        running = state.mode.mode is RobotMode.RUNNING
-        was_active = self.programs.has_work or state.motion.is_moving or state.mode.is_changing
+            self._safety.cut_power()
         if state.payload is not self._payload:
             # What a program declares is taken to be really there: the arm carries it from now on.
             self._payload = state.payload
             self.plant.set_payload(state.payload.mass, state.payload.cog)
-        compliance = state.compliance
-        mode = _BY_POSITION
+
+    def _step_motion(self, running: bool) -> tuple[ControlMode, JointTarget]:
+        """How the arm is driven in this cycle, and to where."""
+        state, compliance = self.state, self.state.compliance
+        control = _BY_POSITION
         if compliance.is_on or state.io_configuration.input_actions or state.modbus.signals:
-            mode = compliance.step(state)
+            control = compliance.step(state)
         target = self._next_target() if running else state.motion.step(self.period_s, state.speed_slider)
-        if mode is _BY_HAND:
-            target = compliance.follow_hand(state)
-            was_active = was_active or any(target.qd)
-        self.plant.step(target if running else None, mode)
-        sensed = self.plant.sense()
+        return control, compliance.follow_hand(state) if control is _BY_HAND else target
+
+    def _watch(self, sensed: PlantState, control: ControlMode, running: bool) -> None:
+        """Stop the arm if what the sensors say breaks a limit, or somebody has asked for it."""
+        state = self.state
         self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
         if running and state.safety.is_watched:
             violation = find_violation(state.robot, sensed, self._saturated_s)
             if self._safety.is_busy and violation is None:
                 violation = self._safety.find_violation(sensed)
-            if mode and violation is None:
-                violation = compliance.find_violation(state.robot, sensed)
+            if control and violation is None:
+                violation = state.compliance.find_violation(state.robot, sensed)
             if violation is None and state.stop_requested:
                 violation = _REQUESTED_STOP
             if violation is not None:
@@ -197,122 +221,6 @@ class Controller:
             if settings.warns_of_deviation and (warning := settings.deviation_warning(sensed.position_error)):
                 state.events.append(warning)
         state.stop_requested = False
-        settings = state.error_settings
-        if settings.pause_codes and settings.asks_for_pause(state.events[n_events:]):
-            self.programs.pause()
-        state.steady_cycles = 0 if mode or any(target.qd) else state.steady_cycles + 1
-        self._settle = max(self._settle - 1, SETTLE_CYCLES if was_active else 0)
-
-        state.snapshot = make_snapshot(state, self.programs, target, sensed)
-        state.q_history.appendleft(sensed.actual_q)
-        return state.snapshot
-
-    # --- commands
-
-    def _apply(self, command: cmd.Command) -> None:
-        state = self.state
-        match command:
-            case cmd.StartProgram(program):
-                self._start(program)
-            case cmd.StopProgram():
-                self.programs.stop()
-            case cmd.PauseProgram():
-                self.programs.pause()
-            case cmd.ResumeProgram():
-                self._resume()
-            case cmd.PowerOn():
-                self._power(ModeCommand.POWER_ON)
-            case cmd.PowerOff():
-                self._safety.cut_power()
-            case GuideByHand():
-                state.compliance.guide(by_client=True)
-            case Push(force, point, duration):
-                self.plant.push(force, point)
-                if duration is not None:
-                    self._push_left = round(duration / self.period_s) + 1
-                    self._push_on()
-                else:
-                    self._push_left = 0
-            case HangLoad(mass, cog):
-                self.plant.hang(mass, cog)
-            case AddObstacle(name, shape, size, pose):
-                try:
-                    self.plant.put_obstacle(name, shape, size, pose)
-                except PlantError as error:
-                    state.events.append(ErrorReported(0, 0, ReportLevel.INFO, str(error)))
-            case RemoveObstacle(name):
-                self.plant.remove_obstacle(name)
-            case cmd.ReleaseBrakes():
-                state.compliance.by_client = False
-                self._power(ModeCommand.BRAKE_RELEASE)
-            case cmd.UnlockProtectiveStop():
-                self._safety.happen(SafetyEvent.UNLOCK)
-            case cmd.SetSpeedSlider(fraction):
-                state.speed_slider = min(1.0, max(0.0, fraction))
-            case cmd.TriggerProtectiveStop():
-                state.stop_requested = True
-            case cmd.WriteInputs(values):
-                write_inputs(state, values)
-            case cmd.WriteModbus():
-                write_range(state, command.is_coils, command.first, command.values)
-            case cmd.AnswerRequest(value, request_id):
-                state.operator.answer(value, request_id)
-            case cmd.ClosePopup():
-                state.operator.close_popups()
-            case cmd.ShowPopup(text):
-                state.operator.show(text)
-                state.events.append(PopupShown("Popup", text, False, False, False))
-            case cmd.RestartSafety():
-                self._safety.happen(SafetyEvent.RESTART)
-            case SetDigitalInput() | SetAnalogInput():
-                set_wire(state.io, command)
-            case _:
-                self._safety.obey(command)
-
-    def _push_on(self) -> None:
-        """Count a cycle of a push that lasts for a while; end it after the last."""
-        self._push_left -= 1
-        if not self._push_left:
-            self.plant.push((0.0, 0.0, 0.0))
-            self._settle = max(self._settle, SETTLE_CYCLES)
-
-    def _power(self, command: ModeCommand) -> None:
-        """Give the joints power or open their brakes, if the safety system lets them have it."""
-        mode = self.state.safety.mode
-        if ROW[mode].may_have_power:
-            self.state.mode.command(command)
-        else:
-            text = f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].way_out}"
-            self.state.events.append(ErrorReported(0, 0, ReportLevel.INFO, text))
-
-    def _start(self, program: CompiledProgram) -> None:
-        """Start a program if the box is in a state to run one; say so if it is not."""
-        obstacle = self._obstacle()
-        if obstacle:
-            text = f"program {program.name} not started: {obstacle}"
-            self.state.events.append(ScriptFailed(1, 1, text))
-        else:
-            self.programs.start(program)
-
-    def _resume(self) -> None:
-        """Let a paused program go on if the box is in a state to run one; say so if it is not."""
-        if not self.programs.is_paused:
-            return
-        obstacle = self._obstacle()
-        if obstacle:
-            text = f"program {self.programs.name} stays paused: {obstacle}"
-            self.state.events.append(ErrorReported(0, 0, ReportLevel.INFO, text))
-        else:
-            self.programs.resume()
-
-    def _obstacle(self) -> str:
-        """Return why no program may move the arm now; "" if one may."""
-        state = self.state
-        if state.safety.is_stopped:
-            safety = state.safety.mode
-            return f"the robot is in {safety.name}, it must be RUNNING: {ROW[safety].way_out}"
-        mode = state.mode.mode
-        return "" if mode is RobotMode.RUNNING else f"the robot is in {mode.name}, it must be RUNNING"
 
     def _check_watchdogs(self) -> None:
         late = self.state.watchdogs.late(self.state.tick)
