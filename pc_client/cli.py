@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import typer
 
 from pc_client.commands import doctor, experiment, movements, recordings
-from pc_client.errors import ClientError
+from pc_client.errors import ClientError, full_message
 from protocol.errors import ProtocolError
 
 app = typer.Typer(
@@ -70,7 +70,7 @@ def run(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _complain("interrupted", 1)
     except (ClientError, ProtocolError) as error:
-        return _complain(_with_notes(error), 1)
+        return _complain(full_message(error), 1)
     except ModuleNotFoundError as error:
         extra = _EXTRAS.get((error.name or "").partition(".")[0])
         if extra is None:
@@ -81,14 +81,6 @@ def run(arguments: list[str] | None = None) -> int:
     if code == _INTERRUPTED:  # newer typer turns Ctrl-C into the shell's exit code
         return _complain("interrupted", 1)
     return code if isinstance(code, int) else 0
-
-
-def _with_notes(error: BaseException) -> str:
-    """The message of an error and what was added to it on its way; a note that says it again replaces it."""
-    text = str(error)
-    for note in getattr(error, "__notes__", ()):
-        text = note if note.startswith(text) else f"{text}; {note}"
-    return text
 
 
 def _complain(text: str, code: int) -> int:

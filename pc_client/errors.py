@@ -4,8 +4,10 @@ ClientError
 ├── MovementError      a movement file or its parameters make no sense
 ├── PlanningError      a path leaves reach or limits; nothing has moved
 ├── DriverError        the robot cannot be reached, or the stream broke
-│   └── RobotStoppedError  the robot stopped itself (protective stop, program error)
-└── RecordingError     a recording cannot be written or read
+│   ├── RobotStoppedError  the robot stopped itself (protective stop, program error)
+│   └── GainMarginError    the gains are too large for the delay of the loop; no movement has begun
+├── RecordingError     a recording cannot be written or read
+└── SweepError         the configuration of a sweep makes no sense, or its folder cannot be used
 
 Every message is one line: what was given, what is allowed, what to do.
 """
@@ -43,5 +45,31 @@ class RobotStoppedError(DriverError):
     """The robot stopped by itself: protective stop, emergency stop or a program error."""
 
 
+class GainMarginError(DriverError):
+    """The gains are too large for the delay of the loop; no movement has begun.
+
+    Attributes:
+        margin: the gain margin, a factor.
+        delay: the identified loop delay [s].
+    """
+
+    def __init__(self, message: str, *, margin: float, delay: float) -> None:
+        super().__init__(message)
+        self.margin = margin
+        self.delay = delay
+
+
 class RecordingError(ClientError):
     """A recording cannot be written or read."""
+
+
+class SweepError(ClientError):
+    """The configuration of a sweep makes no sense, or its folder cannot be used."""
+
+
+def full_message(error: BaseException) -> str:
+    """The message of an error and what was added to it on its way; a note that says it again replaces it."""
+    text = str(error)
+    for note in getattr(error, "__notes__", ()):
+        text = note if note.startswith(text) else f"{text}; {note}"
+    return text

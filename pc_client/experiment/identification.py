@@ -15,7 +15,7 @@ from pc_client.control.stability import gain_margin
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
-from pc_client.errors import DriverError
+from pc_client.errors import DriverError, GainMarginError
 from protocol.realtime_layout import RealtimeFrame
 
 _LEAD, _SETTLE = 0.1, 0.3
@@ -40,7 +40,8 @@ def identify_delay(
         The delay, and what happened on the wire.
 
     Raises:
-        DriverError: the stream broke, the arm did not follow, or the controller would be unstable.
+        DriverError: the stream broke, or the arm did not follow.
+        GainMarginError: the controller would be unstable, or nearly.
     """
     q_start = driver.actual_q()
     # Feed-forward alone, its mean over each cycle: the integral of the commands ends exactly where it began.
@@ -69,8 +70,10 @@ def identify_delay(
         )
     margin = gain_margin(config.gain_p, config.gain_i, max(estimate.delay, driver.info.period))
     if margin < _LEAST_MARGIN:
-        raise DriverError(
+        raise GainMarginError(
             f"with a loop delay of {estimate.delay * 1e3:.0f} ms the controller {config.name!r} has a "
-            f"gain margin of {margin:.1f}, needed is {_LEAST_MARGIN}: the loop is too slow for it"
+            f"gain margin of {margin:.1f}, needed is {_LEAST_MARGIN}: the loop is too slow for it",
+            margin=margin,
+            delay=estimate.delay,
         )
     return estimate, report
