@@ -65,7 +65,7 @@ def draw_movement(row: Row) -> str:
     Returns:
         SVG text.
     """
-    with _figure(11.0, 8.4, row.runs[0].provenance.simulated) as (figure, page):
+    with svg_figure(11.0, 8.4, row.runs[0].provenance.simulated) as (figure, page):
         speed_axes = figure.add_axes((0.065, 0.645, 0.575, 0.3))
         _draw_speed(speed_axes, row.runs)
         _draw_speed_error(figure.add_axes((0.065, 0.425, 0.575, 0.165), sharex=speed_axes), row.runs)
@@ -78,7 +78,7 @@ def draw_movement(row: Row) -> str:
 
 def draw_table(table: Table) -> str:
     """Draw Table I: our repetitions and mean beside the paper's figure, for each movement."""
-    with _figure(11.0, 3.4, table.simulated) as (figure, page):
+    with svg_figure(11.0, 3.4, table.simulated) as (figure, page):
         axes = figure.add_axes((0.06, 0.2, 0.925, 0.68))
         x = np.arange(len(table.rows))
         paper = [np.nan if row.paper_snr_db is None else row.paper_snr_db for row in table.rows]
@@ -112,7 +112,7 @@ def draw_definitions(table: Table) -> str:
         ("velocity vector", "s", RED, lambda run: run.snr.velocity_db),
         ("velocity vector, after best time shift", "D", ORANGE, lambda run: run.snr.velocity_shifted_db),
     )
-    with _figure(11.0, 3.1, table.simulated) as (figure, page):
+    with svg_figure(11.0, 3.1, table.simulated) as (figure, page):
         axes = figure.add_axes((0.06, 0.21, 0.925, 0.63))
         for i, (label, marker, colour, value) in enumerate(series):
             x = np.arange(len(table.rows)) + 0.16 * (i - 1.5)
@@ -129,7 +129,7 @@ def draw_definitions(table: Table) -> str:
 
 def draw_budget(table: Table) -> str:
     """Draw where the error power of each movement lies: bars of shares, and the level of the whole."""
-    with _figure(11.0, 0.34 * len(table.rows) + 1.25, table.simulated) as (figure, page):
+    with svg_figure(11.0, 0.34 * len(table.rows) + 1.25, table.simulated) as (figure, page):
         height = figure.get_figheight()
         axes = figure.add_axes((0.115, 0.55 / height, 0.755, 1.0 - 1.15 / height))
         y = np.arange(len(table.rows))
@@ -264,8 +264,17 @@ def _colours(runs: Sequence[Run]) -> list[str]:
 
 
 @contextmanager
-def _figure(width_in: float, height_in: float, simulated: bool) -> Iterator[tuple[Figure, io.StringIO]]:
-    """Give a figure in the report's style; on leaving, its SVG text is in the page."""
+def svg_figure(width_in: float, height_in: float, simulated: bool) -> Iterator[tuple[Figure, io.StringIO]]:
+    """Give a figure in the report's style; on leaving, its SVG text is in the page.
+
+    Args:
+        width_in: width [inch].
+        height_in: height [inch].
+        simulated: whether the data are, which is then written on it.
+
+    Yields:
+        The figure, and the page that the text will be in.
+    """
     page = io.StringIO()
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(width_in, height_in))
