@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import typer
 
-from pc_client.commands import doctor, experiment, movements, recordings
+from pc_client.commands import doctor, experiment, movements, recordings, sweep
 from pc_client.errors import ClientError, full_message
 from protocol.errors import ProtocolError
 
@@ -26,6 +26,7 @@ app = typer.Typer(
 app.command()(experiment.experiment)
 app.command()(experiment.run)
 app.add_typer(movements.app, name="movements")
+app.command()(sweep.sweep)
 app.command()(recordings.report)
 app.command()(recordings.export)
 app.command()(doctor.doctor)

@@ -1,0 +1,208 @@
+"""`ur-client sweep`: many experiments from one file, over the cores of this machine or a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pc_client.commands.options import YesOption, console, ports_of, say
+from pc_client.errors import ClientError, SweepError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from pc_client.sweep.case import Case, GivenRobot
+    from pc_client.sweep.config import SweepConfig
+    from pc_client.sweep.folder import SweepFolder
+    from pc_client.sweep.ranking import Setting
+
+_MOST_SHOWN = 5
+"""Settings and errors on the terminal; table and page have all."""
+
+
+def sweep(
+    config: Annotated[Path, typer.Argument(metavar="CONFIG", help="The sweep, .toml; see docs/sweeps.md.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results, instead of `output`.")
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers", metavar="N", min=1, help="Processes; as many as there are cores by default."
+        ),
+    ] = None,
+    dask: Annotated[
+        str | None,
+        typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler to work on, tcp://HOST:8786."),
+    ] = None,
+    format: Annotated[
+        str | None,
+        typer.Option(
+            "--format", metavar="parquet|csv", help="Of the table; parquet where pyarrow is there, else csv."
+        ),
+    ] = None,
+    yes: YesOption = False,
+) -> None:
+    """Run every combination of gains, arms and movements; a second call goes on where the first ended."""
+    from pc_client.sweep.case import all_cases
+    from pc_client.sweep.config import read_config
+    from pc_client.sweep.folder import SweepFolder, table_rows
+    from pc_client.sweep.progress import SweepProgress
+    from pc_client.sweep.run_case import run_case
+    from pc_client.sweep.schedule import run_in_turn, run_side_by_side
+    from pc_client.sweep.table import table_content, table_format
+
+    if workers is not None and dask is not None:
+        raise typer.BadParameter("--workers is for this machine, --dask for a cluster: give only one")
+    plan = read_config(config)
+    if plan.host is not None and (workers is not None or dask is not None):
+        raise typer.BadParameter(f"robot = {plan.host!r} is one robot: no --workers and no --dask")
+    folder = SweepFolder(_folder_of(plan, out))
+    written_as = table_format(format)
+    arms = plan.arms if plan.host is None else (_given_robot(plan, plan.host),)
+    cases = all_cases(plan.movements, arms, plan.controllers, plan.repeat)
+    folder.prepare()
+    outcomes = {case.identity: folder.load(case, plan.keep_recordings) for case in cases}
+    waiting = [case for case in cases if outcomes[case.identity] is None]
+    say(f"{len(cases)} cases, {len(cases) - len(waiting)} of them done before; results in {folder.path}")
+    if plan.host is None:
+        results = run_side_by_side(waiting, plan.keep_recordings, run_case, workers=workers, dask=dask)
+    else:
+        if waiting and not yes:
+            _ask(plan.host, plan.port_base, waiting)
+        results = run_in_turn(waiting, plan.keep_recordings, run_case)
+
+    def rows() -> list[dict[str, object]]:
+        return table_rows([(case, outcome) for case in cases if (outcome := outcomes[case.identity])])
+
+    try:
+        with closing(results), SweepProgress(console, len(cases), len(waiting)) as progress:
+            for case, outcome in results:
+                folder.store(case, outcome)
+                outcomes[case.identity] = outcome
+                progress.finished(outcome)
+    except KeyboardInterrupt as interrupt:
+        folder.write(f"sweep.{written_as}", table_content(rows(), written_as))
+        n_done = sum(outcome is not None for outcome in outcomes.values())
+        doubts = "".join(f"; {note}" for note in getattr(interrupt, "__notes__", ()))
+        raise ClientError(
+            f"interrupted{doubts}; {n_done} of {len(cases)} cases are kept in {folder.path}, "
+            "the same command goes on from there"
+        ) from interrupt
+    table = rows()
+    say(f"table: {folder.write(f'sweep.{written_as}', table_content(table, written_as))}")
+    _draw(folder, config.stem, table)
+    _show(table)
+    left = [case for case in cases if outcomes[case.identity] is None]
+    if left:
+        say(f"{len(left)} cases have not begun: look at the arm, then give the same command again")
+    if left or any(row["status"] == "failed" for row in table):
+        raise typer.Exit(1)
+
+
+def _folder_of(plan: SweepConfig, out: Path | None) -> Path:
+    """Where the results go.
+
+    Raises:
+        SweepError: nobody said it.
+    """
+    folder = out or plan.output
+    if folder is None:
+        raise SweepError(f"{plan.source}: no folder for the results; give output = DIR, or --out DIR")
+    return folder
+
+
+def _given_robot(plan: SweepConfig, host: str) -> GivenRobot:
+    """Ask the robot who it is.
+
+    Raises:
+        ClientError: it does not answer, or does not tell.
+    """
+    from pc_client.driver.probe import read_info
+    from pc_client.driver.robot_info import UNKNOWN
+    from pc_client.driver.transport import TcpNetwork
+    from pc_client.sweep.case import GivenRobot
+
+    info = read_info(TcpNetwork(), host, ports_of(plan.port_base))
+    if info.model == UNKNOWN:
+        raise ClientError(f"{host} does not tell which arm it is: there is no plan for it")
+    return GivenRobot(host, plan.port_base, info.model.lower(), info.serial.text)
+
+
+def _ask(host: str, port_base: int, cases: Sequence[Case]) -> None:
+    """Before a real arm moves: show all that it is going to do, and ask.
+
+    Raises:
+        typer.Abort: the answer is no.
+    """
+    from pc_client.commands.experiment import ask_before_motion
+    from pc_client.experiment.preflight import is_loopback
+    from pc_client.experiment.prepare import Experiment
+    from pc_client.sweep.run_case import plan_case
+
+    if is_loopback(host):
+        return
+    by_movement = {case.movement: case for case in cases}
+    plans = [plan_case(case) for case in by_movement.values()]
+    runs = sum(case.repeat for case in cases) // len(plans)
+    planned = tuple(planned for plan in plans for planned in plan.planned)
+    ask_before_motion(Experiment(plans[0].model, planned, runs, Path()), host, ports_of(port_base))
+
+
+def _draw(folder: SweepFolder, name: str, table: Sequence[dict[str, object]]) -> None:
+    """Write the page with the plots; without matplotlib the table has to do."""
+    from pc_client.sweep.page import render_page
+
+    try:
+        with console.status("drawing"):
+            page = render_page(name, table)
+    except ModuleNotFoundError as error:
+        say(
+            f"no plots: they need {error.name}; run `pip install 'ur-hil[report]'` and give the command again"
+        )
+        return
+    say(f"plots: {folder.write('sweep.html', page.encode())}")
+
+
+def _show(table: Sequence[dict[str, object]]) -> None:
+    """Say on the terminal what is best and what went wrong."""
+    from pc_client.sweep.ranking import rank_settings
+
+    settings = rank_settings(table)
+    console.print(_ranking_table(settings[:_MOST_SHOWN]))
+    complete = [setting for setting in settings if setting.complete]
+    if complete:
+        best = complete[0]
+        margin = "no feedback" if best.gain_margin is None else f"gain margin {best.gain_margin:.2f}"
+        say(f"best of {len(settings)}: {best.name}: {best.mean_snr_db:.2f} dB, {best.n_runs} runs, {margin}")
+    else:
+        say("no setting has all its cases done: there is no best one")
+    for status in ("refused", "failed"):
+        errors = [row for row in table if row["status"] == status]
+        for row in errors[:_MOST_SHOWN]:
+            say(f"{status}: {row['case']} ({row['movement']}): {row['error']}")
+        if len(errors) > _MOST_SHOWN:
+            say(f"{status}: {len(errors) - _MOST_SHOWN} more, see the table")
+
+
+def _ranking_table(settings: Sequence[Setting]) -> Table:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("setting")
+    for heading in ("mean SNR\n\\[dB]", "gain\nmargin", "max error\n\\[mm]", "runs", "refused", "failed"):
+        table.add_column(heading, justify="right")
+    for setting in settings:
+        figures = (setting.mean_snr_db, setting.gain_margin, setting.max_position_error_mm)
+        counts = (setting.n_runs, setting.n_refused, setting.n_failed)
+        table.add_row(
+            setting.name,
+            *("" if figure is None else f"{figure:.2f}" for figure in figures),
+            *map(str, counts),
+        )
+    return table

@@ -1,0 +1,131 @@
+"""One case of a sweep: a movement, an arm, a controller, some repetitions. Its identity is its content."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from pc_client.control.controller_config import ControllerConfig
+
+
+@dataclass(frozen=True, slots=True)
+class MovementFile:
+    """A movement as text, so that it can travel to other machines.
+
+    Attributes:
+        name: the movement's name.
+        file_name: name of its file, without folders; the suffix says what the text is.
+        text: content of the file.
+    """
+
+    name: str
+    file_name: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedArm:
+    """An arm that a case starts for itself.
+
+    Attributes:
+        robot: "ur3", "ur5" or "ur10".
+        fidelity: how imperfect it is, as `ur-emulator serve --fidelity`.
+        seed: which arm of its kind.
+    """
+
+    robot: str
+    fidelity: str
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class GivenRobot:
+    """A control box that is there already, real or not.
+
+    Attributes:
+        host: its name or address.
+        port_base: offset of its ports.
+        robot: "ur3", "ur5" or "ur10", as it told.
+        serial: its serial number: this is who it is, wherever it answers.
+    """
+
+    host: str
+    port_base: int
+    robot: str
+    serial: str
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One experiment of a sweep.
+
+    Attributes:
+        movement: what to do.
+        arm: with which arm.
+        controller: by which controller.
+        repeat: how often, in one session.
+    """
+
+    movement: MovementFile
+    arm: SimulatedArm | GivenRobot
+    controller: ControllerConfig
+    repeat: int
+
+    def content(self) -> dict[str, Any]:
+        """Everything that may change its figures, as JSON knows it."""
+        arm = asdict(self.arm)
+        for address in ("host", "port_base"):
+            arm.pop(address, None)
+        return {
+            "client_version": _client_version(),
+            "movement": asdict(self.movement),
+            "arm": arm,
+            "controller": asdict(self.controller),
+            "repeat": self.repeat,
+        }
+
+    @property
+    def identity(self) -> str:
+        """16 hexadecimal digits that equal cases share, today and tomorrow, here and elsewhere."""
+        text = json.dumps(self.content(), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def factors(self) -> dict[str, str | int | float | bool | None]:
+        """What was chosen, by the names of the table's columns."""
+        settings = asdict(self.controller)
+        own = self.arm if isinstance(self.arm, SimulatedArm) else None
+        return {
+            "robot": self.arm.robot,
+            "fidelity": None if own is None else own.fidelity,
+            "seed": None if own is None else own.seed,
+            "movement": self.movement.name,
+            "controller": settings.pop("name"),
+            **settings,
+        }
+
+
+def all_cases(
+    movements: Sequence[MovementFile],
+    arms: Sequence[SimulatedArm] | Sequence[GivenRobot],
+    controllers: Sequence[ControllerConfig],
+    repeat: int,
+) -> list[Case]:
+    """Every combination, arms outermost; cases that are equal appear once."""
+    cases = [
+        Case(movement, arm, controller, repeat)
+        for arm in arms
+        for movement in movements
+        for controller in controllers
+    ]
+    return list({case.identity: case for case in cases}.values())
+
+
+def _client_version() -> str:
+    try:
+        return version("ur-hil")
+    except PackageNotFoundError:  # run from a source tree
+        return "unknown"

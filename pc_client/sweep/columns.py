@@ -1,0 +1,66 @@
+"""The columns of a sweep's table, in order: what was chosen, what came of it, what was measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pc_client.analysis.budget import PARTS
+from pc_client.sweep.controller_axes import sweepable_fields
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column.
+
+    Attributes:
+        name: with its unit, where it has one.
+        kind: type of its values; any of them may be missing.
+        text: what it is.
+    """
+
+    name: str
+    kind: type
+    text: str
+
+
+def budget_column(part: str) -> str:
+    """The column of one part of the error budget."""
+    return f"budget_{part.replace(' ', '_')}"
+
+
+FACTORS = (
+    Column("robot", str, "type of the arm"),
+    Column("fidelity", str, "how imperfect the simulated arm is; none for a robot that was there already"),
+    Column("seed", int, "which simulated arm of its kind"),
+    Column("movement", str, "name of the movement"),
+    Column("controller", str, "named controller that the settings start from"),
+    *(Column(name, kind, "as in ControllerConfig") for name, kind in sweepable_fields().items()),
+)
+"""What a case is made of; the axes of a sweep are those of them that vary."""
+
+FIGURES = (
+    Column("kind", str, "law of the movement: lognormal, uniform ..."),
+    Column("repetition", int, "run within the case, from 1"),
+    Column("snr_db", float, "SNR of the TCP speed, Eq. 10 of the paper: neither shifted nor smoothed"),
+    Column("snr_shifted_db", float, "the same after the one time shift that makes it best"),
+    Column("lag_ms", float, "that shift; positive: the arm is behind"),
+    Column("vector_snr_db", float, "SNR of the TCP velocity vector"),
+    Column("vector_snr_shifted_db", float, "the same after its own best shift"),
+    Column("max_position_error_mm", float, "largest distance of reference and reported TCP at one time"),
+    Column("rms_position_error_mm", float, "its root mean square"),
+    Column("max_path_error_mm", float, "the same after the best shift and without the constant offset"),
+    *(Column(budget_column(part), float, f"share of {part} in the error power, 0..1") for part in PARTS),
+    Column("delay_ms", float, "loop delay that the client identified before the first run"),
+    Column("gain_margin", float, "factor by which both gains may grow with this delay; refused below 2"),
+    Column("late_frames", int, "frames that came late"),
+    Column("lost_frames", int, "frames that never came"),
+)
+"""What is measured on a run."""
+
+COLUMNS = (
+    Column("case", str, "identity: equal cases of any sweep share it"),
+    Column("status", str, "done, refused (gain margin too small, nothing ran) or failed"),
+    Column("error", str, "why it is not done"),
+    *FACTORS,
+    *FIGURES,
+)

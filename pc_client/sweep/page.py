@@ -1,0 +1,71 @@
+"""The page of a sweep: ranking, plots, what is not done. One file that needs no network and holds no date."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import Any
+
+from pc_client.sweep.controller_axes import sweepable_fields
+from pc_client.sweep.ranking import rank_settings, varying
+
+Rows = Sequence[Mapping[str, Any]]
+
+_TEMPLATE = "sweep.html.j2"
+_MOST_SETTINGS = 25
+"""Settings in the ranking; the table has all."""
+
+_MOST_ERRORS = 50
+
+
+def render_page(name: str, rows: Rows) -> str:
+    """Return the text of `sweep.html`.
+
+    Args:
+        name: of the sweep.
+        rows: of the table, at least one.
+
+    Raises:
+        ModuleNotFoundError: matplotlib or jinja2 is not installed (extra `report`).
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    from pc_client.sweep import figures
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    template = environment.from_string(
+        resources.files("pc_client.sweep").joinpath(_TEMPLATE).read_text(encoding="utf-8")
+    )
+    axes = varying(rows)
+    done = [row for row in rows if row["status"] == "done" and row["snr_db"] is not None]
+    pair = map_axes(rows)
+    settings = rank_settings(rows)
+    plotted = [axis for axis in axes if done and len({row[axis] for row in done}) > 1]
+    return template.render(
+        name=name,
+        axes={axis: len({row[axis] for row in rows}) for axis in axes},
+        n_runs=sum(row["status"] == "done" for row in rows),
+        n_cases=len({row["case"] for row in rows}),
+        simulated=any(row["fidelity"] is not None for row in rows),
+        settings=settings[:_MOST_SETTINGS],
+        n_settings=len(settings),
+        map_figure=_data_uri(figures.draw_map(rows, *pair)) if pair and done else None,
+        axis_figures=[(axis, _data_uri(figures.draw_axis(done, axis))) for axis in plotted],
+        not_done=[row for row in rows if row["status"] != "done"][:_MOST_ERRORS],
+        n_not_done=sum(row["status"] != "done" for row in rows),
+    )
+
+
+def map_axes(rows: Rows) -> tuple[str, str] | None:
+    """The axes of the map: both gains if they vary, else the controller's first two numbers that do."""
+    fields = sweepable_fields()
+    numbers = [axis for axis in varying(rows) if fields.get(axis) in (float, int)]
+    numbers.sort(key=lambda axis: axis not in ("gain_p", "gain_i"))
+    return (numbers[0], numbers[1]) if len(numbers) > 1 else None
+
+
+def _data_uri(svg: str) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode()

@@ -1,0 +1,84 @@
+"""One case, from its content to its figures. This is the job that workers do.
+
+Whatever goes wrong is part of the answer: a sweep is not ended by one case.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pc_client.driver.ur_driver import UrDriver
+from pc_client.errors import ClientError, GainMarginError, full_message
+from pc_client.experiment.prepare import Experiment, PlannedMovement, prepare_experiment
+from pc_client.experiment.runner import ExperimentRunner
+from pc_client.kinematics.robot_model import robot_model
+from pc_client.movements.files import load_movement
+from pc_client.sweep.box import simulated_box
+from pc_client.sweep.case import Case, MovementFile, SimulatedArm
+from pc_client.sweep.measure import loop_figures, measure_run
+from pc_client.sweep.outcome import Outcome, failed
+from protocol.errors import ProtocolError
+from protocol.ur_types import Ports
+
+
+def run_case(case: Case, keep_recordings: bool) -> Outcome:
+    """Do one case.
+
+    Args:
+        case: what to do.
+        keep_recordings: True: the recordings are part of the answer.
+
+    Returns:
+        What came of it; errors of robot, plan or disk are in it.
+    """
+    try:
+        if isinstance(case.arm, SimulatedArm):
+            with simulated_box(case.arm) as box:
+                return _run(case, box.host, box.ports, box.folder, keep_recordings)
+        with TemporaryDirectory(prefix="ur-sweep-") as folder:
+            ports = Ports.standard(case.arm.port_base)
+            return _run(case, case.arm.host, ports, Path(folder), keep_recordings)
+    except GainMarginError as error:
+        return Outcome(
+            "refused", full_message(error), ({"delay_ms": 1e3 * error.delay, "gain_margin": error.margin},)
+        )
+    except (ClientError, ProtocolError, OSError) as error:
+        return failed(full_message(error))
+
+
+def plan_case(case: Case) -> Experiment:
+    """The experiment of a case, checked and planned; its folder is to be set.
+
+    Raises:
+        PlanningError: the arm cannot do the movement.
+        MovementError: the movement makes no sense.
+    """
+    planned = _planned(case.movement, case.arm.robot)
+    # A model of its own: it carries scratch data, and workers of a cluster may be threads.
+    return Experiment(robot_model(case.arm.robot), (planned,), case.repeat, Path())
+
+
+def _run(case: Case, host: str, ports: Ports, folder: Path, keep_recordings: bool) -> Outcome:
+    planned = plan_case(case)
+    experiment = Experiment(planned.model, planned.planned, planned.repeat, folder / "recordings")
+    with UrDriver(host, ports) as driver:
+        report = ExperimentRunner(driver, experiment, case.controller).run()
+        loop = loop_figures(case.controller, report.delay.delay, driver.info.period)
+    rows = tuple(
+        {**measure_run(path, stream), **loop}
+        for path, stream in zip(report.paths, report.streams, strict=True)
+    )
+    recordings = tuple((path.name, path.read_bytes()) for path in report.paths) if keep_recordings else ()
+    return Outcome("done", rows=rows, recordings=recordings)
+
+
+@lru_cache(maxsize=64)
+def _planned(movement: MovementFile, robot: str) -> PlannedMovement:
+    """Plan a movement, once for all cases of this worker; a plan is never changed."""
+    with TemporaryDirectory(prefix="ur-sweep-") as folder:
+        path = Path(folder) / movement.file_name
+        path.write_text(movement.text, encoding="utf-8")
+        loaded = load_movement(path)
+    return prepare_experiment([loaded], repeat=1, out=Path(), robot=robot).planned[0]
