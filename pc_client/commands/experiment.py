@@ -80,7 +80,7 @@ def _run(
             raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")
         planned = prepare_experiment(loaded, repeat=repeat, out=out, robot=arm.lower())
     if not yes and not is_loopback(robot):
-        _ask(planned, robot, ports)
+        ask_before_motion(planned, robot, ports)
     try:
         with Progress(console, planned.n_runs) as progress, UrDriver(robot, ports) as driver:
             report = ExperimentRunner(driver, planned, config, progress).run()
@@ -99,7 +99,7 @@ def _run(
     show_report(out)
 
 
-def _ask(planned: Experiment, robot: str, ports: Ports) -> None:
+def ask_before_motion(planned: Experiment, robot: str, ports: Ports) -> None:
     """Show what is going to happen and ask; nothing has moved and no connection stays open meanwhile.
 
     Raises:
