@@ -58,10 +58,23 @@ def show(
     say(plan_text(plan_movement(loaded)))
 
 
+@app.command("kinds")
+def kinds() -> None:
+    """List the generators of movements."""
+    from pc_client.movements.twins import GENERATORS
+
+    table = Table("kind", "movement", "strokes last as long as lognormal's")
+    for name, generator in GENERATORS.items():
+        table.add_row(name, generator.says, "yes" if generator.same_strokes else "only the whole")
+    console.print(table)
+
+
 @app.command("generate")
 def generate(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Movement file to write, .toml.")],
-    kind: Annotated[str, typer.Option("--kind", help="lognormal or uniform.")] = "lognormal",
+    kind: Annotated[
+        str, typer.Option("--kind", help="Generator: lognormal, uniform and others; `kinds` lists them.")
+    ] = "lognormal",
     targets: Annotated[int, typer.Option("--targets", min=2, max=50, help="Number of target points.")] = 4,
     seed: Annotated[int, typer.Option("--seed", min=0, help="The same seed gives the same movement.")] = 0,
 ) -> None:
@@ -74,6 +87,29 @@ def generate(
     movement = generate_movement(kind, targets, seed, name=out.stem)
     plan = plan_movement(movement)
     save_movement(movement, out)
+    say(plan_text(plan))
+    say(f"saved: {out}")
+
+
+@app.command("duplicate")
+def duplicate(
+    movement: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A lognormal movement.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Movement file to write, .toml.")],
+    seed: Annotated[int, typer.Option("--seed", min=0, help="The same seed gives the same duplicate.")] = 0,
+    share: Annotated[
+        float,
+        typer.Option("--share", min=0.0, max=1.0, help="Share of the published human variability."),
+    ] = 1.0,
+) -> None:
+    """Vary a movement as people vary when they repeat one, check that the arm can do it, and save it."""
+    from pc_client.movements.files import load_movement, save_movement
+    from pc_client.movements.variability import duplicate as vary
+    from pc_client.planning.plan import plan_movement
+    from pc_client.planning.plan_text import plan_text
+
+    varied = vary(load_movement(movement), seed, name=out.stem, share=share)
+    plan = plan_movement(varied)
+    save_movement(varied, out)
     say(plan_text(plan))
     say(f"saved: {out}")
 

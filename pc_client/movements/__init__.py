@@ -1,13 +1,15 @@
-"""Movements of the TCP: human-like (Sigma-Lognormal), robot-like (trapezoids) or brought along as samples.
+"""Movements of the TCP: human-like (three laws), robot-like (trapezoids) or brought along as samples.
 
 A `Movement` gives position and velocity at any time in closed form. This package knows no robot: no joints,
 no limits, no sockets.
 
     lognormal, timing, stroke, sigma_lognormal   the human-like model, from one bell to a whole movement
     path, robotic                                the robot-like model: geometry, and the law of speed
+    minimum_jerk; smooth_path, power_law         two other models of human movement
+    durations, variability                       how long strokes last; the same movement another time
     samples                                      (x, y, z, t) files
-    movement, files, description                 the `Movement`, its files and its figures
-    targets, generate, fit, geometry             new movements by a seed, and movements into a workspace
+    movement, files, law_tables, description     the `Movement`, its files and its figures
+    targets, generate, twins, fit, geometry      new movements by a seed, and movements into a workspace
 
 Names are loaded when they are first asked for, so that importing the package costs nothing.
 """
@@ -25,22 +27,24 @@ if TYPE_CHECKING:
     from pc_client.movements.fit import fit_movement as fit_movement
     from pc_client.movements.generate import generate_library as generate_library
     from pc_client.movements.generate import generate_movement as generate_movement
-    from pc_client.movements.generate import robotic_twin as robotic_twin
     from pc_client.movements.movement import Movement as Movement
     from pc_client.movements.movement import MovementSample as MovementSample
     from pc_client.movements.movement import export_samples as export_samples
+    from pc_client.movements.twins import robotic_twin as robotic_twin
+    from pc_client.movements.variability import duplicate as duplicate
 
 _HOMES = {
     "Movement": "movement",
     "MovementSample": "movement",
     "describe": "description",
+    "duplicate": "variability",
     "export_samples": "movement",
     "fit_movement": "fit",
     "generate_library": "generate",
     "generate_movement": "generate",
     "library_names": "files",
     "load_movement": "files",
-    "robotic_twin": "generate",
+    "robotic_twin": "twins",
     "save_movement": "files",
 }
 __all__ = sorted(_HOMES)

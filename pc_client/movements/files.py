@@ -13,17 +13,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pc_client.errors import MovementError
-from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.law_tables import LAW_FIELDS, LAW_WORDS, law_lines, parse_law
 from pc_client.movements.movement import Movement
-from pc_client.movements.robotic import RoboticLaw
 from pc_client.movements.samples import SampledLaw, parse_samples, write_samples
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke
 from pc_client.movements.tables import TableReader, toml_value
-from pc_client.movements.timing import FULL_COVERAGE, LiteralTiming, Timing, TwoSidedTiming, lead_from_k
 
 __all__ = [
     "LIBRARY_FOLDER",
@@ -41,13 +36,7 @@ LIBRARY_NAMES = tuple(
 )
 
 _FORMAT = 1
-_FIELDS = (
-    "format, name, kind, duration, stroke_durations, target_points, provenance, "
-    "strokes (lognormal), profile (uniform)"
-)
-_STROKE_FIELDS = (
-    "turn, tilt, and one of: start, duration, sigma, coverage; start, duration, lead (or k); t0, mu, sigma"
-)
+_FIELDS = f"format, name, kind, duration, stroke_durations, target_points, provenance, {LAW_FIELDS}"
 
 
 def library_names() -> list[str]:
@@ -100,14 +89,10 @@ def save_movement(movement: Movement, path: str | Path) -> None:
 def movement_text(movement: Movement) -> str:
     """The TOML file of a movement with a law, complete and readable."""
     law = movement.law
-    what = {
-        "lognormal": "human-like: overlapping lognormal strokes",
-        "uniform": "robot-like: constant speed with ramps",
-    }
-    if movement.kind not in what:
+    if movement.kind not in LAW_WORDS:
         raise MovementError(f"movement {movement.name} is made of samples: save it as a .csv file")
     lines = [
-        f"# A movement of the TCP, {what[movement.kind]}.",
+        f"# A movement of the TCP, {LAW_WORDS[movement.kind]}.",
         "# x, y, z over t derive from it; docs/movements.md explains the fields.",
         f"format = {_FORMAT}",
         f"name = {toml_value(movement.name)}",
@@ -121,37 +106,12 @@ def movement_text(movement: Movement) -> str:
     if movement.provenance:
         lines += ["", "[provenance]"]
         lines += [f"{_toml_key(key)} = {toml_value(value)}" for key, value in movement.provenance.items()]
-    if isinstance(law, RoboticLaw):
-        lines += [
-            "",
-            "[profile]",
-            f"corners = {toml_value(law.corners)}",
-            f"ramps = {toml_value(list(law.ramps))}  # s",
-        ]
-        lines += [f"blend = {toml_value(law.blend)}  # m"] if law.blend else []
-    elif isinstance(law, SigmaLognormal):
-        for stroke in law.strokes:
-            lines += ["", "[[strokes]]"]
-            lines += [f"{key} = {toml_value(value)}{unit}" for key, value, unit in _stroke_fields(stroke)]
+    lines += law_lines(law)
     return "\n".join(lines) + "\n"
 
 
 def _toml_key(key: str) -> str:
     return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else toml_value(key)
-
-
-def _stroke_fields(stroke: Stroke) -> list[tuple[str, float, str]]:
-    fields: list[tuple[str, float, str]]
-    match stroke.timing:
-        case TwoSidedTiming(start, duration, sigma, coverage):
-            fields = [("start", start, "  # s"), ("duration", duration, "  # s"), ("sigma", sigma, "")]
-            fields += [("coverage", coverage, "")] if coverage != FULL_COVERAGE else []
-        case LiteralTiming(start, duration, lead):
-            fields = [("start", start, "  # s"), ("duration", duration, "  # s"), ("lead", lead, "  # s")]
-        case other:
-            bell = other.lognormal
-            fields = [("t0", bell.t0, "  # s"), ("mu", bell.mu, "  # ln s"), ("sigma", bell.sigma, "")]
-    return [*fields, ("turn", stroke.turn, "  # rad"), ("tilt", stroke.tilt, "  # rad")]
 
 
 def _read(path: Path) -> Movement:
@@ -187,57 +147,10 @@ def _parse_movement(table: TableReader, source: str) -> Movement:
     provenance = table.table("provenance").facts() if "provenance" in table else {}
     duration = table.number("duration")
     durations = np.array(table.numbers("stroke_durations")) if "stroke_durations" in table else None
-    law: SigmaLognormal | RoboticLaw
     with _naming(source):
-        if kind == "lognormal":
-            strokes = tuple(_parse_stroke(stroke) for stroke in table.tables("strokes"))
-            law = SigmaLognormal(points, strokes, duration)
-            if durations is None:
-                durations = np.diff(np.concatenate(([0.0], law.speed_minima(), [duration])))
-        elif kind == "uniform":
-            if durations is None:
-                raise table.error("stroke_durations", "missing; give a list of numbers")
-            law = _parse_robotic(table.table("profile"), points, durations)
-            if abs(law.duration - duration) > 1e-6:
-                raise table.error(
-                    "duration", f"{duration} s; the stroke durations add up to {law.duration:.6f} s"
-                )
-        else:
-            raise table.error("kind", f'"{kind}"; give "lognormal" or "uniform" (samples are .csv files)')
+        law, durations = parse_law(kind, table, points, duration, durations)
         table.finish(_FIELDS)
         return Movement(name, law, durations, provenance)
-
-
-def _parse_stroke(table: TableReader) -> Stroke:
-    timing: Timing
-    if "mu" in table:
-        timing = Lognormal(table.number("t0"), table.number("mu"), table.number("sigma"))
-    elif "sigma" in table:
-        coverage = table.number("coverage", FULL_COVERAGE)
-        timing = TwoSidedTiming(
-            table.number("start"), table.number("duration"), table.number("sigma"), coverage
-        )
-    else:
-        start, duration = table.number("start"), table.number("duration")
-        lead = lead_from_k(table.number("k"), duration) if "k" in table else table.number("lead")
-        timing = LiteralTiming(start, duration, lead)
-    stroke = Stroke(timing, table.number("turn", 0.0), table.number("tilt", 0.0))
-    table.finish(_STROKE_FIELDS)
-    return stroke
-
-
-def _parse_robotic(
-    table: TableReader, points: NDArray[np.float64], durations: NDArray[np.float64]
-) -> RoboticLaw:
-    corners = table.text("corners")
-    if corners not in ("stop", "blend"):
-        raise table.error("corners", f'"{corners}"; give "stop" or "blend"')
-    ramps = tuple(table.numbers("ramps"))
-    law = RoboticLaw(
-        points, durations, ramps, "stop" if corners == "stop" else "blend", table.number("blend", 0.0)
-    )
-    table.finish("corners, ramps, blend")
-    return law
 
 
 @contextmanager

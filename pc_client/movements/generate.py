@@ -20,11 +20,11 @@ from pc_client.errors import MovementError
 from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_NAMES, save_movement
 from pc_client.movements.geometry import UR3_BOX, Box
 from pc_client.movements.movement import Movement
-from pc_client.movements.robotic import Corners, RoboticLaw
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Stroke
 from pc_client.movements.targets import TargetRules, random_targets
 from pc_client.movements.timing import TwoSidedTiming
+from pc_client.movements.twins import GENERATORS, RobotRules, robotic_twin
 
 __all__ = [
     "HumanRules",
@@ -67,21 +67,6 @@ class HumanRules:
     rest: float = 0.1
 
 
-@dataclass(frozen=True, slots=True)
-class RobotRules:
-    """The profile of robot-like movements: see `RoboticLaw`.
-
-    The ramps together last as long as those that a UR makes by itself: movel's default speed over its default
-    acceleration, .25 m/s / 1.2 m/s^2 = .21 s (Source: URScript manual, movel). Most of it bounds the
-    acceleration, the rest the jerk. To stop at the target points is what a UR does on movel without a blend
-    radius.
-    """
-
-    ramps: tuple[float, ...] = (0.16, 0.05)
-    corners: Corners = "stop"
-    blend: float = 0.0
-
-
 def generate_movement(
     kind: str,
     n_targets: int,
@@ -94,10 +79,10 @@ def generate_movement(
     human_rules: HumanRules | None = None,
     robot_rules: RobotRules | None = None,
 ) -> Movement:
-    """A random movement; the two kinds of one seed are twins: same target points, same stroke durations.
+    """A random movement; all kinds of one seed are twins: same target points, same duration.
 
     Args:
-        kind: "lognormal" or "uniform".
+        kind: a name of `twins.GENERATORS`, e.g. "lognormal" or "uniform".
         n_targets: number of target points, at least 2.
         seed: 0 or more; the same seed gives the same movement everywhere.
         name: e.g. "lognorm_5_1"; made from kind, n_targets and seed if None.
@@ -107,8 +92,8 @@ def generate_movement(
         human_rules: ranges of the strokes; defaults if None.
         robot_rules: profile of a "uniform" movement; defaults if None.
     """
-    if kind not in ("lognormal", "uniform"):
-        raise MovementError(f'kind "{kind}": give "lognormal" or "uniform"')
+    if kind not in GENERATORS:
+        raise MovementError(f'kind "{kind}": give one of {", ".join(GENERATORS)}')
     if seed < 0:
         raise MovementError(f"seed {seed}: give a whole number, 0 or more")
     source = random.Random(seed)
@@ -117,25 +102,13 @@ def generate_movement(
     boundaries = np.concatenate(([0.0], np.round(law.speed_minima(), 3), [law.duration]))
     durations = [round(duration, 3) for duration in np.diff(boundaries).tolist()]
     provenance: dict[str, str | int | float] = {"generator": "pc_client.movements.generate", "seed": seed}
-    human = Movement(name or f"lognorm_{n_targets}_seed{seed}", law, np.array(durations), provenance)
+    human = Movement(f"lognorm_{n_targets}_seed{seed}", law, np.array(durations), provenance)
     if kind == "lognormal":
-        return human
-    return robotic_twin(human, name or f"uniform_{n_targets}_seed{seed}", robot_rules)
-
-
-def robotic_twin(movement: Movement, name: str, rules: RobotRules | None = None) -> Movement:
-    """The robot-like movement along the same target points with the same stroke durations.
-
-    Args:
-        movement: any movement with a stroke between each two target points.
-        name: the twin's.
-        rules: its profile; defaults if None.
-    """
-    rules = rules or RobotRules()
-    law = RoboticLaw(
-        movement.target_points, movement.stroke_durations, rules.ramps, rules.corners, rules.blend
-    )
-    return Movement(name, law, movement.stroke_durations, {**movement.provenance, "twin": movement.name})
+        return human.renamed(name or human.name)
+    name = name or f"{kind}_{n_targets}_seed{seed}"
+    if kind == "uniform":
+        return robotic_twin(human, name, robot_rules)
+    return GENERATORS[kind].make(human, seed, name)
 
 
 def generate_library(seed: int = LIBRARY_SEED) -> dict[str, Movement]:

@@ -17,14 +17,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import MovementError
 from pc_client.movements.geometry import Similarity, read_only
+from pc_client.movements.minimum_jerk import MinimumJerk
+from pc_client.movements.power_law import PowerLaw
 from pc_client.movements.robotic import RoboticLaw
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Motion
 
 __all__ = ["Kind", "Movement", "MovementLaw", "MovementSample", "SampleColumns", "export_samples"]
 
-#: Human-like, robot-like, or brought along as samples.
-Kind = Literal["lognormal", "uniform", "samples"]
+#: Which law made a movement, as its file says it; "samples" were brought along.
+Kind = Literal["lognormal", "uniform", "minimum_jerk", "power_law", "samples"]
+
+_KINDS: Mapping[type, Kind] = MappingProxyType(
+    {
+        SigmaLognormal: "lognormal",
+        RoboticLaw: "uniform",
+        MinimumJerk: "minimum_jerk",
+        PowerLaw: "power_law",
+    }
+)
 
 
 class MovementSample(NamedTuple):
@@ -76,8 +87,8 @@ class Movement:
     Attributes:
         name: as in tables and file names.
         law: the closed form behind it.
-        stroke_durations: (n_strokes,), s: times between the least speeds of the movement; their sum is the
-            duration.
+        stroke_durations: (n_strokes,), s: times between the least speeds of the movement, or, where a law
+            names them, between its passages at the target points; their sum is the duration.
         provenance: how it was made, as short facts; written into its file.
     """
 
@@ -108,10 +119,8 @@ class Movement:
 
     @property
     def kind(self) -> Kind:
-        """Human-like, robot-like or samples."""
-        if isinstance(self.law, SigmaLognormal):
-            return "lognormal"
-        return "uniform" if isinstance(self.law, RoboticLaw) else "samples"
+        """Which law made it."""
+        return _KINDS.get(type(self.law), "samples")
 
     @property
     def duration(self) -> float:

@@ -1,0 +1,215 @@
+"""How human-like a movement is, in four figures that need no model of it.
+
+    sparc                    smoothness, from the speed's spectrum: near -1.4 for one bell, lower when
+    ragged log_dimensionless_jerk   smoothness, from the speed's second derivative: -5.3 for minimum jerk,
+    lower when worse speed_peaks              how many bells: a person needs one a stroke power_law_exponent
+    beta in speed = k curvature^-beta: one third for drawing hands
+
+Pure functions on samples at equal steps of time. None of them filters: noise that is differentiated twice
+is all that is left, so measured signals are smoothed before (`comparison.filtering`).
+
+Source: S. Balasubramanian et al., "On the analysis of movement smoothness", JNER 12:112 (2015), for the
+    first two; P. Viviani and F. Lacquaniti et al. for the two-thirds power law.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pc_client.errors import ClientError
+
+__all__ = [
+    "PowerLawFit",
+    "between_peaks",
+    "curvature_of",
+    "fit_power_law",
+    "log_dimensionless_jerk",
+    "peaks_of",
+    "power_law_exponent",
+    "sparc",
+    "speed_peaks",
+]
+
+#: Fewest samples that a figure is computed from.
+_MIN_SAMPLES = 8
+
+
+def sparc(
+    speed: ArrayLike, rate: float, *, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4
+) -> float:
+    """The spectral arc length: minus the length of the speed's spectrum, drawn in a unit square.
+
+    The amplitude spectrum is divided by its maximum; it counts from the first to the last frequency below
+    the cutoff at which it reaches the threshold, and this range of frequencies is scaled to 1.
+
+    Args:
+        speed: (n,), any unit, n >= 8, not all zero.
+        rate: samples a second, Hz.
+        cutoff: highest frequency that is looked at, Hz.
+        threshold: amplitude below which the spectrum is taken to be over, 0 to 1.
+        padding: the transform is 2^padding times as long as the signal, for a smooth curve.
+
+    Returns: Below -1; the nearer to 0, the smoother. Figures compare only among movements of the same
+        number of strokes.
+    """
+    values = _checked(speed, rate)
+    size = 2 ** (math.ceil(math.log2(len(values))) + padding)
+    frequency = np.fft.rfftfreq(size, 1.0 / rate)
+    amplitude = np.abs(np.fft.rfft(values, size))
+    amplitude /= amplitude.max()
+    low = frequency <= cutoff
+    frequency, amplitude = frequency[low], amplitude[low]
+    reached = np.flatnonzero(amplitude >= threshold)
+    kept = slice(int(reached[0]), int(reached[-1]) + 1)
+    frequency, amplitude = frequency[kept], amplitude[kept]
+    if len(frequency) < 2:
+        raise ClientError("a spectrum of one line has no arc length: give a longer signal or a higher cutoff")
+    steps = np.hypot(np.diff(frequency) / (frequency[-1] - frequency[0]), np.diff(amplitude))
+    return -float(steps.sum())
+
+
+def log_dimensionless_jerk(speed: ArrayLike, rate: float) -> float:
+    """LDJ = -ln(T^3 / v_peak^2 * integral of (d2v/dt2)^2 dt), T = n / rate, by second differences.
+
+    A profile with corners has infinite jerk there: its figure falls with the rate, so compare at equal
+    rates only.
+
+    Args: speed: (n,), any unit, n >= 8, not all zero: the movement from rest to rest, for dead time at its
+        ends counts in T. rate: samples a second, Hz.
+
+    Returns:
+        -ln 204.8 = -5.322 for one minimum-jerk stroke; inf for a constant speed.
+    """
+    values = _checked(speed, rate)
+    jerk = np.diff(values, 2) * rate**2
+    duration = len(values) / rate
+    cost = duration**3 / float(values.max()) ** 2 * float(jerk @ jerk) / rate
+    return -math.log(cost) if cost > 0.0 else math.inf
+
+
+def peaks_of(speed: ArrayLike, *, prominence: float = 0.05) -> list[int]:
+    """Samples at which the speed has a peak that stands out by a share of the highest; a plateau is one peak.
+
+    A peak counts when the speed has risen by that share from the dip before it and falls by as much after it.
+
+    Args:
+        speed: (n,), any unit.
+        prominence: share of the top speed, above 0, up to 1.
+
+    Returns:
+        Indices in order; of a plateau, the first of its highest samples.
+    """
+    values = np.asarray(speed, dtype=np.float64).tolist()
+    step = prominence * max(values, default=0.0)
+    peaks: list[int] = []
+    if step <= 0.0:
+        return peaks
+    # The signal comes from rest and goes to rest, so a movement cut off at its top speed has a peak there.
+    low, top, top_at, climbing = 0.0, 0.0, 0, True
+    for index, value in enumerate([*values, 0.0]):
+        if climbing:
+            if value > top:
+                top, top_at = value, index
+            elif value <= top - step:
+                if top - low >= step:
+                    peaks.append(top_at)
+                low, climbing = value, False
+        elif value < low:
+            low = value
+        elif value >= low + step:
+            top, top_at, climbing = value, index, True
+    return peaks
+
+
+def speed_peaks(speed: ArrayLike, *, prominence: float = 0.05) -> int:
+    """How many peaks the speed has; arguments as of `peaks_of`."""
+    return len(peaks_of(speed, prominence=prominence))
+
+
+def between_peaks(speed: ArrayLike, *, prominence: float = 0.05) -> slice:
+    """The samples from the first to the last peak of the speed; arguments as of `peaks_of`."""
+    peaks = peaks_of(speed, prominence=prominence)
+    return slice(peaks[0], peaks[-1] + 1) if peaks else slice(0, 0)
+
+
+def curvature_of(v: ArrayLike, a: ArrayLike) -> NDArray[np.float64]:
+    """Curvature |v x a| / |v|^3 of a path in space, (n,), 1/m; nan where it stands still.
+
+    Args:
+        v: velocities, (n, 3), m/s.
+        a: accelerations, (n, 3), m/s^2.
+    """
+    velocity, acceleration = np.asarray(v, dtype=np.float64), np.asarray(a, dtype=np.float64)
+    speed = np.linalg.norm(velocity, axis=1)
+    across = np.linalg.norm(np.cross(velocity, acceleration), axis=1)
+    moving = speed > 0.0
+    return np.where(moving, across / np.where(moving, speed, 1.0) ** 3, np.nan)
+
+
+class PowerLawFit(NamedTuple):
+    """speed = gain curvature^-exponent through the logarithms, and how well it holds.
+
+    Attributes:
+        exponent: beta; nan when the path has no bend to fit.
+        r_squared: share of the variance of ln speed that the law explains, 0 to 1; nan likewise.
+        n_samples: samples that were used.
+    """
+
+    exponent: float
+    r_squared: float
+    n_samples: int
+
+
+def fit_power_law(
+    v: ArrayLike, a: ArrayLike, *, min_speed: float = 0.1, max_radius: float = 1.0
+) -> PowerLawFit:
+    """Fit ln speed = ln k - beta ln curvature by least squares over the samples.
+
+    Noise alone makes curvature high where speed is low and so feigns a law: judge r_squared too, and smooth
+    measured signals first.
+
+    Args: v: velocities, (n, 3), m/s, at equal steps of time. a: accelerations, (n, 3), m/s^2. min_speed:
+        samples slower than this share of the top speed are left out: starts and stops follow no law.
+        max_radius: samples on a path straighter than this radius (m) are left out: a line has no curvature
+        to speak of.
+    """
+    speed = np.linalg.norm(np.asarray(v, dtype=np.float64), axis=1)
+    curvature = curvature_of(v, a)
+    used = (speed > min_speed * speed.max()) & (curvature > 1.0 / max_radius)
+    n_used = int(np.count_nonzero(used))
+    if n_used < _MIN_SAMPLES:
+        return PowerLawFit(math.nan, math.nan, n_used)
+    x, y = np.log(curvature[used]), np.log(speed[used])
+    x, y = x - x.mean(), y - y.mean()
+    spread, total = float(x @ x), float(y @ y)
+    if spread < 1e-12 * n_used:  # one radius everywhere: any exponent would do
+        return PowerLawFit(math.nan, math.nan, n_used)
+    slope = float(x @ y) / spread
+    return PowerLawFit(-slope, slope**2 * spread / total if total > 0.0 else math.nan, n_used)
+
+
+def power_law_exponent(
+    v: ArrayLike, a: ArrayLike, *, min_speed: float = 0.1, max_radius: float = 1.0
+) -> float:
+    """Beta in speed = k curvature^-beta: 1/3 is the two-thirds power law; nan for a path without bends.
+
+    Arguments as of `fit_power_law`.
+    """
+    return fit_power_law(v, a, min_speed=min_speed, max_radius=max_radius).exponent
+
+
+def _checked(speed: ArrayLike, rate: float) -> NDArray[np.float64]:
+    values = np.asarray(speed, dtype=np.float64)
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise ClientError(f"rate of {rate} Hz: give a number greater than 0")
+    if values.ndim != 1 or len(values) < _MIN_SAMPLES or not np.all(np.isfinite(values)):
+        raise ClientError(
+            f"speed of shape {values.shape}: give at least {_MIN_SAMPLES} finite samples in a row"
+        )
+    if not values.max() > 0.0:
+        raise ClientError("a speed that is zero everywhere has no smoothness: give a movement")
+    return values

@@ -1,0 +1,148 @@
+"""How long a stroke lasts for its length: isochrony and Fitts' law, and strokes re-timed by them.
+
+Both rules speak of proportions between the strokes of one movement; the total is the movement's own. People
+draw large and small in nearly the same time (isochrony, T = a D^b with b of .1 to .5, here 0 for the pure
+case: the theory's mu and sigma are kept and only D scales). When they must hit a target they take longer
+for a farther and a smaller one (Fitts, T = a + b log2(2 D / W)).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pc_client.errors import MovementError
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.stroke import Stroke
+from pc_client.movements.timing import TwoSidedTiming
+
+__all__ = ["DurationRule", "Fitts", "Isochrony", "chained_windows", "leg_lengths", "retimed"]
+
+
+class DurationRule(Protocol):
+    """Anything that says how long a stroke lasts for its length."""
+
+    def durations(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Durations (n,), s, of strokes of these lengths (n,), m."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Isochrony:
+    """T = scale (D / 1 m)^exponent.
+
+    Attributes:
+        exponent: 0 is strict isochrony, 1 a constant mean speed.
+        scale: s, for a stroke of 1 m.
+    """
+
+    exponent: float = 0.0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.exponent) and math.isfinite(self.scale) and self.scale > 0.0):
+            raise MovementError(
+                f"isochrony with exponent {self.exponent} and scale {self.scale} s: "
+                "give finite numbers, the scale above 0"
+            )
+
+    def durations(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Durations (n,), s, of strokes of these lengths (n,), m."""
+        return self.scale * lengths**self.exponent
+
+
+@dataclass(frozen=True, slots=True)
+class Fitts:
+    """T = intercept + slope log2(2 D / width).
+
+    Attributes:
+        intercept: s.
+        slope: s/bit; people reach with .1 to .2.
+        width: of the target, m.
+    """
+
+    intercept: float = 0.1
+    slope: float = 0.15
+    width: float = 0.02
+
+    def __post_init__(self) -> None:
+        if not (
+            self.slope >= 0.0 and self.width > 0.0 and math.isfinite(self.intercept + self.slope + self.width)
+        ):
+            raise MovementError(
+                f"Fitts' law with slope {self.slope} s/bit and width {self.width} m: "
+                "give a slope of 0 or more and a width above 0"
+            )
+
+    def durations(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Durations (n,), s, of strokes of these lengths (n,), m.
+
+        Raises:
+            MovementError: a stroke so short against the target's width that the law gives it no time.
+        """
+        durations = self.intercept + self.slope * np.log2(2.0 * lengths / self.width)
+        if not np.all(durations > 0.0):
+            raise MovementError(
+                f"Fitts' law gives a stroke of {lengths.min():.4f} m to a target of {self.width} m no time; "
+                "give a smaller width"
+            )
+        return durations
+
+
+def leg_lengths(target_points: ArrayLike) -> NDArray[np.float64]:
+    """Distances (n - 1,), m, between consecutive target points (n, 3), m."""
+    lengths: NDArray[np.float64] = np.linalg.norm(
+        np.diff(np.asarray(target_points, dtype=np.float64), axis=0), axis=1
+    )
+    return lengths
+
+
+def chained_windows(
+    proportions: ArrayLike, total: float, overlap: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Windows in these proportions, each overlapping the next, that together last a total.
+
+    Args:
+        proportions: (n,), above 0.
+        total: from the begin of the first window, 0, to the end of the last, s.
+        overlap: share of the shorter of two windows in which both are open, 0 to below 1.
+
+    Returns:
+        Begins and lengths of the windows, each (n,), s.
+    """
+    shape = np.asarray(proportions, dtype=np.float64)
+    if not (shape.ndim == 1 and len(shape) and np.all(np.isfinite(shape)) and np.all(shape > 0.0)):
+        raise MovementError(f"windows in proportions {shape.tolist()}: give numbers above 0")
+    if not (math.isfinite(total) and total > 0.0 and 0.0 <= overlap < 1.0):
+        raise MovementError(
+            f"windows of {total} s that overlap by {overlap}: give a time above 0, an overlap in [0, 1)"
+        )
+    shared = overlap * np.minimum(shape[:-1], shape[1:])
+    begins = np.concatenate(([0.0], np.cumsum(shape[:-1] - shared)))
+    scale = total / float(begins[-1] + shape[-1])
+    return scale * begins, scale * shape
+
+
+def retimed(law: SigmaLognormal, rule: DurationRule, *, overlap: float, rest: float) -> SigmaLognormal:
+    """The same arcs with windows by a rule, one sigma (the mean) and one overlap, in the same total time.
+
+    Args:
+        law: whose target points, arcs and duration are kept.
+        rule: how long a stroke lasts for the distance of its two target points.
+        overlap: as of `chained_windows`.
+        rest: time at rest before the first and after the last window, s.
+    """
+    if not 0.0 <= 2.0 * rest < law.duration:
+        raise MovementError(f"rests of {rest} s in a movement of {law.duration} s: give less than half of it")
+    sigma = float(np.mean([stroke.timing.lognormal.sigma for stroke in law.strokes]))
+    durations = rule.durations(leg_lengths(law.target_points))
+    begins, windows = chained_windows(durations, law.duration - 2.0 * rest, overlap)
+    strokes = tuple(
+        Stroke(TwoSidedTiming(rest + begin, window, sigma), stroke.turn, stroke.tilt)
+        for begin, window, stroke in zip(begins.tolist(), windows.tolist(), law.strokes, strict=True)
+    )
+    return SigmaLognormal(law.target_points, strokes, law.duration)

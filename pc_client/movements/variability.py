@@ -1,0 +1,197 @@
+"""Human variability: the same movement as a person would do it another time.
+
+People repeat a movement with other parameters of its strokes, within ranges that were published for
+handwriting. Some of those are relative to quantities that depend on the choice of a unit or an axis; what is
+made of them here:
+
+    length    each stroke's D, relative
+    sigma     each stroke's sigma, relative
+    rhythm    t0, relative: one factor for the whole movement, on the times between commands. Where t0 counts
+              from is arbitrary, the times between are not
+    pace      mu, relative to its value *in human time*: mu is the logarithm of a number of seconds, so a
+              relative change of it means nothing until the unit of time is fixed, and would change its sign
+              at exp(mu) = 1 s. A slow movement is therefore thought of as sped up until its median stroke
+              lasts as long as a hand's, .15 s; there mu is about -2, and 10 % of it are a factor of 1.2 in
+              time. One draw for the whole movement
+    angles    theta_s and theta_e of each stroke, in the plane of its arc, relative to a quarter turn, the
+              mean size of an angle of any direction: space has no axis from which they could be measured
+
+Rhythm and pace are drawn once a movement because they are properties of it: drawn for each stroke, mu's range
+alone would move strokes by half of their time against each other and put them out of order.
+
+Source: ranges attributed to M. Diaz et al., "Dynamic signature verification system based on one real
+    signature", as an open implementation of the kinematic theory states them (it, too, draws one change of t0
+    for all strokes, and finds angles relative to themselves unfit).
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.errors import MovementError
+from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.movement import Movement
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.stroke import Stroke, arc_frame, sinc, tilt_of_normal
+from pc_client.movements.timing import FULL_COVERAGE
+
+__all__ = ["HUMAN_STROKE", "PUBLISHED", "VariabilityRanges", "duplicate"]
+
+#: Time (s) between least speeds that a hand takes for a stroke. Source: the median of five public signatures.
+HUMAN_STROKE = 0.15
+#: An arc cannot turn by a whole turn; changed turns are held below this, rad.
+_MAX_TURN = 6.2
+
+
+@dataclass(frozen=True, slots=True)
+class VariabilityRanges:
+    """Least and greatest relative change of each parameter; drawn evenly between.
+
+    Attributes:
+        length: of D.
+        rhythm: of t0.
+        pace: of mu.
+        sigma: of sigma.
+        theta_start: of the direction at the begin.
+        theta_end: of the direction at the end.
+    """
+
+    length: tuple[float, float] = (-0.10, 0.10)
+    rhythm: tuple[float, float] = (-0.085, 0.0825)
+    pace: tuple[float, float] = (-0.3775, 0.395)
+    sigma: tuple[float, float] = (-0.2875, 0.325)
+    theta_start: tuple[float, float] = (-0.015, 0.03)
+    theta_end: tuple[float, float] = (-0.015, 0.0275)
+
+
+PUBLISHED = VariabilityRanges()
+
+
+def duplicate(
+    movement: Movement,
+    seed: int,
+    *,
+    name: str | None = None,
+    share: float = 1.0,
+    ranges: VariabilityRanges = PUBLISHED,
+) -> Movement:
+    """The movement as a person might repeat it, by a seed.
+
+    It begins at the same point with the same rest before and after; its other target points move, because its
+    strokes have other lengths and directions. Whether an arm can do it is the business of planning.
+
+    Args:
+        movement: a "lognormal" one.
+        seed: 0 or more; the same seed gives the same duplicate everywhere.
+        name: the duplicate's; made from name and seed if None.
+        share: how much of the ranges is used: 0 gives the movement itself, 1 all of them.
+        ranges: what may change by how much.
+
+    Raises:
+        MovementError: another kind of movement, or a share outside of 0 to 1.
+    """
+    law = movement.law
+    if not isinstance(law, SigmaLognormal):
+        raise MovementError(
+            f"movement {movement.name} is of kind {movement.kind}: only lognormal strokes have the "
+            "parameters that people vary; give a lognormal movement"
+        )
+    if not 0.0 <= share <= 1.0:
+        raise MovementError(f"share {share} of the human variability: give a number from 0 to 1")
+    if seed < 0:
+        raise MovementError(f"seed {seed}: give a whole number, 0 or more")
+    source = random.Random(seed)
+
+    def draw(limits: tuple[float, float]) -> float:
+        low, high = limits
+        return share * (low + (high - low) * source.random())
+
+    bells = _vary_timing(law, float(np.median(movement.stroke_durations)), draw, ranges)
+    targets, strokes = _vary_arcs(law, bells, draw, ranges)
+    varied = _framed(targets, strokes, law)
+    provenance = {**movement.provenance, "duplicate_of": movement.name, "variation_seed": seed}
+    return Movement(
+        name or f"{movement.name}_v{seed}",
+        varied,
+        _durations(varied),
+        {**provenance, "variation_share": share},
+    )
+
+
+def _vary_timing(
+    law: SigmaLognormal,
+    stroke_time: float,
+    draw: Callable[[tuple[float, float]], float],
+    ranges: VariabilityRanges,
+) -> list[Lognormal]:
+    bells = [stroke.timing.lognormal for stroke in law.strokes]
+    to_human = math.log(stroke_time / HUMAN_STROKE)
+    rhythm, pace = 1.0 + draw(ranges.rhythm), draw(ranges.pace)
+    first = bells[0].t0
+    return [
+        Lognormal(
+            first + rhythm * (bell.t0 - first),
+            bell.mu + pace * (bell.mu - to_human),
+            bell.sigma * (1.0 + draw(ranges.sigma)),
+        )
+        for bell in bells
+    ]
+
+
+def _vary_arcs(
+    law: SigmaLognormal,
+    bells: list[Lognormal],
+    draw: Callable[[tuple[float, float]], float],
+    ranges: VariabilityRanges,
+) -> tuple[NDArray[np.float64], tuple[Stroke, ...]]:
+    """New arcs, each in the plane of the old one, end to end from the same first point."""
+    points = law.target_points
+    targets, strokes = [points[0]], []
+    for a, b, stroke, length, bell in zip(
+        points[:-1], points[1:], law.strokes, law.lengths.tolist(), bells, strict=True
+    ):
+        chord, normal = arc_frame(a, b, stroke.tilt)
+        length = length * (1.0 + draw(ranges.length))
+        begins, ends = (0.5 * math.pi * draw(limits) for limits in (ranges.theta_start, ranges.theta_end))
+        turn = min(max(stroke.turn + ends - begins, -_MAX_TURN), _MAX_TURN)
+        swing = 0.5 * (begins + ends)
+        new_chord = math.cos(swing) * chord + math.sin(swing) * normal
+        new_normal = math.cos(swing) * normal - math.sin(swing) * chord
+        targets.append(targets[-1] + length * float(sinc(0.5 * turn)) * new_chord)
+        strokes.append(Stroke(bell, turn, tilt_of_normal(new_chord, new_normal)))
+    return np.array(targets), tuple(strokes)
+
+
+def _framed(targets: NDArray[np.float64], strokes: tuple[Stroke, ...], law: SigmaLognormal) -> SigmaLognormal:
+    """The strokes shifted and the end set so that the rests before and after are those of the law."""
+    old_begin, old_end = _extent(law.strokes)
+    begin, end = _extent(strokes)
+    rest_before, rest_after = max(old_begin, 0.0), max(law.duration - old_end, 0.0)
+    shift = rest_before - begin
+    moved = []
+    for stroke in strokes:
+        bell = stroke.timing.lognormal
+        moved.append(Stroke(Lognormal(bell.t0 + shift, bell.mu, bell.sigma), stroke.turn, stroke.tilt))
+    return SigmaLognormal(targets, tuple(moved), end + shift + rest_after)
+
+
+def _extent(strokes: tuple[Stroke, ...]) -> tuple[float, float]:
+    """When the first tail begins and the last one ends, s."""
+    bells = [stroke.timing.lognormal for stroke in strokes]
+    return (
+        min(bell.time_at_deviation(-FULL_COVERAGE) for bell in bells),
+        max(bell.time_at_deviation(FULL_COVERAGE) for bell in bells),
+    )
+
+
+def _durations(law: SigmaLognormal) -> NDArray[np.float64]:
+    """Times between least speeds; strokes that merged into one count as one."""
+    inner = np.unique(law.speed_minima())
+    inner = inner[(inner > 1e-3) & (inner < law.duration - 1e-3)]
+    return np.diff(np.concatenate(([0.0], inner, [law.duration])))
