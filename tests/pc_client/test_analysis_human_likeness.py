@@ -1,0 +1,225 @@
+"""Measures of human-likeness against the reference table (1-s unit strokes at 1 kHz) and against signals whose answer is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from pc_client.analysis.human_likeness import (
+    between_peaks,
+    curvature_of,
+    fit_power_law,
+    log_dimensionless_jerk,
+    peaks_of,
+    power_law_exponent,
+    sparc,
+    speed_peaks,
+)
+from pc_client.errors import ClientError
+from pc_client.movements.minimum_jerk import stroke_shape
+from pc_client.movements.robotic import SmoothedSquareWave
+from pc_client.movements.timing import FULL_COVERAGE, LiteralTiming, TwoSidedTiming
+
+RATE = 1000.0
+T = np.arange(1001) / RATE
+Profile = Callable[[], NDArray[np.float64]]
+
+
+def lognormal(timing: LiteralTiming | TwoSidedTiming) -> NDArray[np.float64]:
+    return timing.lognormal.evaluate(T).rate
+
+
+def two_sided(sigma: float, coverage: float = FULL_COVERAGE) -> NDArray[np.float64]:
+    return lognormal(TwoSidedTiming(0.0, 1.0, sigma, coverage))
+
+
+def trapezoid(up: float, down: float) -> NDArray[np.float64]:
+    return np.clip(np.minimum(T / up, (1.0 - T) / down), 0.0, 1.0) / (1.0 - 0.5 * (up + down))
+
+
+def two_boxcars() -> NDArray[np.float64]:
+    """As the reference figure was made: a square of .8 s and two boxcars of .1 s, sampled with both ends."""
+    boxcar = np.ones(101) / 101
+    wave = np.convolve(np.convolve(np.ones(801), boxcar), boxcar)
+    return wave / (wave.sum() / RATE)
+
+
+# profile -> peak, SPARC and LDJ as printed: the number of digits is the tolerance.
+REFERENCE: dict[str, tuple[Profile, str, str, str]] = {
+    "minimum jerk": (lambda: stroke_shape(T).rate, "1.8750", "-1.4024", "-5.320"),
+    "lognormal k=2": (lambda: lognormal(LiteralTiming(0.0, 1.0, 0.0)), "5.003", "-1.4209", "-8.008"),
+    "two-sided .0426": (lambda: two_sided(0.0426), "3.407", "-1.4123", "-6.732"),
+    "two-sided .1": (lambda: two_sided(0.1), "3.505", "-1.4154", "-6.861"),
+    "two-sided c=3 .25": (lambda: two_sided(0.25, 3.0), "2.708", "-1.4236", "-6.345"),
+    "trapezoid .2/.2": (lambda: trapezoid(0.2, 0.2), "1.25", "-1.846", "-10.8"),
+    "trapezoid .1/.1": (lambda: trapezoid(0.1, 0.1), "1.111", "-2.100", "-12.2"),
+    "trapezoid .05/.05": (lambda: trapezoid(0.05, 0.05), "1.053", "-2.362", "-13.6"),
+    "trapezoid .15/.25": (lambda: trapezoid(0.15, 0.25), "1.25", "-1.812", "-11.0"),
+    "two boxcars": (two_boxcars, "1.248", "-1.911", "-8.26"),
+}
+
+
+def printed(value: float, like: str) -> str:
+    return f"{value:.{len(like.partition('.')[2])}f}"
+
+
+@pytest.mark.parametrize("name", REFERENCE)
+def test_reference_table_to_the_printed_digits(name: str) -> None:
+    make, peak, smoothness, jerk = REFERENCE[name]
+    speed = make()
+    assert printed(float(speed.max()), peak) == peak
+    assert printed(sparc(speed, RATE), smoothness) == smoothness
+    assert printed(log_dimensionless_jerk(speed, RATE), jerk) == jerk
+    assert speed_peaks(speed) == 1
+
+
+def test_two_boxcars_in_closed_form_are_near_the_sampled_ones() -> None:
+    """The library's own S-curve has exactly .8 s and .1 s: 1.25 instead of 1.248."""
+    speed = SmoothedSquareWave(np.array([[0.1, 0.9]]), np.array([1.25]), (0.1, 0.1)).evaluate(T).v
+    assert speed.max() == 1.25
+    assert sparc(speed, RATE) == pytest.approx(-1.912, abs=5e-4)
+    assert log_dimensionless_jerk(speed, RATE) == pytest.approx(-8.29, abs=5e-3)
+
+
+@pytest.mark.parametrize(("rate", "error"), [(1e3, 3e-3), (1e4, 3e-4), (1e5, 3e-5)])
+def test_jerk_of_minimum_jerk_tends_to_its_exact_value(rate: float, error: float) -> None:
+    t = np.arange(round(rate) + 1) / rate
+    exact = -math.log(204.8)
+    assert exact == pytest.approx(-5.32203, abs=5e-6)
+    found = log_dimensionless_jerk(stroke_shape(t).rate, rate)
+    assert found == pytest.approx(exact, abs=error)
+
+
+def test_jerk_of_corners_falls_with_the_rate() -> None:
+    """Ten times the rate, ten times the squared jerk of a corner: ln 10 less."""
+    figures = []
+    for rate in (1e3, 1e4):
+        t = np.arange(round(rate) + 1) / rate
+        figures.append(log_dimensionless_jerk(np.clip(np.minimum(t, 1 - t) / 0.2, 0, 1), rate))
+    assert figures[0] - figures[1] == pytest.approx(math.log(10.0), abs=0.01)
+
+
+@given(size=st.floats(1e-3, 1e3), stretch=st.floats(0.5, 2.0))
+def test_smoothness_knows_no_unit_of_speed_and_jerk_none_of_time(size: float, stretch: float) -> None:
+    speed = stroke_shape(T).rate
+    assert sparc(size * speed, RATE) == pytest.approx(sparc(speed, RATE), abs=1e-9)
+    found = log_dimensionless_jerk(size * speed, RATE * stretch)
+    assert found == pytest.approx(log_dimensionless_jerk(speed, RATE), abs=1e-9)
+
+
+def test_ragged_is_less_smooth() -> None:
+    smooth = stroke_shape(T).rate
+    ragged = smooth * (1.0 + 0.2 * np.sin(2 * math.pi * 6.0 * T))
+    assert sparc(ragged, RATE) < sparc(smooth, RATE) - 0.05
+    assert log_dimensionless_jerk(ragged, RATE) < log_dimensionless_jerk(smooth, RATE) - 1.0
+
+
+def test_spectrum_ends_at_the_cutoff() -> None:
+    """What is faster than 10 Hz is not movement: it changes nothing but the scale."""
+    speed = stroke_shape(T).rate
+    shaken = speed + 0.3 * np.sin(2 * math.pi * 40.0 * T) * speed
+    assert sparc(shaken, RATE) == pytest.approx(sparc(speed, RATE), abs=0.01)
+    assert sparc(shaken, RATE, cutoff=60.0) < sparc(speed, RATE) - 0.1
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_peaks_are_counted(count: int) -> None:
+    speed = np.concatenate([stroke_shape(T).rate] * count)
+    assert speed_peaks(speed) == count
+    assert peaks_of(speed) == [500 + 1001 * k for k in range(count)]
+    noisy = speed + 0.01 * np.random.default_rng(1).standard_normal(len(speed))
+    assert speed_peaks(noisy) == count
+
+
+def test_ripples_plateaus_and_cut_ends() -> None:
+    wave = np.sin(np.linspace(0.0, 4 * math.pi, 400))
+    assert speed_peaks(1.0 + 0.02 * wave) == 1  # ripples of 4 % on a plateau
+    assert speed_peaks(1.0 + 0.04 * wave) == 2
+    assert speed_peaks(trapezoid(0.2, 0.2) + 1e-15 * np.random.default_rng(2).standard_normal(1001)) == 1
+    assert peaks_of(np.linspace(0.0, 1.0, 50)) == [49]
+    assert peaks_of(np.linspace(1.0, 0.0, 50)) == [0]
+    assert speed_peaks(np.zeros(50)) == 0
+    assert between_peaks(np.zeros(50)) == slice(0, 0)
+    speed = np.concatenate([stroke_shape(T).rate] * 3)
+    assert between_peaks(speed) == slice(500, 2503)
+
+
+def ellipse(beta: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Velocity and acceleration on an ellipse run with speed = curvature^-beta, by differences in the parameter."""
+    u = np.linspace(0.0, 2 * math.pi, 4001)
+    p = np.column_stack((0.2 * np.cos(u), 0.1 * np.sin(u), 0.05 * np.cos(u)))
+    first = np.column_stack((-0.2 * np.sin(u), 0.1 * np.cos(u), -0.05 * np.sin(u)))
+    pace = np.linalg.norm(first, axis=1)
+    curvature = np.linalg.norm(np.cross(first, -p), axis=1) / pace**3
+    u_dot = curvature**-beta / pace
+    v = first * u_dot[:, None]
+    return v, np.gradient(v, u, axis=0, edge_order=2) * u_dot[:, None]
+
+
+@pytest.mark.parametrize("beta", [0.0, 0.2, 1 / 3, 0.5])
+def test_exponent_of_an_ellipse(beta: float) -> None:
+    """Harmonic motion on an ellipse obeys the two-thirds law exactly; any other exponent can be imposed."""
+    fit = fit_power_law(*ellipse(beta))
+    assert fit.exponent == pytest.approx(beta, abs=2e-5)
+    assert power_law_exponent(*ellipse(beta)) == fit.exponent
+    if beta:
+        assert fit.r_squared == pytest.approx(1.0, abs=1e-6)
+
+
+def test_harmonic_motion_obeys_the_law() -> None:
+    u = np.linspace(0.0, 6.0, 500)
+    v = np.column_stack((-0.2 * np.sin(u), 0.1 * np.cos(u), 0 * u))
+    a = np.column_stack((-0.2 * np.cos(u), -0.1 * np.sin(u), 0 * u))
+    assert power_law_exponent(v, a) == pytest.approx(1 / 3, abs=1e-12)
+    # angular speed = speed times curvature goes with curvature^(2/3): the name of the law
+    omega = np.linalg.norm(v, axis=1) * curvature_of(v, a)
+    slope = np.polyfit(np.log(curvature_of(v, a)), np.log(omega), 1)[0]
+    assert slope == pytest.approx(2 / 3, abs=1e-12)
+
+
+def test_straight_and_circular_paths_have_no_exponent() -> None:
+    shape = stroke_shape(T)
+    v, a = (np.outer(values, [1.0, 2.0, 0.0]) for values in (shape.rate, shape.rate_change))
+    assert math.isnan(power_law_exponent(v, a))
+    assert fit_power_law(v, a).n_samples == 0
+    u = np.linspace(0.0, 6.0, 500)
+    v = np.column_stack((-np.sin(u), np.cos(u), 0 * u)) * 0.1
+    a = np.column_stack((-np.cos(u), -np.sin(u), 0 * u)) * 0.1
+    assert math.isnan(power_law_exponent(v, a))
+    assert fit_power_law(v, a).n_samples == 500
+
+
+def test_curvature_of_a_standstill_is_not_a_number() -> None:
+    found = curvature_of([[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]], [[1.0, 0.0, 0.0], [8.0, 0.0, 0.0]])
+    assert math.isnan(found[0])
+    assert found[1] == 2.0
+
+
+def test_slow_and_nearly_straight_samples_are_left_out() -> None:
+    v, a = ellipse(1 / 3)
+    slow = np.concatenate((v, 1e-3 * v)), np.concatenate((a, 1e-3 * a))
+    assert fit_power_law(*slow).n_samples == len(v)
+    assert fit_power_law(v, a, max_radius=0.1).n_samples < len(v)
+
+
+@pytest.mark.parametrize(
+    "measure",
+    [
+        lambda: sparc(np.ones(5), RATE),
+        lambda: sparc(np.zeros(100), RATE),
+        lambda: sparc(np.ones((10, 3)), RATE),
+        lambda: sparc(T, 0.0),
+        lambda: sparc(T, RATE, cutoff=0.01),
+        lambda: log_dimensionless_jerk([1.0] * 9 + [math.nan], RATE),
+        lambda: log_dimensionless_jerk(T, math.inf),
+    ],
+)
+def test_nonsense_is_refused(measure: object) -> None:
+    with pytest.raises(ClientError):
+        measure()
