@@ -24,6 +24,7 @@ from pc_client.errors import ClientError
 
 if TYPE_CHECKING:
     from pc_client.experiment.prepare import Experiment
+    from pc_client.movements.movement import Movement
     from protocol.ur_types import Ports
 
 
@@ -61,24 +62,52 @@ def run(
 def _run(
     movements: Sequence[str], robot: str, out: Path, repeat: int, controller: str, port_base: int, yes: bool
 ) -> None:
+    from pc_client.experiment.prepare import load_movements
+
+    execute(load_movements(movements), robot, out, repeat, controller, port_base, yes)
+    show_report(out)
+
+
+def execute(
+    movements: Sequence[Movement],
+    robot: str,
+    out: Path,
+    repeat: int,
+    controller: str,
+    port_base: int,
+    yes: bool,
+) -> None:
+    """Plan movements, ask where a real arm would move, run them, and say how it went.
+
+    Args:
+        movements: what the TCP shall do, in order.
+        robot: name or address of the control box.
+        out: folder of the recordings.
+        repeat: runs of each.
+        controller: its name.
+        port_base: offset of all ports.
+        yes: do not ask.
+
+    Raises:
+        ClientError: a check failed, the robot stopped or the user interrupted; the arm rests.
+    """
     from pc_client.control.controller_config import controller_config
     from pc_client.driver.probe import read_info
     from pc_client.driver.robot_info import UNKNOWN
     from pc_client.driver.transport import TcpNetwork
     from pc_client.driver.ur_driver import UrDriver
     from pc_client.experiment.preflight import is_loopback
-    from pc_client.experiment.prepare import load_movements, prepare_experiment
+    from pc_client.experiment.prepare import prepare_experiment
     from pc_client.experiment.progress import Progress
     from pc_client.experiment.runner import ExperimentRunner
 
     config = controller_config(controller)
     ports = ports_of(port_base)
     with console.status("planning"):
-        loaded = load_movements(movements)
         arm = read_info(TcpNetwork(), robot, ports).model
         if arm == UNKNOWN:
             raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")
-        planned = prepare_experiment(loaded, repeat=repeat, out=out, robot=arm.lower())
+        planned = prepare_experiment(movements, repeat=repeat, out=out, robot=arm.lower())
     if not yes and not is_loopback(robot):
         ask_before_motion(planned, robot, ports)
     try:
@@ -96,7 +125,6 @@ def _run(
         f"({robot_time / max(wall_time, 1e-9):.1f} x real time), "
         f"loop delay {report.delay.delay * 1e3:.1f} ms, {late} late and {lost} lost frames"
     )
-    show_report(out)
 
 
 def ask_before_motion(planned: Experiment, robot: str, ports: Ports) -> None:
