@@ -1,0 +1,193 @@
+"""The strokes of a part as the extraction holds them: arrays, in the variables in which a fit is tame.
+
+The theory's (t0, mu, sigma) slide along a ridge: for small sigma a lognormal tends to a Gaussian, and only
+the median time t0 + e^mu and the width e^mu sigma are left fixed by the data. So these two are variables
+here, and sigma beside them is a pure number that says how skew the bell is:
+
+    median m = t0 + e^mu,   width w = e^mu sigma,   sigma     <=>     t0 = m - w / sigma,   mu = ln(w / sigma)
+
+Space is held by the virtual target points. Each belongs to the stroke that ends there and the stroke that
+begins there; moving one changes the movement only while these two strokes run, so that all that is computed
+of a fit is local in time. That the targets may go where they want, off the path, is the idea of iDeLog.
+
+Source: sections 1.5 and 3 of the theory notes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.stroke import Stroke, tilt_of_normal
+
+__all__ = [
+    "BOUNDS",
+    "Bounds",
+    "Chain",
+    "in_order",
+    "inserted",
+    "normals_across",
+    "sigma_lognormal",
+    "without",
+]
+
+
+class Bounds(NamedTuple):
+    """What a stroke may be, each as (least, most)."""
+
+    sigma: tuple[float, float]
+    width: tuple[float, float]
+    turn: tuple[float, float]
+
+
+#: sigma: below .08 a lognormal is a Gaussian for all purposes (skewness .24) and its t0 runs away. Width (s):
+#: the narrowest bell that a 12 Hz signal can show, and one of a slow sweep. Turn (rad): an arc of 2 pi has no
+#: chord, so its target points could not carry it.
+BOUNDS = Bounds(sigma=(0.08, 0.6), width=(0.012, 4.0), turn=(-4.5, 4.5))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """Strokes from target to target.
+
+    Attributes:
+        median: times at which half of each stroke is done, (s,), s.
+        width: e^mu sigma, (s,), s.
+        sigma: (s,).
+        turn: (s,), rad; positive turns from the chord towards normal x chord.
+        normal: unit vectors (s, 3) about which the strokes turn, at right angles to their chords. Flat
+            strokes have +z.
+        targets: (s + 1, 2) or (s + 1, 3).
+    """
+
+    median: NDArray[np.float64]
+    width: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    turn: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    targets: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.median)
+
+    @property
+    def chords(self) -> NDArray[np.float64]:
+        """From the begin of each stroke to its end, (s, dim)."""
+        chords: NDArray[np.float64] = np.diff(self.targets, axis=0)
+        return chords
+
+    @property
+    def lengths(self) -> NDArray[np.float64]:
+        """Arc lengths D, (s,)."""
+        lengths: NDArray[np.float64] = np.linalg.norm(self.chords, axis=1) / np.sinc(
+            self.turn / (2 * math.pi)
+        )
+        return lengths
+
+    def time_at_deviation(self, z: float) -> NDArray[np.float64]:
+        """Times (s,) at which each bell has done Phi(z) of its way."""
+        times: NDArray[np.float64] = self.median + self.width * np.expm1(self.sigma * z) / self.sigma
+        return times
+
+
+def normals_across(chords: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The unit vectors at right angles to the chords that are nearest to given ones, both (s, 3).
+
+    Where the two are parallel (or a chord is nothing) any right angle will do.
+    """
+    norms = np.linalg.norm(chords, axis=1, keepdims=True)
+    unit = chords / np.where(norms > 0.0, norms, 1.0)
+    across = normals - np.einsum("ij,ij->i", normals, unit)[:, None] * unit
+    sizes = np.linalg.norm(across, axis=1)
+    for index in np.flatnonzero(sizes < 1e-9):
+        axis = np.eye(3)[int(np.argmin(np.abs(unit[index])))]
+        across[index] = axis - (axis @ unit[index]) * unit[index]
+        sizes[index] = np.linalg.norm(across[index])
+    nearest: NDArray[np.float64] = across / sizes[:, None]
+    return nearest
+
+
+def inserted(chain: Chain, median: NDArray[np.float64], width: NDArray[np.float64], sigma: float) -> Chain:
+    """The chain with further strokes that do not move anything yet (chord 0), each put in by its median.
+
+    A fit gives them their chords in its first, linear step; nothing gets worse by an insertion.
+    """
+    order = np.argsort(median)
+    at = np.searchsorted(chain.median, median[order])
+    dim = chain.targets.shape[1]
+    up = np.array([0.0, 0.0, 1.0])
+    if dim == 3 and len(chain):
+        up = chain.normal.mean(axis=0) + np.array([0.0, 0.0, 1e-6])
+    return Chain(
+        np.insert(chain.median, at, median[order]),
+        np.insert(chain.width, at, width[order]),
+        np.insert(chain.sigma, at, sigma),
+        np.insert(chain.turn, at, 0.0),
+        np.insert(chain.normal, at, up / np.linalg.norm(up), axis=0),
+        np.insert(chain.targets, at, chain.targets[at], axis=0),
+    )
+
+
+def without(chain: Chain, drop: NDArray[np.bool_]) -> Chain:
+    """The chain without some strokes (drop is (s,)): the stroke after a dropped one begins at its begin.
+
+    The end of the whole chain is kept when its last stroke is dropped.
+    """
+    keep = ~drop
+    targets = np.vstack((chain.targets[:1], chain.targets[1:][keep]))
+    if drop[-1]:
+        targets[-1] = chain.targets[-1]
+    return Chain(
+        chain.median[keep],
+        chain.width[keep],
+        chain.sigma[keep],
+        chain.turn[keep],
+        chain.normal[keep],
+        targets,
+    )
+
+
+def in_order(chain: Chain) -> Chain:
+    """The strokes sorted by their medians. The movement stays the same: each keeps its own chord."""
+    order = np.argsort(chain.median, kind="stable")
+    if np.array_equal(order, np.arange(len(order))):
+        return chain
+    ends = chain.targets[0] + np.cumsum(chain.chords[order], axis=0)
+    return Chain(
+        chain.median[order],
+        chain.width[order],
+        chain.sigma[order],
+        chain.turn[order],
+        chain.normal[order],
+        np.vstack((chain.targets[:1], ends)),
+    )
+
+
+def sigma_lognormal(chain: Chain, duration: float) -> SigmaLognormal:
+    """The chain as a movement of the package; flat ones lie in z = 0.
+
+    Args:
+        chain: at least one stroke; no chord is nothing.
+        duration: when the movement is taken to be over, s.
+    """
+    targets = np.zeros((len(chain.targets), 3))
+    targets[:, : chain.targets.shape[1]] = chain.targets
+    strokes = []
+    for j, chord in enumerate(np.diff(targets, axis=0)):
+        unit = chord / np.linalg.norm(chord)
+        timing = Lognormal(
+            float(chain.median[j] - chain.width[j] / chain.sigma[j]),
+            math.log(chain.width[j] / chain.sigma[j]),
+            float(chain.sigma[j]),
+        )
+        # A stroke of the package swings from -m to +m, m the normal in its plane: turning about n, that is
+        # n x chord.
+        tilt = tilt_of_normal(unit, np.cross(chain.normal[j], unit))
+        strokes.append(Stroke(timing, float(chain.turn[j]), tilt))
+    return SigmaLognormal(targets, tuple(strokes), duration)

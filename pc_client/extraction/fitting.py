@@ -1,0 +1,162 @@
+"""The order of things in a fit: first strokes, joint refinement, further strokes while they pay.
+
+All parts of a recording share one budget of strokes, and a further stroke goes to where most of the velocity
+is still unexplained, whichever part that is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.extraction.addition import best_candidates, idle_strokes
+from pc_client.extraction.chain import Chain, inserted, without
+from pc_client.extraction.initial import TYPICAL_SIGMA, initial_chain
+from pc_client.extraction.refine import Aim, Fit, refine, residuals
+from pc_client.extraction.smoothing import SmoothPart, low_passed, velocity
+
+__all__ = ["FitOptions", "Scales", "fit_parts"]
+
+#: The fit looks at every fourth sample of the 200 Hz signal: twice 12 Hz is 24 Hz, 50 Hz is enough.
+_DECIMATION = 4
+_LEAST_SAMPLES = 16
+#: Share of the average residual of a stroke that a further stroke has to take away, by its first estimate.
+_PAYS = 0.1
+#: Above this SNR (dB) what the low-pass took from the strokes is the larger part of the residual.
+_CLEAN_DB = 35.0
+_GIVE_BACKS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class FitOptions:
+    """How much effort a fit makes.
+
+    Attributes:
+        rounds: times that strokes are added; each of them spends half of what is left of the budget, the
+            last one all.
+        iterations: of the refinement after each round.
+        last_iterations: of the last refinement.
+        enough_db: SNR of the velocity, dB, above which no stroke is added.
+    """
+
+    rounds: int = 3
+    iterations: int = 6
+    last_iterations: int = 40
+    enough_db: float = 40.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """Size of a recording's movement, by which errors are measured.
+
+    Attributes:
+        p: root of the summed squared distances of all samples from the mean of their part.
+        v: root of the summed squared velocities of all samples.
+    """
+
+    p: float
+    v: float
+
+    @classmethod
+    def of(cls, parts: Sequence[SmoothPart]) -> Scales:
+        """The scales of a recording with these moving parts."""
+        p = math.sqrt(sum(float(np.sum((part.p - part.p.mean(axis=0)) ** 2)) for part in parts))
+        v = math.sqrt(sum(float(np.sum(part.v**2)) for part in parts))
+        return cls(p, v)
+
+
+def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> list[Chain]:
+    """Strokes for all parts.
+
+    Args:
+        parts: at least one; all move.
+        budget: most strokes of all parts together. Every part gets one for each of its bells in any case.
+        options: effort.
+    """
+    scales = Scales.of(parts)
+    aims = [_aim(part, part.p, part.v, scales) for part in parts]
+    fits = [
+        refine(initial_chain(part), aim, options.iterations) for part, aim in zip(parts, aims, strict=True)
+    ]
+    for round_ in range(options.rounds):
+        left = budget - sum(len(fit.chain) for fit in fits)
+        wanted = left if round_ == options.rounds - 1 else math.ceil(left / 2)
+        if left <= 0 or not _add(fits, parts, aims, scales, wanted, options):
+            break
+    fits = [
+        refine(_tidy(fit, aim), aim, options.last_iterations) for fit, aim in zip(fits, aims, strict=True)
+    ]
+    if _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_CLEAN_DB / 10.0):
+        fits = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
+    return [fit.chain for fit in fits]
+
+
+def _add(
+    fits: list[Fit],
+    parts: Sequence[SmoothPart],
+    aims: Sequence[Aim],
+    scales: Scales,
+    wanted: int,
+    options: FitOptions,
+) -> bool:
+    """Add the best candidates to the fits and refine where something was added; False when nothing pays."""
+    left = [residuals(fit.chain, part.t, part.p, part.v)[1] for fit, part in zip(fits, parts, strict=True)]
+    energy = sum(float(np.sum(v**2)) for v in left)
+    if energy < scales.v**2 * 10.0 ** (-options.enough_db / 10.0):
+        return False
+    least = _PAYS * energy / sum(len(fit.chain) for fit in fits)
+    found = [
+        (candidate, index)
+        for index, (part, v) in enumerate(zip(parts, left, strict=True))
+        for candidate in best_candidates(part.t, v, wanted)
+        if candidate.energy > least
+    ]
+    found.sort(key=lambda pair: -pair[0].energy)
+    for index in sorted({index for _, index in found[:wanted]}):
+        mine = [candidate for candidate, owner in found[:wanted] if owner == index]
+        median = np.array([candidate.median for candidate in mine])
+        width = np.array([candidate.width for candidate in mine])
+        chain = inserted(_tidy(fits[index], aims[index]), median, width, TYPICAL_SIGMA)
+        fits[index] = refine(chain, aims[index], options.iterations)
+    return bool(found)
+
+
+def _tidy(fit: Fit, aim: Aim) -> Chain:
+    """The fit's chain without strokes that do nothing; one is kept in any case."""
+    idle = idle_strokes(fit.chain, aim.v_scale, float(aim.t[1] - aim.t[0]), fit.cost)
+    if idle.all():
+        idle[int(np.argmax(fit.chain.lengths))] = False
+    return without(fit.chain, idle) if idle.any() else fit.chain
+
+
+def _given_back(fit: Fit, part: SmoothPart, scales: Scales, options: FitOptions) -> Fit:
+    """Refine against the signal with what the low-pass takes from these strokes given back to it.
+
+    The low-pass blunts fast bells a little. That is far below the noise of a hand's recording, but strokes
+    fitted to a clean signal would come out too wide by it.
+    """
+    for _ in range(_GIVE_BACKS):
+        p_left, v_left = residuals(fit.chain, part.t, part.p, part.v)
+        p_model, v_model = part.p - p_left, part.v - v_left
+        passed = low_passed(p_model, 1.0 / part.step)
+        p, v = part.p + p_model - passed, part.v + v_model - velocity(part.t, passed)
+        fit = refine(fit.chain, _aim(part, p, v, scales), options.last_iterations, tolerance=1e-4)
+    return fit
+
+
+def _velocity_cost(chains: Sequence[Chain], parts: Sequence[SmoothPart], scales: Scales) -> float:
+    left = (residuals(chain, part.t, part.p, part.v)[1] for chain, part in zip(chains, parts, strict=True))
+    return sum(float(np.sum(v**2)) for v in left) / scales.v**2
+
+
+def _aim(part: SmoothPart, p: NDArray[np.float64], v: NDArray[np.float64], scales: Scales) -> Aim:
+    decimation = max(1, min(_DECIMATION, len(part.t) // _LEAST_SAMPLES))
+    rows = np.arange(0, len(part.t), decimation)
+    if rows[-1] != len(part.t) - 1:
+        rows = np.append(rows, len(part.t) - 1)
+    weight = math.sqrt(len(part.t) / len(rows))
+    return Aim(part.t[rows], p[rows], v[rows], weight / scales.p, weight / scales.v)

@@ -1,0 +1,147 @@
+"""The first strokes of a part: one for every bell of the speed, from minimum to minimum.
+
+The minima are the salient points; in time they divide the part into bells, in space they are the first
+virtual targets. Sigma, median and width of each stroke come from the closed forms, by the candidate that fits
+the bell best; its turn from the directions at its inflections. What they get wrong, overlap above all, is the
+business of the joint refinement.
+
+Source: section 3.1 of the theory notes: segmentation of iDeLog, parameters of Robust XZERO.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from pc_client.extraction.chain import BOUNDS, Chain, normals_across
+from pc_client.extraction.closed_forms import (
+    CharacteristicPoints,
+    bell_from_points,
+    sigma_from_peak_ratio,
+    sigma_from_slope_ratio,
+    turn_rate,
+)
+from pc_client.extraction.smoothing import SmoothPart
+from pc_client.movements.lognormal import evaluate_bells
+
+__all__ = ["initial_chain", "salient_points"]
+
+#: Bells that stand out by less than this share of the top speed are ripples on their neighbours at first;
+#: strokes for those that deserve one are added where the refined residual is worst.
+RIPPLE = 0.05
+#: Sigma of a bell whose shape says nothing: the middle of what is found in handwriting.
+TYPICAL_SIGMA = 0.2
+#: Peak speed times width over length of a bell, 1 / sqrt(2 pi), nearly for every sigma.
+_PEAK_WIDTH = 1.0 / math.sqrt(2.0 * math.pi)
+#: Largest turn that a first guess may have, rad.
+_MAX_FIRST_TURN = 2.5
+
+
+def salient_points(part: SmoothPart) -> NDArray[np.intp]:
+    """Indices that divide a part into bells: its first sample, the speed minima, its last, (n_bells + 1,)."""
+    speed = part.speed
+    peaks, _ = find_peaks(speed, prominence=RIPPLE * float(speed.max()))
+    minima = [a + int(np.argmin(speed[a:b])) for a, b in pairwise(peaks)]
+    return np.array([0, *minima, len(speed) - 1])
+
+
+def initial_chain(part: SmoothPart) -> Chain:
+    """One stroke a bell."""
+    marks = salient_points(part)
+    speed = part.speed
+    way = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * part.step))
+    first = [_timing(part.t[a : b + 1], speed[a : b + 1]) for a, b in pairwise(marks)]
+    median, width, sigma = np.array(first).T
+    targets = part.p[marks]
+    dim = targets.shape[1]
+    turns = [_turn(part, way, a, b) for a, b in pairwise(marks)]
+    vectors = np.array(turns)
+    chords = np.zeros((len(vectors), 3))
+    chords[:, :dim] = np.diff(targets, axis=0)
+    if dim == 2:
+        return Chain(
+            median, width, sigma, vectors[:, 2], np.tile([0.0, 0.0, 1.0], (len(vectors), 1)), targets
+        )
+    sizes = np.linalg.norm(vectors, axis=1)
+    normals = np.where(sizes[:, None] > 1e-6, vectors, [0.0, 0.0, 1.0])
+    return Chain(median, width, sigma, sizes, normals_across(chords, normals), targets)
+
+
+def _timing(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Median, width and sigma for a bell given between its minima: the best of the candidates."""
+    candidates = [_by_area(t, speed), *_by_closed_forms(t, speed)]
+    errors = []
+    for median, width, sigma in candidates:
+        shape = evaluate_bells(t, median - width / sigma, math.log(width / sigma), sigma).rate
+        power = float(shape @ shape)
+        scale = float(shape @ speed) / power if power > 0.0 else 0.0
+        errors.append(float(np.sum((speed - scale * shape) ** 2)))
+    return candidates[int(np.argmin(errors))]
+
+
+def _by_area(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
+    """The bell with the area and the peak of the measured one; it can be had of every bell."""
+    top = int(np.argmax(speed))
+    area = float(np.sum(0.5 * (speed[1:] + speed[:-1]))) * float(t[1] - t[0])
+    peak = float(speed[top])
+    width = _clipped(_PEAK_WIDTH * area / peak if peak > 0.0 else 0.0, BOUNDS.width)
+    return float(t[top]) + width * TYPICAL_SIGMA, width, TYPICAL_SIGMA
+
+
+def _by_closed_forms(t: NDArray[np.float64], speed: NDArray[np.float64]) -> list[tuple[float, float, float]]:
+    points = characteristic_points(t, speed)
+    if points is None:
+        return []
+    v2, v3, v4 = points.speeds
+    found = []
+    for sigma in (
+        sigma_from_peak_ratio(v2 / v3),
+        sigma_from_peak_ratio(v4 / v3),
+        sigma_from_slope_ratio(v4 / v2),
+    ):
+        law = bell_from_points(points, _clipped(sigma, BOUNDS.sigma)).lognormal
+        width = _clipped(math.exp(law.mu) * law.sigma, BOUNDS.width)
+        found.append((law.median, width, law.sigma))
+    return found
+
+
+def characteristic_points(t: NDArray[np.float64], speed: NDArray[np.float64]) -> CharacteristicPoints | None:
+    """Inflections and peak of a bell, or None where one of them is not inside."""
+    top = int(np.argmax(speed))
+    if top < 2 or top > len(speed) - 3:
+        return None
+    slope = np.gradient(speed, t)
+    before, after = int(np.argmax(slope[: top + 1])), top + int(np.argmin(slope[top:]))
+    at = (before, top, after)
+    times = (float(t[before]), float(t[top]), float(t[after]))
+    speeds = (float(speed[before]), float(speed[top]), float(speed[after]))
+    if not (times[0] < times[1] < times[2] and 0.0 < speeds[0] < speeds[1] > speeds[2] > 0.0) or 0 in at:
+        return None
+    return CharacteristicPoints(times, speeds)
+
+
+def _turn(part: SmoothPart, way: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
+    """Turn of the stroke between two salient points as a vector along its axis, (3,), rad."""
+    length = float(way[b] - way[a])
+    if length <= 0.0:
+        return np.zeros(3)
+    # A quarter and three quarters of the way stand for the inflections: they are always there.
+    i, k = np.searchsorted(way, (way[a] + 0.25 * length, way[a] + 0.75 * length))
+    v = np.zeros((2, 3))
+    v[:, : part.v.shape[1]] = part.v[[i, min(k, len(part.v) - 1)]]
+    axis = np.cross(v[0], v[1])
+    size = float(np.linalg.norm(axis))
+    if size == 0.0 or way[k] <= way[i]:
+        return np.zeros(3)
+    angle = math.atan2(size, float(v[0] @ v[1]))
+    total = turn_rate((0.0, angle), (float(way[i]), float(way[k]))) * length
+    turned: NDArray[np.float64] = min(total, _MAX_FIRST_TURN) * axis / size
+    return turned
+
+
+def _clipped(value: float, bounds: tuple[float, float]) -> float:
+    return min(max(value, bounds[0]), bounds[1])

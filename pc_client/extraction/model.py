@@ -1,0 +1,178 @@
+"""Position and velocity of a chain of strokes, and their derivatives by every variable, in closed form.
+
+With u = (t - m) / w, z = ln(1 + sigma u) / sigma, F = Phi(z) and Lambda = dF/dt, a stroke with chord c,
+turn d about the normal n and k = 1 / sinc(d / 2) does
+
+    v(t) = Lambda k [cos(d (F - 1/2)) c + sin(d (F - 1/2)) n x c]
+    p(t) = k [C c + S n x c],   C + i S = integral from 0 to F of exp(i d (f - 1/2)) df
+
+Everything is a number per time and stroke, times one of two vectors, c and n x c. That holds for flat and
+spatial strokes alike; the latter have one variable more, the bending out of their plane, whose vector is n.
+
+Variables of a stroke, in this order: median (in units of its width), ln width, sigma, turn, bending (rad,
+spatial strokes only), end target. The first target stands before them all.
+
+Source: section 1.5 of the theory notes; derivatives by hand, held against differences by a test.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from pc_client.extraction.chain import Chain
+
+__all__ = ["Linearisation", "linearise", "variables_per_stroke"]
+
+_INV_SQRT_TWO_PI = 1.0 / math.sqrt(2.0 * math.pi)
+#: |turn| below which differences of nearly equal numbers give way to the first terms of a series.
+_STRAIGHT = 1e-3
+
+
+class Linearisation(NamedTuple):
+    """A piece of a movement at given times and how it changes.
+
+    Attributes:
+        p: positions, (n, dim).
+        v: velocities, (n, dim).
+        jacobian: derivatives, (2, dim, n, columns): of p, then of v.
+    """
+
+    p: NDArray[np.float64]
+    v: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
+
+
+def variables_per_stroke(dim: int) -> int:
+    """Number of variables of one stroke in the plane (2) or in space (3)."""
+    return 6 if dim == 2 else 8
+
+
+def linearise(chain: Chain, t: NDArray[np.float64], first: int, last: int) -> Linearisation:
+    """Evaluate strokes first .. last - 1 at the times t (n,), when all before are done and none after begun.
+
+    The columns of the Jacobian: the target at which stroke `first` begins, then the variables of each stroke.
+    """
+    s = slice(first, last)
+    m, w, sigma, turn = chain.median[s], chain.width[s], chain.sigma[s], chain.turn[s]
+    targets = chain.targets[first : last + 1]
+    chord = np.diff(targets, axis=0)
+    dim = chord.shape[1]
+    across = _cross(chain.normal[s], chord)
+
+    # The bells: F, Lambda and the logarithmic derivatives of Lambda.
+    u = (t[:, None] - m) / w
+    x = 1.0 + sigma * u
+    begun = x > 1e-12
+    x = np.where(begun, x, 1.0)
+    z = np.log(x) / sigma
+    g = 1.0 / x
+    phi = np.where(begun, _INV_SQRT_TWO_PI * np.exp(-0.5 * z * z), 0.0)
+    done = np.where(begun, ndtr(z), 0.0)
+    phi_g = phi * g
+    rate = phi_g / w
+    z_sigma = (u * g - z) / sigma
+    h = g * (z + sigma)
+    log_rate = (h, u * h - 1.0, -z * z_sigma - u * g)
+    done_by = (-phi_g, -u * phi_g, phi * z_sigma)
+
+    # The arcs: coefficients of the chord and of the vector across it.
+    half = 0.5 * turn
+    k = 1.0 / np.sinc(half / math.pi)
+    k_log_slope = np.where(np.abs(turn) < _STRAIGHT, turn / 12.0, _safe_slope(turn))
+    lag = done - 0.5
+    beta = turn * lag
+    cos, sin = k * np.cos(beta), k * np.sin(beta)
+    v_c, v_q = rate * cos, rate * sin
+    p_c, p_q, dp_c, dp_q = _arc_integrals(turn, done, cos, sin, k)
+
+    n, size = len(t), variables_per_stroke(dim)
+    jacobian = np.zeros((2, dim, n, dim + (last - first) * size))
+    by_stroke = jacobian[..., dim:].reshape(2, dim, n, last - first, size)
+    turned = (
+        k_log_slope * v_c - lag * v_q,
+        k_log_slope * v_q + lag * v_c,
+        k_log_slope * p_c + dp_c,
+        k_log_slope * p_q + dp_q,
+    )
+    for i in range(dim):
+        c, q = chord[:, i], across[:, i]
+        along = cos * c + sin * q
+        sideways = turn * (cos * q - sin * c)
+        for column, (change, gain) in enumerate(zip(done_by, log_rate, strict=True)):
+            by_stroke[0, i, :, :, column] = change * along
+            by_stroke[1, i, :, :, column] = rate * (gain * along + change * sideways)
+        by_stroke[0, i, :, :, 3] = turned[2] * c + turned[3] * q
+        by_stroke[1, i, :, :, 3] = turned[0] * c + turned[1] * q
+    if dim == 3:
+        # Bending turns the vector across, n x c, towards -n at right angles to both.
+        out_of_plane = -chain.normal[s] * np.linalg.norm(chord, axis=1)[:, None]
+        small = np.abs(turn) < _STRAIGHT
+        safe = np.where(small, 1.0, turn)
+        bend_v = rate * np.where(small, k * lag, sin / safe)
+        bend_p = np.where(small, 0.5 * k * (done * done - done), p_q / safe)
+        for i in range(3):
+            by_stroke[0, i, :, :, 4] = bend_p * out_of_plane[:, i]
+            by_stroke[1, i, :, :, 4] = bend_v * out_of_plane[:, i]
+    _add_targets(jacobian, by_stroke, chain.normal[s], ((p_c, p_q), (v_c, v_q)))
+    return Linearisation(targets[0] + p_c @ chord + p_q @ across, v_c @ chord + v_q @ across, jacobian)
+
+
+def _cross(normal: NDArray[np.float64], chord: NDArray[np.float64]) -> NDArray[np.float64]:
+    if chord.shape[1] == 2:
+        return np.column_stack((-chord[:, 1], chord[:, 0]))
+    return np.cross(normal, chord)
+
+
+def _safe_slope(turn: NDArray[np.float64]) -> NDArray[np.float64]:
+    safe = np.where(np.abs(turn) < _STRAIGHT, 1.0, turn)
+    slope: NDArray[np.float64] = 1.0 / safe - 0.5 / np.tan(0.5 * safe)
+    return slope
+
+
+def _arc_integrals(
+    turn: NDArray[np.float64],
+    done: NDArray[np.float64],
+    cos: NDArray[np.float64],
+    sin: NDArray[np.float64],
+    k: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """K C and k S, and k dC/dd and k dS/dd."""
+    size = done * np.sinc(turn * done / (2.0 * math.pi))
+    angle = 0.5 * turn * (done - 1.0)
+    c, s = k * size * np.cos(angle), k * size * np.sin(angle)
+    small = np.abs(turn) < _STRAIGHT
+    safe = np.where(small, 1.0, turn)
+    lag = done - 0.5
+    end_cos, end_sin = 0.5 * k * np.cos(0.5 * turn), 0.5 * k * np.sin(0.5 * turn)
+    dc = np.where(small, -turn * (lag**3 + 0.125) / 3.0, (lag * cos + end_cos - c) / safe)
+    ds = np.where(small, 0.5 * (done * done - done), (lag * sin - end_sin - s) / safe)
+    return c, s, dc, ds
+
+
+def _add_targets(
+    jacobian: NDArray[np.float64],
+    by_stroke: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    coefficients: tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...],
+) -> None:
+    """The columns of the targets: a target ends one stroke, G_j, and takes from the next, - G_(j+1)."""
+    dim = jacobian.shape[1]
+    if dim == 2:
+        turning = np.array([[[0.0, -1.0], [1.0, 0.0]]])
+    else:
+        x, y, z = normal.T
+        o = np.zeros_like(x)
+        turning = np.array([[o, -z, y], [z, o, -x], [-y, x, o]]).transpose(2, 0, 1)
+    for kind, (along, sideways) in enumerate(coefficients):
+        for i in range(dim):
+            for j in range(dim):
+                own = sideways * turning[:, i, j] + (along if i == j else 0.0)
+                ends = by_stroke[kind, i, :, :, by_stroke.shape[-1] - dim + j]
+                ends[...] = own
+                ends[:, :-1] -= own[:, 1:]
+                jacobian[kind, i, :, j] = (1.0 if kind == 0 and i == j else 0.0) - own[:, 0]

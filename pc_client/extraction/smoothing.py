@@ -1,0 +1,144 @@
+"""From irregular samples to the signal that the strokes are judged by.
+
+Three steps, in this order:
+
+    1. interpolation onto a uniform grid of 200 Hz (finer first where the recording itself is finer),
+    2. a zero-phase low-pass at 12 Hz: a Butterworth filter of order 4, run forwards and backwards,
+    3. the derivative of the cubic spline through the result: the velocity.
+
+The hand holds little above 10 Hz; what a recorder adds above (quantised positions, late time stamps) is not
+the strokes' business. The filter must not shift anything in time, hence forwards and backwards. At its ends a
+part is continued by point reflection, so that the first and the last position stay where they are and a part
+may begin and end in full motion.
+
+Source: section 2 of the theory notes (12 Hz low-pass of signatures).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, make_interp_spline
+from scipy.signal import butter, find_peaks, sosfiltfilt
+
+from pc_client.extraction.recording import PenPart
+from pc_client.movements.geometry import read_only
+
+__all__ = [
+    "CUTOFF_HZ",
+    "PROMINENCE",
+    "RATE_HZ",
+    "SmoothPart",
+    "low_passed",
+    "moves",
+    "smooth_part",
+    "speed_peaks",
+    "velocity",
+]
+
+#: Uniform rate of the signal, Hz.
+RATE_HZ = 200.0
+#: Cut-off of the low-pass, Hz. Run forwards and backwards the filter halves the amplitude there (-6 dB).
+CUTOFF_HZ = 12.0
+#: A local maximum of the speed is a peak when it stands out by this share of the part's top speed.
+PROMINENCE = 0.01
+#: A part shorter than this, s, holds no movement that a 12 Hz signal could tell from a touch.
+MIN_DURATION_S = 0.02
+
+_ORDER = 4
+#: The impulse response has died away (to 1e-6) after this time, s.
+_SETTLED_S = 0.25
+#: Time steps of a clock that can be trusted differ by less than this factor from one to the next.
+_STEADY_RATIO = 4.0
+_MAX_OVERSAMPLING = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SmoothPart:
+    """A part on the uniform grid, low-passed.
+
+    Attributes:
+        t: times, (n,), s, uniform; first and last are those of the recorded part.
+        p: positions, (n, 2) or (n, 3).
+        v: velocities, the same shape, per second.
+    """
+
+    t: NDArray[np.float64]
+    p: NDArray[np.float64]
+    v: NDArray[np.float64]
+
+    @property
+    def step(self) -> float:
+        """Distance of the grid's times, s."""
+        return float(self.t[1] - self.t[0])
+
+    @property
+    def speed(self) -> NDArray[np.float64]:
+        """Length of the velocity, (n,)."""
+        length: NDArray[np.float64] = np.sqrt(np.einsum("ij,ij->i", self.v, self.v))
+        return length
+
+
+def moves(part: PenPart) -> bool:
+    """Whether a part holds a movement; a touch, a dot or a single sample does not."""
+    return len(part.t) >= 2 and part.duration >= MIN_DURATION_S and part.extent > 0.0
+
+
+def smooth_part(part: PenPart) -> SmoothPart:
+    """The low-passed signal of a part that moves.
+
+    The grid's step is stretched by the few per mille that let it end at the last sample.
+    """
+    n_steps = max(4, round(part.duration * RATE_HZ))
+    sample_rate = (len(part.t) - 1) / part.duration
+    oversampling = min(_MAX_OVERSAMPLING, max(1, math.ceil(sample_rate / RATE_HZ)))
+    fine = np.linspace(part.t[0], part.t[-1], n_steps * oversampling + 1)
+    filtered = low_passed(_interpolated(part, fine), RATE_HZ * oversampling)
+    t, p = fine[::oversampling], filtered[::oversampling]
+    return SmoothPart(read_only(t), read_only(p), read_only(velocity(t, p)))
+
+
+def speed_peaks(part: SmoothPart) -> NDArray[np.intp]:
+    """Indices of the local maxima of the speed inside a part, (n_peaks,).
+
+    All of them count that rise by more than `PROMINENCE` of the part's top speed above the higher of the two
+    valleys beside them. The first and the last sample are no maxima, however high.
+    """
+    speed = part.speed
+    peaks, _ = find_peaks(speed, prominence=PROMINENCE * float(speed.max()))
+    found: NDArray[np.intp] = peaks
+    return found
+
+
+def velocity(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The derivative of the cubic spline through positions p (n, dim) at the times t (n,), (n, dim) per s."""
+    derivative: NDArray[np.float64] = CubicSpline(t, p)(t, 1)
+    return derivative
+
+
+def _interpolated(part: PenPart, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    # A cubic spline is exact to the fourth order, but swings out where two time stamps lie close together and
+    # the clock is not to be trusted. There nothing but the straight line is known between two samples.
+    steps = np.diff(part.t)
+    ratios = steps[1:] / steps[:-1]
+    steady = len(steps) >= 3 and float(np.maximum(ratios, 1.0 / ratios).max()) < _STEADY_RATIO
+    curve = CubicSpline(part.t, part.p) if steady else make_interp_spline(part.t, part.p, k=1)
+    points: NDArray[np.float64] = curve(t)
+    return points
+
+
+def low_passed(points: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+    """Positions (n, dim) at a uniform rate (Hz), low-passed at 12 Hz without a shift in time."""
+    padding = min(len(points) - 1, math.ceil(_SETTLED_S * rate))
+    filtered: NDArray[np.float64] = sosfiltfilt(_filter(rate), points, axis=0, padtype="odd", padlen=padding)
+    return filtered
+
+
+@lru_cache(maxsize=32)
+def _filter(rate: float) -> NDArray[np.float64]:
+    sections: NDArray[np.float64] = butter(_ORDER, CUTOFF_HZ, fs=rate, output="sos")
+    return sections

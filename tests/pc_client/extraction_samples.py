@@ -1,0 +1,49 @@
+"""Movements to extract from: own strokes with known parameters, and where the real drawings lie."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pc_client.extraction.recording import PenPart, PenRecording
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.stroke import Stroke
+from pc_client.movements.timing import TwoSidedTiming
+
+DRAWINGS = Path(__file__).parents[3] / "shared" / "data" / "pen_strokes" / "strokes_background_small1.zip"
+
+needs_drawings = pytest.mark.skipif(
+    not DRAWINGS.exists(),
+    reason=f"the drawings are not here: {DRAWINGS} (they are never part of the project)",
+)
+
+
+def own_strokes(seed, dim, n=5, stroke_time=1.0, overlap=0.4):
+    """A movement of n overlapping strokes, sigma .1 to .3, arcs of up to 1.5 rad, in the plane or in space."""
+    rng = np.random.default_rng(seed)
+    start, strokes = 0.0, []
+    for sigma in rng.uniform(0.1, 0.3, n):
+        duration = stroke_time * rng.uniform(0.85, 1.15)
+        timing = TwoSidedTiming(start, duration, sigma, 3.0).lognormal
+        # Tilt 90 degrees about a level chord: the plane of the arc is the xy plane.
+        strokes.append(
+            Stroke(timing, rng.uniform(-1.5, 1.5), rng.uniform(-1.0, 1.0) if dim == 3 else math.pi / 2)
+        )
+        start += duration * (1.0 - overlap)
+    heading = np.cumsum(rng.uniform(0.6, 2.2, n) * rng.choice([-1.0, 1.0], n))
+    rise = rng.uniform(-0.7, 0.7, n) if dim == 3 else np.zeros(n)
+    steps = np.column_stack((np.cos(heading), np.sin(heading), rise)) * rng.uniform(60.0, 140.0, n)[:, None]
+    targets = np.vstack((np.zeros(3), np.cumsum(steps, axis=0)))
+    return SigmaLognormal(targets, tuple(strokes), start + stroke_time)
+
+
+def recorded(law, dim, rate=200.0, noise=0.0, seed=0):
+    """The movement as a recording; noise is that of the velocity, white, as a share of its rms."""
+    t = np.arange(0.0, law.duration + 0.2, 1.0 / rate)
+    motion = law.evaluate(t)
+    rms = math.sqrt(float(np.mean(np.sum(motion.v**2, axis=1))))
+    shaken = np.random.default_rng(seed).normal(size=(len(t), dim)) * noise * rms / math.sqrt(dim)
+    return PenRecording("own", (PenPart(t, motion.p[:, :dim] + np.cumsum(shaken, axis=0) / rate),))
