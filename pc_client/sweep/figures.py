@@ -6,6 +6,7 @@ Loads matplotlib; import it only where a plot is drawn. Style and colours are th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,13 @@ from pc_client.analysis.figures import BLUE, GREEN, ORANGE, PURPLE, RED, SKY, sv
 Rows = Sequence[Mapping[str, Any]]
 
 _COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY)
+_STYLES = (("s", "-"), ("^", "--"), ("o", ":"))
 _NOT_DONE = "#DDDDDD"
 _WIDTH = 11.0
 
 
 def draw_axis(rows: Rows, axis: str) -> str:
-    """Draw the SNR of all runs over one axis, and its mean for each kind of movement.
+    """Draw the SNR of all runs over one axis, and its mean for each kind of movement and each fidelity.
 
     Args:
         rows: runs that are done.
@@ -33,31 +35,42 @@ def draw_axis(rows: Rows, axis: str) -> str:
         SVG text.
     """
     values = _in_order(rows, axis)
-    numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
-    positions = dict(zip(values, values if numeric else range(len(values)), strict=True))
-    kinds = _in_order(rows, "kind")
+    # Seeds are numbers, but there is no more or less of a seed.
+    scale = axis != "seed" and all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+    positions = dict(zip(values, values if scale else range(len(values)), strict=True))
+    fidelities = [None] if axis == "fidelity" else _in_order(rows, "fidelity")
     with svg_figure(_WIDTH, 3.2, _simulated(rows)) as (figure, page):
-        axes = figure.add_axes((0.06, 0.2 if numeric else 0.27, 0.925, 0.66 if numeric else 0.59))
-        for i, kind in enumerate(kinds):
-            of_kind = [row for row in rows if row["kind"] == kind]
-            _draw_kind(axes, of_kind, axis, positions, kind, _COLOURS[i % len(_COLOURS)])
-        if not numeric:
+        axes = figure.add_axes((0.06, 0.2 if scale else 0.27, 0.925, 0.64 if scale else 0.57))
+        for kind, colour in zip(_in_order(rows, "kind"), cycle(_COLOURS)):
+            for fidelity, (marker, line) in zip(fidelities, cycle(_STYLES)):
+                series = [r for r in rows if r["kind"] == kind and fidelity in (None, r["fidelity"])]
+                label = kind if len(fidelities) == 1 else f"{kind}, {fidelity}"
+                style: dict[str, Any] = {"color": colour, "marker": marker}
+                axes.plot(*_points(series, axis, positions), ls="", ms=3, alpha=0.3, **style)
+                axes.plot(
+                    *_mean_points(series, axis, positions),
+                    ls=line if scale else "",
+                    ms=6,
+                    label=label,
+                    **style,
+                )
+        if not scale:
             axes.set_xticks(list(positions.values()), [str(value) for value in values])
+            axes.set_xlim(-0.6, len(values) - 0.4)
             if len(values) > 4:
                 axes.tick_params(axis="x", rotation=20)
-            axes.set_xlim(-0.6, len(values) - 0.4)
         axes.yaxis.set_major_locator(MaxNLocator(6))
         axes.set_xlabel(axis)
         axes.set_ylabel("SNR [dB]")
-        axes.set_title(f"SNR of the TCP speed over {axis}: all runs, and the mean of each kind")
-        axes.legend(ncols=3, loc="lower right", bbox_to_anchor=(0.9, 1.0), borderaxespad=0.2)
+        axes.set_title(f"SNR over {axis}: runs and means")
+        axes.legend(ncols=6, loc="lower right", bbox_to_anchor=(0.9, 1.0), borderaxespad=0.2)
     return page.getvalue()
 
 
 def draw_map(rows: Rows, x: str, y: str) -> str:
-    """Draw the mean SNR over two numeric axes, one panel a fidelity, all in the same colours.
+    """Draw the mean SNR over two numeric axes, one panel a fidelity, each with its own colours.
 
-    A full grid becomes tiles, with a cross where nothing could be run; anything else becomes dots.
+    A full grid becomes tiles, with a cross where not all cases could be run; anything else becomes dots.
 
     Args:
         rows: all of the table, done or not.
@@ -68,16 +81,14 @@ def draw_map(rows: Rows, x: str, y: str) -> str:
         SVG text.
     """
     panels = _in_order(rows, "fidelity")
-    means = {panel: _means([r for r in rows if r["fidelity"] == panel], x, y) for panel in panels}
-    levels = [mean for points in means.values() for mean in points.values() if mean is not None]
-    low, high = (min(levels), max(levels)) if levels else (0.0, 1.0)
-    colours = {"vmin": low, "vmax": max(high, low + 1e-3), "cmap": "viridis"}
+    xs, ys = _in_order(rows, x), _in_order(rows, y)
     with svg_figure(_WIDTH, 4.2, _simulated(rows)) as (figure, page):
-        grid = figure.add_gridspec(1, len(panels), left=0.06, right=0.9, bottom=0.14, top=0.86, wspace=0.18)
+        grid = figure.add_gridspec(1, len(panels), left=0.06, right=0.97, bottom=0.14, top=0.86, wspace=0.12)
         for i, panel in enumerate(panels):
             axes = figure.add_subplot(grid[0, i])
-            xs, ys = _in_order(rows, x), _in_order(rows, y)
-            points = means[panel]
+            points = _means([row for row in rows if row["fidelity"] == panel], x, y)
+            levels = [mean for mean in points.values() if mean is not None] or [0.0]
+            colours = {"vmin": min(levels), "vmax": max(max(levels), min(levels) + 1e-3), "cmap": "viridis"}
             if len(points) == len(xs) * len(ys):
                 shown = _draw_tiles(axes, points, xs, ys, colours)
             else:
@@ -85,22 +96,18 @@ def draw_map(rows: Rows, x: str, y: str) -> str:
             axes.set_xlabel(x)
             axes.set_ylabel(y if i == 0 else "")
             axes.set_title("mean SNR [dB]" + (f", {panel}" if panel is not None else ""))
-        bar = figure.colorbar(shown, cax=figure.add_axes((0.915, 0.14, 0.014, 0.72)))
-        bar.set_label("mean SNR [dB]")
+            figure.colorbar(shown, ax=axes, fraction=0.05, pad=0.02)
     return page.getvalue()
 
 
-def _draw_kind(
-    axes: Axes, rows: Rows, axis: str, positions: Mapping[Any, float], kind: str, colour: str
-) -> None:
-    axes.plot(
-        [positions[r[axis]] for r in rows], [r["snr_db"] for r in rows], "o", ms=3, color=colour, alpha=0.35
-    )
-    values = [value for value in positions if any(row[axis] == value for row in rows)]
-    means = [np.mean([row["snr_db"] for row in rows if row[axis] == value]) for value in values]
-    # Many values are samples, or movements: a line between them would say nothing.
-    line = "-" if 1 < len(values) <= 12 and axis != "movement" else ""
-    axes.plot([positions[v] for v in values], means, marker="s", ms=5.5, ls=line, color=colour, label=kind)
+def _points(rows: Rows, axis: str, positions: Mapping[Any, float]) -> tuple[list[float], list[float]]:
+    return [positions[row[axis]] for row in rows], [row["snr_db"] for row in rows]
+
+
+def _mean_points(rows: Rows, axis: str, positions: Mapping[Any, float]) -> tuple[list[float], list[float]]:
+    levels = {value: [row["snr_db"] for row in rows if row[axis] == value] for value in positions}
+    known = {value: float(np.mean(level)) for value, level in levels.items() if level}
+    return [positions[value] for value in known], list(known.values())
 
 
 def _draw_tiles(
