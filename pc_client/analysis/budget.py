@@ -3,10 +3,11 @@
     delay           what the best time shift takes away
     scale and ramp  what is left of it, as far as it is a constant times the reference speed (too fast, too
                     slow) plus a constant times its second derivative (corners rounded off)
-    slow rest       below 6 Hz: friction, settling, limits of acceleration
+    slow rest       below 6 Hz, less the noise: friction, settling, limits of acceleration, slow gear ripple
     fast rest       above 6 Hz, less the noise: gear ripple (101 cycles a joint turn pass 6 Hz at 0.4 rad/s),
                     jitter of the command stream
-    noise           what the differenced position shows at rest, along the direction of the movement
+    noise           what the differenced position shows at rest, turned into noise of the speed: its variance
+                    is taken from the fast rest, what it adds to the mean of the speed near rest from the slow
 
 Each part is the drop in mean square error from one step to the next, so no part is counted twice. What is
 measured is the correlation with these shapes, not a cause: a cause that looks like a delay is in `delay`.
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from pc_client.analysis.metrics import rest_noise
 from pc_client.analysis.snr import shifted_pair
+from pc_client.analysis.speed_noise import speed_noise
 from pc_client.analysis.track import ShiftedReference, TcpTrack, speed, velocity
 from pc_client.recording.loader import Recording
 
@@ -78,8 +80,16 @@ def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
     after_shape = min(_power(rest), after_shift)
 
     fast = min(_power_above(rest, SPLIT_HZ * cycle), after_shape)
-    noise = min(_noise_along(recording, track), fast)
-    parts = (error_power - after_shift, after_shift - after_shape, after_shape - fast, fast - noise, noise)
+    slow = after_shape - fast
+    noise_slow, noise_fast = _noise_of_speed(recording, track)
+    noise_slow, noise_fast = min(noise_slow, slow), min(noise_fast, fast)
+    parts = (
+        error_power - after_shift,
+        after_shift - after_shape,
+        slow - noise_slow,
+        fast - noise_fast,
+        noise_slow + noise_fast,
+    )
     return Budget(_power(ref_speed), error_power, dict(zip(PARTS, parts, strict=True)))
 
 
@@ -95,16 +105,11 @@ def _power_above(signal: NDArray[np.float64], cycles_per_sample: float) -> float
     return float(power[np.fft.rfftfreq(n) > cycles_per_sample].sum())
 
 
-def _noise_along(recording: Recording, track: TcpTrack) -> float:
-    """Return the noise power of the scalar speed: noise at rest, seen along the direction of the movement.
-
-    While the arm moves, a small velocity error changes the speed only by its component along the motion.
-    """
+def _noise_of_speed(recording: Recording, track: TcpTrack) -> tuple[float, float]:
+    """Return what noise at rest adds to the power of the speed error: by its mean, slow, and its variance."""
     covariance = rest_noise(recording, track)
     if covariance is None:
-        return 0.0
+        return 0.0, 0.0
     v = velocity(track.t, track.p_ref)[track.movement_steps]
-    length = np.linalg.norm(v, axis=1)
-    moving = length > 0.05 * length.max()
-    u = v[moving] / length[moving, None]
-    return float(np.mean(np.einsum("ni,ij,nj->n", u, covariance, u))) if len(u) else 0.0
+    mean, variance = speed_noise(v, covariance)
+    return _power(mean), float(np.mean(variance))

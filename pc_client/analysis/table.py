@@ -16,6 +16,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
 from pc_client.analysis.run import Run
 from pc_client.errors import RecordingError
 
@@ -38,11 +39,19 @@ KINDS = ("uniform", "lognormal")
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One movement: one figure a repetition, in the order of the repetitions."""
+    """One movement: one figure a repetition, in the order of the repetitions.
+
+    Attributes:
+        name: of the movement.
+        kind: of the movement.
+        runs: its repetitions.
+        noise_floor_db: SNR that the noise of the arm's encoders alone would leave (`noise_floor`).
+    """
 
     name: str
     kind: str
     runs: tuple[Run, ...]
+    noise_floor_db: float | None = None
 
     @property
     def snr_db(self) -> list[float]:
@@ -63,6 +72,12 @@ class Row:
     def difference_db(self) -> float | None:
         """Ours less the paper's."""
         return None if self.paper_snr_db is None else self.mean_snr_db - self.paper_snr_db
+
+    @property
+    def unrepeatable_db(self) -> float | None:
+        """SNR that the difference of runs that were driven alike would leave; None without such runs."""
+        power = unrepeatable_power(self.runs)
+        return 10.0 * math.log10(self.runs[0].budget.signal_power / power) if power else None
 
     @property
     def max_position_error_mm(self) -> float:
@@ -116,6 +131,8 @@ class Table:
                 "shifted_vector_snr_db": [_number(run.snr.velocity_shifted_db) for run in row.runs],
                 "rms_position_error_mm": [_number(run.errors.rms_position_error_mm) for run in row.runs],
                 "max_path_error_mm": [_number(run.errors.max_path_error_mm) for run in row.runs],
+                "noise_floor_db": None if row.noise_floor_db is None else _number(row.noise_floor_db),
+                "unrepeatable_db": None if row.unrepeatable_db is None else _number(row.unrepeatable_db),
             }
             for row in self.rows
         ]
@@ -204,8 +221,10 @@ def build_table(runs: Sequence[Run]) -> Table:
                 "(robot, seed, pace or controller differ); keep one experiment a folder"
             )
     ordered = sorted(runs, key=lambda run: (*_rank(run), run.provenance.repetition))
+    # The encoders are the same in all runs; the more of them are at rest, the better their noise is known.
+    covariance = step_covariance(runs)
     rows = [
-        Row(name, group[0].provenance.kind, group)
+        Row(name, group[0].provenance.kind, group, floor_db(group[0], covariance))
         for name, group in ((n, tuple(g)) for n, g in groupby(ordered, key=lambda r: r.provenance.movement))
     ]
     return Table(*common, rows=tuple(rows))

@@ -27,6 +27,15 @@ class ControllerConfig:
         integral_limit: largest correction by the integral part [rad/s].
         speed_share: share of the joint speed limits that a command may use, 0..1.
         abort_error: position error of any joint that ends the run [rad].
+        compensates_lag: with `looks_ahead`: dead time and lag are identified apart; the feed-forward is ahead
+            by the dead time and adds lag * joint acceleration.
+        compensates_gear: with `looks_ahead`: the waves of the gears are found from the movements run so far,
+            and the feed-forward is that of motors which make up for them (`gear`).
+        learns: a repetition begins with what the run before it taught (`learning`).
+        estimates: the feedback takes positions from a Kalman filter (`state_estimate`).
+        learning_gain: share of a run's error that is learned, 0..1.
+        learning_speed: bound of the learned part of a command [rad/s].
+        learning_acceleration: bound of its change [rad/s2].
     """
 
     name: str
@@ -38,6 +47,13 @@ class ControllerConfig:
     integral_limit: float
     speed_share: float
     abort_error: float
+    compensates_lag: bool = False
+    compensates_gear: bool = False
+    learns: bool = False
+    estimates: bool = False
+    learning_gain: float = 0.8
+    learning_speed: float = 0.2
+    learning_acceleration: float = 20.0
 
 
 CONTROLLERS = MappingProxyType(
@@ -69,6 +85,23 @@ CONTROLLERS = MappingProxyType(
             integral_limit=0.1,
             speed_share=0.95,
             abort_error=0.2,
+        ),
+        # All that the identified loop allows: its lag made up for as well, the waves of the gears once a
+        # movement has shown them, and each repetition of a movement learns from the one before. The feedback
+        # is that of `preview`: it has little left to do.
+        "best": ControllerConfig(
+            name="best",
+            gain_p=5.0,
+            gain_i=3.0,
+            looks_ahead=True,
+            speedj_acceleration=40.0,
+            slew_limit=30.0,
+            integral_limit=0.1,
+            speed_share=0.95,
+            abort_error=0.2,
+            compensates_lag=True,
+            compensates_gear=True,
+            learns=True,
         ),
     }
 )

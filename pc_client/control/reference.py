@@ -7,6 +7,7 @@ Frames come on a fixed grid, so the whole reference is computed before the arm m
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import floor
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -71,10 +72,28 @@ class ReferenceTable:
         settle: time after it [s].
         lookahead: None: feed-forward is the reference velocity at the current time. A number: it is the
             mean reference velocity over the cycle that begins this much later [s].
+        motors: with a lookahead: what the motors have to do so that the joints follow; the feed-forward is
+            taken from it. None: what the joints do.
+        lag: with a lookahead: time constant of a first-order lag to make up for [s]. The feed-forward is
+            then the mean of qd + lag qdd, the input whose lagged output is qd.
+        learned: (n, 6) velocities to add to the feed-forward [rad/s], one a cycle from `lead` before the
+            movement on, or None.
         tcp: the TCP reference to log, or None when there is none.
     """
 
-    __slots__ = ("_joints", "_lookahead", "_period", "_points", "_tcp", "duration", "lead", "settle")
+    __slots__ = (
+        "_joints",
+        "_lag",
+        "_learned",
+        "_lookahead",
+        "_motors",
+        "_period",
+        "_points",
+        "_tcp",
+        "duration",
+        "lead",
+        "settle",
+    )
 
     def __init__(
         self,
@@ -84,15 +103,21 @@ class ReferenceTable:
         lead: float,
         settle: float,
         lookahead: float | None = None,
+        motors: JointReference | None = None,
+        lag: float = 0.0,
+        learned: NDArray[np.float64] | None = None,
         tcp: TcpReference | None = None,
     ) -> None:
         self.duration = joints.duration
         self.lead = lead
         self.settle = settle
         self._joints = joints
+        self._motors = joints if motors is None else motors
         self._tcp = tcp
         self._period = period
         self._lookahead = lookahead
+        self._lag = lag
+        self._learned = learned
         self._points: dict[int, ReferencePoint] = {}
         grid = np.arange(round((lead + self.duration + settle) / period) + 2) * period - lead
         self._compute(np.round(grid * _TICKS_PER_SECOND).astype(int).tolist())
@@ -101,6 +126,14 @@ class ReferenceTable:
     def period(self) -> float:
         """Control cycle of the robot [s]."""
         return self._period
+
+    def commands(self) -> NDArray[np.float64]:
+        """The feed-forward of a whole run (n, 6) [rad/s], one a cycle: all that is sent but for feedback."""
+        n = round((self.lead + self.duration + self.settle) / self._period) + 1
+        rows: NDArray[np.float64] = np.array(
+            [self.at(k * self._period - self.lead).qd_feedforward for k in range(n)]
+        )
+        return rows
 
     def at(self, t: float) -> ReferencePoint:
         """The reference at time t [s] since the movement began, negative before it."""
@@ -121,13 +154,32 @@ class ReferenceTable:
         for i, tick in enumerate(ticks):
             t = float(times[i])
             q, qd = (np.array(x, dtype=np.float64) for x in self._joints.at(t))
-            feedforward = qd if self._lookahead is None else self._mean_velocity(t + self._lookahead)
+            of_reference = qd if self._lookahead is None else self._mean_velocity(t + self._lookahead)
+            feedforward = of_reference if self._learned is None else of_reference + self._learned_at(t)
             self._points[tick] = ReferencePoint(
                 tuple(q.tolist()), tuple(feedforward.tolist()), q, qd, p[i], v[i]
             )
 
     def _mean_velocity(self, t: float) -> NDArray[np.float64]:
-        """Mean reference velocity (6,) [rad/s] over the cycle that begins at t [s]."""
-        now, later = (np.asarray(self._joints.at(at)[0], dtype=np.float64) for at in (t, t + self._period))
-        mean: NDArray[np.float64] = (later - now) / self._period
+        """Mean (6,) [rad/s] of the motors' velocity + lag * acceleration over the cycle from t [s] on.
+
+        Both are differences over the cycle, of position and of velocity: nothing is integrated numerically.
+        """
+        q_now, qd_now = (np.asarray(x, dtype=np.float64) for x in self._motors.at(t))
+        q_later, qd_later = (np.asarray(x, dtype=np.float64) for x in self._motors.at(t + self._period))
+        mean: NDArray[np.float64] = (q_later - q_now + self._lag * (qd_later - qd_now)) / self._period
         return mean
+
+    def _learned_at(self, t: float) -> NDArray[np.float64]:
+        """What was learned for time t [s]; between two cycles in between, 0 outside."""
+        assert self._learned is not None
+        position = (t + self.lead) / self._period
+        k = floor(position)
+        share = position - k
+        n = len(self._learned)
+        value = np.zeros(self._learned.shape[1])
+        if 0 <= k < n:
+            value += (1.0 - share) * self._learned[k]
+        if 0 <= k + 1 < n:
+            value += share * self._learned[k + 1]
+        return value

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from pc_client.control.controller_config import ControllerConfig
 from pc_client.control.pi_feedforward import PiState, step_pi
 from pc_client.control.reference import ReferencePoint, ReferenceTable
+from pc_client.control.state_estimate import StateEstimator
 from pc_client.errors import DriverError
 from pc_client.recording.layout import Phase
 from protocol.ur_types import JOINT_NAMES
@@ -43,12 +44,20 @@ class Tracker:
         reference: what to follow.
         config: the controller.
         qd_max: (6,) joint speed limits of the arm [rad/s]; the controller uses its share of them.
+        estimator: fresh, gives the positions that are fed back; None feeds back those that are reported.
     """
 
-    __slots__ = ("_config", "_end", "_last_stamp", "_qd_max", "_reference", "_start", "_state")
+    __slots__ = ("_config", "_end", "_estimator", "_last_stamp", "_qd_max", "_reference", "_start", "_state")
 
-    def __init__(self, reference: ReferenceTable, config: ControllerConfig, qd_max: Sequence[float]) -> None:
+    def __init__(
+        self,
+        reference: ReferenceTable,
+        config: ControllerConfig,
+        qd_max: Sequence[float],
+        estimator: StateEstimator | None = None,
+    ) -> None:
         self._reference = reference
+        self._estimator = estimator
         self._config = config
         self._qd_max = tuple(limit * config.speed_share for limit in qd_max)
         self._state = PiState()
@@ -76,7 +85,9 @@ class Tracker:
         if self._start is None:
             self._start = stamp + reference.lead
             dt = reference.period
+            cycles = 1
         else:
+            cycles = max(round((stamp - self._last_stamp) / reference.period), 1)
             dt = min(stamp - self._last_stamp, _MOST_CYCLES_PER_STEP * reference.period)
         self._last_stamp = stamp
         t = stamp - self._start
@@ -86,7 +97,11 @@ class Tracker:
             # Written so that NaN aborts too.
             if not -abort < wanted - actual < abort:
                 raise DriverError(_describe_error(point.q, q, t, abort))
+        if self._estimator is not None:
+            q = self._estimator.update(q, cycles)
         command = step_pi(self._config, self._qd_max, self._state, point.q, point.qd_feedforward, q, dt)
+        if self._estimator is not None:
+            self._estimator.sent(command)
         return TrackerStep(t, self._phase(t), point, command, t >= self._end)
 
     def observe(self, stamp: float) -> TrackerStep:

@@ -1,17 +1,25 @@
-"""The loop delay of this session: stream the small excitation, evaluate what came back."""
+"""The loop of this session: stream the small excitation, evaluate what came back.
+
+What is found here is all that the controller ever learns about the arm's dynamics; it is the same for all
+movements of the experiment.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pc_client.control.controller_config import ControllerConfig
 from pc_client.control.delay import DelayEstimate, estimate_delay
 from pc_client.control.excitation import Excitation
+from pc_client.control.lag import identify_loop
+from pc_client.control.learning_filter import LearningFilter, design_filter
+from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
-from pc_client.control.stability import gain_margin
+from pc_client.control.stability import LoopMargins, gain_margin, loop_margins
+from pc_client.control.state_estimate import EstimatorGains, identify_estimator
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
@@ -19,6 +27,9 @@ from pc_client.errors import DriverError, GainMarginError
 from protocol.realtime_layout import RealtimeFrame
 
 _LEAD, _SETTLE = 0.1, 0.3
+_AT_REST = 12
+"""The last frames of the excitation, in which the arm rests: the last third of `_SETTLE`."""
+
 _RETURN_TOLERANCE = 2e-3
 """How far from where it began the excitation may leave a joint [rad]."""
 
@@ -26,10 +37,60 @@ _LEAST_MARGIN = 2.0
 """A controller needs at least this gain margin with the identified delay: 6 dB, the usual one."""
 
 
-def identify_delay(
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """What is known of the loop, and what the controller makes of it.
+
+    Attributes:
+        estimate: dead time and lag as one delay.
+        loop: dead time and lag apart, for a controller that uses them; else all of it dead time.
+        margins: of the feedback on this loop.
+        learning: the filter of a controller that learns; None for another.
+        estimator: the gains of a controller that estimates; None for another.
+    """
+
+    estimate: DelayEstimate
+    loop: LoopModel
+    margins: LoopMargins
+    learning: LearningFilter | None
+    estimator: EstimatorGains | None
+
+    @property
+    def delay(self) -> float:
+        """The loop delay [s]."""
+        return self.estimate.delay
+
+    def facts(self) -> Mapping[str, float | str]:
+        """Return what belongs into provenance and report, by name."""
+        facts: dict[str, float | str] = {
+            "dead_time_s": self.loop.dead_time,
+            "lag_s": self.loop.lag,
+            "joint_spread_s": self.loop.spread,
+            "gain_margin": self.margins.gain,
+            "phase_margin_deg": self.margins.phase_deg,
+            "delay_margin_s": self.margins.delay,
+            "sensitivity_peak": self.margins.peak,
+        }
+        if self.learning is not None:
+            facts |= {
+                "learning_cut_off_hz": self.learning.cut_off,
+                "learning_limited_by": self.learning.limited_by,
+                "learning_contraction": self.learning.contraction,
+                "learning_noise_share": self.learning.noise_share,
+            }
+        if self.estimator is not None:
+            facts |= {
+                "estimator_k_q": self.estimator.k_q,
+                "estimator_k_qd": self.estimator.k_qd,
+                "encoder_sigma_rad": self.estimator.encoder_sigma,
+            }
+        return facts
+
+
+def identify(
     driver: UrDriver, config: ControllerConfig, qd_max: Sequence[float]
-) -> tuple[DelayEstimate, StreamReport]:
-    """Identify the loop delay where the arm stands; it moves less than one degree and comes back.
+) -> tuple[Identification, StreamReport]:
+    """Identify the loop where the arm stands; it moves less than one degree and comes back.
 
     Args:
         driver: a session; the arm rests.
@@ -37,17 +98,18 @@ def identify_delay(
         qd_max: (6,) joint speed limits [rad/s].
 
     Returns:
-        The delay, and what happened on the wire.
+        What was found, and what happened on the wire.
 
     Raises:
         DriverError: the stream broke, or the arm did not follow.
         GainMarginError: the controller would be unstable, or nearly.
     """
+    period = driver.info.period
     q_start = driver.actual_q()
     # Feed-forward alone, its mean over each cycle: the integral of the commands ends exactly where it began.
     open_loop = replace(config, name="excitation", gain_p=0.0, gain_i=0.0)
     table = ReferenceTable(
-        Excitation(q_start.tolist()), period=driver.info.period, lead=_LEAD, settle=_SETTLE, lookahead=0.0
+        Excitation(q_start.tolist()), period=period, lead=_LEAD, settle=_SETTLE, lookahead=0.0
     )
     stamps: list[float] = []
     commands: list[list[float]] = []
@@ -61,14 +123,15 @@ def identify_delay(
     report = driver.stream(
         Tracker(table, open_loop, qd_max), collect, acceleration=config.speedj_acceleration
     )
-    estimate = estimate_delay(np.array(stamps), np.array(commands), np.array(positions), driver.info.period)
+    t, qd_cmd, q = np.array(stamps), np.array(commands), np.array(positions)
+    estimate = estimate_delay(t, qd_cmd, q, period)
     drift = float(np.abs(driver.actual_q() - q_start).max())
     if not drift <= _RETURN_TOLERANCE:
         raise DriverError(
             f"the excitation left a joint {drift:.4f} rad from where it began, "
             f"allowed is {_RETURN_TOLERANCE} rad"
         )
-    margin = gain_margin(config.gain_p, config.gain_i, max(estimate.delay, driver.info.period))
+    margin = gain_margin(config.gain_p, config.gain_i, max(estimate.delay, period))
     if margin < _LEAST_MARGIN:
         raise GainMarginError(
             f"with a loop delay of {estimate.delay * 1e3:.0f} ms the controller {config.name!r} has a "
@@ -76,4 +139,38 @@ def identify_delay(
             margin=margin,
             delay=estimate.delay,
         )
-    return estimate, report
+    if config.compensates_lag or config.learns or config.estimates:
+        loop = identify_loop(t, qd_cmd, q, period)
+    else:  # one delay is all that this controller wants to know
+        loop = LoopModel(estimate.delay, 0.0, 0.0, estimate.residual)
+    return Identification(
+        estimate=estimate,
+        loop=loop,
+        margins=loop_margins(loop, config.gain_p, config.gain_i, period),
+        learning=_learning_filter(config, loop, period),
+        estimator=identify_estimator(qd_cmd, q, loop, period, _AT_REST) if config.estimates else None,
+    ), report
+
+
+def _learning_filter(config: ControllerConfig, loop: LoopModel, period: float) -> LearningFilter | None:
+    """The filter of a controller that learns.
+
+    Raises:
+        DriverError: learning would not converge for every loop within the spread of the identified one.
+    """
+    if not config.learns:
+        return None
+    learning = design_filter(
+        loop,
+        period,
+        learning_gain=config.learning_gain,
+        gain_p=config.gain_p,
+        gain_i=config.gain_i,
+    )
+    if not learning.contraction < 1.0:
+        raise DriverError(
+            f"learning would not converge: from run to run an error may grow by {learning.contraction:.2f}, "
+            f"allowed is less than 1; single joints differ by {loop.spread * 1e3:.1f} ms from the loop's "
+            "delay, use --controller preview"
+        )
+    return learning

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
-from pc_client.control.delay import DelayEstimate
 from pc_client.driver.robot_info import RobotInfo
 from pc_client.driver.velocity_stream import StreamReport
+from pc_client.experiment.identification import Identification
 from pc_client.planning.approach import Approach
 
 
@@ -22,8 +22,8 @@ class Observer(Protocol):
         """The arm begins to move to the start of a movement."""
         ...
 
-    def identified(self, estimate: DelayEstimate) -> None:
-        """The loop delay is known."""
+    def identified(self, found: Identification) -> None:
+        """The loop is known."""
         ...
 
     def running(self, name: str, repetition: int) -> None:
@@ -44,7 +44,7 @@ class Silent:
     def approaching(self, approach: Approach) -> None:
         """Say nothing."""
 
-    def identified(self, estimate: DelayEstimate) -> None:
+    def identified(self, found: Identification) -> None:
         """Say nothing."""
 
     def running(self, name: str, repetition: int) -> None:

@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as RichProgress
 
-from pc_client.control.delay import DelayEstimate
 from pc_client.driver.robot_info import RobotInfo
 from pc_client.driver.velocity_stream import StreamReport
+from pc_client.experiment.identification import Identification
 from pc_client.planning.approach import Approach
 
 
@@ -55,9 +55,22 @@ class Progress:
         """Say that the arm moves to a start."""
         self._show(f"{approach.plan.name}: to the start")
 
-    def identified(self, estimate: DelayEstimate) -> None:
-        """Say what the loop delay is."""
-        self._console.print(f"loop delay: {estimate.delay * 1e3:.1f} ms")
+    def identified(self, found: Identification) -> None:
+        """Say what the loop is, and how far from oscillating."""
+        margins = found.margins
+        self._console.print(
+            f"loop delay: {found.delay * 1e3:.1f} ms; gain margin {margins.gain:.1f}, phase margin "
+            f"{margins.phase_deg:.0f} deg, delay margin {margins.delay * 1e3:.0f} ms",
+            soft_wrap=True,
+        )
+        if found.learning is not None:
+            loop = found.loop
+            self._console.print(
+                f"learning: dead time {loop.dead_time * 1e3:.1f} ms, lag {loop.lag * 1e3:.1f} ms, "
+                f"joints within {loop.spread * 1e3:.1f} ms; up to {found.learning.cut_off:.0f} Hz "
+                f"(set by the {found.learning.limited_by}), contraction {found.learning.contraction:.2f}",
+                soft_wrap=True,
+            )
 
     def running(self, name: str, repetition: int) -> None:
         """Say what runs."""

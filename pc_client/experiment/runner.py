@@ -11,15 +11,17 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from pc_client.control.controller_config import ControllerConfig
-from pc_client.control.delay import DelayEstimate
+from pc_client.control.gear import GearObserver, MotorReference
 from pc_client.control.reference import ReferenceTable
+from pc_client.control.state_estimate import StateEstimator
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
-from pc_client.experiment.identification import identify_delay
+from pc_client.experiment.identification import Identification, identify
 from pc_client.experiment.observer import Observer, Silent
 from pc_client.experiment.preflight import check_model
 from pc_client.experiment.prepare import Experiment, PlannedMovement, clear_folder
+from pc_client.experiment.repetitions import Repetitions, RunLog, is_clean
 from pc_client.planning.approach import Approach, plan_approach
 from pc_client.planning.plan import JointPlan
 from pc_client.recording.provenance import Provenance
@@ -38,14 +40,16 @@ class ExperimentReport:
     """What an experiment came to.
 
     Attributes:
-        delay: the identified loop delay.
+        delay: the identified loop and its margins.
         paths: recordings, in order.
         streams: what happened on the wire in each run.
+        remarks: one line for each run in which nothing could be learned or used.
     """
 
-    delay: DelayEstimate
+    delay: Identification
     paths: list[Path] = field(default_factory=list)
     streams: list[StreamReport] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
 
 
 class ExperimentRunner:
@@ -86,21 +90,26 @@ class ExperimentRunner:
         report: ExperimentReport | None = None
         pace = "realtime"
         for planned in experiment.planned:
+            repetitions: Repetitions | None = None
             for repetition in range(1, experiment.repeat + 1):
                 plan = self._approach(planned.plan)
                 if report is None:
-                    delay, stream = identify_delay(driver, self._config, self._qd_max)
-                    self._observer.identified(delay)
-                    report = ExperimentReport(delay)
+                    found, stream = identify(driver, self._config, self._qd_max)
+                    self._observer.identified(found)
+                    report = ExperimentReport(found)
                     # Only a robot whose time waits for its client repeats a frame.
                     pace = "lockstep" if stream.heartbeats else "realtime"
+                    gears = GearObserver(found.loop, driver.info.period)
+                if repetitions is None:
+                    repetitions = self._repetitions(report.delay, gears)
                 self._observer.running(planned.movement.name, repetition)
                 path = experiment.recording_path(planned, repetition)
-                stream = self._record(
-                    path, planned, plan, self._provenance(planned, repetition, report.delay, pace)
-                )
+                provenance = self._provenance(planned, repetition, report.delay, pace)
+                stream = self._record(path, planned, plan, provenance, report.delay, repetitions, gears)
                 report.paths.append(path)
                 report.streams.append(stream)
+                if repetitions.remark:
+                    report.remarks.append(f"{planned.movement.name}: {repetitions.remark}")
                 self._observer.finished(planned.movement.name, repetition, path, stream)
         assert report is not None  # an experiment has at least one run
         return report
@@ -115,23 +124,53 @@ class ExperimentRunner:
             )
         return approach.plan
 
-    def _record(
-        self, path: Path, planned: PlannedMovement, plan: JointPlan, provenance: Provenance
-    ) -> StreamReport:
-        """Stream one run into one file."""
+    def _repetitions(self, found: Identification, gears: GearObserver) -> Repetitions:
+        """The memory of one movement, empty but for what earlier movements have shown of the gears."""
+        model, period = self._experiment.model, self._driver.info.period
+        gear = gears.model() if self._config.compensates_gear else None
+        return Repetitions(self._config, found.loop, found.learning, gear, model, period)
+
+    def _table(
+        self, planned: PlannedMovement, plan: JointPlan, found: Identification, repetitions: Repetitions
+    ) -> ReferenceTable:
+        """The reference of one run, with the feed-forward that the controller makes of it."""
         config = self._config
-        table = ReferenceTable(
+        lookahead = found.loop.dead_time if config.compensates_lag else found.delay
+        return ReferenceTable(
             plan.spline,
             period=self._driver.info.period,
             lead=LEAD,
             settle=SETTLE,
-            lookahead=provenance.identified_delay_s if config.looks_ahead else None,
+            lookahead=lookahead if config.looks_ahead else None,
+            motors=None if repetitions.gear is None else MotorReference(plan.spline, repetitions.gear),
+            lag=found.loop.lag if config.compensates_lag else 0.0,
+            learned=repetitions.learned,
             tcp=planned.movement,
         )
+
+    def _record(
+        self,
+        path: Path,
+        planned: PlannedMovement,
+        plan: JointPlan,
+        provenance: Provenance,
+        found: Identification,
+        repetitions: Repetitions,
+        gears: GearObserver,
+    ) -> StreamReport:
+        """Stream one run into one file; the repetitions and the gears learn from it."""
+        config = self._config
+        table = self._table(planned, plan, found, repetitions)
+        if not repetitions.may_use(plan, table):
+            table = self._table(planned, plan, found, repetitions)
+        estimator = None
+        if found.estimator is not None:
+            estimator = StateEstimator(found.loop, found.estimator, self._driver.info.period)
+        log = RunLog() if config.learns or config.compensates_gear else None
         with Recorder(path, provenance, self._signals) as recorder:
             stream = self._driver.stream(
-                Tracker(table, config, self._qd_max),
-                _row_sink(recorder),
+                Tracker(table, config, self._qd_max, estimator),
+                _row_sink(recorder, log),
                 acceleration=config.speedj_acceleration,
             )
             recorder.close(
@@ -139,12 +178,18 @@ class ExperimentRunner:
                     "late_frames": stream.late_frames,
                     "lost_frames": stream.lost_frames,
                     "n_commands": stream.n_commands,
+                    "learned_from": repetitions.learned_from,
+                    "gear_waves": 0 if repetitions.gear is None else repetitions.gear.n_waves,
                 }
             )
+        if log is not None:
+            if is_clean(stream):
+                gears.take(log.qd_cmd, log.q)
+            repetitions.take(provenance.repetition, log, stream, LEAD, SETTLE)
         return stream
 
     def _provenance(
-        self, planned: PlannedMovement, repetition: int, delay: DelayEstimate, pace: str
+        self, planned: PlannedMovement, repetition: int, found: Identification, pace: str
     ) -> Provenance:
         info, movement = self._driver.info, planned.movement
         points = tuple((float(x), float(y), float(z)) for x, y, z in movement.target_points)
@@ -161,15 +206,16 @@ class ExperimentRunner:
             pace=pace,
             client_version=_client_version(),
             cycle_time_s=info.period,
-            identified_delay_s=delay.delay,
+            identified_delay_s=found.delay,
+            loop=dict(found.facts()),
             controller_config=asdict(self._config),
             movement_text=planned.text,
             target_points=points,
         )
 
 
-def _row_sink(recorder: Recorder) -> Callable[[RealtimeFrame, TrackerStep], None]:
-    """A function that records a row, and ends the run when the disk fails."""
+def _row_sink(recorder: Recorder, log: RunLog | None) -> Callable[[RealtimeFrame, TrackerStep], None]:
+    """A function that records a row, keeps it for learning, and ends the run when the disk fails."""
     append = recorder.append
 
     def record(frame: RealtimeFrame, step: TrackerStep) -> None:
@@ -177,6 +223,8 @@ def _row_sink(recorder: Recorder) -> Callable[[RealtimeFrame, TrackerStep], None
         append(frame.values, step.t, point.q_array, point.qd_array, point.p, point.v, step.qd_cmd, step.phase)
         if recorder.error is not None:
             raise recorder.error
+        if log is not None:
+            log.append(frame, step)
 
     return record
 

@@ -20,9 +20,9 @@ class Provenance:
 
     Attributes:
         movement: name of the movement, e.g. "lognorm_4_1".
-        kind: "lognormal" or "uniform".
+        kind: which law made it: "lognormal", "uniform", "minimum_jerk", "power_law" or "samples".
         repetition: 1, 2, 3 ...
-        controller: name of the controller configuration, "preview" or "paper".
+        controller: name of the controller configuration, e.g. "preview".
         controller_config: its numbers (gains, limits), by name.
         robot_model: e.g. "UR3".
         firmware: controller software as it reports itself, e.g. "3.15.8".
@@ -32,6 +32,7 @@ class Provenance:
         pace: "realtime" or "lockstep".
         cycle_time_s: control cycle of the robot in s.
         identified_delay_s: loop delay that the client measured, in s; None when it did not.
+        loop: what the client identified of the loop, and its margins, by name; empty in old recordings.
         client_version: version of this package.
         movement_text: the movement file, as it was read.
         target_points: the movement's target points in the base frame, (x, y, z) in m.
@@ -51,6 +52,7 @@ class Provenance:
     cycle_time_s: float = 0.008
     identified_delay_s: float | None = None
     controller_config: Mapping[str, float | int | bool | str | None] = field(default_factory=dict)
+    loop: Mapping[str, float | str] = field(default_factory=dict)
     movement_text: str = ""
     target_points: tuple[tuple[float, float, float], ...] = ()
 

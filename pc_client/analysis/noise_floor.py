@@ -1,0 +1,115 @@
+"""The noise floor: the SNR of Eq. 10 that no controller can pass, derived from the arm's own recordings.
+
+A perfect arm would still be judged by what its encoders say. Eq. 10 takes the length of differenced reported
+positions; the noise n of that difference at rest, seen through the Jacobian J along the movement, adds
+
+    P_floor = mean over the steps of E[ (|v_ref + n| - |v_ref|)^2 ],     n ~ N(0, J C J' / dt^2)
+
+C (6, 6) is the covariance of the one-cycle differences of `actual_q` while the arm rests before and after its
+movements: of the differences, so that whatever colour the noise has is in it. While the arm is fast only the
+noise along the motion counts, near rest all of it does; the expectation takes care of both. Nothing is fitted
+to the movement, and nothing is known of the arm but what it reports.
+
+What moves with the arm and does not repeat (the moment of sampling, for one) is not in C. It can be measured
+together with the encoders' noise, from runs that were driven alike: `unrepeatable_power`, half the mean
+square of the difference of two. What noise adds to the mean of the speed near rest is the same in both and
+drops out there: of a movement with long slow tails this figure is better than the floor, else a little worse.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.analysis.run import Run
+from pc_client.analysis.speed_noise import speed_noise
+from pc_client.analysis.track import speed, velocity
+from pc_client.kinematics.forward import tcp_jacobian
+from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
+from pc_client.recording.layout import Phase
+
+Array = NDArray[np.float64]
+
+LEAST_STEPS = 30
+"""Differences at rest from which C is worth estimating: its diagonal is good to 25 % then."""
+
+
+def rest_steps(run: Run) -> Array:
+    """Return one-cycle differences (n, 6) [rad] of the reported joints at rest, each stretch less its mean.
+
+    The half of each settling phase that is farther from the movement counts, as in `metrics.rest_noise`.
+    """
+    phase = run.recording.column("phase")[run.track.rows]
+    q = run.recording.column("actual_q")[run.track.rows]
+    before = np.flatnonzero(phase == Phase.SETTLE_BEFORE)
+    after = np.flatnonzero(phase == Phase.SETTLE_AFTER)
+    stretches = [
+        np.diff(q[samples], axis=0)
+        for samples in (before[: len(before) // 2], after[len(after) // 2 :])
+        if len(samples) >= 8
+    ]
+    centred = [steps - steps.mean(axis=0) for steps in stretches]
+    return np.concatenate(centred) if centred else np.empty((0, q.shape[1]))
+
+
+def step_covariance(runs: Sequence[Run]) -> Array | None:
+    """Return C (6, 6) [rad2] of all runs of one arm together; None with fewer than `LEAST_STEPS` steps."""
+    steps = np.concatenate([rest_steps(run) for run in runs])
+    if len(steps) < LEAST_STEPS:
+        return None
+    covariance: Array = steps.T @ steps / (len(steps) - 2 * len(runs))
+    return covariance
+
+
+def floor_power(run: Run, covariance: Array, model: RobotModel) -> float:
+    """Return P_floor [(m/s)2] of one run's movement.
+
+    Args:
+        run: gives the reference and its time stamps.
+        covariance: C (6, 6) [rad2].
+        model: the nominal arm; its Jacobian is good to the calibration, 1 %.
+    """
+    track, steps = run.track, run.track.movement_steps
+    q = run.recording.column("ref_q")[track.rows][steps]
+    dt = np.diff(track.t)[steps]
+    v = velocity(track.t, track.p_ref)[steps]
+    jacobians = np.array([tcp_jacobian(model, q_k)[:3] for q_k in q])
+    noise = jacobians @ covariance @ jacobians.transpose(0, 2, 1) / np.square(dt)[:, None, None]
+    mean, variance = speed_noise(v, noise)
+    return float(np.mean(np.square(mean) + variance))
+
+
+def floor_db(run: Run, covariance: Array | None) -> float | None:
+    """Return the SNR [dB] at which noise alone would leave a run; None for an unknown arm or without rest."""
+    name = run.provenance.robot_model.lower()
+    if covariance is None or name not in ROBOTS:
+        return None
+    power = floor_power(run, covariance, robot_model(name))
+    signal = run.budget.signal_power
+    return 10.0 * math.log10(signal / power) if power > 0.0 < signal else None
+
+
+def driven_alike(first: Run, second: Run) -> bool:
+    """True when two runs of a movement had the same feed-forward: nothing was learned between them."""
+    return all(not run.provenance.controller_config.get("learns", False) for run in (first, second))
+
+
+def unrepeatable_power(runs: Sequence[Run]) -> float | None:
+    """Return half the mean square difference [(m/s)2] of the speeds of runs that were driven alike.
+
+    Args:
+        runs: repetitions of one movement; neighbours are compared.
+
+    Returns:
+        The mean over all pairs; None when there is no such pair.
+    """
+    halves = []
+    for first, second in pairwise(runs):
+        a, b = (speed(run.track.t, run.track.p_actual)[run.track.movement_steps] for run in (first, second))
+        if driven_alike(first, second) and len(a) == len(b):
+            halves.append(0.5 * float(np.mean(np.square(a - b))))
+    return float(np.mean(halves)) if halves else None

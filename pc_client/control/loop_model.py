@@ -1,0 +1,111 @@
+"""The loop as the client knows it: a dead time, a first-order lag, and an integrator behind them.
+
+    q(s) = qd_cmd(s) exp(-s dead_time) / (1 + s lag) / s
+
+A command is held from its frame to the next one. What this does to the positions that are reported once a
+cycle is exact here: `velocity_response` is the sampled response of the differenced position, the very signal
+that Eq. 10 judges, to one held command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import ceil, exp
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_SETTLED = 12.0
+"""Time constants after which a first-order lag has settled to 6e-6."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoopModel:
+    """Two parameters and how well they are known.
+
+    Attributes:
+        dead_time: from a command to the first effect in a reported position [s].
+        lag: time constant of the first-order lag behind it [s].
+        spread: largest difference of a single joint's delay from the common one [s]; what the model leaves
+            open.
+        residual: rms of what the model does not explain [rad].
+    """
+
+    dead_time: float
+    lag: float
+    spread: float
+    residual: float
+
+    @property
+    def delay(self) -> float:
+        """Dead time and lag together: by how much slow motion trails [s]."""
+        return self.dead_time + self.lag
+
+    def corners(self) -> Iterator[LoopModel]:
+        """The loops at the edges of what `spread` leaves open: later or earlier, more or less lag."""
+        for shift in (-self.spread, self.spread):
+            for share in (0.0, 0.5, 1.0):  # of the shift that is lag rather than dead time
+                yield replace(
+                    self,
+                    dead_time=max(self.dead_time + (1.0 - share) * shift, 0.0),
+                    lag=max(self.lag + share * shift, 0.0),
+                )
+
+
+def velocity_response(loop: LoopModel, period: float) -> Array:
+    """Differenced position after a unit velocity that is commanded for one cycle.
+
+    Args:
+        loop: dead time and lag.
+        period: control cycle [s].
+
+    Returns:
+        (n,): (q_k - q_(k-1)) / period for k = 0, 1, ...; the command is held from k = 0 to k = 1. Sums to 1.
+    """
+    n = ceil((loop.dead_time + _SETTLED * loop.lag) / period) + 3
+    t: Array = np.arange(-1, n, dtype=np.float64) * period - loop.dead_time
+    pulse = _way_after_step(t, loop.lag) - _way_after_step(t - period, loop.lag)
+    response: Array = np.diff(pulse) / period
+    return response
+
+
+def frequency_response(loop: LoopModel, period: float, hertz: Array) -> NDArray[np.complex128]:
+    """Response of the differenced position to the commands at frequencies (m,) [Hz], (m,)."""
+    response = velocity_response(loop, period)
+    turns = np.outer(hertz, np.arange(len(response)) * period)
+    values: NDArray[np.complex128] = (np.exp(-2j * np.pi * turns) @ response).astype(np.complex128)
+    return values
+
+
+def lagged_way(knots: Array, commands: Array, lag: float) -> tuple[Array, Array]:
+    """Follow held velocities through the lag alone.
+
+    Args:
+        knots: (n + 1,) times; command k holds from knot k to k + 1 [s].
+        commands: (n, j) velocities [rad/s].
+        lag: time constant [s].
+
+    Returns:
+        Position and velocity at the knots, (n + 1, j) each; both begin at 0.
+    """
+    steps = np.diff(knots)
+    velocity = np.zeros((len(knots), commands.shape[1]))
+    if lag > 0.0:
+        now = velocity[0]
+        for k, step in enumerate(steps):
+            now = commands[k] + (now - commands[k]) * exp(-step / lag)
+            velocity[k + 1] = now
+    way = np.vstack([np.zeros(commands.shape[1]), np.cumsum(commands * steps[:, None], axis=0)])
+    return way - lag * velocity, velocity
+
+
+def _way_after_step(t: Array, lag: float) -> Array:
+    """Way at times t since a velocity step of 1 began, behind the lag: t - lag (1 - exp(-t / lag))."""
+    since = np.maximum(t, 0.0)
+    if lag <= 0.0:
+        return since
+    way: Array = since - lag * -np.expm1(-since / lag)
+    return way

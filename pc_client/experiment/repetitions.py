@@ -1,0 +1,224 @@
+"""What the repetitions of one movement hand on: the learned command, and when it may be used.
+
+One memory belongs to one plan and is gone when the next movement begins; only the waves of the gears, which
+are the arm's and not the movement's, go on to it. Nothing is learned from a run that was not clean, and what
+was learned before such a run is forgotten with it. Before anything learned is used, the whole of what would
+be sent is held against the limits that the plan itself was held against.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.gear import GearModel
+from pc_client.control.learning import LearningBounds, RunSignals, learn
+from pc_client.control.learning_filter import LearningFilter
+from pc_client.control.loop_model import LoopModel
+from pc_client.control.reference import ReferenceTable
+from pc_client.control.tracker import TrackerStep
+from pc_client.driver.velocity_stream import StreamReport
+from pc_client.kinematics.clearance import clearance_model
+from pc_client.kinematics.robot_model import RobotModel
+from pc_client.planning.checks import measure_joint_range
+from pc_client.planning.plan import JointPlan
+from protocol.realtime_layout import RealtimeFrame
+
+Array = NDArray[np.float64]
+
+_LEARNED_WAY = 0.25
+"""What was learned may lead a joint this share of the way to where the run would be aborted."""
+
+_CLEARANCE_STEP = 4
+"""Every so many cycles the arm's clearance is measured: 32 ms, in which it moves by less than a margin."""
+
+
+class RunLog:
+    """The frames of one run, kept while it goes on, for learning."""
+
+    __slots__ = ("_feedforward", "_q", "_q_ref", "_qd_cmd", "_t")
+
+    def __init__(self) -> None:
+        self._t: list[float] = []
+        self._q_ref: list[Sequence[float]] = []
+        self._q: list[Sequence[float]] = []
+        self._feedforward: list[Sequence[float]] = []
+        self._qd_cmd: list[Sequence[float]] = []
+
+    def append(self, frame: RealtimeFrame, step: TrackerStep) -> None:
+        """Take one frame and what was made of it."""
+        self._t.append(step.t)
+        self._q_ref.append(step.point.q)
+        self._q.append(frame.actual_q.tolist())
+        self._feedforward.append(step.point.qd_feedforward)
+        self._qd_cmd.append(step.qd_cmd)
+
+    @property
+    def qd_cmd(self) -> Array:
+        """(n, 6) commands [rad/s]."""
+        return np.array(self._qd_cmd)
+
+    @property
+    def q(self) -> Array:
+        """(n, 6) reported positions [rad]."""
+        return np.array(self._q)
+
+    def signals(self, learned: Array | None, lead: float, period: float) -> RunSignals:
+        """Return the run on the grid of cycles; its time stamps may jitter about it.
+
+        Args:
+            learned: (n, 6) what the run's feed-forward held beside the reference's own, or None.
+            lead: time of the first frame before the movement [s].
+            period: control cycle [s].
+        """
+        t = np.array(self._t)
+        grid = np.arange(len(t)) * period - lead
+        error, added = (
+            np.stack([np.interp(grid, t, column) for column in signal.T], axis=1)
+            for signal in (np.array(self._q_ref) - self.q, self.qd_cmd - np.array(self._feedforward))
+        )
+        if learned is not None:
+            n = min(len(grid), len(learned))
+            added[:n] += learned[:n]
+        return RunSignals(error, added)
+
+
+class Repetitions:
+    """The memory of one movement.
+
+    Args:
+        config: the controller.
+        loop: the identified loop.
+        learning: Q; None for a controller that does not learn.
+        gear: what is known of the gears by now, the same for all runs of the movement; None: nothing.
+        model: the nominal arm.
+        period: control cycle [s].
+
+    Attributes:
+        learned: (n, 6) what the next run adds to its feed-forward [rad/s]; None: nothing.
+        gear: what is known of the gears; None: nothing, or not to be used.
+        learned_from: repetition that it was learned from; 0: none.
+        remark: why nothing could be learned or used, one line; empty when all is well.
+    """
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        loop: LoopModel,
+        learning: LearningFilter | None,
+        gear: GearModel | None,
+        model: RobotModel,
+        period: float,
+    ) -> None:
+        self._config = config
+        self._loop = loop
+        self._learning = learning
+        self.gear = gear
+        self._model = model
+        self._period = period
+        self.learned: Array | None = None
+        self.learned_from = 0
+        self.remark = ""
+
+    def forget(self, remark: str) -> None:
+        """Begin the next run without anything learned from the one before."""
+        self.learned, self.learned_from, self.remark = None, 0, remark
+
+    def take(self, repetition: int, log: RunLog, stream: StreamReport, lead: float, settle: float) -> None:
+        """Learn from a run that came to its end.
+
+        Args:
+            repetition: its number.
+            log: its frames.
+            stream: what happened on the wire.
+            lead: time of the run before the movement [s]; in its first half nothing is learned.
+            settle: time of the run after it [s]; in its second half nothing is learned.
+        """
+        if self._learning is None:
+            return
+        if not is_clean(stream):
+            self.forget(
+                f"run {repetition} had {stream.late_frames} late and {stream.lost_frames} lost frames: "
+                "nothing learned"
+            )
+            return
+        config = self._config
+        self.learned = learn(
+            log.signals(self.learned, lead, self._period),
+            self._loop,
+            self._learning,
+            config.learning_gain,
+            LearningBounds(config.learning_speed, config.learning_acceleration),
+            (0.5 * lead, 0.5 * settle),
+            self._period,
+        )
+        self.learned_from, self.remark = repetition, ""
+
+    def may_use(self, plan: JointPlan, table: ReferenceTable) -> bool:
+        """Hold the whole of what would be sent against the limits, before anything is sent.
+
+        Args:
+            plan: in the turns where the arm is.
+            table: of the coming run, with what was learned.
+
+        Returns:
+            False when a limit would be broken; what was learned is forgotten then, the gears are left out
+            for the rest of this movement, and the table must be made again without both.
+        """
+        if self.learned is None and self.gear is None:
+            return True
+        complaint = broken_limit(
+            plan, table.commands(), self.learned, self._model, self._config, self._period
+        )
+        if complaint:
+            self.forget(f"what was learned is not used: {complaint}")
+            self.gear = None
+        return not complaint
+
+
+def is_clean(stream: StreamReport) -> bool:
+    """True for a run in which every frame came and got its command: one that may be learned from."""
+    return not (stream.late_frames or stream.lost_frames)
+
+
+def broken_limit(
+    plan: JointPlan,
+    commands: Array,
+    learned: Array | None,
+    model: RobotModel,
+    config: ControllerConfig,
+    period: float,
+) -> str:
+    """Name the first limit that a whole run of commands breaks.
+
+    Args:
+        plan: where the run begins, and the limits.
+        commands: (n, 6) feed-forward of all cycles [rad/s].
+        learned: (m, 6) the part of it that was learned from the run before [rad/s], or None.
+        model: the nominal arm.
+        config: its shares of the limits.
+        period: control cycle [s].
+
+    Returns:
+        One phrase; empty when all limits are kept.
+    """
+    limits = plan.report.limits
+    way = plan.start_q + np.cumsum(commands, axis=0) * period
+    clearance = clearance_model(model).along(way[::_CLEARANCE_STEP])
+    acceleration = np.abs(np.diff(commands, axis=0)) / period
+    learned_way = np.zeros(1) if learned is None else np.abs(np.cumsum(learned, axis=0)) * period
+    checks = (
+        ("joint speed", np.abs(commands) / (config.speed_share * np.array(model.limits.qd_max))),
+        ("joint acceleration", acceleration / np.minimum(limits.qdd_max, config.slew_limit)),
+        ("learned way", learned_way / (_LEARNED_WAY * config.abort_error)),
+        ("joint range", np.array([measure_joint_range(way, model.limits, limits).share])),
+        ("clearance to itself", limits.own_clearance_min / np.maximum(clearance.own, 1e-6)),
+        ("clearance to the base plane", limits.floor_clearance_min / np.maximum(clearance.floor, 1e-6)),
+    )
+    for what, share in checks:
+        if not float(np.max(share)) <= 1.0:  # NaN fails too
+            return f"{what} would be {float(np.max(share)):.0%} of what is allowed"
+    return ""
