@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
@@ -34,7 +35,7 @@ def work_without_end(port):
     """Say over TCP that it works; the other side reads the end of the stream when this process ends."""
     with socket.create_connection(("127.0.0.1", port)) as link:
         link.sendall(b"x")
-        link.recv(1)
+        threading.Event().wait()
 
 
 @pytest.fixture
@@ -50,7 +51,7 @@ def cluster():
         n_workers=1,
         threads_per_worker=1,
         processes=False,
-        dashboard_address=None,
+        dashboard_address=":0",
         protocol="tcp",
         host="127.0.0.1",
     ) as cluster:
