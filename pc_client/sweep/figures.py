@@ -83,7 +83,7 @@ def draw_map(rows: Rows, x: str, y: str) -> str:
     panels = _in_order(rows, "fidelity")
     xs, ys = _in_order(rows, x), _in_order(rows, y)
     with svg_figure(_WIDTH, 4.2, _simulated(rows)) as (figure, page):
-        grid = figure.add_gridspec(1, len(panels), left=0.06, right=0.97, bottom=0.14, top=0.86, wspace=0.12)
+        grid = figure.add_gridspec(1, len(panels), left=0.06, right=0.95, bottom=0.14, top=0.86, wspace=0.2)
         for i, panel in enumerate(panels):
             axes = figure.add_subplot(grid[0, i])
             points = _means([row for row in rows if row["fidelity"] == panel], x, y)

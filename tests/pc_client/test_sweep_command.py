@@ -1,0 +1,277 @@
+"""`ur-client sweep` as a user meets it: tables, plots, resuming, interruption, errors in one line."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import sys
+
+import pytest
+import sweep_samples
+from fake_robot import FakeRobot
+from sweep_samples import write
+
+import pc_client.driver.transport as transport
+import pc_client.driver.ur_driver as ur_driver_module
+from pc_client import cli
+from pc_client.sweep.case import all_cases
+from pc_client.sweep.config import read_config
+
+GRID = """
+movements = ["uniform_4_1", "lognorm_4_1"]
+fidelities = ["typical", "poor"]
+seeds = [1]
+repeat = 2
+[controller]
+gain_p = [2.0, 5.0, 8.0]
+gain_i = [0.0, 2.0]
+"""
+
+
+@pytest.fixture
+def job(monkeypatch):
+    """Runs invented jobs in this process instead of experiments; a list of the cases that ran."""
+    ran = []
+
+    def use(function):
+        def side_by_side(cases, keep, job, *, workers, dask):
+            for case in cases:
+                ran.append(case)
+                yield case, function(case, keep)
+
+        monkeypatch.setattr("pc_client.sweep.schedule.run_side_by_side", side_by_side)
+        return ran
+
+    return use
+
+
+@pytest.fixture
+def quick_job(job, monkeypatch):
+    """The same without plots, which take seconds."""
+    monkeypatch.setattr("pc_client.sweep.page.render_page", lambda name, rows: name)
+    return job
+
+
+def run(path, out, *options):
+    return cli.run(["sweep", str(path), "--out", str(out), *options])
+
+
+def read_csv(out):
+    with (out / "sweep.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def one_line(capsys):
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1, err
+    assert "Traceback" not in err
+    return err
+
+
+def test_a_sweep_finds_the_best_gains(job, tmp_path, capsys):
+    job(sweep_samples.invented)
+    out = tmp_path / "out"
+    assert run(write(tmp_path, GRID), out, "--format", "csv") == 0
+    told = capsys.readouterr().out
+    assert "24 cases, 0 of them done before" in told
+    assert "best of 6: gain_p = 5, gain_i = 2: 30.15 dB, 8 runs, gain margin 8.33" in told
+    assert len(read_csv(out)) == 48
+    page = (out / "sweep.html").read_text()
+    assert "SIMULATED" in page
+    assert page.count("<img") == 1 + 4  # the map; over movement, fidelity and both gains
+    assert page.index("gain_p = 5, gain_i = 2") < page.index("gain_p = 8, gain_i = 0")
+
+
+def test_a_second_call_does_nothing_again_and_gives_the_same_table(job, tmp_path, capsys):
+    ran = job(sweep_samples.invented)
+    out, path = tmp_path / "out", write(tmp_path, GRID)
+    assert run(path, out, "--format", "csv") == 0
+    first = (out / "sweep.csv").read_bytes()
+    page = (out / "sweep.html").read_bytes()
+    ran.clear()
+    assert run(path, out, "--format", "csv") == 0
+    assert ran == []
+    assert "24 of them done before" in capsys.readouterr().out
+    assert (out / "sweep.csv").read_bytes() == first
+    assert (out / "sweep.html").read_bytes() == page
+
+
+def test_a_changed_configuration_uses_the_cases_that_it_shares(quick_job, tmp_path):
+    ran = quick_job(sweep_samples.invented)
+    out = tmp_path / "out"
+    assert run(write(tmp_path, GRID), out, "--format", "csv") == 0
+    ran.clear()
+    assert run(write(tmp_path, GRID.replace("2.0, 5.0, 8.0", "5.0, 6.0")), out, "--format", "csv") == 0
+    assert {case.controller.gain_p for case in ran} == {6.0}
+    assert {row["gain_p"] for row in read_csv(out)} == {"5.0", "6.0"}
+
+
+def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(quick_job, tmp_path, capsys):
+    out, path = tmp_path / "out", write(tmp_path, GRID.replace("seeds = [1]", "seeds = [1, 13]"))
+    quick_job(sweep_samples.interrupted)
+    assert run(path, out, "--format", "csv") == 1
+    assert "interrupted; 12 of 48 cases are kept" in one_line(capsys)
+    assert len(read_csv(out)) == 24
+    ran = quick_job(sweep_samples.invented)
+    ran.clear()
+    assert run(path, out, "--format", "csv") == 1  # seed 13 fails
+    assert len(ran) == 36
+
+
+def test_refused_and_failed_cases_are_rows_and_the_sweep_goes_on(job, tmp_path, capsys):
+    job(sweep_samples.invented)
+    text = GRID.replace("seeds = [1]", "seeds = [1, 13]").replace("8.0]", "30.0]")
+    out = tmp_path / "out"
+    assert run(write(tmp_path, text), out, "--format", "csv") == 1
+    rows = read_csv(out)
+    assert [sum(row["status"] == s for row in rows) for s in ("done", "refused", "failed")] == [32, 16, 16]
+    assert {row["gain_margin"] for row in rows if row["status"] == "refused"} == {"0.5"}
+    told = capsys.readouterr().out
+    assert "no setting has all its cases done" in told
+    assert "failed: 11 more" in told
+    page = (out / "sweep.html").read_text()
+    assert "the simulated box died" in page
+
+
+def test_refused_cases_alone_are_no_failure(quick_job, tmp_path, capsys):
+    quick_job(sweep_samples.invented)
+    assert run(write(tmp_path, GRID.replace("8.0]", "30.0]")), tmp_path / "out", "--format", "csv") == 0
+    assert "best of 6: gain_p = 5, gain_i = 2" in capsys.readouterr().out
+
+
+def test_random_samples_are_drawn_as_dots(job, tmp_path, capsys):
+    job(sweep_samples.invented)
+    text = """
+        movements = ["uniform_4_1"]
+        random = 12
+        [controller]
+        gain_p = { from = 1.0, to = 30.0, scale = "log" }
+        gain_i = { from = 0.0, to = 5.0 }
+    """
+    assert run(write(tmp_path, text), tmp_path / "out", "--format", "csv") == 0
+    assert (tmp_path / "out" / "sweep.html").read_text().count("<img") == 3
+    assert "best of 12" in capsys.readouterr().out
+
+
+def test_one_case_alone_needs_no_plots(job, tmp_path, capsys):
+    job(sweep_samples.invented)
+    assert run(write(tmp_path, 'movements = ["uniform_4_1"]'), tmp_path / "out", "--format", "csv") == 0
+    assert "<img" not in (tmp_path / "out" / "sweep.html").read_text()
+    assert "best of 1: controller = preview" in capsys.readouterr().out
+
+
+def test_without_matplotlib_there_is_a_table(job, tmp_path, capsys, monkeypatch):
+    job(sweep_samples.invented)
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    assert run(write(tmp_path, GRID), tmp_path / "out", "--format", "csv") == 0
+    assert "no plots: they need jinja2" in capsys.readouterr().out
+    assert (tmp_path / "out" / "sweep.csv").exists()
+
+
+def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, capsys, monkeypatch):
+    from pc_client.sweep.folder import SweepFolder
+
+    stored = []
+    real = SweepFolder.store
+
+    def store(self, case, outcome):
+        if len(stored) == 5:
+            (self.path / "cases").rename(self.path / "gone")
+            (self.path / "cases").write_text("")
+        real(self, case, outcome)
+        stored.append(case)
+
+    ran = quick_job(sweep_samples.invented)
+    monkeypatch.setattr(SweepFolder, "store", store)
+    assert run(write(tmp_path, GRID), tmp_path / "out", "--format", "csv") == 1
+    assert "cannot write" in one_line(capsys)
+    assert len(ran) == 6
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "code", "words"),
+    [
+        (GRID, ["--workers", "0"], 2, "workers"),
+        (GRID, ["--workers", "2", "--dask", "tcp://x:1"], 2, "only one"),
+        (GRID, ["--format", "xlsx"], 1, "parquet, csv"),
+        (GRID + "gain_d = 3", [], 1, "did you mean gain_"),
+        ('movements = ["uniform_4_1"]\nrobot = "127.0.0.1"', ["--workers", "2"], 2, "one robot"),
+        ('movements = ["uniform_4_1"]\nrobot = "no.such.invalid"', ["--yes"], 1, "cannot be looked up"),
+        (GRID, ["--out", "sweep.toml"], 1, "cannot write"),
+        (GRID, ["--dask", "tcp://127.0.0.1:1"], 1, "no Dask scheduler answers"),
+    ],
+)
+def test_what_does_not_work_is_one_line(text, options, code, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("pc_client.executors._DASK_TIMEOUT", "300ms")
+    path = write(tmp_path, text)
+    assert (
+        cli.run(["sweep", str(path), *(["--out", "out"] if "--out" not in options else []), *options]) == code
+    )
+    assert words in one_line(capsys)
+
+
+def test_a_sweep_needs_a_folder(tmp_path, capsys):
+    assert cli.run(["sweep", str(write(tmp_path, GRID))]) == 1
+    assert "--out DIR" in one_line(capsys)
+
+
+@pytest.fixture
+def robot(monkeypatch):
+    """A robot in memory instead of the network."""
+    fake = FakeRobot()
+    fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
+    for module in (transport, ur_driver_module):
+        monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
+    return fake
+
+
+GIVEN = (
+    'movements = ["uniform_4_1"]\nrobot = "HOST"\nkeep_recordings = true\n[controller]\ngain_p = [4.0, 6.0]'
+)
+
+
+def test_a_robot_that_is_there_runs_one_case_after_the_other(robot, tmp_path, capsys):
+    out, path = tmp_path / "out", write(tmp_path, GIVEN.replace("HOST", "127.0.0.1"))
+    assert run(path, out, "--format", "csv") == 0
+    assert robot.at_rest
+    rows = read_csv(out)
+    assert [row["status"] for row in rows] == ["done", "done"]
+    assert {(row["robot"], row["fidelity"], row["seed"]) for row in rows} == {("ur3", "", "")}
+    assert len(list(out.glob("recordings/*/uniform_4_1_r1.mcap"))) == 2
+    assert "best of 2" in capsys.readouterr().out
+
+
+def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, monkeypatch):
+    def answer(question, abort):
+        assert robot.programs == []
+        raise cli.typer.Abort
+
+    monkeypatch.setattr(cli.typer, "confirm", answer)
+    path = write(tmp_path, GIVEN.replace("HOST", "192.0.2.7"))
+    assert run(path, tmp_path / "out") == 1
+    assert robot.programs == []
+    told = capsys.readouterr()
+    assert "2 runs of each" in told.out
+    assert told.err == "ur-client: aborted\n"
+
+
+def test_a_robot_that_stops_ends_the_sweep(robot, tmp_path, capsys):
+    def stop(r):
+        if len(r.received) == 300:
+            r.safety_mode = 3
+
+    robot.on_tick = stop
+    path = write(tmp_path, GIVEN.replace("HOST", "127.0.0.1"))
+    assert run(path, tmp_path / "out", "--format", "csv") == 1
+    (row,) = read_csv(tmp_path / "out")
+    assert row["status"] == "failed"
+    assert "PROTECTIVE_STOP" in row["error"]
+    assert "1 cases have not begun: look at the arm" in capsys.readouterr().out
+
+
+def test_every_case_of_the_grid_is_there_once(tmp_path):
+    config = read_config(write(tmp_path, GRID))
+    cases = all_cases(config.movements, config.arms, config.controllers, config.repeat)
+    count = functools.reduce(lambda n, values: n * len(values), [(1, 2), (1, 2), (1, 2, 3), (1, 2)], 1)
+    assert len(cases) == count == 24

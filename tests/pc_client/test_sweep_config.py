@@ -1,0 +1,179 @@
+"""The file of a sweep: what it spans, and what is refused before anything starts."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sweep_samples import PREVIEW, write
+
+from pc_client.control.controller_config import ControllerConfig
+from pc_client.errors import ClientError
+from pc_client.movements.files import LIBRARY_FOLDER
+from pc_client.sweep.case import SimulatedArm, all_cases
+from pc_client.sweep.config import FIDELITIES, KEYS, read_config
+from pc_client.sweep.controller_axes import Range, grid, samples, sweepable_fields
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted((ROOT / "examples" / "sweeps").glob("*.toml"))
+
+
+def cases_of(config):
+    return all_cases(config.movements, config.arms, config.controllers, config.repeat)
+
+
+def test_the_shortest_file(tmp_path):
+    config = read_config(write(tmp_path, 'movements = ["uniform_4_1"]'))
+    (case,) = cases_of(config)
+    assert case.arm == SimulatedArm("ur3", "typical", 0)
+    assert case.controller == PREVIEW
+    assert (config.repeat, config.keep_recordings, config.output) == (1, False, None)
+
+
+def test_every_combination(tmp_path):
+    text = """
+        movements = ["uniform_4_1", "lognorm_4_1"]
+        controllers = ["paper", "preview"]
+        robots = ["ur3", "ur5"]
+        fidelities = ["ideal", "poor"]
+        seeds = [1, 2, 3]
+        repeat = 2
+        output = "out/here"
+        [controller]
+        gain_p = [1, 2.5]
+        looks_ahead = [true, false]
+        abort_error = 0.1
+    """
+    config = read_config(write(tmp_path, text))
+    cases = cases_of(config)
+    assert len(cases) == len({case.identity for case in cases}) == 2 * 2 * 2 * 2 * 3 * 4
+    assert {case.controller.gain_p for case in cases} == {1.0, 2.5}
+    assert {case.controller.abort_error for case in cases} == {0.1}
+    assert {case.controller.name for case in cases} == {"paper", "preview"}
+    assert config.output == Path("out/here")
+
+
+def test_movement_files_lie_beside_the_configuration(tmp_path):
+    shutil.copy(LIBRARY_FOLDER / "uniform_5_1.toml", tmp_path / "mine.toml")
+    config = read_config(write(tmp_path, 'movements = ["mine.toml"]'))
+    assert config.movements[0].name == "uniform_5_1"
+    assert config.movements[0].file_name == "mine.toml"
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_make_sense(path):
+    config = read_config(path)
+    assert config.output is not None
+    assert len(cases_of(config)) > 10
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("movements = [", "not TOML"),
+        ("", "movements: missing"),
+        ("movements = []", "at least one"),
+        ('movements = "uniform_4_1"', "give a list"),
+        ('movements = ["uniform_4_11"]', "did you mean uniform_4_1?"),
+        ('movements = ["nowhere.toml"]', "nowhere.toml"),
+        ('movements = ["uniform_4_1", "uniform_4_1"]', "twice"),
+        ("movements = [1]", "give texts"),
+        ('MOVES\nmovment = ["uniform_4_1"]', "did you mean movements?"),
+        ("MOVES\nfidelitys = []", "did you mean fidelities?"),
+        ("MOVES\ngain_p = 3", "put it under [controller]"),
+        ('MOVES\nfidelities = ["perfect"]', "known are ideal, typical, poor"),
+        ('MOVES\nfidelities = ["tipical"]', "did you mean typical?"),
+        ('MOVES\nrobots = ["ur4"]', "did you mean ur"),
+        ('MOVES\ncontrollers = ["pid"]', "'pid' is not known"),
+        ("MOVES\nseeds = [1.5]", "whole numbers"),
+        ("MOVES\nseeds = [-1]", "whole numbers"),
+        ("MOVES\nseeds = [true]", "whole numbers"),
+        ("MOVES\nseeds = 3", "seeds = [...]"),
+        ("MOVES\nrepeat = 0", "1 to 99"),
+        ("MOVES\nrepeat = 2.0", "1 to 99"),
+        ("MOVES\nkeep_recordings = 1", "true or false"),
+        ("MOVES\noutput = 7", "give a text"),
+        ("MOVES\nport_base = 3", "goes with robot"),
+        ('MOVES\nrobot = "10.0.0.2"\nseeds = [1]', "is for simulated arms"),
+        ("MOVES\nrandom_seed = 1", "goes with random"),
+        ("MOVES\nrandom = 5", "nothing to draw"),
+        ("MOVES\nrandom = 0\n[controller]\ngain_p = [1]", "random: 0"),
+        ("MOVES\ncontroller = 3", "give a table [controller]"),
+        ("MOVES\n[controller]\ngain_q = 3", "did you mean gain_"),
+        ('MOVES\n[controller]\nname = "mine"', "controller.name: no such key"),
+        ("MOVES\n[controller]\ngain_p = []", "an empty list"),
+        ("MOVES\n[controller]\ngain_p = [1, 1.0]", "twice"),
+        ('MOVES\n[controller]\ngain_p = "3"', "give a number"),
+        ("MOVES\n[controller]\ngain_p = -1", "give a number"),
+        ("MOVES\n[controller]\ngain_p = nan", "give a number"),
+        ("MOVES\n[controller]\ngain_p = true", "give a number"),
+        ("MOVES\n[controller]\nlooks_ahead = 1", "true or false"),
+        ("MOVES\n[controller]\nspeed_share = 1.2", "0 to 1"),
+        ("MOVES\n[controller]\ngain_p = { from = 1, to = 2 }", "give random = N"),
+        ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 2, to = 1 }", "must be the smaller"),
+        ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 2 }", "without 'to'"),
+        ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 0, to = 1, scale = 'log' }", "above 0"),
+        ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 0, to = 1, scale = 'sin' }", "linear"),
+        ("MOVES\nrandom = 3\n[controller]\ngain_p = { form = 0, to = 1 }", "did you mean from?"),
+        ("MOVES\nrandom = 3\n[controller]\nlooks_ahead = { from = 0, to = 1 }", "a range is of numbers"),
+        (f"MOVES\nseeds = {list(range(2000))}\n[controller]\ngain_p = {list(range(100))}", "at most 100000"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line_with_file_and_key(text, words, tmp_path):
+    path = write(tmp_path, text.replace("MOVES", 'movements = ["uniform_4_1"]'))
+    with pytest.raises(ClientError) as caught:
+        read_config(path)
+    message = str(caught.value)
+    assert words in message
+    assert message.startswith(str(path))
+    assert "\n" not in message
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(ClientError, match="cannot be read"):
+        read_config(tmp_path / "none.toml")
+
+
+def test_fidelities_are_those_of_the_box():
+    from ur_emulator.models.fidelity import FIDELITIES as OF_THE_BOX
+
+    assert set(FIDELITIES) == set(OF_THE_BOX)
+
+
+def test_every_number_and_switch_of_the_controller_can_be_swept():
+    fields = {field.name for field in dataclasses.fields(ControllerConfig)}
+    assert set(sweepable_fields()) == fields - {"name"}
+
+
+def test_every_key_is_explained_in_the_documentation():
+    page = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    for key in KEYS:
+        assert f"`{key}`" in page or f"`[{key}]`" in page
+
+
+AXES = {"gain_p": Range(1.0, 30.0, True), "gain_i": Range(0.0, 20.0, False), "slew_limit": (10.0, 20.0)}
+
+
+@given(seed=st.integers(0, 2**32), n=st.integers(1, 20))
+def test_samples_lie_in_their_ranges_and_more_of_them_begin_with_the_same(seed, n):
+    drawn = samples(PREVIEW, AXES, n, seed)
+    for setting in drawn:
+        assert 1.0 <= setting.gain_p <= 30.0
+        assert 0.0 <= setting.gain_i <= 20.0
+        assert setting.slew_limit in (10.0, 20.0)
+    assert samples(PREVIEW, AXES, n + 3, seed)[:n] == drawn
+
+
+def test_one_more_field_does_not_change_the_other_samples():
+    few = samples(PREVIEW, {"gain_p": AXES["gain_p"]}, 5, 1)
+    many = samples(PREVIEW, AXES, 5, 1)
+    assert [s.gain_p for s in few] == [s.gain_p for s in many]
+    assert len({s.gain_p for s in many}) == 5
+
+
+def test_a_grid_without_axes_is_the_controller_itself():
+    assert grid(PREVIEW, {}, "file") == [PREVIEW]

@@ -1,0 +1,83 @@
+"""Cases over processes and Dask: errors are rows, a dead worker costs its own case, one robot works in turn."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from sweep_samples import case, deadly, faulty, interrupted, invented
+
+from pc_client.sweep.outcome import Outcome, failed
+from pc_client.sweep.run_case import run_case
+from pc_client.sweep.schedule import run_in_turn, run_side_by_side
+
+CASES = [case(seed=seed) for seed in (1, 2, 13, 3, 4, 5)]
+
+
+def statuses(outcomes):
+    return {case.arm.seed: outcome.status for case, outcome in outcomes}
+
+
+def test_side_by_side_in_processes():
+    outcomes = list(run_side_by_side(CASES, False, invented, workers=2, dask=None))
+    assert len(outcomes) == len(CASES)
+    assert statuses(outcomes) == {1: "done", 2: "done", 13: "failed", 3: "done", 4: "done", 5: "done"}
+    assert all(outcome == invented(case, False) for case, outcome in outcomes)
+
+
+def test_side_by_side_on_dask():
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
+    ) as cluster:
+        outcomes = list(run_side_by_side(CASES, True, invented, workers=None, dask=cluster.scheduler_address))
+    assert dict(outcomes) == {case: invented(case, True) for case in CASES}
+
+
+def test_a_job_that_kills_its_worker_costs_only_its_own_case():
+    outcomes = list(run_side_by_side(CASES, False, deadly, workers=1, dask=None))
+    assert len(outcomes) == len(CASES)
+    assert statuses(outcomes) == {1: "done", 2: "done", 13: "failed", 3: "done", 4: "done", 5: "done"}
+    (error,) = [outcome.error for case, outcome in outcomes if case.arm.seed == 13]
+    assert "worker process died" in error
+
+
+def test_a_mistake_in_the_job_is_a_row_too():
+    ((_, outcome),) = run_side_by_side([case()], False, faulty, workers=1, dask=None)
+    assert outcome == failed("ZeroDivisionError: division by zero")
+
+
+def test_nothing_to_do_starts_nothing(monkeypatch):
+    monkeypatch.setattr("pc_client.sweep.schedule.open_executor", None)
+    assert list(run_side_by_side([], False, invented, workers=2, dask=None)) == []
+
+
+def test_one_robot_works_in_turn_and_stops_after_a_failure():
+    outcomes = list(run_in_turn(CASES, False, invented))
+    assert [case.arm.seed for case, _ in outcomes] == [1, 2, 13]
+    assert outcomes[-1][1].status == "failed"
+
+
+def test_ctrl_c_goes_through():
+    outcomes = run_in_turn(CASES, False, interrupted)
+    assert [next(outcomes)[0].arm.seed for _ in range(2)] == [1, 2]
+    with pytest.raises(KeyboardInterrupt):
+        next(outcomes)
+
+
+def test_without_the_box_every_case_fails_in_one_line(monkeypatch):
+    monkeypatch.setattr(
+        "pc_client.sweep.box._command", lambda *a: [sys.executable, "-m", "ur_emulator_not_here"]
+    )
+    outcome = run_case(case(), False)
+    assert outcome.status == "failed"
+    assert "No module named" in outcome.error
+    assert "\n" not in outcome.error
+
+
+def test_a_folder_without_room_is_a_failed_case(monkeypatch):
+    def full(*args, **options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pc_client.sweep.box.tempfile.mkdtemp", full)
+    assert run_case(case(), False) == Outcome("failed", "[Errno 28] No space left on device")
