@@ -153,15 +153,15 @@ GENERATORS: Mapping[str, Generator] = MappingProxyType(
         ),
         "isochronous": Generator(
             lambda human, _, name: retimed_twin(human, name, Isochrony()),
-            "the same, all strokes with one mu and sigma",
+            "lognormal strokes with one mu and sigma",
             False,
         ),
         "fitts": Generator(
             lambda human, _, name: retimed_twin(human, name, Fitts()),
-            "the same, strokes timed by Fitts' law",
+            "lognormal strokes timed by Fitts' law",
             False,
         ),
-        "duplicate": Generator(_duplicate, "the same, varied as people vary between repetitions", False),
+        "duplicate": Generator(_duplicate, "lognormal strokes, varied as between repetitions", False),
         "minimum_jerk": Generator(
             lambda human, _, name: minimum_jerk_twin(human, name),
             "minimum jerk, at rest at every target point",
@@ -179,7 +179,7 @@ GENERATORS: Mapping[str, Generator] = MappingProxyType(
         ),
         "power_law_3d": Generator(
             lambda human, _, name: power_law_twin(human, name, torsion=True),
-            "the same with the factor of torsion",
+            "power law with the factor of torsion",
             False,
         ),
         "uniform": Generator(

@@ -1,0 +1,89 @@
+"""`ur-client compare`: how human-like every generator of movements is, planned and executed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pc_client.commands.experiment import execute
+from pc_client.commands.options import ControllerOption, OutOption, PortBaseOption, YesOption, console, say
+from pc_client.errors import ClientError
+
+if TYPE_CHECKING:
+    from pc_client.analysis.run import Run
+    from pc_client.comparison.movement_set import MovementSet
+    from pc_client.comparison.table import Comparison
+
+
+def compare(
+    out: OutOption,
+    robot: Annotated[
+        str | None,
+        typer.Option("--robot", metavar="HOST", help="Control box to execute on; planned only without."),
+    ] = None,
+    targets: Annotated[int, typer.Option("--targets", min=2, max=50, help="Number of target points.")] = 4,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the first set of target points.")] = 1,
+    sets: Annotated[
+        int,
+        typer.Option(
+            "--sets", min=1, max=99, help="Sets of target points, seeds in a row; the table has means."
+        ),
+    ] = 1,
+    controller: ControllerOption = "preview",
+    port_base: PortBaseOption = 0,
+    yes: YesOption = False,
+) -> None:
+    """Compare all generators of movements: smoothness, power law, peaks; planned and executed."""
+    from pc_client.comparison.movement_set import make_sets, save_sets
+    from pc_client.comparison.table import build_comparison
+
+    with console.status("making movements"):
+        made = make_sets(targets, seed, sets)
+    movements = [movement for one in made for movement in one.movements.values()]
+    runs = None
+    if robot is not None:
+        execute(movements, robot, out, 1, controller, port_base, yes)
+        runs = _read_runs(out)
+    save_sets(made, out / "movements")
+    with console.status("measuring"):
+        table = build_comparison(made, runs)
+    console.print(table.to_rich())
+    for path in _write(table, made[0], runs, out):
+        say(str(path))
+
+
+def _read_runs(out: Path) -> dict[str, Run]:
+    """The runs of a folder by the movement's name."""
+    from rich.progress import track
+
+    from pc_client.analysis.run import analyse_run
+    from pc_client.recording.loader import load_recording
+
+    files = sorted(out.glob("*.mcap"))
+    runs = [
+        analyse_run(load_recording(path))
+        for path in track(files, description="reading", console=console, transient=True)
+    ]
+    return {run.provenance.movement: run for run in runs}
+
+
+def _write(table: Comparison, one: MovementSet, runs: Mapping[str, Run] | None, out: Path) -> list[Path]:
+    """Write table and pictures; returns the files."""
+    import json
+
+    from pc_client.comparison.figure import draw_comparison
+
+    texts = {
+        "compare.json": json.dumps(table.to_json(), indent=2, allow_nan=False) + "\n",
+        "compare.md": table.to_markdown(),
+        "compare.svg": draw_comparison(one, runs),
+    }
+    for name, text in texts.items():
+        try:
+            (out / name).write_text(text, encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise ClientError(f"cannot write {out / name}: {error.strerror or error}") from error
+    return [out / name for name in texts]

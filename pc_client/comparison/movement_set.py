@@ -1,0 +1,68 @@
+"""Which movements are compared: every generator on the same target points, for one or more seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from pc_client.errors import ClientError
+from pc_client.movements.files import save_movement
+from pc_client.movements.generate import generate_movement
+from pc_client.movements.movement import Movement
+from pc_client.movements.twins import GENERATORS
+
+__all__ = ["MovementSet", "make_sets", "save_sets"]
+
+
+@dataclass(frozen=True, slots=True)
+class MovementSet:
+    """The movements of one seed.
+
+    Attributes:
+        seed: of the target points, and of what is random in the generators.
+        movements: by the generator's name, in the order of `GENERATORS`.
+    """
+
+    seed: int
+    movements: Mapping[str, Movement]
+
+
+def make_sets(n_targets: int, seed: int, n_sets: int) -> tuple[MovementSet, ...]:
+    """Make the movements of the seeds seed, seed + 1 ...
+
+    Args:
+        n_targets: number of target points, at least 2.
+        seed: the first, 0 or more.
+        n_sets: how many, at least 1.
+    """
+    if n_sets < 1:
+        raise ClientError(f"{n_sets} sets of movements is nothing to compare; give at least one")
+    return tuple(
+        MovementSet(
+            number,
+            MappingProxyType(
+                {
+                    kind: generate_movement(kind, n_targets, number, name=f"{kind}_{n_targets}_seed{number}")
+                    for kind in GENERATORS
+                }
+            ),
+        )
+        for number in range(seed, seed + n_sets)
+    )
+
+
+def save_sets(sets: tuple[MovementSet, ...], folder: Path) -> None:
+    """Write all movements as files into a folder, so that each can be run or looked at by itself.
+
+    Raises:
+        ClientError: the folder cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ClientError(f"cannot use the folder {folder}: {error.strerror or error}") from error
+    for movements in sets:
+        for movement in movements.movements.values():
+            save_movement(movement, folder / f"{movement.name}.toml")
