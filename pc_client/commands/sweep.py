@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from pc_client.sweep.case import Case, GivenRobot
     from pc_client.sweep.config import SweepConfig
     from pc_client.sweep.folder import SweepFolder
+    from pc_client.sweep.ledger import Ledger
     from pc_client.sweep.ranking import Setting
+    from pc_client.sweep.schedule import Outcomes
 
 _MOST_SHOWN = 5
 """Settings and errors on the terminal; table and page have all."""
@@ -50,8 +52,8 @@ def sweep(
     """Run every combination of gains, arms and movements; a second call goes on where the first ended."""
     from pc_client.sweep.case import all_cases
     from pc_client.sweep.config import read_config
-    from pc_client.sweep.folder import SweepFolder, table_rows
-    from pc_client.sweep.progress import SweepProgress
+    from pc_client.sweep.folder import SweepFolder
+    from pc_client.sweep.ledger import Ledger
     from pc_client.sweep.run_case import run_case
     from pc_client.sweep.schedule import run_in_turn, run_side_by_side
     from pc_client.sweep.table import table_content, table_format
@@ -66,42 +68,43 @@ def sweep(
     arms = plan.arms if plan.host is None else (_given_robot(plan, plan.host),)
     cases = all_cases(plan.movements, arms, plan.controllers, plan.repeat)
     folder.prepare()
-    outcomes = {case.identity: folder.load(case, plan.keep_recordings) for case in cases}
-    waiting = [case for case in cases if outcomes[case.identity] is None]
-    say(f"{len(cases)} cases, {len(cases) - len(waiting)} of them done before; results in {folder.path}")
+    ledger = Ledger(cases, folder, plan.keep_recordings)
+    waiting = ledger.waiting()
+    say(f"{len(ledger)} cases, {ledger.n_settled} of them done before; results in {folder.path}")
     if plan.host is None:
-        results = run_side_by_side(waiting, plan.keep_recordings, run_case, workers=workers, dask=dask)
+        outcomes = run_side_by_side(waiting, plan.keep_recordings, run_case, workers=workers, dask=dask)
     else:
         if waiting and not yes:
             _ask(plan.host, plan.port_base, waiting)
-        results = run_in_turn(waiting, plan.keep_recordings, run_case)
-
-    def rows() -> list[dict[str, object]]:
-        return table_rows([(case, outcome) for case in cases if (outcome := outcomes[case.identity])])
-
+        outcomes = run_in_turn(waiting, plan.keep_recordings, run_case)
     try:
-        with closing(results), SweepProgress(console, len(cases), len(waiting)) as progress:
-            for case, outcome in results:
-                folder.store(case, outcome)
-                outcomes[case.identity] = outcome
-                progress.finished(outcome)
+        _work(ledger, outcomes, live=plan.host is None)
     except KeyboardInterrupt as interrupt:
-        folder.write(f"sweep.{written_as}", table_content(rows(), written_as))
-        n_done = sum(outcome is not None for outcome in outcomes.values())
         doubts = "".join(f"; {note}" for note in getattr(interrupt, "__notes__", ()))
         raise ClientError(
-            f"interrupted{doubts}; {n_done} of {len(cases)} cases are kept in {folder.path}, "
+            f"interrupted{doubts}; {ledger.n_settled} of {len(ledger)} cases are kept in {folder.path}, "
             "the same command goes on from there"
         ) from interrupt
-    table = rows()
-    say(f"table: {folder.write(f'sweep.{written_as}', table_content(table, written_as))}")
+    finally:  # of what there is, whatever ended it
+        table = ledger.rows()
+        path = folder.write(f"sweep.{written_as}", table_content(table, written_as))
+    say(f"table: {path}")
     _draw(folder, config.stem, table)
     _show(table)
-    left = [case for case in cases if outcomes[case.identity] is None]
-    if left:
-        say(f"{len(left)} cases have not begun: look at the arm, then give the same command again")
+    if left := len(ledger.waiting()):
+        say(f"{left} cases have not begun: look at the arm, then give the same command again")
     if left or any(row["status"] == "failed" for row in table):
         raise typer.Exit(1)
+
+
+def _work(ledger: Ledger, outcomes: Outcomes, *, live: bool) -> None:
+    """Settle case by case, and show how far it is."""
+    from pc_client.sweep.progress import SweepProgress
+
+    with closing(outcomes), SweepProgress(console, len(ledger), ledger.n_settled, live=live) as progress:
+        for case, outcome in outcomes:
+            ledger.settle(case, outcome)
+            progress.finished(outcome)
 
 
 def _folder_of(plan: SweepConfig, out: Path | None) -> Path:

@@ -24,11 +24,12 @@ class SweepProgress:
     Args:
         console: where.
         n_cases: cases in all.
-        n_waiting: those that are still to run.
+        n_settled: those that are done before.
+        live: True: the clock ticks. False: redrawn when a case is done; the thread that lets it tick would
+            take the interpreter from a control loop in this process.
     """
 
-    def __init__(self, console: Console, n_cases: int, n_waiting: int) -> None:
-        # Redrawn when a case is done: rich's own thread would take the interpreter from a control loop here.
+    def __init__(self, console: Console, n_cases: int, n_settled: int, *, live: bool) -> None:
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -37,11 +38,11 @@ class SweepProgress:
             TextColumn("left"),
             TimeRemainingColumn(),
             console=console,
-            auto_refresh=False,
+            auto_refresh=live,
             transient=True,
         )
         self._console = console
-        self._task = self._bar.add_task("running", total=n_cases, completed=n_cases - n_waiting)
+        self._task = self._bar.add_task("running", total=n_cases, completed=n_settled)
         self._counts: dict[Status, int] = {"done": 0, "refused": 0, "failed": 0}
         self._n_runs = 0
 
