@@ -122,6 +122,7 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         definitions_figure=_data_uri(figures.draw_definitions(table)),
         budget_figure=_data_uri(figures.draw_budget(table)),
         provenance=_provenance_facts(table),
+        learned=_learned(table),
         left_out=list(left_out),
     )
 
@@ -182,9 +183,37 @@ def _provenance_facts(table: Table) -> Mapping[str, Any]:
         "controller": first.controller,
         "controller settings": ", ".join(f"{k} = {v}" for k, v in sorted(first.controller_config.items())),
         "loop delay identified by the client": delay,
+        **_loop_facts(table.loop),
         "client version": ", ".join(sorted({run.provenance.client_version for run in runs})),
         "runs": f"{len(runs)}, of {len(table.rows)} movements",
     }
+
+
+def _loop_facts(loop: Mapping[str, float | str]) -> Mapping[str, str]:
+    """Return the identified loop and its margins as texts by name; nothing for old recordings."""
+    if not loop:
+        return {}
+    facts = {
+        "identified loop": f"dead time {1e3 * float(loop['dead_time_s']):.1f} ms, "
+        f"lag {1e3 * float(loop['lag_s']):.1f} ms, "
+        f"single joints within {1e3 * float(loop['joint_spread_s']):.1f} ms",
+        "margins of the feedback": f"gain {float(loop['gain_margin']):.1f}, phase "
+        f"{float(loop['phase_margin_deg']):.0f}°, delay {1e3 * float(loop['delay_margin_s']):.0f} ms, "
+        f"sensitivity at most {float(loop['sensitivity_peak']):.2f}",
+    }
+    if "learning_cut_off_hz" in loop:
+        facts["learning"] = (
+            f"up to {float(loop['learning_cut_off_hz']):.1f} Hz (set by the {loop['learning_limited_by']}), "
+            f"contraction {float(loop['learning_contraction']):.2f} a run"
+        )
+    return facts
+
+
+def _learned(table: Table) -> str:
+    """Return which runs used what an earlier one had taught, as "3 of 9"; empty when none could."""
+    runs = [run for row in table.rows for run in row.runs]
+    learned = sum(bool(run.recording.summary.get("learned_from")) for run in runs)
+    return f"{learned} of {len(runs)}" if learned else ""
 
 
 def _data_uri(svg: str) -> str:

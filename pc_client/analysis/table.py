@@ -6,7 +6,7 @@ One table, three forms: `table1.json` for programs, `table1.md` for documents, a
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from statistics import fmean
@@ -146,6 +146,7 @@ class Table:
             "rows": rows,
             "mean_snr_db": {kind: None if mean is None else _number(mean) for kind, mean in means.items()},
             "paper_mean_snr_db": {kind: self.paper_mean_of(kind) for kind in KINDS},
+            "loop": dict(self.loop),
         }
 
     def to_markdown(self) -> str:
@@ -159,6 +160,8 @@ class Table:
             "| " + " | ".join(columns) + " |",
             "|" + "|".join(["---", *["---:"] * (len(columns) - 1)]) + "|",
             *["| " + " | ".join(row) + " |" for row in rows],
+            "",
+            "floor: SNR that the noise of the arm's encoders at rest alone would leave a perfect arm.",
         ]
         return "\n".join(lines) + "\n"
 
@@ -177,6 +180,11 @@ class Table:
         return table
 
     @property
+    def loop(self) -> Mapping[str, float | str]:
+        """What the client identified of the loop and its margins; empty for old recordings."""
+        return self.rows[0].runs[0].provenance.loop
+
+    @property
     def title(self) -> str:
         """One line that says what the table shows, and that it is a simulation when it is."""
         arm = f"SIMULATED {self.robot}, seed {self.seed}" if self.simulated else self.robot
@@ -186,17 +194,19 @@ class Table:
         """Return headings and texts; the mean of a kind follows its rows."""
         n_runs = max((len(row.runs) for row in self.rows), default=0)
         repetitions = [f"r{k}" for k in range(1, n_runs + 1)]
-        columns = ["movement", *repetitions, "mean", "paper", "diff", "error [mm]", "lag [ms]"]
+        columns = ["movement", *repetitions, "mean", "paper", "diff", "floor", "error [mm]", "lag [ms]"]
         rows = []
         for kind, group in groupby(self.rows, key=lambda row: row.kind):
             for row in group:
                 figures = [f"{v:.2f}" for v in row.snr_db] + [""] * (n_runs - len(row.runs))
                 compared = _compare(row.mean_snr_db, row.paper_snr_db)
-                errors = [f"{row.max_position_error_mm:.2f}", f"{row.lag_ms:.1f}"]
+                floor = "" if row.noise_floor_db is None else f"{row.noise_floor_db:.2f}"
+                errors = [floor, f"{row.max_position_error_mm:.2f}", f"{row.lag_ms:.1f}"]
                 rows.append([row.name, *figures, *compared, *errors])
             mean = self.mean_of(kind)
             assert mean is not None  # the group has at least one row
-            rows.append([f"mean {kind}", *[""] * n_runs, *_compare(mean, self.paper_mean_of(kind)), "", ""])
+            compared = _compare(mean, self.paper_mean_of(kind))
+            rows.append([f"mean {kind}", *[""] * n_runs, *compared, "", "", ""])
         return columns, rows
 
 

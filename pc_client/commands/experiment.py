@@ -125,6 +125,8 @@ def execute(
         f"({robot_time / max(wall_time, 1e-9):.1f} x real time), "
         f"loop delay {report.delay.delay * 1e3:.1f} ms, {late} late and {lost} lost frames"
     )
+    for remark in report.remarks:
+        say(remark)
 
 
 def ask_before_motion(planned: Experiment, robot: str, ports: Ports) -> None:

@@ -23,7 +23,14 @@ OutOption = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Folder for recordings, tables and report.")
 ]
 ControllerOption = Annotated[
-    str, typer.Option("--controller", metavar="NAME", help="preview or paper.", show_default=True)
+    str,
+    typer.Option(
+        "--controller",
+        metavar="NAME",
+        help="paper (as published), preview (ahead by the loop delay) or best (makes up for the drives' lag "
+        "and the gears' waves, and learns from one run of a movement to the next).",
+        show_default=True,
+    ),
 ]
 RepeatOption = Annotated[int, typer.Option("--repeat", min=1, max=99, help="Runs of each movement.")]
 YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a real arm moves.")]

@@ -13,7 +13,7 @@ import numpy as np
 
 from pc_client.control.controller_config import ControllerConfig
 from pc_client.control.delay import DelayEstimate, estimate_delay
-from pc_client.control.excitation import Excitation
+from pc_client.control.excitation import BRISK_PULSE, PULSE, Excitation
 from pc_client.control.lag import identify_loop
 from pc_client.control.learning_filter import LearningFilter, design_filter
 from pc_client.control.loop_model import LoopModel
@@ -108,9 +108,9 @@ def identify(
     q_start = driver.actual_q()
     # Feed-forward alone, its mean over each cycle: the integral of the commands ends exactly where it began.
     open_loop = replace(config, name="excitation", gain_p=0.0, gain_i=0.0)
-    table = ReferenceTable(
-        Excitation(q_start.tolist()), period=period, lead=_LEAD, settle=_SETTLE, lookahead=0.0
-    )
+    knows_lag = config.compensates_lag or config.compensates_gear or config.learns or config.estimates
+    excitation = Excitation(q_start.tolist(), BRISK_PULSE if knows_lag else PULSE)
+    table = ReferenceTable(excitation, period=period, lead=_LEAD, settle=_SETTLE, lookahead=0.0)
     stamps: list[float] = []
     commands: list[list[float]] = []
     positions: list[list[float]] = []
@@ -139,7 +139,7 @@ def identify(
             margin=margin,
             delay=estimate.delay,
         )
-    if config.compensates_lag or config.learns or config.estimates:
+    if knows_lag:
         loop = identify_loop(t, qd_cmd, q, period)
     else:  # one delay is all that this controller wants to know
         loop = LoopModel(estimate.delay, 0.0, 0.0, estimate.residual)

@@ -1,0 +1,255 @@
+"""What each piece of the controller brings: `make ablation` runs this.
+
+Runs the ten movements three times with every composition of the controller's pieces, on boxes of all three
+fidelities in lockstep, then the best composition on further seeds and once in real time. Nothing is chosen
+for a movement or a box: the compositions are the rows of `COMPOSITIONS`. Results: ablation.md, ablation.json
+and ablation.svg in the folder, the recordings in folders below it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
+from protocol.ur_types import Ports
+
+HOST = "127.0.0.1"
+
+PAPER, PREVIEW, BEST = CONTROLLERS["paper"], CONTROLLERS["preview"], CONTROLLERS["best"]
+LAG = replace(BEST, compensates_gear=False, learns=False)
+
+COMPOSITIONS: dict[str, tuple[ControllerConfig, str]] = {
+    "paper": (PAPER, "PI and feed-forward, as published"),
+    "short ramp": (replace(PREVIEW, looks_ahead=False), "the robot's own ramp 40 rad/s2, other gains"),
+    "preview": (PREVIEW, "+ feed-forward ahead by the identified delay"),
+    "lag": (LAG, "+ dead time and lag apart: qd + lag qdd, ahead by the dead time"),
+    "lag, kalman": (replace(LAG, estimates=True), "lag + feedback of estimated positions"),
+    "lag, gear": (replace(LAG, compensates_gear=True), "lag + feed-forward against the waves of the gears"),
+    "lag, learning": (replace(LAG, learns=True), "lag + learning between repetitions"),
+    "preview, learning": (replace(LAG, compensates_lag=False, learns=True), "the same without lag"),
+    "best": (BEST, "lag + gear + learning"),
+    "best, kalman": (replace(BEST, estimates=True), "best + feedback of estimated positions"),
+}
+FIDELITIES = ("ideal", "typical", "poor")
+SEEDS = (0, 1, 2, 7)
+KINDS = ("lognormal", "uniform")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="What each piece of the controller brings.")
+    parser.add_argument("--out", type=Path, default=Path("out/ablation"))
+    parser.add_argument("--seed", type=int, default=7)
+    options = parser.parse_args()
+    cases = [
+        *((name, fidelity, options.seed, "lockstep") for fidelity in FIDELITIES for name in COMPOSITIONS),
+        *(("best", "typical", seed, "lockstep") for seed in SEEDS if seed != options.seed),
+        ("best", "typical", options.seed, "realtime"),
+    ]
+    results = []
+    for name, fidelity, seed, pace in cases:
+        folder = options.out / f"{name.replace(', ', '_').replace(' ', '_')}-{fidelity}-{seed}-{pace}"
+        result = run_case(name, fidelity, seed, pace, folder)
+        print(f"{name:18} {fidelity:8} seed {seed} {pace:8}  {result['summary']}", flush=True)
+        results.append(result)
+        write(results, options.out)
+    return 0
+
+
+def write(results: list[dict[str, Any]], out: Path) -> None:
+    """Write the three files from what there is by now."""
+    (out / "ablation.json").write_text(json.dumps(results, indent=1) + "\n")
+    (out / "ablation.md").write_text(markdown(results))
+    (out / "ablation.svg").write_text(figure(results))
+
+
+def run_case(name: str, fidelity: str, seed: int, pace: str, folder: Path) -> dict[str, Any]:
+    """Run the ten movements with one composition on one box; returns figures by movement."""
+    from pc_client.analysis.budget import PARTS
+    from pc_client.analysis.run import analyse_run
+    from pc_client.analysis.table import build_table
+    from pc_client.driver.ur_driver import UrDriver
+    from pc_client.experiment.prepare import load_movements, prepare_experiment
+    from pc_client.experiment.runner import ExperimentRunner
+    from pc_client.movements.files import library_names
+    from pc_client.recording.loader import load_recording
+
+    planned = prepare_experiment(load_movements(library_names()), repeat=3, out=folder)
+    with box(fidelity, seed, pace) as ports, UrDriver(HOST, ports) as driver:
+        report = ExperimentRunner(driver, planned, COMPOSITIONS[name][0]).run()
+    table = build_table([analyse_run(load_recording(path)) for path in report.paths])
+    rows = {
+        row.name: {
+            "kind": row.kind,
+            "snr_db": [round(x, 2) for x in row.snr_db],
+            "noise_floor_db": row.noise_floor_db,
+            "unrepeatable_db": row.unrepeatable_db,
+            "budget_share": {part: fmean(run.budget.share(part) for run in row.runs[-1:]) for part in PARTS},
+        }
+        for row in table.rows
+    }
+    means = {
+        kind: [fmean(row["snr_db"][k] for row in rows.values() if row["kind"] == kind) for k in range(3)]
+        for kind in KINDS
+    }
+    summary = "  ".join(f"{kind} {' '.join(f'{x:.2f}' for x in means[kind])} dB" for kind in KINDS)
+    return {
+        "composition": name,
+        "fidelity": fidelity,
+        "seed": seed,
+        "pace": pace,
+        "rows": rows,
+        "means": means,
+        "loop": dict(report.delay.facts()),
+        "late_frames": sum(stream.late_frames for stream in report.streams),
+        "lost_frames": sum(stream.lost_frames for stream in report.streams),
+        "remarks": report.remarks,
+        "summary": summary,
+    }
+
+
+def markdown(results: list[dict[str, Any]]) -> str:
+    """Tables of mean SNRs and error budgets, and the rows of the best composition."""
+    lines = [
+        "Mean SNR (Eq. 10) of the five movements of a kind in dB: runs 1, 2, 3. Floor: what the encoders' "
+        "noise at rest alone would leave.",
+        "",
+        "| composition | what it is | fidelity | lognormal r1, r2, r3 | floor | uniform r1, r2, r3 | floor |",
+        "|---|---|---|---|---:|---|---:|",
+    ]
+    for r in _of_main(results):
+        cells = [r["composition"], COMPOSITIONS[r["composition"]][1], r["fidelity"]]
+        for kind in KINDS:
+            cells += [
+                ", ".join(f"{x:.1f}" for x in r["means"][kind]),
+                f"{_mean(r, kind, 'noise_floor_db'):.1f}",
+            ]
+        lines.append("| " + " | ".join(cells) + " |")
+    parts = list(next(iter(results[0]["rows"].values()))["budget_share"])
+    lines += [
+        "",
+        "Where the error power of the third run lies, mean over the ten movements, in %.",
+        "",
+        "| composition | fidelity | " + " | ".join(parts) + " |",
+        "|---|---|" + "---:|" * len(parts),
+    ]
+    for r in _of_main(results):
+        shares = [100.0 * fmean(row["budget_share"][part] for row in r["rows"].values()) for part in parts]
+        cells = [r["composition"], r["fidelity"], *(f"{share:.0f}" for share in shares)]
+        lines.append("| " + " | ".join(cells) + " |")
+    lines += [
+        "",
+        "The best composition, typical fidelity, row by row: runs 1, 2, 3, and the third less the floor, dB.",
+        "",
+        "| seed | pace | movement | r1 | r2 | r3 | floor | r3 - floor |",
+        "|---|---|---|---:|---:|---:|---:|---:|",
+    ]
+    for r in results:
+        if (r["composition"], r["fidelity"]) == ("best", "typical"):
+            for name, row in r["rows"].items():
+                runs = " | ".join(f"{x:.2f}" for x in row["snr_db"])
+                floor = row["noise_floor_db"]
+                below = row["snr_db"][-1] - floor
+                lines.append(f"| {r['seed']} | {r['pace']} | {name} | {runs} | {floor:.2f} | {below:+.2f} |")
+    lines += [
+        "",
+        "The identified loop and its margins.",
+        "",
+        "| composition | fidelity | seed | pace | dead time, lag [ms] | gain margin | phase [deg] "
+        "| delay [ms] | contraction | late, lost |",
+        "|---|---|---|---|---|---:|---:|---:|---:|---|",
+    ]
+    for r in results:
+        loop = r["loop"]
+        contraction = f"{loop['learning_contraction']:.2f}" if "learning_contraction" in loop else ""
+        lines.append(
+            f"| {r['composition']} | {r['fidelity']} | {r['seed']} | {r['pace']} "
+            f"| {1e3 * loop['dead_time_s']:.1f}, {1e3 * loop['lag_s']:.1f} | {loop['gain_margin']:.1f} "
+            f"| {loop['phase_margin_deg']:.0f} | {1e3 * loop['delay_margin_s']:.0f} | {contraction} "
+            f"| {r['late_frames']}, {r['lost_frames']} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def figure(results: list[dict[str, Any]]) -> str:
+    """One panel a fidelity: mean SNR of each composition, by kind and run, and the floor; SVG text."""
+    from pc_client.analysis.figures import BLUE, ORANGE, svg_figure
+
+    fidelities = [f for f in FIDELITIES if any(r["fidelity"] == f for r in _of_main(results))]
+    with svg_figure(11.0, 4.2, simulated=True) as (page_figure, page):
+        for k, fidelity in enumerate(fidelities):
+            axes = page_figure.add_axes((0.05 + 0.32 * k, 0.3, 0.285, 0.58))
+            cases = [r for r in _of_main(results) if r["fidelity"] == fidelity]
+            for shift, kind, colour in ((-0.2, "lognormal", BLUE), (0.2, "uniform", ORANGE)):
+                for i, r in enumerate(cases):
+                    label = kind if i == 0 else None
+                    runs = r["means"][kind]
+                    axes.plot([i + shift] * len(runs), runs, color=colour, lw=1.0, alpha=0.6)
+                    axes.scatter([i + shift] * len(runs), runs, s=[10, 22, 40], color=colour, label=label)
+                floor = fmean(_mean(r, kind, "noise_floor_db") for r in cases)
+                axes.axhline(floor, color=colour, lw=1.2, ls="--", label=f"noise floor, {kind}")
+            axes.set_xticks(range(len(cases)), [r["composition"] for r in cases], rotation=40, ha="right")
+            axes.set_title(fidelity)
+            axes.grid(axis="x", visible=False)
+            if k == 0:
+                axes.set_ylabel("mean SNR [dB]; small to large: runs 1, 2, 3")
+            if k == len(fidelities) - 1:
+                axes.legend(loc="lower right")
+    return page.getvalue()
+
+
+def _of_main(results: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The cases of the table: one seed, lockstep."""
+    return [r for r in results if r["seed"] == results[0]["seed"] and r["pace"] == "lockstep"]
+
+
+def _mean(result: dict[str, Any], kind: str, figure_name: str) -> float:
+    return fmean(row[figure_name] for row in result["rows"].values() if row["kind"] == kind)
+
+
+@contextmanager
+def box(fidelity: str, seed: int, pace: str) -> Iterator[Ports]:
+    """Run a box in a process of its own, so that its loop and ours do not share an interpreter."""
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_serve, args=(theirs, fidelity, seed, pace))
+    process.start()
+    try:
+        if not ours.poll(60.0) or (port_base := ours.recv()) is None:
+            sys.exit("ablation: no box could be started; stop other boxes")
+        yield Ports.standard(offset=port_base)
+        ours.send("stop")
+    finally:
+        ours.close()
+        process.join(20.0)
+
+
+def _serve(connection: Connection, fidelity: str, seed: int, pace: str) -> None:
+    from ur_emulator import ControlBox
+    from ur_emulator.errors import PortError
+
+    # Moved up, out of the way of a box on the standard ports.
+    for port_base in range(8_000, 28_000, 1000):
+        control_box = ControlBox(host=HOST, port_base=port_base, fidelity=fidelity, seed=seed, pace=pace)
+        try:
+            control_box.listen()
+        except PortError:
+            continue
+        with control_box:
+            connection.send(port_base)
+            connection.poll(None)
+        return
+    connection.send(None)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
