@@ -21,8 +21,8 @@ setup: $(STAMP) ## install everything that the other targets use
 demo: $(STAMP) ## the paper's experiment: box and client, ten movements, three times each, into out/demo
 	$(BIN)/python examples/demo.py
 
-test: $(STAMP) ## all tests
-	$(BIN)/python -m pytest
+test: $(STAMP) ## all tests, in as many processes as there are cores, at most four
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
 
 check-static: $(STAMP)
 	$(BIN)/ruff check .
@@ -30,7 +30,7 @@ check-static: $(STAMP)
 	$(BIN)/mypy
 
 check: check-static ## lint, types, fast tests
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest -m "not slow" --numprocesses auto --maxprocesses 4 --dist loadfile
 
 bench: $(STAMP) ## measure speed, lateness, memory; writes bench/results.json
 	$(BIN)/python -m bench

@@ -214,11 +214,12 @@ class VelocitySession:
         return self.frames.new()
 
     def spin_up(self, speed=0.4):
-        """Bring the base joint to a speed."""
-        for _ in range(60):
+        """Bring the base joint to a speed; in real time a command may come late, so that the arm starts anew."""
+        for sent in range(400):
             frame = self.velocity(speed)
-        assert frame.target_qd[0] == speed
-        return frame
+            if sent >= 60 and frame.target_qd[0] == speed:
+                return frame
+        raise AssertionError(f"the base joint turns with {frame.target_qd[0]} rad/s, asked was {speed}")
 
 
 # --- processes
