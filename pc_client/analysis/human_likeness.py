@@ -179,7 +179,7 @@ def fit_power_law(
     """
     speed = np.linalg.norm(np.asarray(v, dtype=np.float64), axis=1)
     curvature = curvature_of(v, a)
-    used = (speed > min_speed * speed.max()) & (curvature > 1.0 / max_radius)
+    used = (speed > min_speed * speed.max(initial=0.0)) & (curvature > 1.0 / max_radius)
     n_used = int(np.count_nonzero(used))
     if n_used < _MIN_SAMPLES:
         return PowerLawFit(math.nan, math.nan, n_used)

@@ -109,7 +109,7 @@ class Comparison:
             f"{FILTER_TEXT}, then differentiated.",
             "SPARC and LDJ: nearer to 0 is smoother; compare LDJ only within one of the three signals. "
             "beta: the exponent of speed = k curvature^-beta, from the first to the last peak of the speed; "
-            "1/3 for drawing hands, where R² is high. A dash: straight lines have none.",
+            "1/3 for drawing hands, where R² is high. A dash: straight lines, or one peak only.",
             *(("SNR: Eq. 10 on the raw TCP speed; best: after the best time shift.",) if self.robot else ()),
         )
 

@@ -113,6 +113,7 @@ class FakeRobot:
         self.refuses = False
         self.deaf_to_stop = False
         self.error_in = None
+        self.tcp_of = None  # where the TCP is for joint angles; at the origin without
         self.pauses = False  # a safety stop pauses the program, as on a real controller
 
     # ---- Network
@@ -252,6 +253,8 @@ class FakeRobot:
             safety_mode=self.safety_mode,
             runtime_state=STOPPED if self.program is None else PAUSED if self.safety_mode != 1 else PLAYING,
         )
+        if self.tcp_of is not None:
+            values["actual_tcp_pose"] = (*self.tcp_of(self.q), 0.0, 0.0, 0.0)
         return _ENCODE(SimpleNamespace(**values))
 
     # ---- what tests look at

@@ -223,3 +223,11 @@ def test_slow_and_nearly_straight_samples_are_left_out() -> None:
 def test_nonsense_is_refused(measure: object) -> None:
     with pytest.raises(ClientError):
         measure()
+
+
+def test_too_few_samples_have_no_exponent() -> None:
+    v, a = ellipse(1 / 3)
+    for n in (0, 5):
+        fit = fit_power_law(v[:n], a[:n])
+        assert math.isnan(fit.exponent)
+        assert fit.n_samples == n

@@ -1,0 +1,208 @@
+"""The comparison of generators: sets, filter, figures of signals, the table, and the command on a robot in memory."""
+
+from __future__ import annotations
+
+import json
+import math
+import xml.etree.ElementTree as ET
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fake_robot import FakeRobot
+
+import pc_client.driver.transport as transport
+import pc_client.driver.ur_driver as ur_driver_module
+from pc_client import cli
+from pc_client.comparison.figure import draw_comparison
+from pc_client.comparison.filtering import CUTOFF_HZ, filtered_motion
+from pc_client.comparison.likeness import Likeness, mean_likeness, measure_likeness
+from pc_client.comparison.movement_set import make_sets, save_sets
+from pc_client.comparison.signals import filtered_signal, planned_signal
+from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, build_comparison
+from pc_client.errors import ClientError
+from pc_client.kinematics.forward import tcp_positions
+from pc_client.kinematics.robot_model import robot_model
+from pc_client.movements import load_movement
+from pc_client.movements.twins import GENERATORS
+
+RATE = 125.0
+
+
+@pytest.fixture(scope="module")
+def sets():
+    return make_sets(4, 1, 2)
+
+
+@pytest.fixture(scope="module")
+def table(sets):
+    return build_comparison(sets)
+
+
+def test_sets_have_every_generator_on_the_same_points(sets):
+    assert [one.seed for one in sets] == [1, 2]
+    for one in sets:
+        assert list(one.movements) == list(GENERATORS)
+        human = one.movements["lognormal"]
+        for kind, movement in one.movements.items():
+            assert movement.name == f"{kind}_4_seed{one.seed}"
+            assert movement.duration == pytest.approx(human.duration, abs=1e-9)
+            if kind != "duplicate":
+                np.testing.assert_array_equal(movement.target_points, human.target_points)
+    assert not np.allclose(
+        sets[0].movements["uniform"].target_points, sets[1].movements["uniform"].target_points
+    )
+
+
+def test_the_first_seed_is_the_first_pair_of_the_library(sets):
+    np.testing.assert_array_equal(
+        sets[0].movements["uniform"].law.evaluate(1.0).p, load_movement("uniform_4_1").law.evaluate(1.0).p
+    )
+
+
+def test_saved_sets_can_be_run_one_by_one(sets, tmp_path):
+    save_sets(sets, tmp_path / "movements")
+    assert len(list((tmp_path / "movements").glob("*.toml"))) == 2 * len(GENERATORS)
+    assert load_movement(tmp_path / "movements" / "power_law_4_seed2.toml").kind == "power_law"
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ClientError, match="cannot use the folder"):
+        save_sets(sets, tmp_path / "file" / "movements")
+
+
+def test_no_sets_are_refused():
+    with pytest.raises(ClientError, match="at least one"):
+        make_sets(4, 1, 0)
+
+
+def wave(frequency, t):
+    """Swings that begin and end at rest."""
+    return np.sin(2 * math.pi * frequency * t) * np.exp(-((t - 10.0) ** 2) / 12.0)
+
+
+@pytest.mark.parametrize(("frequency", "gain"), [(0.5, 1.0), (CUTOFF_HZ, 0.5), (25.0, 0.0)])
+def test_filter_passes_movements_halves_at_its_cutoff_and_shifts_nothing(frequency, gain):
+    t = np.arange(2500) / RATE
+    swing = np.outer(wave(frequency, t), [1.0, -2.0, 0.5])
+    start = np.array([0.3, 0.1, 0.2])
+    np.testing.assert_allclose(filtered_motion(start + swing, RATE).p - start, gain * swing, atol=0.02)
+
+
+def test_filter_differentiates():
+    t = np.arange(1250) / RATE
+    motion = filtered_motion(np.outer(wave(0.5, t), [1.0, 0.0, 0.0]), RATE)
+    np.testing.assert_allclose(motion.v, np.gradient(motion.p, 1 / RATE, axis=0), atol=1e-12)
+    np.testing.assert_allclose(motion.a, np.gradient(motion.v, 1 / RATE, axis=0), atol=1e-12)
+    with pytest.raises(ClientError, match="more than 10 samples"):
+        filtered_motion(np.zeros((100, 3)), 10.0)
+
+
+def test_filtered_plan_is_the_plan_but_for_corners(sets):
+    """Lognormals survive the filter; the square ramps of a trapezoid lose their jerk."""
+    human = sets[0].movements["lognormal"]
+    plan, filtered = planned_signal(human), filtered_signal(human, RATE)
+    assert filtered.t[0] == 0.0
+    assert len(filtered.t) == math.floor(human.duration * RATE + 1e-9) + 1
+    np.testing.assert_allclose(filtered.speed, np.interp(filtered.t, plan.t, plan.speed), atol=2e-3)
+    smooth, sharp = (
+        [
+            measure_likeness(signal.motion, signal.rate)
+            for signal in (planned_signal(m), filtered_signal(m, RATE))
+        ]
+        for m in (human, sets[0].movements["uniform"])
+    )
+    assert smooth[0].log_jerk == pytest.approx(smooth[1].log_jerk, abs=0.05)
+    assert sharp[1].log_jerk - sharp[0].log_jerk > 0.3
+
+
+def test_means_of_the_power_law_leave_out_those_without():
+    with_law = Likeness(-2.0, -9.0, 3.0, 0.3, 0.9, 0.2, 0.5)
+    without = Likeness(-3.0, -11.0, 4.0, math.nan, math.nan, 0.4, 0.7)
+    assert mean_likeness([with_law, without]) == Likeness(-2.5, -10.0, 3.5, 0.3, 0.9, pytest.approx(0.3), 0.6)
+    assert math.isnan(mean_likeness([without]).exponent)
+
+
+def test_table_says_what_the_laws_promise(table):
+    """One bell a stroke, exponents of a third where the law imposes it, none on straight lines."""
+    means = {kind: table.means(kind)["planned"] for kind in table.kinds}
+    for kind in ("lognormal", "isochronous", "fitts", "minimum_jerk", "uniform"):
+        assert means[kind].peaks == 3.0
+    assert means["uniform_blend"].peaks == 1.0
+    assert means["power_law"].exponent == pytest.approx(1 / 3, abs=0.015)
+    assert means["power_law"].r_squared > 0.99
+    for kind in ("minimum_jerk", "uniform"):
+        assert math.isnan(means[kind].exponent)
+    # the robot's profile is the least smooth by its jerk, the movement of least jerk through the points the smoothest
+    jerk = {kind: figures.log_jerk for kind, figures in means.items()}
+    assert max(jerk, key=jerk.get) == "minimum_jerk_via"
+    assert sorted(jerk, key=jerk.get)[:2] == ["uniform", "uniform_blend"]
+    # and it needs the least speed for the same way in the same time
+    assert min(means, key=lambda kind: means[kind].peak_speed) == "uniform_blend"
+
+
+def test_table_in_three_forms(table):
+    data = table.to_json()
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    assert data["robot"] is None
+    assert len(data["rows"]) == 2 * len(GENERATORS)
+    assert data["means"]["uniform"]["planned"]["exponent"] is None
+    assert set(data["means"]["uniform"]) == {"planned", "filtered", "snr_db", "shifted_snr_db"}
+    lines = table.to_markdown().splitlines()
+    assert lines[0].endswith("3 strokes each, means over 2 sets of target points: planned only")
+    rows = [line for line in lines if line.startswith("|")]
+    assert len(rows) == 2 + 2 * len(GENERATORS)
+    assert {line.count("|") for line in rows} == {len(COLUMNS) + 3}
+    assert len(table.to_rich().columns) == 2 + len(COLUMNS)
+
+
+def test_page_shows_every_generator(sets):
+    root = ET.fromstring(draw_comparison(sets[0]))
+    assert root.tag.endswith("svg")
+    panels = [node for node in root.iter() if (node.get("id") or "").startswith("axes_")]
+    assert len(panels) == 2 * len(GENERATORS)
+
+
+@pytest.fixture
+def robot(monkeypatch):
+    fake = FakeRobot(delay=4)
+    model = robot_model("ur3")
+    fake.tcp_of = lambda q: tcp_positions(model, [q])[0]
+    fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
+    for module in (transport, ur_driver_module):
+        monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
+    return fake
+
+
+def test_command_executes_measures_and_writes(robot, tmp_path, capsys):
+    out = tmp_path / "out"
+    arguments = ["compare", "--robot", "127.0.0.1", "--out", str(out), "--targets", "2", "--seed", "5"]
+    assert cli.run(arguments) == 0
+    assert len(list(out.glob("*.mcap"))) == len(GENERATORS)
+    assert len(list((out / "movements").glob("*.toml"))) == len(GENERATORS)
+    assert "compare.svg" in capsys.readouterr().out
+    data = json.loads((out / "compare.json").read_text())
+    assert data["robot"] == "SIMULATED UR3 3.15.8, seed 7, controller preview"
+    for row in data["rows"]:
+        # a robot in memory that is late and does nothing else wrong is as human as its plan
+        assert row["snr_db"] > 15.0
+        assert row["executed"]["sparc"] == pytest.approx(row["filtered"]["sparc"], abs=0.02)
+        assert row["executed"]["peaks"] == row["filtered"]["peaks"] == 1.0
+        assert row["executed"]["peak_speed"] == pytest.approx(row["filtered"]["peak_speed"], rel=0.02)
+        assert row["executed"]["log_jerk"] == pytest.approx(row["filtered"]["log_jerk"], abs=0.4)
+    markdown = (out / "compare.md").read_text()
+    assert markdown.count("executed |") == len(GENERATORS)
+    assert all(column in markdown for column in (*COLUMNS, *EXECUTED_COLUMNS))
+    assert (out / "compare.svg").stat().st_size > 10_000
+
+
+def test_command_without_a_robot_plans_only(tmp_path, capsys):
+    assert cli.run(["compare", "--out", str(tmp_path / "out"), "--targets", "3"]) == 0
+    assert "planned only" in capsys.readouterr().out
+    assert not list((tmp_path / "out").glob("*.mcap"))
+
+
+def test_a_movement_without_a_recording_is_named(sets):
+    another = SimpleNamespace(
+        provenance=SimpleNamespace(cycle_time_s=0.008, simulated=False, robot="UR3", controller="preview")
+    )
+    with pytest.raises(ClientError, match="no recording of lognormal_4_seed1"):
+        build_comparison(sets[:1], {"another": another})
