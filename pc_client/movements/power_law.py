@@ -78,20 +78,14 @@ class PowerLaw:
             if not 0.0 <= value <= 1.0:
                 raise MovementError(f"{name} {value}: give a number from 0 to 1")
         path = SmoothPath(self.target_points)
-        u = np.unique(
-            np.concatenate(
-                [
-                    np.linspace(a, b, _INTERVALS + 1)
-                    for a, b in zip(path.knots[:-1], path.knots[1:], strict=True)
-                ]
-            )
-        )
+        legs = len(path.knots) - 1
+        u = np.interp(np.linspace(0.0, legs, legs * _INTERVALS + 1), np.arange(legs + 1), path.knots)
         w = self._table(path, u)
         object.__setattr__(self, "target_points", path.target_points)
         object.__setattr__(self, "path", path)
         slopes = 1.0 / self._cost(path, u[[0, -1]])
         object.__setattr__(self, "_parameter", CubicSpline(w, u, bc_type=((1, slopes[0]), (1, slopes[1]))))
-        object.__setattr__(self, "_targets_at", read_only(w[np.searchsorted(u, path.knots)]))
+        object.__setattr__(self, "_targets_at", read_only(w[::_INTERVALS]))
         half = 0.5 * sum(self.ramps)
         window = np.array([[half, self.duration - half]])
         level = np.array([w[-1] / (self.duration - 2.0 * half)])

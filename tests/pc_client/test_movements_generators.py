@@ -45,6 +45,21 @@ def test_every_kind_keeps_targets_and_time_and_survives_saving(kind: str, tmp_pa
         np.testing.assert_array_equal(got, expected)
 
 
+@settings(max_examples=40, deadline=None)
+@given(kind=st.sampled_from(list(GENERATORS)), n=st.integers(2, 7), seed=st.integers(0, 10**6))
+def test_any_movement_of_any_kind_is_smooth_from_rest_to_rest(kind: str, n: int, seed: int) -> None:
+    made = generate_movement(kind, n, seed)
+    t = np.linspace(0.0, made.duration, 4001)
+    motion = made.motion(t)
+    assert all(np.all(np.isfinite(values)) for values in motion)
+    assert np.linalg.norm(motion.v[[0, -1]], axis=1).max() < 1e-3
+    np.testing.assert_allclose(motion.p[[0, -1]], made.target_points[[0, -1]], atol=1e-5)
+    # positions belong to velocities: no step is longer than the top speed allows
+    steps = np.linalg.norm(np.diff(motion.p, axis=0), axis=1) / t[1]
+    assert steps.max() <= made.speed(t).max() * (1.0 + 1e-3)
+    assert np.all(made.stroke_durations > 0.0)
+
+
 def test_kinds_in_files() -> None:
     kinds = {kind: generate_movement(kind, 4, 1).kind for kind in GENERATORS}
     assert kinds == {
