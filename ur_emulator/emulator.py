@@ -24,7 +24,7 @@ from ur_emulator.control.box_operations import BoxOperations
 from ur_emulator.control.desk import ControlDesk, Surroundings
 from ur_emulator.controller.commands import Command
 from ur_emulator.controller.controller import Controller
-from ur_emulator.errors import EmulatorError, PortPermissionError
+from ur_emulator.errors import EmulatorError
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.programs.folder import ProgramFolder
@@ -35,14 +35,13 @@ from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.servers.box_access import BUILD, BoxAccess, BoxIdentity
 from ur_emulator.servers.dashboard_answers import DashboardAnswers
 from ur_emulator.servers.dashboard_port import DashboardPort
-from ur_emulator.servers.listener import Listener, Port
 from ur_emulator.servers.modbus_loading import CodecLoader
 from ur_emulator.servers.modbus_server import ModbusPort
+from ur_emulator.servers.port_set import CONTROL, MODBUS, PortSet, ServedPort
 from ur_emulator.servers.primary_port import PrimaryPort
 from ur_emulator.servers.program_desk import ProgramDesk
 from ur_emulator.servers.program_intake import ProgramIntake
 from ur_emulator.servers.realtime_port import RealtimePort
-from ur_emulator.servers.reserve import Reserve
 from ur_emulator.servers.robot_state import StateEncoder
 from ur_emulator.servers.rtde_port import RtdePort
 from ur_emulator.servers.script_sockets import LoopNetwork
@@ -65,7 +64,6 @@ class ControlBox(BoxOperations):
         control_port: number of the port for the control API over HTTP, 0 if it is not open.
         port_base: what was added to the standard ones.
         serial_number: as the dashboard gives it; simulated boxes are recognisable by it.
-        notices: what a user should know although the box runs, one line each.
         is_shut_down: a dashboard client has switched the box off: its ports are closed.
     """
 
@@ -142,7 +140,7 @@ class ControlBox(BoxOperations):
         desk = ProgramDesk(self._access, ProgramFolder(None if programs is None else Path(programs)))
         states = StateEncoder(software, controller.state.arm)
         # In the order in which they hear of a cycle: first those whose clients act on it.
-        self._port_objects: dict[str, Port] = {
+        ports: dict[str, ServedPort] = {
             "realtime": RealtimePort(software, self._intake),
             "rtde": RtdePort(
                 identity.version._replace(build=BUILD), controller, self._box.submit, self._box.announce
@@ -174,10 +172,8 @@ class ControlBox(BoxOperations):
         if control_port is not None:
             from ur_emulator.servers.control_port import ControlPort
 
-            self._port_objects["control"] = ControlPort(self._desk, host)
-        self._listeners: dict[str, Listener] = {}
-        self._reserve = Reserve()
-        self.notices: list[str] = []
+            ports[CONTROL] = ControlPort(self._desk, host)
+        self._port_set = PortSet(self._loop, host, self._box, ports)
         self.is_shut_down = False
         self.on_shut_down: Callable[[], None] = self._loop.stop if self._owns_loop else self.close
 
@@ -198,6 +194,11 @@ class ControlBox(BoxOperations):
         return BoxRack(counted_up(count, options))
 
     # --- what is going on, and what shall happen
+
+    @property
+    def notices(self) -> list[str]:
+        """What a user should know although the box runs, one line each."""
+        return self._port_set.notices
 
     @property
     def log(self) -> tuple[LogEntry, ...]:
@@ -234,53 +235,28 @@ class ControlBox(BoxOperations):
         Raises:
             PortError: one of them is taken; none stays open then and the box cannot be used any more.
         """
-        if self._listeners:
+        if self._port_set.is_open:
             return
-        self._reserve.fill()
         try:
-            for name, port in self._port_objects.items():
-                self._listen_on(name, port)
+            numbers = self._port_set.open(self._wanted_numbers())
         except EmulatorError:
             self.close()
             raise
-        numbers = {name: item.number for name, item in self._listeners.items()}
-        self.control_port = numbers.pop("control", 0)
-        self.ports = dataclasses.replace(self.ports, **{"modbus": 0, **numbers})
-        for port in self._port_objects.values():
-            self._box.attach(port)  # type: ignore[arg-type]
+        self.control_port = numbers.pop(CONTROL, 0)
+        self.ports = dataclasses.replace(self.ports, **{MODBUS: 0, **numbers})
         self._box.attach(self._desk)
         self._loop.add(self._box)
 
-    def _listen_on(self, name: str, port: Port) -> None:
-        """Open one port; of all, only Modbus may be missing: its number is one that needs privileges."""
-        if name == "control":
-            self._listen_for_control(port)
-            return
-        number = 0 if self._free_ports else getattr(self.ports, name)
-        if name == "modbus" and not (number or self._free_ports):
-            return
-        try:
-            self._listeners[name] = Listener(
-                self._loop,
-                self.host,
-                number,
-                port,
-                self._box.backlog,
-                self._box.notice,
-                name,
-                self._reserve,
-            )
-        except PortPermissionError as error:
-            if name != "modbus":
-                raise
-            self.notices.append(f"no Modbus server: {error}")
-
-    def _listen_for_control(self, port: Port) -> None:
-        """Open the control port; lockstep does not wait for its clients, and they do not fill the log."""
-        number = self._wanted_control_port or 0
-        self._listeners["control"] = Listener(
-            self._loop, self.host, number, port, set(), lambda text: None, "control", self._reserve
-        )
+    def _wanted_numbers(self) -> dict[str, int]:
+        """Numbers of the ports to open by name; 0 takes a free one."""
+        numbers = dataclasses.asdict(self.ports)
+        if self._free_ports:
+            numbers = dict.fromkeys(numbers, 0)
+        elif not numbers[MODBUS]:
+            del numbers[MODBUS]
+        if self._wanted_control_port is not None:
+            numbers[CONTROL] = self._wanted_control_port
+        return numbers
 
     def serve_forever(self) -> None:
         """Run in the calling thread until `stop`; the ports must be open."""
@@ -322,12 +298,7 @@ class ControlBox(BoxOperations):
         self._intake.close()
         self._access.close()
         self._network.close()
-        self._reserve.close()
-        for listener in self._listeners.values():
-            listener.close()
-        for port in self._port_objects.values():
-            for connection in tuple(port.clients):  # type: ignore[attr-defined]
-                connection.close()
+        self._port_set.close()
         if self._owns_loop:
             self._loop.close()
 

@@ -129,7 +129,7 @@ class FuzzBox:
         self.served._pacer = self.pacer
         self.controller = self.served.controller
         self.controller.programs._network = FakeNetwork()
-        self.ports = box._port_objects
+        self.ports = box._port_set._ports
         self.ports["modbus"]._loader.codec = ModbusCodec()
         for port in self.ports.values():
             self.served.attach(port)

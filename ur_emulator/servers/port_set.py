@@ -1,0 +1,98 @@
+"""All ports of one box: opened together, closed together with their connections."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from ur_emulator.errors import PortPermissionError
+from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.realtime.served_box import Publisher, ServedBox
+from ur_emulator.servers.connection import Connection
+from ur_emulator.servers.listener import Listener, Port
+from ur_emulator.servers.reserve import Reserve
+
+CONTROL, MODBUS = "control", "modbus"
+
+
+class ServedPort(Port, Publisher, Protocol):
+    """A port with clients that hears of every cycle."""
+
+    @property
+    def clients(self) -> tuple[Connection, ...]:
+        """Who is connected."""
+        ...
+
+
+class PortSet:
+    """The ports of a box by name, in the order in which they hear of a cycle.
+
+    Args:
+        loop: watches their sockets.
+        host: address to listen on.
+        box: what they belong to.
+        ports: by name.
+
+    Attributes:
+        notices: what a user should know although the box runs, one line each.
+    """
+
+    def __init__(self, loop: EventLoop, host: str, box: ServedBox, ports: Mapping[str, ServedPort]) -> None:
+        self._loop = loop
+        self._host = host
+        self._box = box
+        self._ports = dict(ports)
+        self._listeners: dict[str, Listener] = {}
+        self._reserve = Reserve()
+        self.notices: list[str] = []
+
+    @property
+    def is_open(self) -> bool:
+        """True once the ports listen."""
+        return bool(self._listeners)
+
+    def open(self, wanted: Mapping[str, int]) -> dict[str, int]:
+        """Listen on all wanted ports, and let all hear of every cycle.
+
+        Args:
+            wanted: numbers by name; 0 takes a free one, a port that is not named stays closed.
+
+        Returns:
+            The numbers. That of Modbus may be missing: it is one that needs privileges.
+
+        Raises:
+            PortError: one of them cannot be opened; `close` gives back the others.
+        """
+        self._reserve.fill()
+        for name, port in self._ports.items():
+            if name not in wanted:
+                continue
+            try:
+                self._listeners[name] = self._listener(name, port, wanted[name])
+            except PortPermissionError as error:
+                if name != MODBUS:
+                    raise
+                self.notices.append(f"no Modbus server: {error}")
+        for port in self._ports.values():
+            self._box.attach(port)
+        return {name: listener.number for name, listener in self._listeners.items()}
+
+    def close(self) -> None:
+        """Close all ports and connections; harmless if closed already."""
+        self._reserve.close()
+        for listener in self._listeners.values():
+            listener.close()
+        for port in self._ports.values():
+            for connection in port.clients:
+                connection.close()
+
+    def _listener(self, name: str, port: ServedPort, number: int) -> Listener:
+        """Listen; lockstep does not wait for clients of the control API, and they do not fill the log."""
+        box = self._box
+        backlog = set[Connection]() if name == CONTROL else box.backlog
+        notice = _keep_quiet if name == CONTROL else box.notice
+        return Listener(self._loop, self._host, number, port, backlog, notice, name, self._reserve)
+
+
+def _keep_quiet(text: str) -> None:
+    """Say nothing."""
