@@ -194,18 +194,17 @@ def _show(table: Sequence[dict[str, object]]) -> None:
 
 def _ranking_table(settings: Sequence[Setting]) -> Table:
     from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    table.add_column("setting")
-    for heading in ("mean SNR\n\\[dB]", "gain\nmargin", "max error\n\\[mm]", "runs", "refused", "failed"):
-        table.add_column(heading, justify="right")
+    for heading in settings[0].values:
+        table.add_column(heading, overflow="fold")
+    for heading in ("mean SNR\n[dB]", "gain\nmargin", "max error\n[mm]", "runs", "refused", "failed"):
+        table.add_column(escape(heading), justify="right")
     for setting in settings:
         figures = (setting.mean_snr_db, setting.gain_margin, setting.max_position_error_mm)
         counts = (setting.n_runs, setting.n_refused, setting.n_failed)
-        table.add_row(
-            setting.name,
-            *("" if figure is None else f"{figure:.2f}" for figure in figures),
-            *map(str, counts),
-        )
+        texts = ("" if figure is None else f"{figure:.2f}" for figure in figures)
+        table.add_row(*setting.texts().values(), *texts, *map(str, counts))
     return table

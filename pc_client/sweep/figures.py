@@ -24,12 +24,13 @@ _NOT_DONE = "#DDDDDD"
 _WIDTH = 11.0
 
 
-def draw_axis(rows: Rows, axis: str) -> str:
+def draw_axis(rows: Rows, axis: str, *, connect: bool) -> str:
     """Draw the SNR of all runs over one axis, and its mean for each kind of movement and each fidelity.
 
     Args:
         rows: runs that are done.
         axis: a column that varies.
+        connect: whether lines join the means of numbers; random samples differ in more than this axis.
 
     Returns:
         SVG text.
@@ -49,7 +50,7 @@ def draw_axis(rows: Rows, axis: str) -> str:
                 axes.plot(*_points(series, axis, positions), ls="", ms=3, alpha=0.3, **style)
                 axes.plot(
                     *_mean_points(series, axis, positions),
-                    ls=line if scale else "",
+                    ls=line if scale and connect else "",
                     ms=6,
                     label=label,
                     **style,

@@ -8,7 +8,7 @@ from importlib import resources
 from typing import Any
 
 from pc_client.sweep.controller_axes import sweepable_fields
-from pc_client.sweep.ranking import rank_settings, varying
+from pc_client.sweep.ranking import rank_settings, spans_grid, varying
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -43,6 +43,7 @@ def render_page(name: str, rows: Rows) -> str:
     done = [row for row in rows if row["status"] == "done" and row["snr_db"] is not None]
     pair = map_axes(rows)
     settings = rank_settings(rows)
+    connect = spans_grid(rows)
     plotted = [axis for axis in axes if done and len({row[axis] for row in done}) > 1]
     return template.render(
         name=name,
@@ -53,7 +54,7 @@ def render_page(name: str, rows: Rows) -> str:
         settings=settings[:_MOST_SETTINGS],
         n_settings=len(settings),
         map_figure=_data_uri(figures.draw_map(rows, *pair)) if pair and done else None,
-        axis_figures=[(axis, _data_uri(figures.draw_axis(done, axis))) for axis in plotted],
+        axis_figures=[(axis, _data_uri(figures.draw_axis(done, axis, connect=connect))) for axis in plotted],
         not_done=[row for row in rows if row["status"] != "done"][:_MOST_ERRORS],
         n_not_done=sum(row["status"] != "done" for row in rows),
     )

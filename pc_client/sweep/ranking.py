@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import prod
 from statistics import fmean
 from typing import Any
 
@@ -47,12 +48,23 @@ class Setting:
     @property
     def name(self) -> str:
         """Its values in one phrase."""
-        return ", ".join(f"{name} = {_short(value)}" for name, value in self.values.items())
+        return ", ".join(f"{name} = {value}" for name, value in self.texts().items())
+
+    def texts(self) -> dict[str, str]:
+        """Its values as texts, by column."""
+        return {name: _short(value) for name, value in self.values.items()}
 
 
 def varying(rows: Rows) -> list[str]:
     """The axes of a sweep: columns of `FACTORS` with more than one value, in their order."""
     return [column.name for column in FACTORS if len({row.get(column.name) for row in rows}) > 1]
+
+
+def spans_grid(rows: Rows) -> bool:
+    """Whether each value of the controller's fields was tried with each: not so for random samples."""
+    axes = _controller_axes(rows)
+    settings = {tuple(row[axis] for axis in axes) for row in rows}
+    return len(settings) == prod(len({row[axis] for row in rows}) for axis in axes)
 
 
 def rank_settings(rows: Rows) -> list[Setting]:
@@ -61,14 +73,18 @@ def rank_settings(rows: Rows) -> list[Setting]:
     Args:
         rows: of the table, with values of all `FACTORS`.
     """
-    of_controller = {"controller", *sweepable_fields()}
-    axes = [name for name in varying(rows) if name in of_controller] or ["controller"]
+    axes = _controller_axes(rows) or ["controller"]
     groups: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
         groups.setdefault(tuple(row[axis] for axis in axes), []).append(row)
     settings = [_judge(dict(zip(axes, key, strict=True)), group) for key, group in groups.items()]
     # The sort is stable: equals keep the order of the table.
     return sorted(settings, key=lambda s: (not s.complete, -(s.mean_snr_db or 0.0), s.mean_snr_db is None))
+
+
+def _controller_axes(rows: Rows) -> list[str]:
+    of_controller = {"controller", *sweepable_fields()}
+    return [name for name in varying(rows) if name in of_controller]
 
 
 def _judge(values: Mapping[str, Any], rows: Rows) -> Setting:
