@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import typer
 
-from pc_client.commands import compare, doctor, experiment, movements, recordings, sweep
+from pc_client.commands import compare, doctor, experiment, extract, movements, recordings, sweep
 from pc_client.errors import ClientError, full_message
 from protocol.errors import ProtocolError
 
@@ -27,6 +27,7 @@ app.command()(experiment.experiment)
 app.command()(experiment.run)
 app.add_typer(movements.app, name="movements")
 app.command()(sweep.sweep)
+app.command()(extract.extract)
 app.command()(compare.compare)
 app.command()(recordings.report)
 app.command()(recordings.export)

@@ -27,7 +27,6 @@ from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Stroke, tilt_of_normal
 
 __all__ = [
-    "BOUNDS",
     "Bounds",
     "Chain",
     "in_order",
@@ -38,18 +37,28 @@ __all__ = [
 ]
 
 
+#: Most width of a stroke over the duration of its part; a stroke that fills it has 1/6.
+WIDEST = 0.35
+
+
 class Bounds(NamedTuple):
-    """What a stroke may be, each as (least, most)."""
+    """What a stroke may be, each as (least, most).
 
-    sigma: tuple[float, float]
-    width: tuple[float, float]
-    turn: tuple[float, float]
+    Attributes:
+        sigma: below .08 a lognormal is a Gaussian for all purposes (skewness .24), and its t0 runs away.
+        width: s; from the narrowest bell that a 12 Hz signal can show to one of a slow sweep.
+        turn: rad; an arc of 2 pi has no chord, so its target points could not carry it.
+    """
 
+    sigma: tuple[float, float] = (0.08, 0.6)
+    width: tuple[float, float] = (0.012, 4.0)
+    turn: tuple[float, float] = (-4.5, 4.5)
 
-#: sigma: below .08 a lognormal is a Gaussian for all purposes (skewness .24) and its t0 runs away. Width (s):
-#: the narrowest bell that a 12 Hz signal can show, and one of a slow sweep. Turn (rad): an arc of 2 pi has no
-#: chord, so its target points could not carry it.
-BOUNDS = Bounds(sigma=(0.08, 0.6), width=(0.012, 4.0), turn=(-4.5, 4.5))
+    @classmethod
+    def of(cls, duration: float) -> Bounds:
+        """Bounds for a part of this duration, s: a bell far wider than the part would be a made-up drift."""
+        least, most = cls().width
+        return cls(width=(least, min(most, max(2.0 * least, WIDEST * duration))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

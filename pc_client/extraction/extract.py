@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.extraction.chain import BOUNDS, Chain, sigma_lognormal
+from pc_client.extraction.chain import Bounds, Chain, sigma_lognormal
 from pc_client.extraction.fitting import FitOptions, fit_parts
 from pc_client.extraction.recording import PenPart, PenRecording
 from pc_client.extraction.smoothing import SmoothPart, moves, smooth_part, speed_peaks
@@ -148,10 +148,10 @@ def _judge(part: SmoothPart, chain: Chain, n_peaks: int) -> tuple[PartExtraction
 
 def _degenerate(chains: Sequence[Chain]) -> list[str]:
     sigma = np.concatenate([chain.sigma for chain in chains])
-    count = int(np.count_nonzero(sigma <= BOUNDS.sigma[0]))
+    least = Bounds().sigma[0]
+    count = int(np.count_nonzero(sigma <= least))
     if not count:
         return []
-    least = BOUNDS.sigma[0]
     return [
         f"{count} of {len(sigma)} strokes held at the least sigma, {least}: bells like Gaussians, t0 is open"
     ]

@@ -38,7 +38,7 @@ _GAP_S = 0.5
 #: Set between parts whose times overlap, s.
 _BETWEEN_PARTS_S = 0.1
 
-_SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
+_SEPARATORS = ("\t", ";", ",")
 _MARKS = {"START", "BREAK"}
 _MISSING = {"", "nan", "na", "n/a", "none", "null", "inf", "+inf", "-inf", "infinity", "-infinity"}
 _TIME_NAMES = {"t", "time", "timestamp", "times"}
@@ -140,8 +140,8 @@ def _rows(text: str, name: str) -> _Table:
 
 
 def _fields(cells: str) -> list[str]:
-    fields = _SEPARATOR.split(cells)
-    return [field.strip().strip('"').strip("'") for field in fields]
+    separator = next((mark for mark in _SEPARATORS if mark in cells), None)  # None: any run of blanks
+    return [field.strip().strip("\"'") for field in cells.split(separator)]
 
 
 def _columns(fields: Sequence[str], where: str) -> _Columns:

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.extraction.addition import best_candidates, idle_strokes
-from pc_client.extraction.chain import Chain, inserted, without
+from pc_client.extraction.chain import Bounds, Chain, inserted, without
 from pc_client.extraction.initial import TYPICAL_SIGMA, initial_chain
 from pc_client.extraction.refine import Aim, Fit, refine, residuals
-from pc_client.extraction.smoothing import SmoothPart, low_passed, velocity
+from pc_client.extraction.smoothing import CUTOFF_HZ, SmoothPart, low_passed, velocity
 
 __all__ = ["FitOptions", "Scales", "fit_parts"]
 
@@ -159,4 +159,7 @@ def _aim(part: SmoothPart, p: NDArray[np.float64], v: NDArray[np.float64], scale
     if rows[-1] != len(part.t) - 1:
         rows = np.append(rows, len(part.t) - 1)
     weight = math.sqrt(len(part.t) / len(rows))
-    return Aim(part.t[rows], p[rows], v[rows], weight / scales.p, weight / scales.v)
+    duration = float(part.t[-1] - part.t[0])
+    freedom = part.p.shape[1] * (1.0 + 2.0 * CUTOFF_HZ * duration)
+    bounds = Bounds.of(duration)
+    return Aim(part.t[rows], p[rows], v[rows], weight / scales.p, weight / scales.v, freedom, bounds)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from pc_client.extraction.chain import BOUNDS, Chain, normals_across
+from pc_client.extraction.chain import Bounds, Chain, normals_across
 from pc_client.extraction.closed_forms import (
     CharacteristicPoints,
     bell_from_points,
@@ -88,7 +88,7 @@ def _by_area(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float,
     top = int(np.argmax(speed))
     area = float(np.sum(0.5 * (speed[1:] + speed[:-1]))) * float(t[1] - t[0])
     peak = float(speed[top])
-    width = _clipped(_PEAK_WIDTH * area / peak if peak > 0.0 else 0.0, BOUNDS.width)
+    width = _clipped(_PEAK_WIDTH * area / peak if peak > 0.0 else 0.0, Bounds().width)
     return float(t[top]) + width * TYPICAL_SIGMA, width, TYPICAL_SIGMA
 
 
@@ -103,8 +103,8 @@ def _by_closed_forms(t: NDArray[np.float64], speed: NDArray[np.float64]) -> list
         sigma_from_peak_ratio(v4 / v3),
         sigma_from_slope_ratio(v4 / v2),
     ):
-        law = bell_from_points(points, _clipped(sigma, BOUNDS.sigma)).lognormal
-        width = _clipped(math.exp(law.mu) * law.sigma, BOUNDS.width)
+        law = bell_from_points(points, _clipped(sigma, Bounds().sigma)).lognormal
+        width = _clipped(math.exp(law.mu) * law.sigma, Bounds().width)
         found.append((law.median, width, law.sigma))
     return found
 

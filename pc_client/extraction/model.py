@@ -39,7 +39,7 @@ class Linearisation(NamedTuple):
     Attributes:
         p: positions, (n, dim).
         v: velocities, (n, dim).
-        jacobian: derivatives, (2, dim, n, columns): of p, then of v.
+        jacobian: derivatives, (columns, 2, dim, n): of p, then of v, by each variable.
     """
 
     p: NDArray[np.float64]
@@ -55,24 +55,24 @@ def variables_per_stroke(dim: int) -> int:
 def linearise(chain: Chain, t: NDArray[np.float64], first: int, last: int) -> Linearisation:
     """Evaluate strokes first .. last - 1 at the times t (n,), when all before are done and none after begun.
 
-    The columns of the Jacobian: the target at which stroke `first` begins, then the variables of each stroke.
+    The rows of the Jacobian: the target at which stroke `first` begins, then the variables of each stroke.
     """
     s = slice(first, last)
-    m, w, sigma, turn = chain.median[s], chain.width[s], chain.sigma[s], chain.turn[s]
+    m, w, sigma, turn = (values[s, None] for values in (chain.median, chain.width, chain.sigma, chain.turn))
     targets = chain.targets[first : last + 1]
-    chord = np.diff(targets, axis=0)
+    chord = targets[1:] - targets[:-1]
     dim = chord.shape[1]
     across = _cross(chain.normal[s], chord)
 
-    # The bells: F, Lambda and the logarithmic derivatives of Lambda.
-    u = (t[:, None] - m) / w
+    # The bells, (strokes, n): F, Lambda and the logarithmic derivatives of Lambda.
+    u = (t - m) / w
     x = 1.0 + sigma * u
     begun = x > 1e-12
     x = np.where(begun, x, 1.0)
-    z = np.log(x) / sigma
     g = 1.0 / x
-    phi = np.where(begun, _INV_SQRT_TWO_PI * np.exp(-0.5 * z * z), 0.0)
-    done = np.where(begun, ndtr(z), 0.0)
+    z = np.log(x) / sigma
+    phi = np.exp(-0.5 * z * z) * (_INV_SQRT_TWO_PI * begun)
+    done = ndtr(z) * begun
     phi_g = phi * g
     rate = phi_g / w
     z_sigma = (u * g - z) / sigma
@@ -81,8 +81,7 @@ def linearise(chain: Chain, t: NDArray[np.float64], first: int, last: int) -> Li
     done_by = (-phi_g, -u * phi_g, phi * z_sigma)
 
     # The arcs: coefficients of the chord and of the vector across it.
-    half = 0.5 * turn
-    k = 1.0 / np.sinc(half / math.pi)
+    k = 1.0 / _sinc(0.5 * turn)
     k_log_slope = np.where(np.abs(turn) < _STRAIGHT, turn / 12.0, _safe_slope(turn))
     lag = done - 0.5
     beta = turn * lag
@@ -91,23 +90,20 @@ def linearise(chain: Chain, t: NDArray[np.float64], first: int, last: int) -> Li
     p_c, p_q, dp_c, dp_q = _arc_integrals(turn, done, cos, sin, k)
 
     n, size = len(t), variables_per_stroke(dim)
-    jacobian = np.zeros((2, dim, n, dim + (last - first) * size))
-    by_stroke = jacobian[..., dim:].reshape(2, dim, n, last - first, size)
-    turned = (
-        k_log_slope * v_c - lag * v_q,
-        k_log_slope * v_q + lag * v_c,
-        k_log_slope * p_c + dp_c,
-        k_log_slope * p_q + dp_q,
-    )
+    jacobian = np.zeros((dim + (last - first) * size, 2, dim, n))
+    by_stroke = jacobian[dim:].reshape(last - first, size, 2, dim, n)
+    p_turned = (k_log_slope * p_c + dp_c, k_log_slope * p_q + dp_q)
+    v_turned = (k_log_slope * v_c - lag * v_q, k_log_slope * v_q + lag * v_c)
+    turned_rates = tuple(rate * turn * change for change in done_by)
+    gained_rates = tuple(rate * gain for gain in log_rate)
     for i in range(dim):
-        c, q = chord[:, i], across[:, i]
-        along = cos * c + sin * q
-        sideways = turn * (cos * q - sin * c)
-        for column, (change, gain) in enumerate(zip(done_by, log_rate, strict=True)):
-            by_stroke[0, i, :, :, column] = change * along
-            by_stroke[1, i, :, :, column] = rate * (gain * along + change * sideways)
-        by_stroke[0, i, :, :, 3] = turned[2] * c + turned[3] * q
-        by_stroke[1, i, :, :, 3] = turned[0] * c + turned[1] * q
+        c, q = chord[:, i, None], across[:, i, None]
+        along, sideways = cos * c + sin * q, cos * q - sin * c
+        for row in range(3):
+            np.multiply(done_by[row], along, out=by_stroke[:, row, 0, i])
+            by_stroke[:, row, 1, i] = gained_rates[row] * along + turned_rates[row] * sideways
+        by_stroke[:, 3, 0, i] = p_turned[0] * c + p_turned[1] * q
+        by_stroke[:, 3, 1, i] = v_turned[0] * c + v_turned[1] * q
     if dim == 3:
         # Bending turns the vector across, n x c, towards -n at right angles to both.
         out_of_plane = -chain.normal[s] * np.linalg.norm(chord, axis=1)[:, None]
@@ -115,17 +111,23 @@ def linearise(chain: Chain, t: NDArray[np.float64], first: int, last: int) -> Li
         safe = np.where(small, 1.0, turn)
         bend_v = rate * np.where(small, k * lag, sin / safe)
         bend_p = np.where(small, 0.5 * k * (done * done - done), p_q / safe)
-        for i in range(3):
-            by_stroke[0, i, :, :, 4] = bend_p * out_of_plane[:, i]
-            by_stroke[1, i, :, :, 4] = bend_v * out_of_plane[:, i]
+        by_stroke[:, 4, 0] = bend_p[:, None] * out_of_plane[:, :, None]
+        by_stroke[:, 4, 1] = bend_v[:, None] * out_of_plane[:, :, None]
     _add_targets(jacobian, by_stroke, chain.normal[s], ((p_c, p_q), (v_c, v_q)))
-    return Linearisation(targets[0] + p_c @ chord + p_q @ across, v_c @ chord + v_q @ across, jacobian)
+    p = targets[0] + p_c.T @ chord + p_q.T @ across
+    return Linearisation(p, v_c.T @ chord + v_q.T @ across, jacobian)
 
 
 def _cross(normal: NDArray[np.float64], chord: NDArray[np.float64]) -> NDArray[np.float64]:
     if chord.shape[1] == 2:
         return np.column_stack((-chord[:, 1], chord[:, 0]))
     return np.cross(normal, chord)
+
+
+def _sinc(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    nonzero = np.where(angle == 0.0, 1e-20, angle)
+    value: NDArray[np.float64] = np.sin(nonzero) / nonzero
+    return value
 
 
 def _safe_slope(turn: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -141,16 +143,19 @@ def _arc_integrals(
     sin: NDArray[np.float64],
     k: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """K C and k S, and k dC/dd and k dS/dd."""
-    size = done * np.sinc(turn * done / (2.0 * math.pi))
-    angle = 0.5 * turn * (done - 1.0)
-    c, s = k * size * np.cos(angle), k * size * np.sin(angle)
+    """K C and k S, and k dC/dd and k dS/dd; cos and sin are those of the tangent, times k."""
+    half = 0.5 * turn
+    reach = k * done * _sinc(half * done)
+    angle = half * done - half
+    c, s = reach * np.cos(angle), reach * np.sin(angle)
     small = np.abs(turn) < _STRAIGHT
     safe = np.where(small, 1.0, turn)
     lag = done - 0.5
-    end_cos, end_sin = 0.5 * k * np.cos(0.5 * turn), 0.5 * k * np.sin(0.5 * turn)
-    dc = np.where(small, -turn * (lag**3 + 0.125) / 3.0, (lag * cos + end_cos - c) / safe)
-    ds = np.where(small, 0.5 * (done * done - done), (lag * sin - end_sin - s) / safe)
+    dc = (lag * cos + 0.5 * k * np.cos(half) - c) / safe
+    ds = (lag * sin - 0.5 * k * np.sin(half) - s) / safe
+    if small.any():
+        dc = np.where(small, -turn * (lag**3 + 0.125) / 3.0, dc)
+        ds = np.where(small, 0.5 * (done * done - done), ds)
     return c, s, dc, ds
 
 
@@ -160,8 +165,8 @@ def _add_targets(
     normal: NDArray[np.float64],
     coefficients: tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...],
 ) -> None:
-    """The columns of the targets: a target ends one stroke, G_j, and takes from the next, - G_(j+1)."""
-    dim = jacobian.shape[1]
+    """The rows of the targets: a target ends one stroke, G_j, and takes from the next, - G_(j+1)."""
+    dim = jacobian.shape[2]
     if dim == 2:
         turning = np.array([[[0.0, -1.0], [1.0, 0.0]]])
     else:
@@ -171,8 +176,8 @@ def _add_targets(
     for kind, (along, sideways) in enumerate(coefficients):
         for i in range(dim):
             for j in range(dim):
-                own = sideways * turning[:, i, j] + (along if i == j else 0.0)
-                ends = by_stroke[kind, i, :, :, by_stroke.shape[-1] - dim + j]
+                own = along if i == j else sideways * turning[:, i, j, None]
+                ends = by_stroke[:, j - dim, kind, i]
                 ends[...] = own
-                ends[:, :-1] -= own[:, 1:]
-                jacobian[kind, i, :, j] = (1.0 if kind == 0 and i == j else 0.0) - own[:, 0]
+                ends[:-1] -= own[1:]
+                jacobian[j, kind, i] = (1.0 if kind == 0 and i == j else 0.0) - own[0]

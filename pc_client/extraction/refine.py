@@ -18,7 +18,6 @@ problems" (2004), section 3.2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -26,15 +25,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solveh_banded
 
-from pc_client.extraction.chain import BOUNDS, Chain, in_order, normals_across
+from pc_client.extraction.chain import Bounds, Chain, in_order, normals_across
 from pc_client.extraction.model import linearise, variables_per_stroke
+from pc_client.extraction.preference import Preference, wishes
 
 __all__ = ["Aim", "Fit", "moved", "refine", "residuals"]
 
 #: A bell counts as begun and as done at this deviation: Phi(-4.5) = 3.4e-6 of its way.
 _TAIL = 4.5
 #: Samples a piece of the time axis.
-_PIECE = 48
+_PIECE = 96
 _DAMPING = 1e-3
 #: Longest step of median/width, ln width, sigma, turn and bending in one iteration.
 _STEP_LIMITS = (1.0, 0.7, 0.2, 1.0, 1.0)
@@ -51,6 +51,8 @@ class Aim:
         v: velocities, (n, dim).
         p_scale: by which position errors are multiplied before they are squared and summed.
         v_scale: by which velocity errors are.
+        freedom: how many independent numbers the signal holds.
+        bounds: of the strokes.
     """
 
     t: NDArray[np.float64]
@@ -58,6 +60,13 @@ class Aim:
     v: NDArray[np.float64]
     p_scale: float
     v_scale: float
+    freedom: float
+    bounds: Bounds
+
+    @property
+    def top_speed(self) -> float:
+        """Highest speed, per s."""
+        return float(np.sqrt(np.einsum("ij,ij->i", self.v, self.v).max()))
 
 
 class Fit(NamedTuple):
@@ -68,26 +77,37 @@ class Fit(NamedTuple):
 
 
 class _Equations(NamedTuple):
-    """Normal equations: the matrix as an upper band (scipy's storage), the gradient, and the cost."""
+    """Normal equations.
+
+    Attributes:
+        band: the matrix, (columns, bandwidth): each column from the diagonal down.
+        gradient: downhill, (columns,).
+        cost: squared errors and wishes.
+        error: squared errors alone.
+    """
 
     band: NDArray[np.float64]
     gradient: NDArray[np.float64]
     cost: float
+    error: float
 
 
 def refine(chain: Chain, aim: Aim, iterations: int, tolerance: float = 1e-3) -> Fit:
     """Better the strokes for some iterations, or until one gains less than `tolerance` of the cost.
 
-    The cost never grows. Every stroke stays inside `BOUNDS`. The strokes come back sorted by their medians.
+    The cost never grows. Every stroke stays inside the aim's bounds. The strokes come back sorted by their
+    medians.
     """
     chain = in_order(chain)
-    now = _equations(chain, aim)
+    data = _data_equations(chain, aim)
+    preference = Preference(data.error / aim.freedom, aim.top_speed)
+    now = _with_wishes(data, chain, preference)
     damping, growth = _DAMPING, 2.0
     for _ in range(iterations):
-        step = _solve(now, chain, damping)
+        step = _solve(now, chain, aim.bounds, damping)
         if step is not None:
-            tried = moved(chain, step)
-            then = _equations(tried, aim)
+            tried = moved(chain, step, aim.bounds)
+            then = _with_wishes(_data_equations(tried, aim), tried, preference)
             foreseen = float(step @ (damping * _diagonal(now) * step + now.gradient))
             gain = (now.cost - then.cost) / max(foreseen, 1e-300)
             if then.cost < now.cost:
@@ -102,7 +122,7 @@ def refine(chain: Chain, aim: Aim, iterations: int, tolerance: float = 1e-3) -> 
         growth *= 2.0
         if damping > 1e6:
             break
-    return Fit(in_order(chain), now.cost)
+    return Fit(in_order(chain), now.error)
 
 
 def residuals(
@@ -133,72 +153,82 @@ def _pieces(chain: Chain, t: NDArray[np.float64]) -> list[tuple[slice, int, int]
     return pieces
 
 
-def _equations(chain: Chain, aim: Aim) -> _Equations:
+def _data_equations(chain: Chain, aim: Aim) -> _Equations:
     dim = aim.p.shape[1]
     size = variables_per_stroke(dim)
     pieces = _pieces(chain, aim.t)
     bandwidth = max(last - first for _, first, last in pieces) * size + dim
     columns = dim + len(chain) * size
-    band = np.zeros((bandwidth, columns))
+    # Column j of the matrix from its diagonal down is band[j, : bandwidth]. Seen with steps one shorter, the
+    # same memory is the matrix itself, (column, row), so a piece is added as a square. What lies above the
+    # diagonal falls into the second half of the columns, where nobody looks.
+    band = np.zeros((columns + 1, 2 * bandwidth))
+    stride = band.strides[1]
+    square = np.lib.stride_tricks.as_strided(
+        band[1:], (columns, columns), ((2 * bandwidth - 1) * stride, stride), writeable=True
+    )
     gradient = np.zeros(columns)
-    cost = 0.0
+    error = 0.0
     for rows, first, last in pieces:
         model = linearise(chain, aim.t[rows], first, last)
         left = np.stack(((aim.p[rows] - model.p).T * aim.p_scale, (aim.v[rows] - model.v).T * aim.v_scale))
-        jacobian = model.jacobian
-        jacobian[0] *= aim.p_scale
-        jacobian[1] *= aim.v_scale
-        flat = jacobian.reshape(-1, jacobian.shape[-1])
+        model.jacobian[:, 0] *= aim.p_scale
+        model.jacobian[:, 1] *= aim.v_scale
+        flat = model.jacobian.reshape(len(model.jacobian), -1)
         flat_left = left.reshape(-1)
-        product = flat.T @ flat
-        start = first * size
-        i, j = _upper(len(product))
-        band[bandwidth - 1 + i - j, start + j] += product[i, j]
-        gradient[start : start + len(product)] += flat.T @ flat_left
-        cost += float(flat_left @ flat_left)
-    return _Equations(band, gradient, cost)
+        place = slice(first * size, first * size + len(flat))
+        square[place, place] += flat @ flat.T
+        gradient[place] += flat @ flat_left
+        error += float(flat_left @ flat_left)
+    return _Equations(band[1:, :bandwidth], gradient, error, error)
 
 
-@lru_cache(maxsize=512)
-def _upper(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    return np.triu_indices(n)
+def _with_wishes(data: _Equations, chain: Chain, preference: Preference) -> _Equations:
+    wished = wishes(chain, preference)
+    width = wished.gradient.shape[1]
+    size = variables_per_stroke(chain.targets.shape[1])
+    for i in range(width):
+        places = slice(i, i + size * len(chain), size)
+        data.gradient[places] += wished.gradient[:, i]
+        data.band[places, : width - i] += wished.matrix[:, i, i:]
+    return _Equations(data.band, data.gradient, data.error + wished.cost, data.error)
 
 
 def _diagonal(equations: _Equations) -> NDArray[np.float64]:
-    diagonal = equations.band[-1]
+    diagonal = equations.band[:, 0]
     floored: NDArray[np.float64] = diagonal + 1e-9 * float(diagonal.max())
     return floored
 
 
-def _solve(equations: _Equations, chain: Chain, damping: float) -> NDArray[np.float64] | None:
+def _solve(equations: _Equations, chain: Chain, bounds: Bounds, damping: float) -> NDArray[np.float64] | None:
     """The damped step; variables that stand at a bound and are pushed over it stay where they are."""
-    band = equations.band.copy()
+    band = equations.band.T.copy()
     diagonal = _diagonal(equations)
-    band[-1] += damping * diagonal
-    pinned = _pinned(chain, equations.gradient)
-    band[-1, pinned] += _PINNED * float(diagonal.max())
+    band[0] += damping * diagonal
+    pinned = _pinned(chain, bounds, equations.gradient)
+    band[0, pinned] += _PINNED * float(diagonal.max())
     try:
-        step: NDArray[np.float64] = solveh_banded(band, equations.gradient, check_finite=False)
+        step: NDArray[np.float64] = solveh_banded(band, equations.gradient, lower=True, check_finite=False)
     except LinAlgError:
         return None
     step[pinned] = 0.0
     return step if np.isfinite(step).all() else None
 
 
-def _pinned(chain: Chain, downhill: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _pinned(chain: Chain, bounds: Bounds, downhill: NDArray[np.float64]) -> NDArray[np.bool_]:
     dim = chain.targets.shape[1]
     pinned = np.zeros(len(downhill), dtype=bool)
     table = pinned[dim:].reshape(len(chain), -1)
     pushes = downhill[dim:].reshape(len(chain), -1)
-    bounded = ((1, chain.width, BOUNDS.width), (2, chain.sigma, BOUNDS.sigma), (3, chain.turn, BOUNDS.turn))
+    bounded = ((1, chain.width, bounds.width), (2, chain.sigma, bounds.sigma), (3, chain.turn, bounds.turn))
     for column, values, (least, most) in bounded:
         push = pushes[:, column]
         table[:, column] = ((values <= least) & (push < 0.0)) | ((values >= most) & (push > 0.0))
     return pinned
 
 
-def moved(chain: Chain, step: NDArray[np.float64]) -> Chain:
-    """The chain after a step of all variables (columns of `linearise`), kept inside `BOUNDS`."""
+def moved(chain: Chain, step: NDArray[np.float64], bounds: Bounds) -> Chain:
+    """The chain after a step of all variables (columns of `linearise`), kept inside the bounds."""
     dim = chain.targets.shape[1]
     table = step[dim:].reshape(len(chain), -1)
     limits = np.array(_STEP_LIMITS[: table.shape[1] - dim])
@@ -209,9 +239,9 @@ def moved(chain: Chain, step: NDArray[np.float64]) -> Chain:
         turn, normal = _bent(chain, turn, change[:, 4], np.diff(targets, axis=0))
     return Chain(
         chain.median + chain.width * change[:, 0],
-        np.clip(chain.width * np.exp(change[:, 1]), *BOUNDS.width),
-        np.clip(chain.sigma + change[:, 2], *BOUNDS.sigma),
-        np.clip(turn, *BOUNDS.turn),
+        np.clip(chain.width * np.exp(change[:, 1]), *bounds.width),
+        np.clip(chain.sigma + change[:, 2], *bounds.sigma),
+        np.clip(turn, *bounds.turn),
         normal,
         targets,
     )

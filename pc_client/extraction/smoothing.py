@@ -51,9 +51,12 @@ MIN_DURATION_S = 0.02
 
 _ORDER = 4
 #: The impulse response has died away (to 1e-6) after this time, s.
-_SETTLED_S = 0.25
-#: Time steps of a clock that can be trusted differ by less than this factor from one to the next.
-_STEADY_RATIO = 4.0
+_SETTLED_S = 0.5
+#: A time step is steady within this factor of the typical one; a clock can be trusted with this share of
+#: steady steps, and a curve can be drawn through so many of them.
+_STEADY_RATIO = 2.0
+_STEADY_SHARE = 0.9
+_LEAST_STEPS = 3
 _MAX_OVERSAMPLING = 16
 
 
@@ -121,21 +124,35 @@ def velocity(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float
 
 
 def _interpolated(part: PenPart, t: NDArray[np.float64]) -> NDArray[np.float64]:
-    # A cubic spline is exact to the fourth order, but swings out where two time stamps lie close together and
-    # the clock is not to be trusted. There nothing but the straight line is known between two samples.
+    """Positions at the times t: cubic splines where the clock is steady, straight lines elsewhere.
+
+    A cubic spline is exact to the fourth order, but swings out where two time stamps lie close together and
+    the clock is not to be trusted. There nothing but the straight line is known between two samples.
+    """
+    points: NDArray[np.float64] = make_interp_spline(part.t, part.p, k=1)(t)
     steps = np.diff(part.t)
-    ratios = steps[1:] / steps[:-1]
-    steady = len(steps) >= 3 and float(np.maximum(ratios, 1.0 / ratios).max()) < _STEADY_RATIO
-    curve = CubicSpline(part.t, part.p) if steady else make_interp_spline(part.t, part.p, k=1)
-    points: NDArray[np.float64] = curve(t)
+    typical = float(np.median(steps))
+    steady = (steps > typical / _STEADY_RATIO) & (steps < typical * _STEADY_RATIO)
+    if np.mean(steady) < _STEADY_SHARE:
+        return points
+    breaks = np.flatnonzero(~steady)
+    for first, last in zip([0, *(breaks + 1)], [*breaks, len(steps)], strict=True):
+        if last - first >= _LEAST_STEPS:
+            inside = (t >= part.t[first]) & (t <= part.t[last])
+            run = slice(first, last + 1)
+            points[inside] = CubicSpline(part.t[run], part.p[run])(t[inside])
     return points
 
 
 def low_passed(points: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
     """Positions (n, dim) at a uniform rate (Hz), low-passed at 12 Hz without a shift in time."""
+    # A straight line passes as it is; without it the filter starts and ends nearly at rest.
+    line = np.linspace(points[0], points[-1], len(points))
     padding = min(len(points) - 1, math.ceil(_SETTLED_S * rate))
-    filtered: NDArray[np.float64] = sosfiltfilt(_filter(rate), points, axis=0, padtype="odd", padlen=padding)
-    return filtered
+    filtered: NDArray[np.float64] = sosfiltfilt(
+        _filter(rate), points - line, axis=0, padtype="odd", padlen=padding
+    )
+    return line + filtered
 
 
 @lru_cache(maxsize=32)

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pc_client.extraction.chain import Chain, in_order, inserted, normals_across, sigma_lognormal, without
+from pc_client.extraction.chain import (
+    Bounds,
+    Chain,
+    in_order,
+    inserted,
+    normals_across,
+    sigma_lognormal,
+    without,
+)
 from pc_client.extraction.model import linearise, variables_per_stroke
 from pc_client.extraction.refine import moved
 
@@ -46,16 +54,18 @@ def test_a_chain_is_the_movement_of_the_package(dim):
 def test_the_jacobian_is_the_derivative(dim, turns):
     chain = chain_of(dim, turns)
     jacobian = linearise(chain, TIMES, 0, len(chain)).jacobian
-    assert jacobian.shape == (2, dim, len(TIMES), dim + len(chain) * variables_per_stroke(dim))
+    assert jacobian.shape == (dim + len(chain) * variables_per_stroke(dim), 2, dim, len(TIMES))
     h = 1e-6
-    for column in range(jacobian.shape[-1]):
-        step = np.zeros(jacobian.shape[-1])
+    for column in range(len(jacobian)):
+        step = np.zeros(len(jacobian))
         step[column] = h
-        ahead, behind = (linearise(moved(chain, sign * step), TIMES, 0, len(chain)) for sign in (1.0, -1.0))
+        ahead, behind = (
+            linearise(moved(chain, sign * step, Bounds()), TIMES, 0, len(chain)) for sign in (1.0, -1.0)
+        )
         for kind, name in enumerate("pv"):
             numeric = (getattr(ahead, name) - getattr(behind, name)).T / (2.0 * h)
             scale = max(1.0, float(np.abs(numeric).max()))
-            assert jacobian[kind, :, :, column] == pytest.approx(numeric, abs=2e-7 * scale)
+            assert jacobian[column, kind] == pytest.approx(numeric, abs=2e-7 * scale)
 
 
 def test_a_piece_of_a_chain_is_evaluated_by_itself():

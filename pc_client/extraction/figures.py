@@ -1,0 +1,121 @@
+"""Pictures of extractions, as PNG bytes: one recording, and an overview of many.
+
+The only module of the package that loads matplotlib. The recording is the thick grey line, the reconstruction
+the thin one upon it; what stands alone (bells, virtual targets) has the colour of its own.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from pc_client.extraction.extract import Extraction, PartExtraction
+from pc_client.extraction.results import Row
+
+__all__ = ["draw_extraction", "draw_overview"]
+
+_RECORDED, _RECONSTRUCTED, _BELLS, _TARGETS = "#A8A29E", "#D55E00", "#56B4E9", "#0072B2"
+_DPI = 110
+
+
+def draw_extraction(extraction: Extraction) -> bytes:
+    """One recording: its path with the virtual targets, and its speed with the single bells.
+
+    Args:
+        extraction: with at least one part that moves.
+    """
+    spatial = extraction.parts[0].p.shape[1] == 3
+    figure = Figure(figsize=(12.0, 4.6), layout="constrained")
+    figure.suptitle(_title(extraction), fontsize=10)
+    grid = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.7))
+    path = figure.add_subplot(grid[0], projection="3d" if spatial else None)
+    speed = figure.add_subplot(grid[1])
+    for index, part in enumerate(extraction.parts):
+        _draw_path(path, part, labelled=index == 0)
+        _draw_speed(speed, part, labelled=index == 0)
+    if not spatial:
+        for still in extraction.still:
+            path.plot(*still.p[0], marker=".", color=_RECORDED)
+        path.set_aspect("equal", adjustable="datalim")
+    path.set_title("path, unit of the recording", fontsize=9)
+    path.legend(fontsize=7, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.06), ncols=3)
+    speed.set_title("speed, unit of the recording per s", fontsize=9)
+    speed.set_xlabel("time (s)")
+    speed.set_ylim(bottom=0.0)
+    speed.spines[["top", "right"]].set_visible(False)
+    speed.legend(fontsize=7, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.1), ncols=3)
+    return _png(figure)
+
+
+def draw_overview(rows: Sequence[Row]) -> bytes:
+    """A batch: histograms of SNR_v, SNR_t and strokes per speed peak.
+
+    Args:
+        rows: of recordings; those in which nothing moves are passed over.
+    """
+    moving = [row for row in rows if row.snr_v_db is not None]
+    figures = (
+        ("SNR_v (dB)", [row.snr_v_db for row in moving], "%.1f dB", "least"),
+        ("SNR_t (dB)", [row.snr_t_db for row in moving], "%.1f dB", "least"),
+        ("strokes per speed peak", [row.strokes_per_peak for row in moving], "%.2f", "most"),
+    )
+    figure = Figure(figsize=(12.0, 3.4), layout="constrained")
+    figure.suptitle(f"{len(moving)} recordings", fontsize=10)
+    for index, (label, values, form, worst) in enumerate(figures):
+        axes = figure.add_subplot(1, 3, index + 1)
+        known = np.array([value for value in values if value is not None])
+        if len(known):
+            axes.hist(known, bins=min(40, max(5, len(known) // 4)), color=_TARGETS)
+            axes.axvline(known.mean(), color=_RECONSTRUCTED, linewidth=1.5)
+            extreme = f"{worst} {form % (known.min() if worst == 'least' else known.max())}"
+            axes.set_title(f"mean {form % known.mean()}, {extreme}", fontsize=9)
+        axes.set_xlabel(label)
+        axes.spines[["top", "right"]].set_visible(False)
+        if index == 0:
+            axes.set_ylabel("recordings")
+    return _png(figure)
+
+
+def _title(extraction: Extraction) -> str:
+    return (
+        f"{'/'.join(PurePath(extraction.name).parts[-3:])}: SNR_v {extraction.snr_v_db:.1f} dB, "
+        f"SNR_t {extraction.snr_t_db:.1f} dB, {extraction.n_strokes} strokes for "
+        f"{extraction.n_speed_peaks} speed peaks"
+    )
+
+
+def _draw_path(axes: Any, part: PartExtraction, *, labelled: bool) -> None:
+    dim = part.p.shape[1]
+    labels = ("recorded", "reconstructed", "virtual targets") if labelled else (None, None, None)
+    targets = part.law.target_points[:, :dim]
+    axes.plot(*part.p.T, color=_RECORDED, linewidth=4.0, alpha=0.7, label=labels[0])
+    axes.plot(*targets.T, color=_TARGETS, linewidth=0.5, linestyle=":")
+    axes.plot(
+        *targets.T, linestyle="none", marker="o", markersize=4, mfc="none", mec=_TARGETS, label=labels[2]
+    )
+    axes.plot(*part.law.evaluate(part.t).p[:, :dim].T, color=_RECONSTRUCTED, linewidth=1.3, label=labels[1])
+
+
+def _draw_speed(axes: Any, part: PartExtraction, *, labelled: bool) -> None:
+    labels = ("recorded, low-passed", "reconstructed", "single strokes") if labelled else (None, None, None)
+    bells = part.law.stroke_speeds(part.t)
+    axes.plot(
+        part.t, np.linalg.norm(part.v, axis=1), color=_RECORDED, linewidth=4.0, alpha=0.7, label=labels[0]
+    )
+    for index, bell in enumerate(bells.T):
+        axes.plot(part.t, bell, color=_BELLS, linewidth=0.8, label=labels[2] if index == 0 else None)
+    reconstructed = np.linalg.norm(part.law.evaluate(part.t).v, axis=1)
+    axes.plot(part.t, reconstructed, color=_RECONSTRUCTED, linewidth=1.3, label=labels[1])
+
+
+def _png(figure: Figure) -> bytes:
+    page = io.BytesIO()
+    FigureCanvasAgg(figure)
+    figure.savefig(page, format="png", dpi=_DPI)
+    return page.getvalue()

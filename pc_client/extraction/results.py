@@ -1,0 +1,109 @@
+"""What an extraction leaves behind: a row of figures for each recording, a row of numbers for each stroke.
+
+`extraction.json` is a list of rows, one for each recording that could be read, in the order they were given.
+`strokes.csv` holds every stroke as the theory writes it, so that the movement can be had back from it alone.
+A stroke runs from (x0, y0, z0) to (x1, y1, z1), in the unit of the recording, turning by `turn` in the plane
+that `tilt` chooses (see `pc_client.movements.stroke.arc_frame`); length is D.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from typing import NamedTuple
+
+from pc_client.extraction.extract import Extraction
+
+__all__ = ["Row", "StrokeRow", "row_of", "stroke_rows", "to_csv", "to_json"]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Figures of one recording, as in extraction.json; None where an SNR is not defined (nothing moves)."""
+
+    file: str
+    snr_v_db: float | None
+    snr_t_db: float | None
+    n_strokes: int
+    n_speed_peaks: int
+
+    @property
+    def lognormality(self) -> float | None:
+        """SNR_v per stroke, dB."""
+        return None if self.snr_v_db is None else self.snr_v_db / self.n_strokes
+
+    @property
+    def strokes_per_peak(self) -> float | None:
+        """Strokes over speed peaks, or None without a peak."""
+        return self.n_strokes / self.n_speed_peaks if self.n_speed_peaks else None
+
+
+class StrokeRow(NamedTuple):
+    """One stroke in strokes.csv; part and stroke count from 1, t0 is in s, angles are in rad."""
+
+    file: str
+    part: int
+    stroke: int
+    t0: float
+    mu: float
+    sigma: float
+    length: float
+    turn: float
+    tilt: float
+    x0: float
+    y0: float
+    z0: float
+    x1: float
+    y1: float
+    z1: float
+
+
+def row_of(extraction: Extraction) -> Row:
+    """The figures of an extraction."""
+    return Row(
+        extraction.name,
+        extraction.snr_v_db,
+        extraction.snr_t_db,
+        extraction.n_strokes,
+        extraction.n_speed_peaks,
+    )
+
+
+def stroke_rows(extraction: Extraction) -> Iterator[StrokeRow]:
+    """All strokes of an extraction, in their order."""
+    for number, part in enumerate(extraction.parts, start=1):
+        law = part.law
+        for index, (stroke, length) in enumerate(zip(law.strokes, law.lengths.tolist(), strict=True)):
+            bell = stroke.timing.lognormal
+            begin, end = law.target_points[index].tolist(), law.target_points[index + 1].tolist()
+            yield StrokeRow(
+                extraction.name,
+                number,
+                index + 1,
+                bell.t0,
+                bell.mu,
+                bell.sigma,
+                length,
+                stroke.turn,
+                stroke.tilt,
+                *begin,
+                *end,
+            )
+
+
+def to_json(rows: Iterable[Row]) -> str:
+    """The text of extraction.json: one line for each recording."""
+    lines = (json.dumps(asdict(row), allow_nan=False, ensure_ascii=False) for row in rows)
+    return "[\n" + ",\n".join(lines) + "\n]\n"
+
+
+def to_csv(rows: Iterable[StrokeRow]) -> str:
+    """The text of strokes.csv, to the last digit."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(StrokeRow._fields)
+    writer.writerows(rows)
+    return text.getvalue()

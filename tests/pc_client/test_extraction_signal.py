@@ -1,0 +1,135 @@
+"""The signal that strokes are judged by: low-passed at 12 Hz, not shifted, not bent at its ends."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pc_client.extraction.addition import best_candidates
+from pc_client.extraction.initial import characteristic_points, initial_chain, salient_points
+from pc_client.extraction.recording import PenPart
+from pc_client.extraction.smoothing import CUTOFF_HZ, moves, smooth_part, speed_peaks
+from pc_client.movements.lognormal import Lognormal
+
+
+def wave(frequency, rate=200.0, duration=4.0):
+    t = np.arange(0.0, duration + 0.5 / rate, 1.0 / rate)
+    return PenPart(
+        t, np.column_stack((np.sin(2 * math.pi * frequency * t), np.cos(2 * math.pi * frequency * t)))
+    )
+
+
+@pytest.mark.parametrize("rate", [60.0, 133.0, 200.0, 1000.0])
+@pytest.mark.parametrize(("frequency", "gain"), [(1.0, 1.0), (5.0, 1.0), (CUTOFF_HZ, 0.5), (24.0, 0.004)])
+def test_what_passes_and_what_does_not(rate, frequency, gain):
+    smooth = smooth_part(wave(frequency, rate))
+    middle = slice(len(smooth.t) // 4, -len(smooth.t) // 4)
+    radius = np.linalg.norm(smooth.p[middle], axis=1)
+    assert radius == pytest.approx(gain, abs=0.01)
+    assert smooth.speed[middle] == pytest.approx(2 * math.pi * frequency * gain, rel=0.02, abs=1.5)
+    if gain > 0.4:  # not shifted in time
+        phase = np.unwrap(np.arctan2(smooth.p[middle, 0], smooth.p[middle, 1]))
+        assert phase - 2 * math.pi * frequency * smooth.t[middle] == pytest.approx(
+            np.zeros(len(radius)) + phase[0] - 2 * math.pi * frequency * smooth.t[middle][0], abs=0.01
+        )
+
+
+def test_a_straight_run_keeps_its_speed_to_both_ends():
+    t = np.linspace(0.0, 0.5, 40)
+    smooth = smooth_part(PenPart(t, np.column_stack((3.0 * t, -4.0 * t))))
+    assert smooth.speed == pytest.approx(5.0)
+    assert smooth.p[[0, -1]] == pytest.approx(np.array([[0.0, 0.0], [1.5, -2.0]]))
+
+
+def test_times_begin_and_end_with_the_part():
+    smooth = smooth_part(PenPart([1.0, 1.01, 1.2, 1.2303], np.eye(4)[:, :2]))
+    assert (smooth.t[0], smooth.t[-1]) == (1.0, 1.2303)
+    assert np.diff(smooth.t) == pytest.approx(smooth.step)
+    assert smooth.step == pytest.approx(0.005, rel=0.02)
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 300), st.integers(-9, 9), st.integers(-9, 9)), min_size=2, max_size=40)
+)
+@settings(max_examples=60, deadline=None)
+def test_no_clock_makes_the_signal_leave_the_path_far(rows):
+    """No overshoot of a curve between close time stamps: never more than the size of the path itself."""
+    steps, x, y = np.array(rows, dtype=float).T
+    part = PenPart(np.cumsum(steps) * 1e-3, np.column_stack((x, y)))
+    if not moves(part):
+        return
+    smooth = smooth_part(part)
+    size = np.ptp(part.p, axis=0)
+    slack = size + 1e-9
+    assert (smooth.p >= part.p.min(axis=0) - slack).all()
+    assert (smooth.p <= part.p.max(axis=0) + slack).all()
+
+
+@pytest.mark.parametrize(
+    ("t", "p", "expected"),
+    [
+        ([0.0], [[1.0, 1.0]], False),
+        ([0.0, 0.01], [[0.0, 0.0], [1.0, 1.0]], False),
+        ([0.0, 0.5], [[2.0, 2.0], [2.0, 2.0]], False),
+        ([0.0, 0.05], [[0.0, 0.0], [1.0, 1.0]], True),
+    ],
+)
+def test_what_is_a_movement(t, p, expected):
+    assert moves(PenPart(t, p)) is expected
+
+
+def bells(*laws):
+    t = np.arange(0.0, 2.5, 0.005)
+    x = sum(length * law.evaluate(t).done for law, length in laws)
+    return smooth_part(PenPart(t, np.column_stack((x, np.zeros_like(x)))))
+
+
+def test_bells_apart_are_one_peak_one_salient_interval_and_one_stroke_each():
+    laws = [Lognormal(0.1, -0.9, 0.25), Lognormal(0.8, -0.9, 0.2), Lognormal(1.4, -0.9, 0.3)]
+    smooth = bells(*((law, 10.0) for law in laws))
+    assert smooth.t[speed_peaks(smooth)] == pytest.approx([law.mode for law in laws], abs=0.01)
+    assert len(salient_points(smooth)) == 4
+    chain = initial_chain(smooth)
+    assert chain.median == pytest.approx([law.median for law in laws], abs=0.03)
+    assert chain.width == pytest.approx([math.exp(law.mu) * law.sigma for law in laws], rel=0.2)
+    assert chain.targets[:, 0] == pytest.approx([0.0, 10.0, 20.0, 30.0], abs=0.5)
+
+
+def test_a_lone_bell_is_found_by_the_closed_forms_alone():
+    law = Lognormal(0.1, -0.5, 0.25)
+    smooth = bells((law, 10.0))
+    chain = initial_chain(smooth)
+    assert (chain.sigma[0], chain.median[0]) == (
+        pytest.approx(0.25, abs=0.02),
+        pytest.approx(law.median, abs=0.01),
+    )
+    points = characteristic_points(smooth.t, smooth.speed)
+    assert points.times == pytest.approx((law.inflections.before, law.mode, law.inflections.after), abs=0.01)
+
+
+def test_a_ripple_counts_as_a_peak_only_above_the_stated_prominence():
+    t = np.arange(0.0, 2.0, 0.005)
+    for height, peaks in ((0.05, 2), (0.002, 1)):
+        speed = np.exp(-0.5 * ((t - 0.6) / 0.1) ** 2) + height * np.exp(-0.5 * ((t - 1.4) / 0.06) ** 2)
+        way = np.cumsum(speed) * 0.005
+        assert len(speed_peaks(smooth_part(PenPart(t, np.column_stack((way, 0.0 * way)))))) == peaks
+
+
+def test_candidates_are_where_the_residual_is():
+    t = np.arange(0.0, 3.0, 0.005)
+    left = np.zeros((len(t), 2))
+    for at, height, axis in ((0.5, 2.0, 0), (1.7, -3.0, 1), (2.99, 1.0, 0)):
+        left[:, axis] += height * np.exp(-0.5 * ((t - at) / 0.032) ** 2)
+    found = best_candidates(t, left, 3)
+    assert [candidate.median for candidate in found] == pytest.approx([1.7, 0.5, 2.99], abs=0.011)
+    assert found[0].width == 0.032
+    assert found[0].energy == pytest.approx(9.0 * math.sqrt(math.pi) * 0.032 / 0.005, rel=0.02)
+    assert found[0].energy > found[1].energy > found[2].energy
+
+
+def test_a_residual_of_nothing_has_no_candidate():
+    assert best_candidates(np.arange(100) * 0.005, np.zeros((100, 2)), 4) == []
