@@ -314,7 +314,9 @@ def test_comparison_is_that_of_the_command() -> None:
     for plan, done in zip(wanted[1::2], executed, strict=True):
         assert plan[4] == done[4]
         assert float(plan[2]) == pytest.approx(float(done[2]), abs=0.02)
-    filtered = next(row for row in wanted[1::2] if row is wanted[17])
+    filtered = wanted[2 * list(GENERATORS).index("uniform") + 1]
     assert "shows .33 with an R² of .85" in SENTENCES
     assert_printed(float(filtered[5]), ".33")
     assert_printed(float(filtered[6]), ".85")
+    straight = executed[list(GENERATORS).index("minimum_jerk")]
+    assert f"shows {straight[5]} as executed, with an R² of {straight[6]}" in SENTENCES
