@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pc_client.control.delay import LONGEST_DELAY, estimate_delay
-from pc_client.control.loop_model import LoopModel, lagged_way
+from pc_client.control.loop_model import NO_LAG, LoopModel, lagged_way
 from pc_client.errors import DriverError
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ def _delayed(t: Array, knots: Array, commands: Array, dead_time: float, lag: flo
     at = np.clip(t - dead_time, knots[0], knots[-1])
     k = np.minimum(np.searchsorted(knots, at, side="right") - 1, len(commands) - 1)
     since = (at - knots[k])[:, None]
-    if lag <= 0.0:
+    if lag < NO_LAG:
         return way[k] + commands[k] * since, commands[k]
     excess = velocity[k] - commands[k]
     left = np.exp(-since / lag)

@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+NO_LAG = 1e-6
+"""A lag below this [s] is none: no motion of an arm shows it."""
+
 _SETTLED = 12.0
 """Time constants after which a first-order lag has settled to 6e-6."""
 
@@ -93,7 +96,7 @@ def lagged_way(knots: Array, commands: Array, lag: float) -> tuple[Array, Array]
     """
     steps = np.diff(knots)
     velocity = np.zeros((len(knots), commands.shape[1]))
-    if lag > 0.0:
+    if lag >= NO_LAG:
         now = velocity[0]
         for k, step in enumerate(steps):
             now = commands[k] + (now - commands[k]) * exp(-step / lag)
@@ -105,7 +108,7 @@ def lagged_way(knots: Array, commands: Array, lag: float) -> tuple[Array, Array]
 def _way_after_step(t: Array, lag: float) -> Array:
     """Way at times t since a velocity step of 1 began, behind the lag: t - lag (1 - exp(-t / lag))."""
     since = np.maximum(t, 0.0)
-    if lag <= 0.0:
+    if lag < NO_LAG:
         return since
     way: Array = since - lag * -np.expm1(-since / lag)
     return way

@@ -20,7 +20,7 @@ from math import exp, floor, log
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.control.loop_model import LoopModel
+from pc_client.control.loop_model import NO_LAG, LoopModel
 
 Array = NDArray[np.float64]
 
@@ -56,18 +56,18 @@ class StateEstimator:
         qd: (6,) estimated velocities [rad/s].
     """
 
-    __slots__ = ("_gains", "_keep", "_lag", "_late", "_period", "_sent", "q", "qd")
+    __slots__ = ("_gains", "_lag", "_pieces", "_sent", "q", "qd")
 
     def __init__(self, loop: LoopModel, gains: EstimatorGains, period: float) -> None:
         self._gains = gains
-        self._period = period
         self._lag = loop.lag
-        self._keep = exp(-period / loop.lag) if loop.lag > 0.0 else 0.0
-        # Over the last cycle acted, for the share `late` of it, the command of `older` cycles ago, then the
-        # one after it.
+        # In the cycle before a report two commands act one after the other: one of `older` cycles ago, whose
+        # end the dead time has moved into this cycle, and its successor. Each piece: time, what is left of an
+        # excess of velocity after it.
         cycles = loop.dead_time / period
         older = floor(cycles) + 1
-        self._late = cycles - floor(cycles)
+        first = (cycles - floor(cycles)) * period
+        self._pieces = [(time, _keep(loop, time)) for time in (first, period - first)]
         self._sent: deque[Sequence[float]] = deque([(0.0,) * 6] * (older + 1), maxlen=older + 1)
         self.q: list[float] = []
         self.qd = [0.0] * 6
@@ -96,13 +96,12 @@ class StateEstimator:
         self._sent.append(qd_cmd)
 
     def _predict(self) -> None:
-        keep, lag, period, late = self._keep, self._lag, self._period, self._late
-        before, after = self._sent[0], self._sent[1]
-        for j in range(6):
-            u = late * before[j] + (1.0 - late) * after[j]
-            excess = self.qd[j] - u
-            self.q[j] += u * period + lag * excess * (1.0 - keep)
-            self.qd[j] = u + excess * keep
+        lag, q, qd = self._lag, self.q, self.qd
+        for (time, keep), command in zip(self._pieces, (self._sent[0], self._sent[1]), strict=True):
+            for j, u in enumerate(command):
+                excess = qd[j] - u
+                q[j] += u * time + lag * excess * (1.0 - keep)
+                qd[j] = u + excess * keep
 
 
 def kalman_gains(ratio: float, keep: float, lag: float, period: float) -> tuple[float, float, float]:
@@ -144,7 +143,7 @@ def identify_estimator(
     """
     steps = np.diff(q[-n_rest:], axis=0)
     sigma = max(float(np.sqrt(np.mean(np.square(steps - steps.mean(axis=0))) / 2.0)), 1e-9)
-    keep = exp(-period / loop.lag) if loop.lag > 0.0 else 0.0
+    keep = _keep(loop, period)
     best: tuple[float, EstimatorGains] | None = None
     for ratio in _RATIOS:
         k_q, k_qd, variance = kalman_gains(float(ratio), keep, loop.lag, period)
@@ -155,6 +154,11 @@ def identify_estimator(
             best = (unlikely, gains)
     assert best is not None  # there are ratios
     return best[1]
+
+
+def _keep(loop: LoopModel, time: float) -> float:
+    """Share of a velocity's distance from the command that the lag leaves after some time [s]."""
+    return exp(-time / loop.lag) if loop.lag >= NO_LAG else 0.0
 
 
 def _surprises(qd_cmd: Array, q: Array, loop: LoopModel, gains: EstimatorGains, period: float) -> Array:

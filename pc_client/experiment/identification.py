@@ -147,12 +147,12 @@ def identify(
         estimate=estimate,
         loop=loop,
         margins=loop_margins(loop, config.gain_p, config.gain_i, period),
-        learning=_learning_filter(config, loop, period),
+        learning=learning_filter(config, loop, period),
         estimator=identify_estimator(qd_cmd, q, loop, period, _AT_REST) if config.estimates else None,
     ), report
 
 
-def _learning_filter(config: ControllerConfig, loop: LoopModel, period: float) -> LearningFilter | None:
+def learning_filter(config: ControllerConfig, loop: LoopModel, period: float) -> LearningFilter | None:
     """The filter of a controller that learns.
 
     Raises:

@@ -8,7 +8,7 @@ be sent is held against the limits that the plan itself was held against.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,18 +207,28 @@ def broken_limit(
     """
     limits = plan.report.limits
     way = plan.start_q + np.cumsum(commands, axis=0) * period
-    clearance = clearance_model(model).along(way[::_CLEARANCE_STEP])
     acceleration = np.abs(np.diff(commands, axis=0)) / period
     learned_way = np.zeros(1) if learned is None else np.abs(np.cumsum(learned, axis=0)) * period
-    checks = (
-        ("joint speed", np.abs(commands) / (config.speed_share * np.array(model.limits.qd_max))),
-        ("joint acceleration", acceleration / np.minimum(limits.qdd_max, config.slew_limit)),
-        ("learned way", learned_way / (_LEARNED_WAY * config.abort_error)),
-        ("joint range", np.array([measure_joint_range(way, model.limits, limits).share])),
-        ("clearance to itself", limits.own_clearance_min / np.maximum(clearance.own, 1e-6)),
-        ("clearance to the base plane", limits.floor_clearance_min / np.maximum(clearance.floor, 1e-6)),
+    motion = {
+        "joint speed": np.abs(commands) / (config.speed_share * np.array(model.limits.qd_max)),
+        "joint acceleration": acceleration / np.minimum(limits.qdd_max, config.slew_limit),
+        "learned way": learned_way / (_LEARNED_WAY * config.abort_error),
+        "joint range": np.array(measure_joint_range(way, model.limits, limits).share),
+    }
+    if complaint := _first_beyond(motion):
+        return complaint  # what is no number must not come to the clearance
+    clearance = clearance_model(model).along(way[::_CLEARANCE_STEP])
+    return _first_beyond(
+        {
+            "clearance to itself": limits.own_clearance_min / np.maximum(clearance.own, 1e-6),
+            "clearance to the base plane": limits.floor_clearance_min / np.maximum(clearance.floor, 1e-6),
+        }
     )
-    for what, share in checks:
-        if not float(np.max(share)) <= 1.0:  # NaN fails too
+
+
+def _first_beyond(shares: Mapping[str, Array]) -> str:
+    """Name the first quantity whose share of what is allowed is above 1, or no number; else empty."""
+    for what, share in shares.items():
+        if not float(np.max(share)) <= 1.0:
             return f"{what} would be {float(np.max(share)):.0%} of what is allowed"
     return ""

@@ -1,0 +1,116 @@
+"""The noise floor: from rest to Eq. 10, checked against perfect arms with known noise."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recording_samples import N_VALUES, PERIOD, SIGNALS, bell, provenance, record_movement
+
+from pc_client.analysis.noise_floor import driven_alike, floor_db, step_covariance, unrepeatable_power
+from pc_client.analysis.run import Run, analyse_run
+from pc_client.analysis.speed_noise import speed_noise
+from pc_client.analysis.table import build_table
+from pc_client.kinematics.forward import tcp_positions
+from pc_client.kinematics.robot_model import robot_model
+from pc_client.recording.layout import Phase
+from pc_client.recording.loader import load_recording
+from pc_client.recording.recorder import Recorder
+
+SIGMA = np.array((1.1e-5, 1.1e-5, 1.45e-5, 1.45e-5, 1.75e-5, 1.75e-5))
+Q0 = np.array((0.4, -1.77, -2.1, -0.1, 1.3, 1.86))
+WAY = np.array((0.5, 0.3, -0.4, 0.2, -0.1, 0.3))
+
+
+def record_joints(path: Path, seed: int, *, ripple: float = 0.0, learns: bool = False) -> Run:
+    """A joint movement on a UR3 whose only fault is the noise of its encoders (and a ripple that repeats)."""
+    model, random = robot_model("ur3"), np.random.default_rng(seed)
+    rest, duration = 0.8, 6.0
+    t = PERIOD * np.arange(-round(rest / PERIOD), round((duration + rest) / PERIOD) + 1)
+    q_ref = Q0 + bell(t, duration)[:, None] * WAY
+    q = q_ref + ripple * np.sin(101 * q_ref) * np.square(np.sin(np.pi * np.clip(t / duration, 0, 1)))[:, None]
+    q = q + random.normal(0.0, SIGMA, q.shape)
+    p_ref, p = tcp_positions(model, q_ref), tcp_positions(model, q)
+    prov = provenance(robot_model="UR3", repetition=seed, controller_config={"learns": learns})
+    with Recorder(path, prov, SIGNALS) as recorder:
+        for i, now in enumerate(t):
+            frame = np.zeros(N_VALUES)
+            frame[0], frame[1:7], frame[7:10] = 10.0 + PERIOD * i, q[i], p[i]
+            phase = Phase.SETTLE_BEFORE if now < -1e-9 else Phase.MOVEMENT
+            phase = Phase.SETTLE_AFTER if now > duration + 1e-9 else phase
+            recorder.append(frame, now, q_ref[i], np.zeros(6), p_ref[i], np.zeros(3), np.zeros(6), phase)
+    return analyse_run(load_recording(path))
+
+
+@pytest.fixture(scope="module")
+def perfect(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
+    folder = tmp_path_factory.mktemp("perfect")
+    return [record_joints(folder / f"a_r{k}.mcap", k) for k in range(1, 7)]
+
+
+def test_a_perfect_arm_stands_on_its_floor(perfect: list[Run]) -> None:
+    covariance = step_covariance(perfect)
+    assert covariance is not None
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), math.sqrt(2) * SIGMA, rtol=0.15)
+    floor = floor_db(perfect[0], covariance)
+    assert floor is not None
+    assert np.mean([run.snr.speed_db for run in perfect]) == pytest.approx(floor, abs=0.4)
+
+
+def test_an_error_that_repeats_is_not_in_the_floor(tmp_path: Path, perfect: list[Run]) -> None:
+    spoilt = [record_joints(tmp_path / f"a_r{k}.mcap", k, ripple=8e-4) for k in range(1, 7)]
+    clean, ours = (floor_db(runs[0], step_covariance(runs)) for runs in (perfect, spoilt))
+    assert clean is not None
+    assert ours == pytest.approx(clean, abs=0.1)
+    assert spoilt[0].snr.speed_db < ours - 3.0
+    # nor is it in what does not repeat; the noise's mean near rest is missing there, so it is a little less
+    power = unrepeatable_power(spoilt)
+    assert power is not None
+    unrepeatable = 10.0 * math.log10(spoilt[0].budget.signal_power / power)
+    assert ours - 0.3 < unrepeatable < ours + 2.0
+
+
+def test_runs_between_which_something_was_learned_are_not_compared(tmp_path: Path) -> None:
+    runs = [record_joints(tmp_path / f"a_r{k}.mcap", k, learns=True) for k in (1, 2)]
+    assert not driven_alike(*runs)
+    assert unrepeatable_power(runs) is None
+
+
+def test_table_shows_the_floor(perfect: list[Run]) -> None:
+    table = build_table(perfect)
+    row = table.to_json()["rows"][0]
+    assert row["noise_floor_db"] == pytest.approx(table.rows[0].noise_floor_db, abs=1e-6)
+    assert row["unrepeatable_db"] is not None
+    assert f"| {table.rows[0].noise_floor_db:.2f} |" in table.to_markdown()
+
+
+def test_without_rest_or_a_known_arm_there_is_no_floor(tmp_path: Path, perfect: list[Run]) -> None:
+    short = analyse_run(load_recording(record_movement(tmp_path / "a.mcap", rest=0.1)))
+    assert step_covariance([short]) is None
+    assert floor_db(perfect[0], None) is None
+    strange = analyse_run(
+        load_recording(record_movement(tmp_path / "b.mcap", prov=provenance(robot_model="unknown")))
+    )
+    assert floor_db(strange, step_covariance(perfect)) is None
+    assert build_table([strange]).to_json()["rows"][0]["noise_floor_db"] is None
+
+
+@pytest.mark.parametrize("speed", [0.0, 5e-4, 2e-3, 0.2])
+def test_expectation_against_draws(speed: float) -> None:
+    root = np.array([[1.2e-3, 0, 0], [3e-4, 8e-4, 0], [-2e-4, 1e-4, 1e-3]])
+    v = np.array([[speed, 0.0, 0.0]])
+    mean, variance = speed_noise(v, root @ root.T)
+    draws = np.random.default_rng(0).normal(size=(400_000, 3)) @ root.T
+    excess = np.linalg.norm(v + draws, axis=1) - speed
+    power = float(np.mean(excess**2))
+    assert mean[0] ** 2 + variance[0] == pytest.approx(power, rel=0.05)
+    assert mean[0] == pytest.approx(excess.mean(), abs=0.06 * math.sqrt(power))
+
+
+def test_fast_motion_feels_the_noise_along_it_alone() -> None:
+    covariance = np.diag([1e-6, 9e-6, 4e-6])
+    mean, variance = speed_noise(np.array([[0.3, 0.0, 0.0]]), covariance)
+    assert variance[0] == pytest.approx(1e-6, rel=1e-3)
+    assert abs(mean[0]) < 1e-4

@@ -1,0 +1,186 @@
+"""The controller `best` in a whole experiment: it learns what repeats, and only from clean runs within limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_robot import PERIOD, FakeRobot
+
+from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.gear import GearModel
+from pc_client.control.learning_filter import design_filter
+from pc_client.control.loop_model import LoopModel
+from pc_client.control.reference import ReferenceTable
+from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.velocity_stream import StreamReport
+from pc_client.errors import DriverError
+from pc_client.experiment.identification import learning_filter
+from pc_client.experiment.prepare import load_movements, prepare_experiment
+from pc_client.experiment.repetitions import Repetitions, broken_limit, is_clean
+from pc_client.experiment.runner import LEAD, SETTLE, ExperimentRunner
+from pc_client.recording.layout import Phase
+from pc_client.recording.loader import load_recording
+
+POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
+BEST = CONTROLLERS["best"]
+LOOP = LoopModel(0.024, 0.010, 0.001, 0.0)
+
+
+class WavyRobot(FakeRobot):
+    """An arm whose gears are as uneven as real ones."""
+
+    gear = GearModel(np.full((2, 6), 1e-4) * [[1.0], [0.4]], np.zeros((2, 6)))
+
+    def follow(self):
+        motor = np.array(self.q)
+        for _ in range(5):
+            motor = np.array(self.q) - self.gear.error(motor)[0]
+        self.q = motor.tolist()
+        super().follow()
+        self.q = (np.array(self.q) + self.gear.error(np.array(self.q))[0]).tolist()
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    movements = load_movements(["uniform_4_1", "lognorm_4_1"])
+    return prepare_experiment(movements, repeat=3, out=tmp_path_factory.mktemp("unused"))
+
+
+@pytest.fixture(scope="module")
+def plan(two):
+    return two.planned[1].plan
+
+
+def run(robot, experiment, out, config=BEST):
+    robot.q = list(POSTURE)
+    with UrDriver("robot", network=robot) as driver:
+        report = ExperimentRunner(driver, replace(experiment, out=out), config).run()
+    return report, [load_recording(path) for path in report.paths]
+
+
+def speed_error(recording):
+    """rms of the differenced joint error over the movement [rad/s]."""
+    moving = recording.rows_of(Phase.MOVEMENT)
+    error = (recording.column("ref_q") - recording.column("actual_q"))[moving]
+    return float(np.sqrt(np.mean(np.square(np.diff(error, axis=0) / PERIOD))))
+
+
+def test_runs_teach_the_next_ones_and_the_gears_all_movements(two, tmp_path):
+    report, recordings = run(WavyRobot(), two, tmp_path)
+    assert report.remarks == []
+    assert [r.summary["learned_from"] for r in recordings] == [0, 1, 2, 0, 1, 2]
+    assert [r.summary["gear_waves"] > 0 for r in recordings] == [False] * 3 + [True] * 3
+    first, second, third, other, _, last = [speed_error(r) for r in recordings]
+    assert second < 0.4 * first
+    assert third < 0.2 * first
+    assert other < 0.4 * first  # its gears are known before it has run
+    assert last < 0.2 * first
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_facts_of_the_loop_go_with_the_recording(two, tmp_path, lockstep):
+    short = replace(two, planned=two.planned[:1], repeat=1)
+    report, (recording,) = run(WavyRobot(lockstep=lockstep), short, tmp_path)
+    loop = recording.provenance.loop
+    assert loop == dict(report.delay.facts())
+    assert loop["dead_time_s"] + loop["lag_s"] == pytest.approx(3 * PERIOD, abs=1e-3)
+    assert loop["gain_margin"] > 4.0
+    assert loop["learning_contraction"] < 1.0
+    assert recording.provenance.controller_config["learns"] is True
+
+
+def test_preview_neither_learns_nor_tells_lag_from_delay(two, tmp_path):
+    short = replace(two, planned=two.planned[:1], repeat=2)
+    _, recordings = run(WavyRobot(), short, tmp_path, CONTROLLERS["preview"])
+    assert [r.summary["learned_from"] for r in recordings] == [0, 0]
+    assert recordings[0].provenance.loop["lag_s"] == 0.0
+    assert "learning_contraction" not in recordings[0].provenance.loop
+    assert speed_error(recordings[1]) == pytest.approx(speed_error(recordings[0]), rel=1e-2)
+
+
+def test_a_run_with_a_lost_frame_teaches_nothing(two, tmp_path):
+    robot = WavyRobot(lockstep=False)
+    movements = []
+
+    def lose_one(r):
+        if r.program == "receiver" and len(r.received) == 200 and len(movements) < 1:
+            movements.append(r.tick)
+            r.skip = 1
+
+    robot.on_tick = lose_one
+    short = replace(two, planned=two.planned[:1])
+    report, recordings = run(robot, short, tmp_path)
+    lost = [r.summary["lost_frames"] for r in recordings]
+    assert sum(lost) == 1
+    spoilt = lost.index(1)
+    learned = [r.summary["learned_from"] for r in recordings]
+    assert learned[spoilt + 1] == 0
+    assert report.remarks == [f"uniform_4_1: run {spoilt + 1} had 0 late and 1 lost frames: nothing learned"]
+
+
+def test_an_estimating_controller_runs_as_well(two, tmp_path):
+    short = replace(two, planned=two.planned[:1], repeat=2)
+    _, recordings = run(WavyRobot(), short, tmp_path, replace(BEST, estimates=True))
+    assert speed_error(recordings[1]) < 0.4 * speed_error(recordings[0])
+    assert recordings[0].provenance.loop["encoder_sigma_rad"] < 1e-6  # this robot's encoders are perfect
+
+
+@pytest.mark.parametrize(("late", "lost", "clean"), [(0, 0, True), (1, 0, False), (0, 1, False)])
+def test_clean_runs(late, lost, clean):
+    assert is_clean(StreamReport(late_frames=late, lost_frames=lost)) is clean
+
+
+def commands_of(plan):
+    table = ReferenceTable(
+        plan.spline, period=PERIOD, lead=LEAD, settle=SETTLE, lookahead=LOOP.dead_time, lag=LOOP.lag
+    )
+    return table, table.commands()
+
+
+def test_a_plan_itself_keeps_the_limits(two, plan):
+    assert broken_limit(plan, commands_of(plan)[1], None, two.model, BEST, PERIOD) == ""
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda c: c + 7.0, "joint speed"),
+        (lambda c: c + 0.3 * (-1.0) ** np.arange(len(c))[:, None], "joint acceleration"),
+        (lambda c: c + np.nan, "joint speed"),
+        (lambda c: c + np.eye(6)[0], "joint range"),
+        (lambda c: c - 0.2 * np.eye(6)[1], "clearance to the base plane"),
+    ],
+)
+def test_commands_that_break_a_limit_are_named(two, plan, spoil, words):
+    assert words in broken_limit(plan, spoil(commands_of(plan)[1]), None, two.model, BEST, PERIOD)
+
+
+def test_a_learned_way_has_an_end(two, plan):
+    _, commands = commands_of(plan)
+    learned = np.full_like(commands, 0.06 / (len(commands) * PERIOD))
+    assert "learned way" in broken_limit(plan, commands, learned, two.model, BEST, PERIOD)
+    assert broken_limit(plan, commands, 0.5 * learned, two.model, BEST, PERIOD) == ""
+
+
+def test_what_breaks_a_limit_is_forgotten_before_anything_is_sent(two, plan):
+    gear = WavyRobot.gear
+    memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), gear, two.model, PERIOD)
+    table, commands = commands_of(plan)
+    assert memory.may_use(plan, table)
+    memory.learned = np.full_like(commands, 0.19)
+    memory.learned_from = 1
+    assert not memory.may_use(plan, table)
+    assert (memory.learned, memory.learned_from, memory.gear) == (None, 0, None)
+    assert "learned way" in memory.remark
+
+
+def test_learning_that_might_not_converge_is_refused():
+    nervous = replace(BEST, gain_p=30.0, gain_i=60.0, learning_gain=0.3)
+    loop = LoopModel(0.03, 0.01, 0.004, 0.0)
+    weight = design_filter(loop, PERIOD, learning_gain=0.3, gain_p=30.0, gain_i=60.0)
+    assert weight.contraction >= 1.0
+    with pytest.raises(DriverError, match="would not converge"):
+        learning_filter(nervous, loop, PERIOD)
+    assert learning_filter(CONTROLLERS["preview"], loop, PERIOD) is None
