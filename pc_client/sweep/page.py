@@ -44,7 +44,8 @@ def render_page(name: str, rows: Rows) -> str:
     pair = map_axes(rows)
     settings = rank_settings(rows)
     connect = spans_grid(rows)
-    plotted = [axis for axis in axes if done and len({row[axis] for row in done}) > 1]
+    # Repetitions are no axis of the sweep, but a controller may learn from one to the next.
+    plotted = [axis for axis in (*axes, "repetition") if len({row[axis] for row in done}) > 1]
     return template.render(
         name=name,
         axes={axis: len({row[axis] for row in rows}) for axis in axes},
@@ -54,7 +55,10 @@ def render_page(name: str, rows: Rows) -> str:
         settings=settings[:_MOST_SETTINGS],
         n_settings=len(settings),
         map_figure=_data_uri(figures.draw_map(rows, *pair)) if pair and done else None,
-        axis_figures=[(axis, _data_uri(figures.draw_axis(done, axis, connect=connect))) for axis in plotted],
+        axis_figures=[
+            (axis, _data_uri(figures.draw_axis(done, axis, connect=connect or axis == "repetition")))
+            for axis in plotted
+        ],
         not_done=[row for row in rows if row["status"] != "done"][:_MOST_ERRORS],
         n_not_done=sum(row["status"] != "done" for row in rows),
     )

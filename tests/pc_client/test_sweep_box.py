@@ -12,12 +12,14 @@ from pathlib import Path
 import pytest
 from sweep_samples import case
 
+import pc_client.sweep.box as box_module
 import pc_client.sweep.run_case as run_case_module
 from pc_client.errors import SweepError
 from pc_client.executors import open_executor
 from pc_client.sweep.box import HOST, simulated_box
 from pc_client.sweep.case import SimulatedArm
 from pc_client.sweep.run_case import run_case
+from protocol.ur_types import Ports
 
 ARM = SimulatedArm("ur3", "typical", 7)
 
@@ -67,6 +69,17 @@ def test_leaving_ends_box_and_scratch_folder():
     with link:
         read_to_the_end(link)
     assert not box.folder.exists()
+
+
+def test_a_port_that_somebody_took_in_between_is_no_trouble(monkeypatch):
+    with socket.create_server((HOST, 0)) as somebody:
+        taken = somebody.getsockname()[1] - Ports().dashboard
+        offsets = iter([taken, taken])
+        find = box_module._free_offset
+        monkeypatch.setattr(box_module, "_free_offset", lambda: next(offsets, None) or find())
+        with simulated_box(ARM) as box:
+            connect(box).close()
+    assert next(offsets, None) is None
 
 
 def test_a_box_that_is_refused_says_why():

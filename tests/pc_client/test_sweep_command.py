@@ -78,7 +78,7 @@ def test_a_sweep_finds_the_best_gains(job, tmp_path, capsys):
     assert len(read_csv(out)) == 48
     page = (out / "sweep.html").read_text()
     assert "SIMULATED" in page
-    assert page.count("<img") == 1 + 4  # the map; over movement, fidelity and both gains
+    assert page.count("<img") == 1 + 5  # the map; over movement, fidelity, both gains and repetition
     assert page.index("gain_p = 5, gain_i = 2") < page.index("gain_p = 8, gain_i = 0")
 
 
