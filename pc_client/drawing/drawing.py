@@ -1,0 +1,141 @@
+"""A recording made ready for an arm: placed, joined, slowed down as far as needed. One call, one record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from pc_client.drawing.joining import Joined, least_gaps
+from pc_client.drawing.marks import Mark, marks_of
+from pc_client.drawing.pacing import factor_needed, least_factor, paced
+from pc_client.drawing.placement import Placement, PlacementOptions, inverse, place
+from pc_client.extraction.extract import Extraction
+from pc_client.kinematics.robot_model import RobotModel
+from pc_client.movements.movement import Movement
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.stroke import Motion
+
+__all__ = ["Drawing", "make_drawing", "spatial"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """A drawing as the arm shall do it.
+
+    Attributes:
+        extraction: the recording as strokes.
+        marks: its parts and dots, in the recording's frame and time.
+        placement: where it is done.
+        joined: all of it in one movement, base frame, as fast as the hand was.
+        factor: how many times slower than the hand the arm is.
+        movement: what the arm shall do.
+    """
+
+    extraction: Extraction
+    marks: tuple[Mark, ...]
+    placement: Placement
+    joined: Joined
+    factor: float
+    movement: Movement
+
+    @property
+    def flat(self) -> bool:
+        """Whether the recording is flat."""
+        return _is_flat(self.extraction)
+
+    @property
+    def law(self) -> SigmaLognormal:
+        """The movement's law, in the time of the arm."""
+        return self.joined.law.stretched(self.factor)
+
+    @property
+    def delays(self) -> NDArray[np.float64]:
+        """How much later after the first mark each one comes than recorded, (n_marks,), s of the hand."""
+        delays: NDArray[np.float64] = self.joined.shifts - self.joined.shifts[0]
+        return delays
+
+    def arm_time(self, t: NDArray[np.float64], mark: int) -> NDArray[np.float64]:
+        """Time of the movement (s, arm) at times of the recording (s) that belong to a mark."""
+        at: NDArray[np.float64] = (t + self.joined.shifts[mark]) * self.factor
+        return at
+
+    def recording_time(self, t: NDArray[np.float64], mark: int) -> NDArray[np.float64]:
+        """Time of the recording (s) at times of the movement (s, arm), for a mark; inverse of `arm_time`."""
+        at: NDArray[np.float64] = t / self.factor - self.joined.shifts[mark]
+        return at
+
+    def points_back(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points of the base frame (n, 3), m, in the recording's frame and unit."""
+        return inverse(self.placement.similarity).points(p)
+
+    def planned(self, t: NDArray[np.float64], mark: int) -> Motion:
+        """The plan at times of the recording that belong to a mark, in its frame, unit and time."""
+        motion = self.joined.law.evaluate(t + self.joined.shifts[mark])
+        back = inverse(self.placement.similarity)
+        return Motion(back.points(motion.p), back.vectors(motion.v), back.vectors(motion.a))
+
+
+def spatial(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (n, 2) with a third coordinate 0; points (n, 3) as they are."""
+    return p if p.shape[1] == 3 else np.column_stack((p, np.zeros(len(p))))
+
+
+def make_drawing(
+    extraction: Extraction, name: str, arm: RobotModel, options: PlacementOptions | None = None
+) -> Drawing:
+    """Make a drawing ready for an arm.
+
+    Args:
+        extraction: the recording as strokes.
+        name: of the movement: for file names and tables.
+        arm: who shall do it.
+        options: where and how large.
+
+    Raises:
+        MovementError: nothing in it moves.
+        PlanningError: the arm cannot do it at any speed; the message is planning's.
+    """
+    options = options or PlacementOptions()
+    marks = marks_of(extraction)
+    drawn = np.vstack(
+        [spatial(part.p) for part in extraction.parts] + [mark.first for mark in marks if mark.law is None]
+    )
+    flat = _is_flat(extraction)
+    placement = place(marks, drawn, options, flat=flat)
+    on_arm = [mark.transformed(placement.similarity) for mark in marks]
+    size = placement.similarity.scale * float(np.ptp(drawn, axis=0).max())
+    joined = paced(name, on_arm, least_gaps(on_arm, size), placement.lift, arm)
+    guess = float(factor_needed(name, joined, arm)[1].max())
+    facts = _facts(extraction, placement, joined)
+
+    def slowed(factor: float) -> Movement:
+        law = joined.law.stretched(factor)
+        return Movement(name, law, _between_slow_moments(law), {**facts, "slower_than_the_hand": factor})
+
+    factor, _ = least_factor(slowed, guess, arm)
+    return Drawing(extraction, marks, placement, joined, factor, slowed(factor))
+
+
+def _is_flat(extraction: Extraction) -> bool:
+    return bool(extraction.parts[0].p.shape[1] == 2)
+
+
+def _facts(extraction: Extraction, placement: Placement, joined: Joined) -> dict[str, str | int | float]:
+    return {
+        "drawing": extraction.name.rpartition("/")[2],
+        "plane": placement.plane,
+        "metres_per_unit": placement.similarity.scale,
+        "rotation_deg": float(np.degrees(placement.rotation)),
+        "marks": len(joined.shifts),
+        "lift_m": float(np.linalg.norm(placement.lift)),
+    }
+
+
+def _between_slow_moments(law: SigmaLognormal) -> NDArray[np.float64]:
+    """Times (s) between the least speeds of a movement, its begin and its end."""
+    t = np.linspace(0.0, law.duration, max(200, int(500 * law.duration)))
+    slow, _ = find_peaks(-np.linalg.norm(law.evaluate(t).v, axis=1))
+    return np.diff(np.concatenate(([0.0], t[slow], [law.duration])))

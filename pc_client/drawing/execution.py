@@ -1,0 +1,110 @@
+"""What the arm did, mapped back: in the frame, the unit and the time of the recording.
+
+The similarity and the scaling of time are undone exactly; nothing is shifted or fitted. Of each part that
+moves there are two signals: the positions at the robot's own time stamps, as they were reported, for
+signal-to-noise ratios; and the same on the grid of the recording, through the low-pass that the recording
+itself went through, for everything that is differentiated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from pc_client.analysis.run import Run
+from pc_client.drawing.drawing import Drawing
+from pc_client.errors import RecordingError
+from pc_client.extraction.smoothing import low_passed, velocity
+from pc_client.movements.geometry import read_only
+
+__all__ = ["ExecutedPart", "Execution", "executed"]
+
+#: This much of the movement (s of the hand) before and after a part goes through the low-pass with it.
+_MARGIN_S = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExecutedPart:
+    """One part as it was executed, in the recording's frame, unit and time.
+
+    Attributes:
+        t: the part's own grid, (n,), s.
+        p: low-passed positions on it, (n, 3).
+        v: their velocities, (n, 3), per second.
+        frame_t: the robot's time stamps while the pen was down, (m,), s of the recording.
+        frame_p: positions as reported then, (m, 3).
+    """
+
+    t: NDArray[np.float64]
+    p: NDArray[np.float64]
+    v: NDArray[np.float64]
+    frame_t: NDArray[np.float64]
+    frame_p: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Execution:
+    """One run of a drawing.
+
+    Attributes:
+        run: the recording and what is measured on every movement.
+        parts: those that move, in order.
+        t: movement time of all frames of the movement, (k,), s of the arm.
+        p: TCP positions then, (k, 3), m, base frame.
+    """
+
+    run: Run
+    parts: tuple[ExecutedPart, ...]
+    t: NDArray[np.float64]
+    p: NDArray[np.float64]
+
+
+def executed(drawing: Drawing, run: Run, shift: float = 0.0) -> Execution:
+    """Map a run back.
+
+    Args:
+        drawing: what the run executed.
+        run: the recording.
+        shift: take the arm's positions this much later, s of the arm; 0 judges it as it was.
+
+    Raises:
+        RecordingError: the run ended before the drawing did.
+    """
+    track = run.track
+    ref_t = run.recording.column("ref_t")[track.rows]
+    t = track.t - track.t_start + float(ref_t[track.movement.start])
+    if t[-1] < float(drawing.joined.pen_down[-1, 1]) * drawing.factor:
+        raise RecordingError(f"{run.recording.path}: ends at {t[-1]:.1f} s, before the drawing was done")
+    path = CubicSpline(t - shift, track.p_actual)
+    moving = [index for index, mark in enumerate(drawing.marks) if mark.law is not None]
+    parts = tuple(
+        _part(drawing, index, part.t, path)
+        for index, part in zip(moving, drawing.extraction.parts, strict=True)
+    )
+    inside = track.movement
+    return Execution(run, parts, read_only(t[inside]), read_only(track.p_actual[inside]))
+
+
+def _part(drawing: Drawing, mark: int, grid: NDArray[np.float64], path: CubicSpline) -> ExecutedPart:
+    def positions(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Positions of the arm at times of the recording; outside the run it rests."""
+        at = np.clip(drawing.arm_time(t, mark), path.x[0], path.x[-1])
+        return drawing.points_back(path(at))
+
+    step = (grid[-1] - grid[0]) / (len(grid) - 1)
+    margin = round(_MARGIN_S / step)
+    wide = grid[0] + step * np.arange(-margin, len(grid) + margin)
+    smooth = low_passed(positions(wide), 1.0 / step)
+    inside = slice(margin, margin + len(grid))
+    frame_t = drawing.recording_time(path.x, mark)
+    frame_t = frame_t[(frame_t >= grid[0]) & (frame_t <= grid[-1])]
+    return ExecutedPart(
+        grid,
+        read_only(smooth[inside]),
+        read_only(velocity(wide, smooth)[inside]),
+        read_only(frame_t),
+        read_only(positions(frame_t)),
+    )

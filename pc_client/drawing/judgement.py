@@ -1,0 +1,260 @@
+"""How near a reconstruction, a plan and its execution come to the person, in figures.
+
+    SNR_v  10 log10( sum |v|^2 / sum |v - v'|^2 )              velocity vectors
+    SNR_t  10 log10( sum |p - mean p|^2 / sum |p - p'|^2 )     positions, mean p of each part by itself
+
+both over all parts that move, while the pen is down. What is compared with the arm is taken at the arm's own
+time stamps, all signals through the same first difference, neither shifted nor smoothed. The figures of
+fluency are those of `analysis.human_likeness`, on signals through one low-pass of 12 Hz (time of the hand).
+
+Source: section 3.3 of the theory notes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from pc_client.analysis.human_likeness import fit_power_law, log_dimensionless_jerk, sparc, speed_peaks
+from pc_client.drawing.drawing import Drawing, spatial
+from pc_client.drawing.execution import Execution, executed
+
+__all__ = ["Agreement", "Fluency", "RunVerdict", "Signal", "Verdict", "judge", "signals"]
+
+#: Fewest samples of a part from which figures of fluency are taken.
+_MIN_SAMPLES = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """How well one signal tells another, dB."""
+
+    snr_v_db: float
+    snr_t_db: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fluency:
+    """How human-like a signal is, while the pen is down.
+
+    Attributes:
+        peaks: of the speed, all parts together.
+        sparc: spectral arc length, mean over the parts by their durations; nan when all are too short.
+        log_jerk: log dimensionless jerk, likewise.
+        exponent: beta of speed = k curvature^-beta over all parts; nan for straight lines.
+        r_squared: how well that law holds, 0 to 1; nan likewise.
+    """
+
+    peaks: int
+    sparc: float
+    log_jerk: float
+    exponent: float
+    r_squared: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """One part of one signal on a uniform grid.
+
+    Attributes:
+        t: (n,), s of the recording.
+        p: (n, 3), in the recording's frame and unit.
+        v: (n, 3), per second.
+    """
+
+    t: NDArray[np.float64]
+    p: NDArray[np.float64]
+    v: NDArray[np.float64]
+
+    @property
+    def speed(self) -> NDArray[np.float64]:
+        """(n,), per second."""
+        speed: NDArray[np.float64] = np.linalg.norm(self.v, axis=1)
+        return speed
+
+
+@dataclass(frozen=True, slots=True)
+class RunVerdict:
+    """One run.
+
+    Attributes:
+        repetition: its number.
+        planned: executed against planned.
+        human: executed against the recording.
+        planned_shifted: executed against planned, after the best time shift.
+        human_shifted: executed against the recording, after the same.
+        lag: that shift, s of the arm; positive: the arm is late.
+        speed_db: Eq. 10 of the paper over the whole movement with its lifts, scalar speed.
+        max_error: largest distance from the plan while the pen is down, m, at equal time stamps.
+        off_sheet: largest distance from the sheet while the pen is down, m; nan for recordings in space.
+        fluency: of the executed signal.
+    """
+
+    repetition: int
+    planned: Agreement
+    human: Agreement
+    planned_shifted: Agreement
+    human_shifted: Agreement
+    lag: float
+    speed_db: float
+    max_error: float
+    off_sheet: float
+    fluency: Fluency
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """All figures of a drawing.
+
+    Attributes:
+        reconstruction: strokes against the recording.
+        plan: the plan, with tails of neighbours and lifts, against the recording.
+        human: fluency of the recording.
+        reconstructed: fluency of the strokes.
+        runs: what the arm did.
+    """
+
+    reconstruction: Agreement
+    plan: Agreement
+    human: Fluency
+    reconstructed: Fluency
+    runs: tuple[RunVerdict, ...]
+
+    @property
+    def best(self) -> RunVerdict:
+        """The last run: the one that has learned most, where the controller learns."""
+        return self.runs[-1]
+
+
+def signals(drawing: Drawing, execution: Execution | None = None) -> dict[str, tuple[Signal, ...]]:
+    """The parts that move as "human", "reconstructed", "planned" and, given a run, "executed"."""
+    moving = [index for index, mark in enumerate(drawing.marks) if mark.law is not None]
+    parts = drawing.extraction.parts
+    found: dict[str, tuple[Signal, ...]] = {
+        "human": tuple(Signal(part.t, spatial(part.p), spatial(part.v)) for part in parts),
+        "reconstructed": tuple(Signal(part.t, *part.law.evaluate(part.t)[:2]) for part in parts),
+        "planned": tuple(
+            Signal(part.t, *drawing.planned(part.t, index)[:2])
+            for index, part in zip(moving, parts, strict=True)
+        ),
+    }
+    if execution is not None:
+        found["executed"] = tuple(Signal(part.t, part.p, part.v) for part in execution.parts)
+    return found
+
+
+def judge(drawing: Drawing, executions: Sequence[Execution]) -> Verdict:
+    """Compute all figures of a drawing and its runs."""
+    own = signals(drawing)
+    human, planned = own["human"], own["planned"]
+    extraction = drawing.extraction
+    assert extraction.snr_v_db is not None  # something moves
+    assert extraction.snr_t_db is not None
+    metres = drawing.placement.similarity.scale
+    return Verdict(
+        Agreement(extraction.snr_v_db, extraction.snr_t_db),
+        _agreement([(h.t, h.p, p.p) for h, p in zip(human, planned, strict=True)]),
+        fluency(human, metres),
+        fluency(own["reconstructed"], metres),
+        tuple(_judge_run(drawing, execution) for execution in executions),
+    )
+
+
+def fluency(parts: Sequence[Signal], metres: float) -> Fluency:
+    """Figures of one signal.
+
+    Args:
+        parts: of the signal.
+        metres: metres per unit: the power law is fitted where the path bends by less than 1 m radius.
+    """
+    long = [part for part in parts if len(part.t) >= _MIN_SAMPLES and part.speed.max() > 0.0]
+    weights = [float(part.t[-1] - part.t[0]) for part in long]
+    rates = [(len(part.t) - 1) / weight for part, weight in zip(long, weights, strict=True)]
+    v = np.vstack([metres * part.v for part in parts])
+    a = np.vstack([metres * np.gradient(part.v, part.t, axis=0) for part in parts])
+    law = fit_power_law(v, a)
+    return Fluency(
+        sum(speed_peaks(part.speed) for part in parts),
+        _mean([sparc(part.speed, rate) for part, rate in zip(long, rates, strict=True)], weights),
+        _mean(
+            [log_dimensionless_jerk(part.speed, rate) for part, rate in zip(long, rates, strict=True)],
+            weights,
+        ),
+        law.exponent,
+        law.r_squared,
+    )
+
+
+def _judge_run(drawing: Drawing, execution: Execution) -> RunVerdict:
+    run = execution.run
+    lag = run.snr.velocity_lag_s
+    shifted = executed(drawing, run, lag)
+    metres = drawing.placement.similarity.scale
+    errors, heights = [], []
+    for _, reference, actual in _against_plan(drawing, execution):
+        errors.append(np.linalg.norm(actual - reference, axis=1))
+        heights.append(np.abs(actual[:, 2]))
+    own = tuple(Signal(part.t, part.p, part.v) for part in execution.parts)
+    return RunVerdict(
+        run.provenance.repetition,
+        _agreement(_against_plan(drawing, execution)),
+        _agreement(_against_human(drawing, execution)),
+        _agreement(_against_plan(drawing, shifted)),
+        _agreement(_against_human(drawing, shifted)),
+        lag,
+        run.snr.speed_db,
+        metres * float(np.concatenate(errors).max()),
+        metres * float(np.concatenate(heights).max()) if drawing.flat else math.nan,
+        fluency(own, metres),
+    )
+
+
+_Pair = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+def _against_plan(drawing: Drawing, execution: Execution) -> list[_Pair]:
+    """Times, planned and executed positions of each part at the robot's time stamps."""
+    moving = [index for index, mark in enumerate(drawing.marks) if mark.law is not None]
+    return [
+        (part.frame_t, drawing.planned(part.frame_t, index).p, part.frame_p)
+        for index, part in zip(moving, execution.parts, strict=True)
+    ]
+
+
+def _against_human(drawing: Drawing, execution: Execution) -> list[_Pair]:
+    """Times, recorded and executed positions of each part at the robot's time stamps."""
+    return [
+        (part.frame_t, CubicSpline(human.t, spatial(human.p))(part.frame_t), part.frame_p)
+        for human, part in zip(drawing.extraction.parts, execution.parts, strict=True)
+    ]
+
+
+def _agreement(pairs: Sequence[_Pair]) -> Agreement:
+    """Pool parts: times (n,), reference and actual positions (n, 3)."""
+    v_signal = v_noise = p_signal = p_noise = 0.0
+    for t, reference, actual in pairs:
+        if len(t) < 2:
+            continue  # a part between two frames of the robot
+        steps = np.diff(t)[:, None]
+        v, error = np.diff(reference, axis=0) / steps, np.diff(actual - reference, axis=0) / steps
+        v_signal, v_noise = v_signal + float(np.sum(v**2)), v_noise + float(np.sum(error**2))
+        p_signal += float(np.sum((reference - reference.mean(axis=0)) ** 2))
+        p_noise += float(np.sum((actual - reference) ** 2))
+    return Agreement(_decibels(v_signal, v_noise), _decibels(p_signal, p_noise))
+
+
+def _decibels(signal: float, noise: float) -> float:
+    if signal <= 0.0:
+        return math.nan
+    return 10.0 * math.log10(signal / max(noise, 1e-30 * signal))
+
+
+def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
+    if not values:
+        return math.nan
+    return math.fsum(v * w for v, w in zip(values, weights, strict=True)) / math.fsum(weights)

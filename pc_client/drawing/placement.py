@@ -1,0 +1,152 @@
+"""Where in the workspace a drawing is done: a sheet, an angle and a scale.
+
+The sheet stands before the robot as a board before a person who looks the same way: right of the drawing is
+-y of the base frame. A recording's own axes are x to the right and y down the sheet, as screens have it (or
+y up, as tablets have it); its third axis then points into the sheet (or out of it), so that the map is a
+proper rotation and no drawing is mirrored. A pen goes up against the direction into the sheet.
+
+Recordings in space keep their axes: x, y, z are those of the base frame, and the pen goes up along +z.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.drawing.marks import Mark
+from pc_client.errors import MovementError
+from pc_client.movements.geometry import UR3_BOX, Box, Similarity, read_only
+
+__all__ = ["PLANES", "Placement", "PlacementOptions", "inverse", "place", "sheet_frame"]
+
+_HALF = math.sqrt(0.5)
+_RIGHT = (0.0, -1.0, 0.0)
+
+#: Direction into the sheet, base frame: a board in front, a table below, a desk square to the tool.
+PLANES: Mapping[str, tuple[float, float, float]] = MappingProxyType(
+    {"vertical": (1.0, 0.0, 0.0), "horizontal": (0.0, 0.0, -1.0), "inclined": (_HALF, 0.0, -_HALF)}
+)
+
+#: Tails of bells shorter than this share of the drawing's size are not looked at when it is placed.
+_PATH_SHARE = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class PlacementOptions:
+    """What is asked of a placement.
+
+    Attributes:
+        plane: a key of `PLANES`; only for flat recordings.
+        y_up: whether the recording's y axis points up the sheet; down otherwise.
+        rotation: turn of the drawing on its sheet, rad, positive to the left as it is looked at; None: the
+            half degree that allows the largest scale.
+        size: longest side of what the pen draws, m; None or too much: as large as the box allows.
+        lift: how far the pen is lifted, m.
+        box: where the whole path must lie, base frame.
+    """
+
+    plane: str = "vertical"
+    y_up: bool = False
+    rotation: float | None = 0.0
+    size: float | None = 0.1
+    lift: float = 0.03
+    box: Box = UR3_BOX
+
+    def __post_init__(self) -> None:
+        if self.plane not in PLANES:
+            raise MovementError(f'plane "{self.plane}": give one of {", ".join(PLANES)}')
+        if not (math.isfinite(self.lift) and 0.0 < self.lift < float(self.box.size.min())):
+            raise MovementError(
+                f"lift of {1e3 * self.lift:g} mm: give more than 0 and less than the "
+                f"{1e3 * float(self.box.size.min()):g} mm of the box"
+            )
+        if self.size is not None and not (math.isfinite(self.size) and self.size > 0.0):
+            raise MovementError(f"size of {1e3 * self.size:g} mm: give more than 0")
+        if self.rotation is not None and not math.isfinite(self.rotation):
+            raise MovementError(f"rotation of {self.rotation} rad: give a finite angle")
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where a drawing is done.
+
+    Attributes:
+        similarity: from the recording's frame (third axis 0 for flat ones) to the base frame, m.
+        lift: from the sheet to the lifted pen, (3,), m, base frame.
+        rotation: turn on the sheet, rad.
+        plane: a key of `PLANES`, or "space".
+    """
+
+    similarity: Similarity
+    lift: NDArray[np.float64]
+    rotation: float
+    plane: str
+
+
+def sheet_frame(plane: str, *, y_up: bool) -> NDArray[np.float64]:
+    """The axes of a flat recording in the base frame: columns x (right), y and x cross y; (3, 3)."""
+    into = np.array(PLANES[plane])
+    down = np.cross(into, _RIGHT)
+    return np.column_stack((_RIGHT, -down, -into) if y_up else (_RIGHT, down, into))
+
+
+def place(
+    marks: Sequence[Mark], drawn: NDArray[np.float64], options: PlacementOptions, *, flat: bool = True
+) -> Placement:
+    """Find the similarity of a drawing.
+
+    Args:
+        marks: in the recording's frame; their whole path must lie in the box.
+        drawn: (n, 3), what the pen draws in the same frame: it has the size that is asked for.
+        options: what is asked.
+        flat: whether the recording is flat.
+
+    Raises:
+        MovementError: all of the drawing is one point.
+    """
+    extent = float(np.ptp(drawn, axis=0).max())
+    if not extent > 0.0:
+        raise MovementError("a drawing of one point has no size: there is nothing to fit into a box")
+    frame = sheet_frame(options.plane, y_up=options.y_up) if flat else np.eye(3)
+    out = -np.array(PLANES[options.plane]) if flat else np.array((0.0, 0.0, 1.0))
+    lift = options.lift * out
+    path = np.vstack([mark.path(_PATH_SHARE * extent) for mark in marks])
+    # Seen from the side that the pen is on, the recording's third axis points away where y points down.
+    sense = 1.0 if options.y_up or not flat else -1.0
+    if options.rotation is None:
+        angles = [math.radians(0.5 * step) for step in range(360)]
+    else:
+        angles = [options.rotation]
+    rotations = [(angle, frame @ _about_third(sense * angle)) for angle in angles]
+    scales = [_largest_scale(path @ R.T, lift, options.box) for _, R in rotations]
+    best = int(np.argmax(scales))
+    angle, R = rotations[best]
+    wanted = math.inf if options.size is None else options.size / extent
+    scale = min(scales[best], wanted)
+    turned = scale * path @ R.T
+    low = turned.min(axis=0) + np.minimum(lift, 0.0)
+    high = turned.max(axis=0) + np.maximum(lift, 0.0)
+    similarity = Similarity(scale, R, options.box.centre - 0.5 * (low + high))
+    return Placement(similarity, read_only(lift), angle, options.plane if flat else "space")
+
+
+def inverse(similarity: Similarity) -> Similarity:
+    """The similarity that undoes another."""
+    back = similarity.R.T
+    return Similarity(1.0 / similarity.scale, back, -(back @ similarity.shift) / similarity.scale)
+
+
+def _about_third(angle: float) -> NDArray[np.float64]:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _largest_scale(path: NDArray[np.float64], lift: NDArray[np.float64], box: Box) -> float:
+    room, need = box.size - np.abs(lift), np.ptp(path, axis=0)
+    wide = need > 1e-12 * need.max()
+    return float((room[wide] / need[wide]).min())
