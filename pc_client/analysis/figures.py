@@ -101,7 +101,7 @@ def draw_table(table: Table) -> str:
             axes.hlines(floors, x - 0.02, x + 0.42, color=RED, lw=1.4, label="noise floor of the encoders")
         axes.set_xticks(x, [row.name for row in table.rows], rotation=20, ha="right")
         axes.set_ylabel("SNR [dB]")
-        axes.set_title("SNR of the TCP speed (Eq. 10): unshifted, unsmoothed")
+        axes.set_title("SNR of the TCP speed (Eq. 10)")
         axes.grid(axis="x", visible=False)
         axes.legend(ncols=4, loc="lower right", bbox_to_anchor=(0.9, 0.99), borderaxespad=0.2)
     return page.getvalue()

@@ -61,7 +61,9 @@ def step_covariance(runs: Sequence[Run]) -> Array | None:
     steps = np.concatenate([rest_steps(run) for run in runs])
     if len(steps) < LEAST_STEPS:
         return None
-    covariance: Array = steps.T @ steps / (len(steps) - 2 * len(runs))
+    # The mean of n differences is the last value less the first over n: taking it away costs 1 / n^2 of the
+    # noise, not 1 / n as of independent values.
+    covariance: Array = steps.T @ steps / len(steps)
     return covariance
 
 

@@ -21,7 +21,7 @@ from pc_client.experiment.identification import Identification, identify
 from pc_client.experiment.observer import Observer, Silent
 from pc_client.experiment.preflight import check_model
 from pc_client.experiment.prepare import Experiment, PlannedMovement, clear_folder
-from pc_client.experiment.repetitions import Repetitions, RunLog, is_clean
+from pc_client.experiment.repetitions import Repetitions, RunLog
 from pc_client.planning.approach import Approach, plan_approach
 from pc_client.planning.plan import JointPlan
 from pc_client.recording.provenance import Provenance
@@ -183,7 +183,8 @@ class ExperimentRunner:
                 }
             )
         if log is not None:
-            if is_clean(stream):
+            # Waves are a mean over thousands of frames: a command that came late is no harm, a gap is.
+            if not stream.lost_frames:
                 gears.take(log.qd_cmd, log.q)
             repetitions.take(provenance.repetition, log, stream, LEAD, SETTLE)
         return stream
