@@ -19,13 +19,15 @@ from pc_client.analysis.figures import BLUE, GREEN, ORANGE, PURPLE, RED, SKY, sv
 Rows = Sequence[Mapping[str, Any]]
 
 _COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY)
-_STYLES = (("s", "-"), ("^", "--"), ("o", ":"))
+_STYLES = (("s", "-"), ("^", "--"), ("o", ":"), ("D", "-."), ("v", "-"), ("P", "--"))
 _NOT_DONE = "#DDDDDD"
 _WIDTH = 11.0
+_MOST_TICKS = 10
+"""Values of a grid that are written on its axis."""
 
 
 def draw_axis(rows: Rows, axis: str, *, connect: bool) -> str:
-    """Draw the SNR of all runs over one axis, and its mean for each kind of movement and each fidelity.
+    """Draw the SNR of all runs over one axis, and its mean by kind of movement, controller and fidelity.
 
     Args:
         rows: runs that are done.
@@ -39,13 +41,14 @@ def draw_axis(rows: Rows, axis: str, *, connect: bool) -> str:
     # Seeds are numbers, but there is no more or less of a seed.
     scale = axis != "seed" and all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
     positions = dict(zip(values, values if scale else range(len(values)), strict=True))
-    fidelities = [None] if axis == "fidelity" else _in_order(rows, "fidelity")
+    splits = [c for c in ("controller", "fidelity") if c != axis and len(_in_order(rows, c)) > 1]
+    groups = list(dict.fromkeys(tuple(row[c] for c in splits) for row in rows))
     with svg_figure(_WIDTH, 3.2, _simulated(rows)) as (figure, page):
-        axes = figure.add_axes((0.06, 0.2 if scale else 0.27, 0.925, 0.64 if scale else 0.57))
+        axes = figure.add_axes((0.06, 0.2 if scale else 0.27, 0.73, 0.68 if scale else 0.61))
         for kind, colour in zip(_in_order(rows, "kind"), cycle(_COLOURS)):
-            for fidelity, (marker, line) in zip(fidelities, cycle(_STYLES)):
-                series = [r for r in rows if r["kind"] == kind and fidelity in (None, r["fidelity"])]
-                label = kind if len(fidelities) == 1 else f"{kind}, {fidelity}"
+            for group, (marker, line) in zip(groups, cycle(_STYLES)):
+                series = [r for r in rows if r["kind"] == kind and tuple(r[c] for c in splits) == group]
+                label = ", ".join((kind, *map(str, group)))
                 style: dict[str, Any] = {"color": colour, "marker": marker}
                 axes.plot(*_points(series, axis, positions), ls="", ms=3, alpha=0.3, **style)
                 axes.plot(
@@ -55,6 +58,8 @@ def draw_axis(rows: Rows, axis: str, *, connect: bool) -> str:
                     label=label,
                     **style,
                 )
+        if scale and connect and len(values) <= _MOST_TICKS:
+            axes.set_xticks(values)
         if not scale:
             axes.set_xticks(list(positions.values()), [str(value) for value in values])
             axes.set_xlim(-0.6, len(values) - 0.4)
@@ -64,7 +69,7 @@ def draw_axis(rows: Rows, axis: str, *, connect: bool) -> str:
         axes.set_xlabel(axis)
         axes.set_ylabel("SNR [dB]")
         axes.set_title(f"SNR over {axis}: runs and means")
-        axes.legend(ncols=6, loc="lower right", bbox_to_anchor=(0.9, 1.0), borderaxespad=0.2)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 0.98), borderaxespad=0.0)
     return page.getvalue()
 
 

@@ -56,8 +56,19 @@ class Setting:
 
 
 def varying(rows: Rows) -> list[str]:
-    """The axes of a sweep: columns of `FACTORS` with more than one value, in their order."""
-    return [column.name for column in FACTORS if len({row.get(column.name) for row in rows}) > 1]
+    """The axes of a sweep: columns of `FACTORS` with more than one value, in their order.
+
+    Named controllers differ in many fields; those that follow from the name are no axes of their own.
+    """
+    axes = [column.name for column in FACTORS if len({row.get(column.name) for row in rows}) > 1]
+    if "controller" not in axes:
+        return axes
+    fields, names = sweepable_fields(), {row["controller"] for row in rows}
+    return [
+        axis
+        for axis in axes
+        if axis not in fields or len({(row["controller"], row[axis]) for row in rows}) > len(names)
+    ]
 
 
 def spans_grid(rows: Rows) -> bool:

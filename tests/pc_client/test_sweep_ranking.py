@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from sweep_samples import case, invented
 
+from pc_client.control.controller_config import CONTROLLERS
 from pc_client.sweep.folder import table_rows
 from pc_client.sweep.outcome import failed
 from pc_client.sweep.page import map_axes
@@ -56,6 +59,15 @@ def test_without_anything_to_compare_the_controller_is_named():
 def test_axes_are_what_varies():
     rows = rows_of(case(gain_p=2.0, looks_ahead=True), case("lognorm_4_1", gain_p=3.0, looks_ahead=False))
     assert varying(rows) == ["movement", "gain_p", "looks_ahead"]
+
+
+def test_what_follows_from_the_name_of_a_controller_is_no_axis():
+    paper = {**asdict(CONTROLLERS["paper"]), "gain_i": 2.0}
+    others = [case(**{**paper, "gain_p": gain}) for gain in (3.0, 4.0)]
+    rows = rows_of(*others, *(case(gain_p=gain, gain_i=2.0) for gain in (3.0, 4.0)))
+    assert varying(rows) == ["controller", "gain_p"]
+    assert spans_grid(rows)
+    assert len(rank_settings(rows)) == 4
 
 
 def test_the_map_prefers_the_gains():
