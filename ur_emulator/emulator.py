@@ -128,7 +128,7 @@ class ControlBox(BoxOperations):
         self._loop = loop or EventLoop(precise=named_pace is Pace.REALTIME)
         self._runner = LoopRunner(self._loop, self.close)
         modbus = CodecLoader(self._loop)
-        self._network = LoopNetwork(self._loop, modbus)
+        self._network = LoopNetwork(self._loop, modbus, host)
         controller = Controller(model, imperfections, seed, self._network, mode=RobotMode.RUNNING)
         controller.state.ports.version = (software.major, software.minor)
         self._box = ServedBox(

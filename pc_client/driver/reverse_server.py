@@ -22,7 +22,8 @@ class ReverseServer:
     Args:
         network: opens the port.
         address: our own address as the robot sees it; the port opens on no other.
-        robot_address: the only address that may call.
+        robot_address: the only address that may call. An emulated robot on this machine may call from any
+            of this machine's loopback addresses.
     """
 
     __slots__ = ("_address", "_listener", "_network", "_robot_address")
@@ -61,7 +62,7 @@ class ReverseServer:
         while True:
             caller = self._listener.accept(_POLL)
             if caller is not None:
-                if caller.peer_address == self._robot_address:
+                if _is_from(caller.peer_address, self._robot_address):
                     break
                 caller.close()  # somebody else found the port
             meanwhile()
@@ -80,6 +81,10 @@ class ReverseServer:
     def close(self) -> None:
         """Close the listening port."""
         self._listener.close()
+
+
+def _is_from(caller: str, robot: str) -> bool:
+    return caller == robot or (caller.startswith("127.") and robot.startswith("127."))
 
 
 def _read_hello(caller: Transport, timeout: float) -> None:

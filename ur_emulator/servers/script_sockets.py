@@ -6,6 +6,7 @@ import errno
 import selectors
 import socket
 import threading
+from weakref import WeakSet
 
 from ur_emulator.controller.modbus_signals import UnitAddress
 from ur_emulator.realtime.event_loop import EventLoop
@@ -26,9 +27,17 @@ _IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOU
 class LoopSocket:
     """One client connection of a script."""
 
-    def __init__(self, loop: EventLoop, host: str, port: int) -> None:
-        """Begin to connect; a name is looked up in a thread of its own, the loop never waits for it."""
+    def __init__(self, loop: EventLoop, host: str, port: int, own_address: str = "") -> None:
+        """Begin to connect; a name is looked up in a thread of its own, the loop never waits for it.
+
+        Args:
+            loop: watches the socket.
+            host: name or address of the peer.
+            port: of the peer.
+            own_address: where to call from, if the peer can be reached from there; "" leaves it open.
+        """
         self._loop = loop
+        self._own_address = own_address
         self._inbox = bytearray()
         self._held_back = False
         self.is_open = False
@@ -94,6 +103,8 @@ class LoopSocket:
         try:
             self._sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
             self._sock.setblocking(False)
+            if _can_call_from(self._own_address, address):
+                self._sock.bind((self._own_address, 0))
             code = self._sock.connect_ex((address, port))
         except (OSError, OverflowError):  # descriptors are out, or that is no address
             code = errno.EINVAL
@@ -165,22 +176,35 @@ def _is_numeric(host: str) -> bool:
     return True
 
 
+def _can_call_from(own: str, address: str) -> bool:
+    """Whether a call from our own address can reach an address: none leads out of the loopback network."""
+    if not _is_numeric(own) or own == "0.0.0.0":
+        return False
+    return own.startswith("127.") == address.startswith("127.")
+
+
 class LoopNetwork:
     """Opens script sockets in a loop."""
 
-    def __init__(self, loop: EventLoop, loader: CodecLoader | None = None) -> None:
+    def __init__(self, loop: EventLoop, loader: CodecLoader | None = None, own_address: str = "") -> None:
         """Prepare; nothing is opened or loaded.
 
         Args:
             loop: watches the sockets.
             loader: of the Modbus library, if it is shared with others.
+            own_address: of the box. A robot calls from the address at which it is called, and clients that
+                listen for it check that.
         """
         self._loop = loop
+        self._own_address = own_address
+        self._sockets: WeakSet[LoopSocket] = WeakSet()
         self._modbus = ModbusClient(loop, loader or CodecLoader(loop), self.open)
 
     def open(self, host: str, port: int) -> LoopSocket:
         """Begin to connect to `host`:`port`."""
-        return LoopSocket(self._loop, host, port)
+        opened = LoopSocket(self._loop, host, port, self._own_address)
+        self._sockets.add(opened)
+        return opened
 
     def remote_server(self, url: str) -> XmlRpcServer:
         """Return an XML-RPC server; nothing is connected before its first call."""
@@ -191,5 +215,7 @@ class LoopNetwork:
         return self._modbus.unit(address)
 
     def close(self) -> None:
-        """Close what does not belong to one program."""
+        """Close everything, whatever the programs are doing."""
         self._modbus.close()
+        for opened in tuple(self._sockets):
+            opened.close()
