@@ -54,9 +54,10 @@ def test_a_perfect_arm_stands_on_its_floor(perfect: list[Run]) -> None:
     covariance = step_covariance(perfect)
     assert covariance is not None
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), math.sqrt(2) * SIGMA, rtol=0.15)
-    floor = floor_db(perfect[0], covariance)
-    assert floor is not None
-    assert np.mean([run.snr.speed_db for run in perfect]) == pytest.approx(floor, abs=0.25)
+    snr = np.mean([run.snr.speed_db for run in perfect])
+    # the derivation, and then with what so few frames at rest tell of the noise
+    assert snr == pytest.approx(floor_db(perfect[0], np.diag(2 * SIGMA**2)), abs=0.2)
+    assert snr == pytest.approx(floor_db(perfect[0], covariance), abs=0.5)
 
 
 def test_an_error_that_repeats_is_not_in_the_floor(tmp_path: Path, perfect: list[Run]) -> None:
