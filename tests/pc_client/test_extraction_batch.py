@@ -1,0 +1,184 @@
+"""Batches: any executor, every outcome in its place, broken files beside good ones, the drawings' figures."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from extraction_samples import DRAWINGS, needs_drawings, own_strokes, recorded
+
+import pc_client.extraction.batch as batch
+from pc_client.errors import ClientError, RecordingError
+from pc_client.executors import open_executor
+from pc_client.extraction.batch import extract_many, extract_sources
+from pc_client.extraction.extract import extract
+from pc_client.extraction.results import Row, StrokeRow, row_of, stroke_rows, to_csv, to_json
+from pc_client.extraction.sources import pen_sources
+from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.stroke import Stroke
+
+
+class AtOnce(Executor):
+    """Does each job when it is submitted; from `broken_from` on, its workers are dead."""
+
+    def __init__(self, broken_from=None):
+        self.jobs, self.broken_from = [], broken_from
+
+    def submit(self, function, *arguments):
+        self.jobs.append(arguments)
+        future = Future()
+        try:
+            if self.broken_from is not None and len(self.jobs) > self.broken_from:
+                raise batch.BrokenExecutor("out of memory")
+            future.set_result(function(*arguments))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+def write(path, law, dim=2):
+    (part,) = recorded(law, dim).parts
+    rows = "".join(
+        ",".join(map(repr, [t, *p])) + "\n" for t, p in zip(part.t.tolist(), part.p.tolist(), strict=True)
+    )
+    path.write_text(("t,x,y\n" if dim == 2 else "t,x,y,z\n") + rows)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two movements, one of them in space, a dot, and two broken files."""
+    path = tmp_path_factory.mktemp("pens")
+    write(path / "a.csv", own_strokes(0, 2, n=2))
+    (path / "b.csv").write_text("t,x,y\n0,nothing,1\n")
+    write(path / "c.csv", own_strokes(1, 3, n=2), 3)
+    (path / "d.txt").write_text("START\n1,2,0\nBREAK\n")
+    (path / "e.txt").write_bytes(b"\xff\xfe\x00")
+    return path
+
+
+def check(outcomes, folder):
+    assert [outcome.name for outcome in outcomes] == [
+        str(folder / n) for n in ("a.csv", "b.csv", "c.csv", "d.txt", "e.txt")
+    ]
+    a, b, c, d, e = outcomes
+    assert (a.error, c.error, d.error) == (None, None, None)
+    assert (a.row.n_strokes, c.row.n_strokes, d.row) == (2, 2, Row(d.name, None, None, 0, 0))
+    assert min(a.row.snr_v_db, c.row.snr_v_db) >= 60.0
+    assert 'line 2: "nothing" is not a number' in b.error
+    assert "no text file" in e.error
+    assert (b.row, e.row) == (None, None)
+
+
+def test_one_after_the_other(folder):
+    check(extract_many([folder], AtOnce()), folder)
+
+
+def test_in_threads(folder):
+    with ThreadPoolExecutor(2) as executor:
+        check(extract_many([folder], executor), folder)
+
+
+def test_in_processes(folder):
+    with open_executor(workers=1) as executor:
+        check(extract_many([folder], executor), folder)
+
+
+def test_on_a_dask_cluster(folder):
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as cluster,
+        open_executor(dask=cluster.scheduler_address) as executor,
+    ):
+        check(extract_many([folder], executor), folder)
+
+
+def test_every_outcome_is_told_once_and_few_jobs_are_in_flight(folder, monkeypatch):
+    monkeypatch.setattr(batch, "_IN_FLIGHT", 2)
+    told = []
+    with ThreadPoolExecutor(2) as executor:
+        outcomes = extract_sources(pen_sources([folder]), executor, on_outcome=told.append)
+    check(outcomes, folder)
+    assert sorted(outcome.name for outcome in told) == [outcome.name for outcome in outcomes]
+
+
+def test_pictures_of_the_first(folder):
+    outcomes = extract_sources(pen_sources([folder]), AtOnce(), n_pictures=2)
+    assert outcomes[0].picture.startswith(b"\x89PNG")
+    assert [outcome.picture for outcome in outcomes[1:]] == [None] * 4
+
+
+def test_an_executor_that_breaks_down_is_one_line(folder):
+    with pytest.raises(ClientError, match=r"a worker ended .*out of memory.*fewer workers"):
+        extract_many([folder], AtOnce(broken_from=1))
+
+
+def test_a_fault_of_ours_costs_one_recording(folder, monkeypatch):
+    def faulty(recording, options):
+        if recording.name.endswith("a.csv"):
+            raise ZeroDivisionError("division by zero")
+        return extract(recording, options)
+
+    monkeypatch.setattr(batch, "extract", faulty)
+    outcomes = extract_many([folder], AtOnce())
+    assert "a.csv: the extraction failed (ZeroDivisionError" in outcomes[0].error
+    assert outcomes[2].row is not None
+
+
+def test_nothing_to_do_is_said(tmp_path):
+    with pytest.raises(RecordingError, match="in this folder"):
+        extract_many([tmp_path], AtOnce())
+
+
+def test_json_has_no_nan_and_the_stated_keys():
+    text = to_json([Row("a/ä.txt", 20.5, 30.25, 4, 3), Row("dot", None, None, 0, 0)])
+    assert json.loads(text) == [
+        {"file": "a/ä.txt", "snr_v_db": 20.5, "snr_t_db": 30.25, "n_strokes": 4, "n_speed_peaks": 3},
+        {"file": "dot", "snr_v_db": None, "snr_t_db": None, "n_strokes": 0, "n_speed_peaks": 0},
+    ]
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        to_json([Row("a", float("nan"), 1.0, 1, 1)])
+    assert json.loads(to_json([])) == []
+    assert Row("a", 20.0, 1.0, 4, 5).lognormality == 5.0
+    assert (Row("dot", None, None, 0, 0).lognormality, Row("dot", None, None, 0, 0).strokes_per_peak) == (
+        None,
+        None,
+    )
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_movement_comes_back_from_the_table_of_strokes_alone(dim):
+    result = extract(recorded(own_strokes(2, dim, n=3), dim))
+    rows = list(csv.DictReader(io.StringIO(to_csv(stroke_rows(result)))))
+    assert list(rows[0]) == list(StrokeRow._fields)
+    numbers = [{key: float(value) for key, value in row.items() if key != "file"} for row in rows]
+    targets = [[row[f"{axis}0"] for axis in "xyz"] for row in numbers]
+    targets.append([numbers[-1][f"{axis}1"] for axis in "xyz"])
+    strokes = [
+        Stroke(Lognormal(row["t0"], row["mu"], row["sigma"]), row["turn"], row["tilt"]) for row in numbers
+    ]
+    law = SigmaLognormal(np.array(targets), tuple(strokes), 1.0)
+    part = result.parts[0]
+    assert law.evaluate(part.t).p == pytest.approx(part.law.evaluate(part.t).p, abs=1e-12)
+    assert law.lengths == pytest.approx([row["length"] for row in numbers])
+    assert row_of(result).n_strokes == 3
+
+
+@needs_drawings
+def test_drawings_drawn_at_random_reach_the_figures():
+    sources = pen_sources([DRAWINGS])
+    chosen = [sources[i] for i in np.random.default_rng(7).choice(len(sources), 30, replace=False)]
+    with open_executor() as executor:
+        rows = [outcome.row for outcome in extract_sources(chosen, executor)]
+    snr_v = np.array([row.snr_v_db for row in rows if row.snr_v_db is not None])
+    assert len(snr_v) >= 29
+    assert snr_v.mean() >= 20.0
+    assert np.mean(snr_v > 15.0) >= 0.95
+    assert np.mean([row.snr_t_db for row in rows if row.snr_t_db is not None]) >= 25.0
+    assert sum(row.n_strokes for row in rows) <= 1.2 * sum(row.n_speed_peaks for row in rows)

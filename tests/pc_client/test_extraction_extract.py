@@ -1,0 +1,253 @@
+"""From recordings to strokes: own strokes come back, noise is borne, real drawings are told well."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from extraction_samples import own_strokes, recorded
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import ndtr
+
+from pc_client.extraction.chain import Bounds
+from pc_client.extraction.extract import ExtractOptions, extract
+from pc_client.extraction.fitting import FitOptions
+from pc_client.extraction.recording import PenPart, PenRecording, on_one_axis, ordered_part
+from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.stroke import arc_frame
+
+
+def numbers(law):
+    """Everything about the strokes that the theory names, (strokes, numbers)."""
+    rows = []
+    targets = law.target_points
+    for stroke, a, b in zip(law.strokes, targets[:-1], targets[1:], strict=True):
+        bell = stroke.timing.lognormal
+        axis = (
+            np.cross(*arc_frame(a, b, stroke.tilt)) * stroke.turn
+        )  # (tilt, turn) and (tilt + pi, -turn) are one
+        rows.append([bell.t0, bell.mu, bell.sigma, *axis, *(0.01 * b)])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_own_strokes_come_back(dim, seed):
+    law = own_strokes(seed, dim)
+    result = extract(recorded(law, dim))
+    assert (result.n_strokes, result.n_speed_peaks) == (5, 5)
+    assert result.snr_v_db >= 60.0
+    assert result.snr_t_db >= 60.0
+    assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
+    assert result.lognormality == pytest.approx(result.snr_v_db / 5)
+
+
+@pytest.mark.parametrize("rate", [60.0, 133.0, 1000.0])
+def test_own_strokes_come_back_at_any_rate(rate):
+    law = own_strokes(4, 2)
+    result = extract(recorded(law, 2, rate=rate))
+    assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
+
+
+def test_own_strokes_come_back_from_an_irregular_clock():
+    law = own_strokes(5, 2)
+    rng = np.random.default_rng(0)
+    t = np.arange(-0.3, law.duration + 0.3, 0.01)
+    t[1:-1] += rng.uniform(-0.003, 0.003, len(t) - 2)
+    result = extract(PenRecording("irregular", (PenPart(t, law.evaluate(t).p[:, :2]),)))
+    assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
+    assert result.snr_v_db >= 60.0
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_one_per_cent_of_noise_is_borne(dim, seed):
+    law = own_strokes(seed, dim)
+    recording = recorded(law, dim, noise=0.01, seed=seed)
+    result = extract(recording)
+    assert result.snr_v_db >= 35.0
+    assert result.snr_t_db >= 40.0
+    t = result.parts[0].t
+    truth, ours = law.evaluate(t).v, result.parts[0].law.evaluate(t).v
+    assert 10.0 * math.log10(np.sum(truth**2) / np.sum((truth - ours) ** 2)) >= 35.0
+
+
+def test_case_e_of_the_notes_comes_back():
+    """D=.2, t0=.1, mu=-1.6, sigma=.25, theta .3 -> 1.5: end point (.116996, .147433)."""
+    bell = Lognormal(0.1, -1.6, 0.25)
+    t = np.arange(0.0, 1.2, 0.005)
+    done = bell.evaluate(t).done
+    chord = 0.2 * done * np.sinc(0.6 * done / math.pi)
+    p = chord[:, None] * np.column_stack((np.cos(0.3 + 0.6 * done), np.sin(0.3 + 0.6 * done)))
+    law = extract(PenRecording("case E", (PenPart(t, p),))).parts[0].law
+    assert len(law.strokes) == 1
+    found = law.strokes[0].timing.lognormal
+    assert (found.t0, found.mu, found.sigma) == pytest.approx((0.1, -1.6, 0.25), abs=1e-3)
+    assert law.lengths[0] == pytest.approx(0.2, abs=2e-4)
+    assert law.target_points[1, :2] == pytest.approx([0.116996, 0.147433], abs=1e-4)
+    assert numbers(law)[0, 5] == pytest.approx(1.2, abs=1e-3)
+
+
+def hand(seed=3):
+    """A rough movement: strokes of a hand, with noise, and a clock like a browser's."""
+    law = own_strokes(seed, 2, n=8, stroke_time=0.35)
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.choice([0.001, 0.008, 0.016, 0.024], 150))
+    p = np.round(law.evaluate(t).p[:, :2] + rng.normal(size=(len(t), 2)))
+    part, _ = ordered_part(t, p)
+    return on_one_axis("hand", [part])
+
+
+def test_the_figures_are_those_of_the_law_that_is_given():
+    result = extract(hand())
+    (part,) = result.parts
+    motion = part.law.evaluate(part.t)
+    error = part.v - motion.v[:, :2]
+    assert result.snr_v_db == pytest.approx(10 * math.log10(np.sum(part.v**2) / np.sum(error**2)))
+    assert result.snr_t_db == pytest.approx(
+        10 * math.log10(np.sum((part.p - part.p.mean(axis=0)) ** 2) / np.sum((part.p - motion.p[:, :2]) ** 2))
+    )
+    assert part.v == pytest.approx(np.gradient(part.p, part.t, axis=0), abs=0.05 * np.abs(part.v).max())
+    assert (part.snr_v_db, part.n_strokes) == (result.snr_v_db, result.n_strokes)
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 1.2, 2.0])
+def test_the_budget_of_strokes_is_kept(ratio):
+    result = extract(hand(), ExtractOptions(strokes_per_peak=ratio))
+    # One stroke for each bell stands at the beginning; the budget is for what is added.
+    assert result.n_strokes <= max(ratio, 1.0) * result.n_speed_peaks
+
+
+def test_more_strokes_tell_more():
+    few, many = (extract(hand(), ExtractOptions(strokes_per_peak=ratio)) for ratio in (1.0, 1.5))
+    assert many.n_strokes > few.n_strokes
+    assert many.snr_v_db > few.snr_v_db + 0.5
+
+
+def test_no_stroke_is_degenerate():
+    bounds = Bounds()
+    for seed in range(3):
+        for part in extract(hand(seed)).parts:
+            for stroke in part.law.strokes:
+                bell = stroke.timing.lognormal
+                assert bounds.sigma[0] - 1e-12 <= bell.sigma <= bounds.sigma[1] + 1e-12
+                assert math.exp(bell.mu) * bell.sigma >= bounds.width[0] - 1e-12
+                assert abs(stroke.turn) <= bounds.turn[1]
+            # No pair of strokes that grew against each other.
+            assert part.law.stroke_speeds(part.t).max() < 3.0 * np.linalg.norm(part.v, axis=1).max()
+
+
+def test_a_gaussian_bell_is_held_at_the_least_sigma_and_told():
+    t = np.arange(0.0, 3.0, 0.005)
+    x = 100.0 * ndtr((t - 1.5) / 0.2)
+    result = extract(PenRecording("gauss", (PenPart(t, np.column_stack((x, 0.0 * x))),)))
+    assert result.parts[0].law.strokes[0].timing.lognormal.sigma == pytest.approx(0.08)
+    assert any("held at the least sigma" in remark for remark in result.remarks)
+    assert result.snr_v_db > 25.0
+
+
+def test_neither_place_nor_size_nor_direction_nor_unit_matters():
+    plain = hand()
+    rotation = np.array([[math.cos(0.7), -math.sin(0.7)], [math.sin(0.7), math.cos(0.7)]])
+    moved = PenRecording(
+        "moved", tuple(PenPart(part.t, 1e-3 * part.p @ rotation.T + [500.0, -20.0]) for part in plain.parts)
+    )
+    one, other = extract(plain), extract(moved)
+    assert other.n_strokes == one.n_strokes
+    assert other.snr_v_db == pytest.approx(one.snr_v_db, abs=0.2)
+    assert other.parts[0].law.lengths.sum() == pytest.approx(1e-3 * one.parts[0].law.lengths.sum(), rel=0.1)
+
+
+def test_slowed_down_movements_have_the_same_strokes_slowed_down():
+    law = own_strokes(6, 2)
+    slow = extract(recorded(law.stretched(3.0), 2)).parts[0].law
+    assert [s.timing.lognormal.sigma for s in slow.strokes] == pytest.approx(
+        [s.timing.lognormal.sigma for s in law.strokes], abs=1e-3
+    )
+
+
+def test_the_same_recording_gives_the_same_strokes():
+    one, other = extract(hand()), extract(hand())
+    assert np.array_equal(one.parts[0].law.target_points, other.parts[0].law.target_points)
+    assert one.snr_v_db == other.snr_v_db
+
+
+def test_parts_share_a_time_axis_and_a_budget():
+    first, second = hand(1).parts[0], hand(2).parts[0]
+    later = PenPart(second.t + first.t[-1] + 0.4, second.p)
+    dot = PenPart([9.0], [[1.0, 2.0]])
+    result = extract(PenRecording("two", (first, later, dot)))
+    assert [part.t[0] for part in result.parts] == [first.t[0], later.t[0]]
+    assert result.still == (dot,)
+    assert result.n_strokes == sum(part.n_strokes for part in result.parts)
+    assert result.n_speed_peaks == sum(part.n_speed_peaks for part in result.parts)
+    for part in result.parts:
+        modes = [stroke.timing.lognormal.mode for stroke in part.law.strokes]
+        assert part.t[0] - 1.0 < min(modes)
+        assert max(modes) < part.t[-1] + 1.0
+    assert "1 of 3 parts hold no movement" in result.remarks[0]
+
+
+@pytest.mark.parametrize(
+    "recording",
+    [
+        PenRecording("nothing", ()),
+        PenRecording("a sample", (PenPart([0.0], [[1.0, 2.0]]),)),
+        PenRecording("a dot", (PenPart([0.0, 0.2, 0.3], [[1.0, 2.0]] * 3),)),
+        PenRecording("a touch", (PenPart([0.0, 0.01], [[1.0, 2.0], [1.0, 3.0]]),)),
+    ],
+    ids=lambda recording: recording.name,
+)
+def test_where_nothing_moves_there_is_no_stroke_and_no_snr(recording):
+    result = extract(recording)
+    assert (result.parts, result.snr_v_db, result.snr_t_db, result.lognormality) == ((), None, None, None)
+    assert (result.n_strokes, result.n_speed_peaks) == (0, 0)
+    assert result.still == recording.parts
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 7])
+@pytest.mark.parametrize("duration", [0.02, 0.05, 0.2, 1.0])
+def test_short_parts_have_a_stroke(n, duration, dim):
+    t = np.linspace(0.0, duration, n)
+    p = np.column_stack([(np.arange(n) + axis) ** 2 for axis in range(dim)]).astype(float)
+    result = extract(PenRecording("short", (PenPart(t, p),)))
+    assert result.n_strokes >= 1
+    assert result.snr_v_db > 5.0
+
+
+rows = st.lists(
+    st.tuples(
+        st.one_of(st.integers(-30, 400), st.just(math.nan)),
+        st.integers(-20, 20).map(float),
+        st.one_of(st.floats(-1e6, 1e6), st.sampled_from([math.nan, math.inf, 0.0])),
+    ),
+    min_size=1,
+    max_size=20,
+)
+
+
+@given(rows, st.sampled_from([1e-3, 1e-2]))
+@settings(max_examples=20, deadline=None)
+def test_no_samples_whatever_make_it_fail(rows, unit):
+    t, x, y = np.array(rows, dtype=float).T
+    part, _ = ordered_part(np.nancumsum(t) * unit, np.column_stack((x, y)))
+    result = extract(
+        on_one_axis("any", [] if part is None else [part]), ExtractOptions(fit=FitOptions(1, 3, 4))
+    )
+    if result.parts:
+        assert math.isfinite(result.snr_v_db)
+        assert math.isfinite(result.snr_t_db)
+        assert all(np.isfinite(part.law.evaluate(part.t).p).all() for part in result.parts)
+
+
+def test_a_long_recording_costs_memory_in_proportion_to_its_length():
+    """A minute of movement: the equations are a band, never a square."""
+    law = own_strokes(7, 2, n=60, stroke_time=1.5, overlap=0.4)
+    options = ExtractOptions(fit=replace(FitOptions(), rounds=1, iterations=3, last_iterations=4))
+    result = extract(recorded(law, 2), options)
+    assert result.parts[0].t[-1] > 50.0
+    assert result.snr_v_db > 30.0
