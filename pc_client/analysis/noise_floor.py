@@ -11,8 +11,8 @@ noise along the motion counts, near rest all of it does; the expectation takes c
 to the movement, and nothing is known of the arm but what it reports.
 
 What moves with the arm and does not repeat (the moment of sampling, for one) is not in C. It can be measured
-together with the encoders' noise, from runs that were driven alike: `unrepeatable_power`, half the mean
-square of the difference of two. What noise adds to the mean of the speed near rest is the same in both and
+together with the encoders' noise, from two runs as if driven alike: `unrepeatable_power`, half the mean
+square of their difference. What noise adds to the mean of the speed near rest is the same in both and
 drops out there: of a movement with long slow tails this figure is better than the floor, else a little worse.
 """
 
@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from pc_client.analysis.run import Run
 from pc_client.analysis.speed_noise import speed_noise
 from pc_client.analysis.track import speed, velocity
+from pc_client.control.loop_model import LoopModel, velocity_response
 from pc_client.kinematics.forward import tcp_jacobian
 from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
 from pc_client.recording.layout import Phase
@@ -95,23 +96,44 @@ def floor_db(run: Run, covariance: Array | None) -> float | None:
     return 10.0 * math.log10(signal / power) if power > 0.0 < signal else None
 
 
-def driven_alike(first: Run, second: Run) -> bool:
-    """True when two runs of a movement had the same feed-forward: nothing was learned between them."""
-    return all(not run.provenance.controller_config.get("learns", False) for run in (first, second))
-
-
 def unrepeatable_power(runs: Sequence[Run]) -> float | None:
-    """Return half the mean square difference [(m/s)2] of the speeds of runs that were driven alike.
+    """Return half the mean square difference [(m/s)2] of the speeds of two runs, as if driven alike.
+
+    What the commands of the second differ by from those of the first (learned or fed back) is taken out
+    through the loop that the client identified.
 
     Args:
         runs: repetitions of one movement; neighbours are compared.
 
     Returns:
-        The mean over all pairs; None when there is no such pair.
+        The mean over all pairs; None for a single run, an unknown arm or old recordings without a loop.
     """
     halves = []
     for first, second in pairwise(runs):
-        a, b = (speed(run.track.t, run.track.p_actual)[run.track.movement_steps] for run in (first, second))
-        if driven_alike(first, second) and len(a) == len(b):
+        p = _as_driven_like(first, second)
+        if p is not None:
+            steps = first.track.movement_steps
+            a, b = (speed(first.track.t, x)[steps] for x in (first.track.p_actual, p))
             halves.append(0.5 * float(np.mean(np.square(a - b))))
     return float(np.mean(halves)) if halves else None
+
+
+def _as_driven_like(first: Run, second: Run) -> Array | None:
+    """Return the positions (n, 3) [m] of the second run as they would be with the commands of the first."""
+    loop, name = first.provenance.loop, first.provenance.robot_model.lower()
+    if not loop or name not in ROBOTS or len(first.track.t) != len(second.track.t):
+        return None
+    model, period = robot_model(name), float(np.median(np.diff(first.track.t)))
+    commands = [run.recording.column("cmd_qd")[run.track.rows] for run in (first, second)]
+    response = velocity_response(
+        LoopModel(float(loop["dead_time_s"]), float(loop["lag_s"]), 0.0, 0.0), period
+    )
+    more = commands[1] - commands[0]
+    further = np.cumsum(
+        np.stack([np.convolve(column, response)[: len(more)] for column in more.T], axis=1), axis=0
+    )
+    q = first.recording.column("ref_q")[first.track.rows]
+    jacobians = np.array([tcp_jacobian(model, q_k)[:3] for q_k in q])
+    moved = np.einsum("nij,nj->ni", jacobians, further * period)
+    positions: Array = second.track.p_actual - moved
+    return positions

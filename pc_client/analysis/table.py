@@ -75,7 +75,7 @@ class Row:
 
     @property
     def unrepeatable_db(self) -> float | None:
-        """SNR that the difference of runs that were driven alike would leave; None without such runs."""
+        """SNR that what does not repeat from run to run would leave; None when it is not known."""
         power = unrepeatable_power(self.runs)
         return 10.0 * math.log10(self.runs[0].budget.signal_power / power) if power else None
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from recording_samples import N_VALUES, PERIOD, SIGNALS, bell, provenance, record_movement
 
-from pc_client.analysis.noise_floor import driven_alike, floor_db, step_covariance, unrepeatable_power
+from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
 from pc_client.analysis.run import Run, analyse_run
 from pc_client.analysis.speed_noise import speed_noise
 from pc_client.analysis.table import build_table
+from pc_client.control.loop_model import LoopModel, velocity_response
 from pc_client.kinematics.forward import tcp_positions
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.recording.layout import Phase
@@ -24,23 +25,29 @@ Q0 = np.array((0.4, -1.77, -2.1, -0.1, 1.3, 1.86))
 WAY = np.array((0.5, 0.3, -0.4, 0.2, -0.1, 0.3))
 
 
-def record_joints(path: Path, seed: int, *, ripple: float = 0.0, learns: bool = False) -> Run:
-    """A joint movement on a UR3 whose only fault is the noise of its encoders (and a ripple that repeats)."""
+def record_joints(path: Path, seed: int, *, ripple: float = 0.0, push: float = 0.0) -> Run:
+    """A joint movement on a UR3 whose only fault is the noise of its encoders (and a ripple that repeats).
+
+    `push` [rad/s] is the size of a command beside those that make it perfect, and of its effect.
+    """
     model, random = robot_model("ur3"), np.random.default_rng(seed)
     rest, duration = 0.8, 6.0
     t = PERIOD * np.arange(-round(rest / PERIOD), round((duration + rest) / PERIOD) + 1)
     q_ref = Q0 + bell(t, duration)[:, None] * WAY
     q = q_ref + ripple * np.sin(101 * q_ref) * np.square(np.sin(np.pi * np.clip(t / duration, 0, 1)))[:, None]
+    cmd_qd = push * np.sin(2 * np.pi * 2.0 * t)[:, None] * ((t > 0.5) & (t < 4.5))[:, None] * np.ones(6)
+    response = velocity_response(LoopModel(0.02, 0.01, 0.0, 0.0), PERIOD) * PERIOD
+    q = q + np.cumsum([np.convolve(column, response)[: len(t)] for column in cmd_qd.T], axis=1).T
     q = q + random.normal(0.0, SIGMA, q.shape)
     p_ref, p = tcp_positions(model, q_ref), tcp_positions(model, q)
-    prov = provenance(robot_model="UR3", repetition=seed, controller_config={"learns": learns})
+    prov = provenance(robot_model="UR3", repetition=seed, loop={"dead_time_s": 0.02, "lag_s": 0.01})
     with Recorder(path, prov, SIGNALS) as recorder:
         for i, now in enumerate(t):
             frame = np.zeros(N_VALUES)
             frame[0], frame[1:7], frame[7:10] = 10.0 + PERIOD * i, q[i], p[i]
             phase = Phase.SETTLE_BEFORE if now < -1e-9 else Phase.MOVEMENT
             phase = Phase.SETTLE_AFTER if now > duration + 1e-9 else phase
-            recorder.append(frame, now, q_ref[i], np.zeros(6), p_ref[i], np.zeros(3), np.zeros(6), phase)
+            recorder.append(frame, now, q_ref[i], np.zeros(6), p_ref[i], np.zeros(3), cmd_qd[i], phase)
     return analyse_run(load_recording(path))
 
 
@@ -73,10 +80,20 @@ def test_an_error_that_repeats_is_not_in_the_floor(tmp_path: Path, perfect: list
     assert ours - 0.3 < unrepeatable < ours + 2.0
 
 
-def test_runs_between_which_something_was_learned_are_not_compared(tmp_path: Path) -> None:
-    runs = [record_joints(tmp_path / f"a_r{k}.mcap", k, learns=True) for k in (1, 2)]
-    assert not driven_alike(*runs)
-    assert unrepeatable_power(runs) is None
+def test_what_the_commands_differ_by_is_taken_out(tmp_path: Path, perfect: list[Run]) -> None:
+    pushed = [record_joints(tmp_path / f"a_r{k}.mcap", k, push=0.005 * k) for k in (1, 2, 3)]
+    alike, driven = unrepeatable_power(perfect[:3]), unrepeatable_power(pushed)
+    assert alike is not None
+    assert driven == pytest.approx(alike, rel=0.06)
+    differ = [np.diff(run.track.p_actual, axis=0) for run in pushed]
+    same = [np.diff(run.track.p_actual, axis=0) for run in perfect[:2]]
+    assert np.std(differ[1] - differ[0]) > 1.2 * np.std(same[1] - same[0])
+
+
+def test_of_old_recordings_and_single_runs_nothing_is_known(tmp_path: Path, perfect: list[Run]) -> None:
+    assert unrepeatable_power(perfect[:1]) is None
+    old = [record_movement(tmp_path / f"b_r{k}.mcap", prov=provenance(repetition=k)) for k in (1, 2)]
+    assert unrepeatable_power([analyse_run(load_recording(path)) for path in old]) is None
 
 
 def test_table_shows_the_floor(perfect: list[Run]) -> None:
