@@ -146,35 +146,39 @@ def markdown(results: list[dict[str, Any]]) -> str:
         shares = [100.0 * fmean(row["budget_share"][part] for row in r["rows"].values()) for part in parts]
         cells = [r["composition"], r["fidelity"], *(f"{share:.0f}" for share in shares)]
         lines.append("| " + " | ".join(cells) + " |")
+    best = [r for r in results if (r["composition"], r["fidelity"]) == ("best", "typical")]
+    heads = [f"seed {r['seed']}, {r['pace']}" for r in best]
     lines += [
         "",
-        "The best composition, typical fidelity, row by row: runs 1, 2, 3, and the third less the floor, dB.",
+        "The best composition at typical fidelity: all runs of the first box, then the third run of each box "
+        "and by how much it is above the floor, dB.",
         "",
-        "| seed | pace | movement | r1 | r2 | r3 | floor | r3 - floor |",
-        "|---|---|---|---:|---:|---:|---:|---:|",
+        f"| movement | {heads[0]}: r1, r2, r3 | " + " | ".join(f"{head}: r3" for head in heads) + " |"
+        if best
+        else "",
+        "|---|---|" + "---:|" * len(best),
     ]
-    for r in results:
-        if (r["composition"], r["fidelity"]) == ("best", "typical"):
-            for name, row in r["rows"].items():
-                runs = " | ".join(f"{x:.2f}" for x in row["snr_db"])
-                floor = row["noise_floor_db"]
-                below = row["snr_db"][-1] - floor
-                lines.append(f"| {r['seed']} | {r['pace']} | {name} | {runs} | {floor:.2f} | {below:+.2f} |")
+    for name in best[0]["rows"] if best else ():
+        cells = [name, ", ".join(f"{x:.1f}" for x in best[0]["rows"][name]["snr_db"])]
+        for r in best:
+            third, floor = r["rows"][name]["snr_db"][-1], r["rows"][name]["noise_floor_db"]
+            cells.append(f"{third:.2f} ({third - floor:+.2f})")
+        lines.append("| " + " | ".join(cells) + " |")
     lines += [
         "",
-        "The identified loop and its margins.",
+        "The loop that the best composition identified, and its margins.",
         "",
-        "| composition | fidelity | seed | pace | dead time, lag [ms] | gain margin | phase [deg] "
-        "| delay [ms] | contraction | late, lost |",
-        "|---|---|---|---|---|---:|---:|---:|---:|---|",
+        "| fidelity | seed | pace | dead time, lag, spread [ms] | gain margin | phase [deg] | delay [ms] "
+        "| cut-off [Hz] | contraction | late, lost frames |",
+        "|---|---|---|---|---:|---:|---:|---:|---:|---|",
     ]
-    for r in results:
+    for r in (r for r in results if r["composition"] == "best"):
         loop = r["loop"]
-        contraction = f"{loop['learning_contraction']:.2f}" if "learning_contraction" in loop else ""
+        times = ", ".join(f"{1e3 * loop[x]:.1f}" for x in ("dead_time_s", "lag_s", "joint_spread_s"))
         lines.append(
-            f"| {r['composition']} | {r['fidelity']} | {r['seed']} | {r['pace']} "
-            f"| {1e3 * loop['dead_time_s']:.1f}, {1e3 * loop['lag_s']:.1f} | {loop['gain_margin']:.1f} "
-            f"| {loop['phase_margin_deg']:.0f} | {1e3 * loop['delay_margin_s']:.0f} | {contraction} "
+            f"| {r['fidelity']} | {r['seed']} | {r['pace']} | {times} | {loop['gain_margin']:.1f} "
+            f"| {loop['phase_margin_deg']:.0f} | {1e3 * loop['delay_margin_s']:.0f} "
+            f"| {loop['learning_cut_off_hz']:.0f} | {loop['learning_contraction']:.2f} "
             f"| {r['late_frames']}, {r['lost_frames']} |"
         )
     return "\n".join(lines) + "\n"

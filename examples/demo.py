@@ -32,7 +32,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--pace", choices=["lockstep", "realtime"], default="lockstep")
     parser.add_argument("--fidelity", choices=["ideal", "typical", "poor"], default="typical")
-    parser.add_argument("--controller", choices=["preview", "paper"], default="preview")
+    parser.add_argument("--controller", choices=["preview", "paper", "best"], default="preview")
     parser.add_argument("--repeat", type=int, default=3)
     options = parser.parse_args()
     box = open_box(seed=options.seed, pace=options.pace, fidelity=options.fidelity)

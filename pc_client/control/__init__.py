@@ -1,10 +1,16 @@
 """The feedback loop, without a robot: pure functions and small state, no sockets, no clock.
 
-controller_config  the two named controllers and their numbers
+controller_config  the named controllers and their numbers
 reference          what the arm should do at any time, prepared for the loop
 pi_feedforward     PI + velocity feed-forward for six joints (the paper's Fig. 3)
+state_estimate     Kalman estimate of positions and velocities for the feedback
 tracker            one frame in, one command out
-stability          how much gain a loop with delay bears
-excitation         the small movement that reveals the loop delay
+excitation         the small movement that reveals the loop
 delay              the loop delay from a logged stream
+loop_model         dead time, lag, integrator: what the client knows of the loop, and its exact response
+lag                dead time and lag apart, from a logged stream
+stability          how much gain a loop with delay bears; margins
+gear               the waves of the gears from finished runs, and how to drive against them
+learning_filter    what part of an error is learned, and the proof that it converges
+learning           what one run of a movement teaches the next
 """

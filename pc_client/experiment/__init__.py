@@ -2,7 +2,8 @@
 
     prepare         plan all movements and look at the folder, before anything moves
     preflight       what a bystander must know and agree to, before a real arm moves
-    identification  the loop delay of this session
+    identification  the loop of this session, and the margins on it
+    repetitions     what runs of one movement hand on, and when it may be used
     runner          approach, stream, record, for every movement and repetition
     observer        what the runner tells while it works
     progress        shows it on the terminal
