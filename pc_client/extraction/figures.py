@@ -43,6 +43,8 @@ def draw_extraction(extraction: Extraction) -> bytes:
         for still in extraction.still:
             path.plot(*still.p[0], marker=".", color=_RECORDED)
         path.set_aspect("equal", adjustable="datalim")
+    else:
+        path.set_aspect("equal")
     path.set_title("path, unit of the recording", fontsize=9)
     path.legend(fontsize=7, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.06), ncols=3)
     speed.set_title("speed, unit of the recording per s", fontsize=9)

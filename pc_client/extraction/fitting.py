@@ -24,8 +24,9 @@ __all__ = ["FitOptions", "Scales", "fit_parts"]
 #: The fit looks at every fourth sample of the 200 Hz signal: twice 12 Hz is 24 Hz, 50 Hz is enough.
 _DECIMATION = 4
 _LEAST_SAMPLES = 16
-#: Share of the average residual of a stroke that a further stroke has to take away, by its first estimate.
-_PAYS = 0.1
+#: A further stroke pays when, by its first estimate, it raises the SNR by this share of what the strokes have
+#: brought on average, SNR_v / number of strokes.
+_PAYS = 0.05
 #: Above this SNR (dB) what the low-pass took from the strokes is the larger part of the residual.
 _CLEAN_DB = 35.0
 _GIVE_BACKS = 4
@@ -108,7 +109,9 @@ def _add(
     energy = sum(float(np.sum(v**2)) for v in left)
     if energy < scales.v**2 * 10.0 ** (-options.enough_db / 10.0):
         return False
-    least = _PAYS * energy / sum(len(fit.chain) for fit in fits)
+    snr = 10.0 * math.log10(scales.v**2 / energy)
+    raised = _PAYS * max(snr, 0.0) / sum(len(fit.chain) for fit in fits)
+    least = energy * (1.0 - 10.0 ** (-raised / 10.0))
     found = [
         (candidate, index)
         for index, (part, v) in enumerate(zip(parts, left, strict=True))

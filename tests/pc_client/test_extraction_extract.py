@@ -251,3 +251,11 @@ def test_a_long_recording_costs_memory_in_proportion_to_its_length():
     result = extract(recorded(law, 2), options)
     assert result.parts[0].t[-1] > 50.0
     assert result.snr_v_db > 30.0
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_strokes_are_not_added_for_noise(dim):
+    """Ten per cent of noise: peaks by the dozen, and still the five strokes that were there."""
+    result = extract(recorded(own_strokes(1, dim), dim, noise=0.1))
+    assert result.n_speed_peaks > 6
+    assert result.n_strokes == 5

@@ -1,0 +1,28 @@
+"""Draws docs/img/extraction.png: a movement of the library, recorded badly, and the strokes found in it.
+
+`python docs/make_extraction_picture.py` from the root of the checkout. Needs the extra `report`.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from pc_client.extraction.extract import extract
+from pc_client.extraction.figures import draw_extraction
+from pc_client.extraction.recording import PenRecording, on_one_axis, ordered_part
+from pc_client.movements.files import load_movement
+
+
+def bad_recording(name: str, seed: int) -> PenRecording:
+    """Millimetres, rounded to half of one, at the irregular times of a browser's mouse events."""
+    movement = load_movement(name)
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.choice([0.001, 0.008, 0.016, 0.024], size=800))
+    t = t[t < movement.duration]
+    part, _ = ordered_part(t, np.round(2e3 * movement.sample(t).p[:, :2]) / 2.0)
+    return on_one_axis(f"{name}, recorded badly", [] if part is None else [part])
+
+
+if __name__ == "__main__":
+    picture = draw_extraction(extract(bad_recording("lognorm_5_2", seed=1)))
+    Path(__file__).with_name("img").joinpath("extraction.png").write_bytes(picture)

@@ -1,0 +1,34 @@
+"""Pictures of extractions are made of anything that moves."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from extraction_samples import own_strokes, recorded
+from matplotlib.image import imread
+
+from pc_client.extraction.extract import extract
+from pc_client.extraction.figures import draw_extraction, draw_overview
+from pc_client.extraction.recording import PenPart, PenRecording
+from pc_client.extraction.results import Row
+
+
+def ink(png):
+    """Share of pixels that are not white."""
+    return float(np.mean(imread(io.BytesIO(png))[..., :3].min(axis=2) < 0.9))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_recording(dim):
+    (part,) = recorded(own_strokes(0, dim, n=2), dim).parts
+    dot = PenPart([9.0], [[0.0] * dim])
+    assert ink(draw_extraction(extract(PenRecording("folder/own.csv", (part, dot))))) > 0.02
+
+
+@pytest.mark.parametrize("n", [0, 1, 40])
+def test_a_batch(n):
+    rows = [Row(f"{i}.txt", 20.0 + i, 30.0 + i, 5 + i, 6) for i in range(n)]
+    empty = ink(draw_overview([Row("dot", None, None, 0, 0)]))
+    assert (ink(draw_overview(rows)) > empty + 0.01) is (n > 0)
