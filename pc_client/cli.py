@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import typer
 
-from pc_client.commands import compare, doctor, experiment, extract, movements, recordings, sweep
+from pc_client.commands import compare, doctor, draw, experiment, extract, movements, recordings, sweep
 from pc_client.errors import ClientError, full_message
 from protocol.errors import ProtocolError
 
@@ -28,6 +28,7 @@ app.command()(experiment.run)
 app.add_typer(movements.app, name="movements")
 app.command()(sweep.sweep)
 app.command()(extract.extract)
+app.command()(draw.draw)
 app.command()(compare.compare)
 app.command()(recordings.report)
 app.command()(recordings.export)

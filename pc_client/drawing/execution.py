@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from pc_client.analysis.run import Run
 from pc_client.drawing.drawing import Drawing
 from pc_client.errors import RecordingError
-from pc_client.extraction.smoothing import low_passed, velocity
+from pc_client.extraction.smoothing import RATE_HZ, low_passed, velocity
 from pc_client.movements.geometry import read_only
 
 __all__ = ["ExecutedPart", "Execution", "executed"]
@@ -52,14 +52,16 @@ class Execution:
     Attributes:
         run: the recording and what is measured on every movement.
         parts: those that move, in order.
-        t: movement time of all frames of the movement, (k,), s of the arm.
-        p: TCP positions then, (k, 3), m, base frame.
+        t: all of the movement on a uniform grid, (k,), s of the hand since it began.
+        p: TCP positions then, through the same low-pass, (k, 3), m, base frame.
+        v: their velocities, (k, 3), m per s of the hand.
     """
 
     run: Run
     parts: tuple[ExecutedPart, ...]
     t: NDArray[np.float64]
     p: NDArray[np.float64]
+    v: NDArray[np.float64]
 
 
 def executed(drawing: Drawing, run: Run, shift: float = 0.0) -> Execution:
@@ -84,8 +86,9 @@ def executed(drawing: Drawing, run: Run, shift: float = 0.0) -> Execution:
         _part(drawing, index, part.t, path)
         for index, part in zip(moving, drawing.extraction.parts, strict=True)
     )
-    inside = track.movement
-    return Execution(run, parts, read_only(t[inside]), read_only(track.p_actual[inside]))
+    whole = np.arange(0.0, drawing.joined.law.duration, 1.0 / RATE_HZ)
+    p = low_passed(path(np.clip(whole * drawing.factor, path.x[0], path.x[-1])), RATE_HZ)
+    return Execution(run, parts, read_only(whole), read_only(p), read_only(velocity(whole, p)))
 
 
 def _part(drawing: Drawing, mark: int, grid: NDArray[np.float64], path: CubicSpline) -> ExecutedPart:

@@ -86,9 +86,11 @@ class RunVerdict:
         repetition: its number.
         planned: executed against planned.
         human: executed against the recording.
-        planned_shifted: executed against planned, after the best time shift.
-        human_shifted: executed against the recording, after the same.
+        planned_aligned: executed against planned, after the best time shift and without the constant offset
+            between the plan's nominal arm and the calibrated one.
+        human_aligned: executed against the recording, after the same.
         lag: that shift, s of the arm; positive: the arm is late.
+        offset: length of that offset, m.
         speed_db: Eq. 10 of the paper over the whole movement with its lifts, scalar speed.
         max_error: largest distance from the plan while the pen is down, m, at equal time stamps.
         off_sheet: largest distance from the sheet while the pen is down, m; nan for recordings in space.
@@ -98,9 +100,10 @@ class RunVerdict:
     repetition: int
     planned: Agreement
     human: Agreement
-    planned_shifted: Agreement
-    human_shifted: Agreement
+    planned_aligned: Agreement
+    human_aligned: Agreement
     lag: float
+    offset: float
     speed_db: float
     max_error: float
     off_sheet: float
@@ -194,6 +197,8 @@ def _judge_run(drawing: Drawing, execution: Execution) -> RunVerdict:
     run = execution.run
     lag = run.snr.velocity_lag_s
     shifted = executed(drawing, run, lag)
+    rest = np.vstack([actual - reference for _, reference, actual in _against_plan(drawing, shifted)])
+    offset = rest.mean(axis=0)
     metres = drawing.placement.similarity.scale
     errors, heights = [], []
     for _, reference, actual in _against_plan(drawing, execution):
@@ -204,9 +209,10 @@ def _judge_run(drawing: Drawing, execution: Execution) -> RunVerdict:
         run.provenance.repetition,
         _agreement(_against_plan(drawing, execution)),
         _agreement(_against_human(drawing, execution)),
-        _agreement(_against_plan(drawing, shifted)),
-        _agreement(_against_human(drawing, shifted)),
+        _agreement(_less(_against_plan(drawing, shifted), offset)),
+        _agreement(_less(_against_human(drawing, shifted), offset)),
         lag,
+        metres * float(np.linalg.norm(offset)),
         run.snr.speed_db,
         metres * float(np.concatenate(errors).max()),
         metres * float(np.concatenate(heights).max()) if drawing.flat else math.nan,
@@ -232,6 +238,10 @@ def _against_human(drawing: Drawing, execution: Execution) -> list[_Pair]:
         (part.frame_t, CubicSpline(human.t, spatial(human.p))(part.frame_t), part.frame_p)
         for human, part in zip(drawing.extraction.parts, execution.parts, strict=True)
     ]
+
+
+def _less(pairs: Sequence[_Pair], offset: NDArray[np.float64]) -> list[_Pair]:
+    return [(t, reference, actual - offset) for t, reference, actual in pairs]
 
 
 def _agreement(pairs: Sequence[_Pair]) -> Agreement:

@@ -80,12 +80,14 @@ class Placement:
         lift: from the sheet to the lifted pen, (3,), m, base frame.
         rotation: turn on the sheet, rad.
         plane: a key of `PLANES`, or "space".
+        y_up: whether the recording's y axis points up the sheet.
     """
 
     similarity: Similarity
     lift: NDArray[np.float64]
     rotation: float
     plane: str
+    y_up: bool
 
 
 def sheet_frame(plane: str, *, y_up: bool) -> NDArray[np.float64]:
@@ -132,7 +134,7 @@ def place(
     low = turned.min(axis=0) + np.minimum(lift, 0.0)
     high = turned.max(axis=0) + np.maximum(lift, 0.0)
     similarity = Similarity(scale, R, options.box.centre - 0.5 * (low + high))
-    return Placement(similarity, read_only(lift), angle, options.plane if flat else "space")
+    return Placement(similarity, read_only(lift), angle, options.plane if flat else "space", options.y_up)
 
 
 def inverse(similarity: Similarity) -> Similarity:

@@ -1,0 +1,274 @@
+"""`ur-client draw`: people's drawings as strokes, on the arm, and on one page that compares the two."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pc_client.commands.experiment import execute
+from pc_client.commands.options import (
+    ControllerOption,
+    OutOption,
+    PortBaseOption,
+    RepeatOption,
+    RobotOption,
+    YesOption,
+    console,
+    ports_of,
+    say,
+)
+from pc_client.errors import ClientError, MovementError
+
+if TYPE_CHECKING:
+    from pc_client.drawing.drawing import Drawing
+    from pc_client.drawing.placement import PlacementOptions
+    from pc_client.drawing.table import Entry
+    from pc_client.extraction.recording import PenRecording
+
+
+def draw(
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE...", help="Recordings of drawings; one inside an archive is ARCHIVE.zip:PATH."
+        ),
+    ],
+    robot: RobotOption,
+    out: OutOption,
+    controller: ControllerOption = "preview",
+    repeat: RepeatOption = 1,
+    plane: Annotated[
+        str,
+        typer.Option(
+            "--plane",
+            metavar="vertical|horizontal|inclined",
+            help="The sheet: a board before the robot, a table, or a desk square to the tool.",
+        ),
+    ] = "vertical",
+    size: Annotated[
+        str,
+        typer.Option(
+            "--size", metavar="MM|max", help="Longest side of the drawing; never larger than the workspace."
+        ),
+    ] = "100",
+    rotate: Annotated[
+        str,
+        typer.Option(
+            "--rotate",
+            metavar="DEG|auto",
+            help="Turn of the drawing on the sheet, positive to the left; auto: as allows the largest size.",
+        ),
+    ] = "0",
+    lift: Annotated[
+        float, typer.Option("--lift", metavar="MM", help="How far the pen is lifted between parts.")
+    ] = 30.0,
+    y_up: Annotated[
+        bool,
+        typer.Option("--y-up", help="The recording's y axis points up, as on tablets; down by default."),
+    ] = False,
+    time_unit: Annotated[
+        str,
+        typer.Option(
+            "--time-unit",
+            metavar="auto|s|ms|us|ns",
+            help="Of the time column; auto: by its name, or by the typical step between samples.",
+        ),
+    ] = "auto",
+    save: Annotated[
+        Path | None,
+        typer.Option("--save", metavar="FILE", help="Write the movement as a .toml for `ur-client run`."),
+    ] = None,
+    port_base: PortBaseOption = 0,
+    yes: YesOption = False,
+) -> None:
+    """Draw what people drew: extract strokes, fit them into the workspace, execute, compare."""
+    from pc_client.control.controller_config import controller_config
+    from pc_client.extraction.files import TIME_UNITS
+
+    if time_unit != "auto" and time_unit not in TIME_UNITS:
+        raise typer.BadParameter(f"no time unit {time_unit!r}: give auto or one of {', '.join(TIME_UNITS)}")
+    if save is not None and len(files) > 1:
+        raise typer.BadParameter("--save is for one drawing: give one FILE")
+    options = _options(plane, size, rotate, lift, y_up)
+    controller_config(controller)  # complains before the work is done
+    import matplotlib  # noqa: F401  # likewise
+
+    recordings = [_read(file, None if time_unit == "auto" else time_unit) for file in files]
+    drawings = _make(recordings, options, robot, port_base)
+    if save is not None:
+        from pc_client.movements.files import save_movement
+
+        save_movement(drawings[0].movement, save)
+        say(f"movement: {save}")
+    for drawing in drawings:
+        say(_summary(drawing))
+    movements = [drawing.movement for drawing in drawings]
+    execute(movements, robot, out, repeat, controller, port_base, yes)
+    _report(_judge(drawings, out), out)
+
+
+def _options(plane: str, size: str, rotate: str, lift: float, y_up: bool) -> PlacementOptions:
+    from pc_client.drawing.placement import PlacementOptions
+
+    try:
+        return PlacementOptions(
+            plane=plane,
+            y_up=y_up,
+            rotation=None if rotate == "auto" else math.radians(_number(rotate, "--rotate", "auto")),
+            size=None if size == "max" else 1e-3 * _number(size, "--size", "max"),
+            lift=1e-3 * lift,
+        )
+    except MovementError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def _number(text: str, option: str, word: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise typer.BadParameter(f"{option} {text!r}: give a number or {word}") from error
+
+
+def _read(given: str, time_unit: str | None) -> PenRecording:
+    """The recording that a user means by a file, or by a path inside an archive.
+
+    Raises:
+        ClientError: it cannot be read, or is a folder or an archive of many.
+    """
+    from pc_client.extraction.files import parse_pen
+    from pc_client.extraction.sources import PenSource, contents
+
+    archive, inside, member = given.partition(".zip:")
+    if inside:
+        source = PenSource(member, Path(f"{archive}.zip"), member)
+    elif Path(given).is_dir() or given.lower().endswith(".zip"):
+        raise ClientError(f"{given} holds many recordings: name one, a file or ARCHIVE.zip:PATH")
+    else:
+        source = PenSource(given, Path(given))
+    ((_, content),) = contents([source])
+    if isinstance(content, Exception):
+        raise content
+    return parse_pen(content, source.name, time_unit)
+
+
+def _make(
+    recordings: Sequence[PenRecording], options: PlacementOptions, robot: str, port_base: int
+) -> list[Drawing]:
+    """Extract the strokes of recordings and make them ready for the arm that answers."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from pc_client.drawing.drawing import make_drawing
+    from pc_client.driver.probe import read_info
+    from pc_client.driver.robot_info import UNKNOWN
+    from pc_client.driver.transport import TcpNetwork
+    from pc_client.extraction.extract import extract
+    from pc_client.kinematics.robot_model import robot_model
+
+    arm = read_info(TcpNetwork(), robot, ports_of(port_base)).model
+    if arm == UNKNOWN:
+        raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")
+    model = robot_model(arm.lower())
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+    )
+    drawings = []
+    with bar:
+        task = bar.add_task("", total=2 * len(recordings))
+        for recording, name in zip(recordings, _names(recordings), strict=True):
+            bar.update(task, description=f"{name}: strokes")
+            extraction = extract(recording)
+            bar.update(task, advance=1, description=f"{name}: pace for the arm")
+            drawings.append(make_drawing(extraction, name, model, options))
+            bar.advance(task)
+    return drawings
+
+
+def _names(recordings: Sequence[PenRecording]) -> list[str]:
+    """Names of movements, each its own and fit for file names."""
+    names: list[str] = []
+    for recording in recordings:
+        stem = re.sub(r"[^A-Za-z0-9_-]+", "_", PurePath(recording.name).stem).strip("_") or "drawing"
+        name, number = stem, 2
+        while name in names:
+            name, number = f"{stem}_{number}", number + 1
+        names.append(name)
+    return names
+
+
+def _summary(drawing: Drawing) -> str:
+    extraction, placement = drawing.extraction, drawing.placement
+    later = float(drawing.delays.max())
+    return (
+        f"{drawing.movement.name}: {len(drawing.marks)} marks, {extraction.n_strokes} strokes, "
+        f"SNR_v {extraction.snr_v_db:.1f} dB; {1e3 * placement.similarity.scale:.3f} mm a unit on a "
+        f"{placement.plane} sheet, turned by {math.degrees(placement.rotation):.1f} deg, "
+        f"{drawing.factor:.3f} times slower than the hand, {drawing.movement.duration:.1f} s"
+        + (f"; later marks up to {later:.2f} s of the hand late" if later > 0.005 else "")
+    )
+
+
+def _judge(drawings: Sequence[Drawing], out: Path) -> list[Entry]:
+    """Read the recordings of the runs and compute all figures."""
+    from rich.progress import track
+
+    from pc_client.analysis.run import analyse_run
+    from pc_client.drawing.execution import executed
+    from pc_client.drawing.judgement import judge
+    from pc_client.drawing.table import Entry
+    from pc_client.recording.loader import load_recording
+
+    runs = [
+        analyse_run(load_recording(path))
+        for path in track(sorted(out.glob("*.mcap")), description="reading", console=console, transient=True)
+    ]
+    runs.sort(key=lambda run: run.provenance.repetition)
+    entries = []
+    for drawing in drawings:
+        own = [run for run in runs if run.provenance.movement == drawing.movement.name]
+        executions = tuple(executed(drawing, run) for run in own)
+        entries.append(Entry(drawing, executions, judge(drawing, executions)))
+    return entries
+
+
+def _report(entries: Sequence[Entry], out: Path) -> None:
+    """Write page, tables and pictures, and show the tables."""
+    import json
+
+    from rich.progress import track
+
+    from pc_client.drawing.figures import Shown
+    from pc_client.drawing.figures import draw as draw_pictures
+    from pc_client.drawing.page import render_page
+    from pc_client.drawing.table import to_json, to_markdown, to_rich
+
+    pictures = {
+        entry.name: draw_pictures(Shown.of(entry.drawing, entry.executions[-1], entry.verdict))
+        for entry in track(entries, description="drawing", console=console, transient=True)
+    }
+    texts = {
+        "draw.json": json.dumps(to_json(entries), indent=2, allow_nan=False) + "\n",
+        "draw.md": to_markdown(entries),
+        "report.html": render_page(entries, pictures),
+    }
+    for name, own in pictures.items():
+        texts |= {f"figures/{name}_{kind}.svg": text for kind, text in own.items()}
+    for name, text in texts.items():
+        path = out / name
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise ClientError(f"cannot write {path}: {error.strerror or error}") from error
+    for entry in entries:
+        console.print(to_rich(entry))
+    say(f"report: {out / 'report.html'}")
