@@ -29,6 +29,8 @@ _LEAST_SAMPLES = 16
 _PAYS = 0.05
 #: Above this SNR (dB) what the low-pass took from the strokes is the larger part of the residual.
 _CLEAN_DB = 35.0
+#: Above this SNR (dB) of the first strokes they may be all there are, blunted by the low-pass.
+_PERHAPS_CLEAN_DB = 25.0
 _GIVE_BACKS = 4
 
 
@@ -83,6 +85,10 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
     fits = [
         refine(initial_chain(part), aim, options.iterations) for part, aim in zip(parts, aims, strict=True)
     ]
+    if _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_PERHAPS_CLEAN_DB / 10.0):
+        sharp = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
+        if _passed_cost(sharp, parts, scales) < 10.0 ** (-options.enough_db / 10.0):
+            return [fit.chain for fit in sharp]
     for round_ in range(options.rounds):
         left = budget - sum(len(fit.chain) for fit in fits)
         wanted = left if round_ == options.rounds - 1 else math.ceil(left / 2)
@@ -149,6 +155,16 @@ def _given_back(fit: Fit, part: SmoothPart, scales: Scales, options: FitOptions)
         p, v = part.p + p_model - passed, part.v + v_model - velocity(part.t, passed)
         fit = refine(fit.chain, _aim(part, p, v, scales), options.last_iterations, tolerance=1e-4)
     return fit
+
+
+def _passed_cost(fits: Sequence[Fit], parts: Sequence[SmoothPart], scales: Scales) -> float:
+    """Share of the velocity that the strokes do not tell when they are seen through the same low-pass."""
+    energy = 0.0
+    for fit, part in zip(fits, parts, strict=True):
+        p_left, _ = residuals(fit.chain, part.t, part.p, part.v)
+        passed = low_passed(part.p - p_left, 1.0 / part.step)
+        energy += float(np.sum((part.v - velocity(part.t, passed)) ** 2))
+    return energy / scales.v**2
 
 
 def _velocity_cost(chains: Sequence[Chain], parts: Sequence[SmoothPart], scales: Scales) -> float:

@@ -52,6 +52,14 @@ def test_own_strokes_come_back_at_any_rate(rate):
     assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
 
 
+@pytest.mark.parametrize("stroke_time", [0.35, 0.5])
+def test_strokes_as_fast_as_handwriting_come_back_though_the_low_pass_blunts_them(stroke_time):
+    law = own_strokes(102, 2, stroke_time=stroke_time)
+    result = extract(recorded(law, 2))
+    assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
+    assert 30.0 < result.snr_v_db < 65.0
+
+
 def test_own_strokes_come_back_from_an_irregular_clock():
     law = own_strokes(5, 2)
     rng = np.random.default_rng(0)
