@@ -1,0 +1,206 @@
+"""`ur-client draw` on a robot in memory: from a text file to a page; wrong words are one line."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawing_samples import one_part, recording_text, two_parts_and_a_dot
+from fake_robot import FakeRobot
+
+import pc_client.driver.transport as transport
+import pc_client.driver.ur_driver as ur_driver_module
+from pc_client import cli
+from pc_client.kinematics.forward import tcp_positions
+from pc_client.kinematics.robot_model import robot_model
+from pc_client.movements.files import load_movement
+from pc_client.recording.loader import load_recording
+
+DATA = Path(__file__).parents[3] / "shared" / "data" / "pen_strokes" / "strokes_background_small1.zip"
+
+
+@pytest.fixture
+def robot(monkeypatch):
+    """A robot in memory instead of the network."""
+    fake = FakeRobot()
+    model = robot_model("ur3")
+    fake.tcp_of = lambda q: tcp_positions(model, [q])[0]
+    fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
+    for module in (transport, ur_driver_module):
+        monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
+    return fake
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "letter a.txt"
+    path.write_text(recording_text(two_parts_and_a_dot()))
+    return path
+
+
+def one_line(capsys):
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1, err
+    assert "Traceback" not in err
+    return err
+
+
+def test_a_drawing_becomes_recordings_tables_and_a_page(robot, file, tmp_path, capsys):
+    out, saved = tmp_path / "out", tmp_path / "letter.toml"
+    words = [
+        "draw",
+        str(file),
+        "--robot",
+        "127.0.0.1",
+        "--out",
+        str(out),
+        "--save",
+        str(saved),
+        "--size",
+        "60",
+    ]
+    assert cli.run(words) == 0
+    assert robot.at_rest
+    assert {path.name for path in out.iterdir()} == {
+        "letter_a_r1.mcap",
+        "draw.json",
+        "draw.md",
+        "report.html",
+        "figures",
+    }
+    said = capsys.readouterr().out
+    assert "letter_a: 3 marks" in said
+    assert "report.html" in said
+    table = json.loads((out / "draw.json").read_text())
+    (one,) = table["drawings"]
+    assert one["name"] == "letter_a"
+    assert one["metres_per_unit"] > 0.0
+    assert one["runs"][0]["planned"]["snr_v_db"] > 15.0
+    page = (out / "report.html").read_text()
+    assert "http" not in page
+    assert str(tmp_path) not in page
+    movement = load_movement(saved)
+    recording = load_recording(out / "letter_a_r1.mcap")
+    moving = recording.rows_of(1)
+    t, p = recording.column("ref_t")[moving], recording.column("ref_tcp_position")[moving]
+    np.testing.assert_allclose(p, movement.sample(t).p, atol=1e-4)
+
+
+def test_several_drawings_repeated_are_one_page_with_a_section_each(robot, tmp_path, capsys):
+    archive = tmp_path / "two.zip"
+    with zipfile.ZipFile(archive, "w") as packed:
+        packed.writestr("a/same.txt", recording_text(one_part()))
+        packed.writestr("b/same.txt", recording_text(one_part()))
+    files = [f"{archive}:a/same.txt", f"{archive}:b/same.txt"]
+    out = tmp_path / "out"
+    words = [
+        "--robot",
+        "127.0.0.1",
+        "--out",
+        str(out),
+        "--repeat",
+        "2",
+        "--size",
+        "50",
+        "--plane",
+        "horizontal",
+    ]
+    assert cli.run(["draw", *files, *words]) == 0
+    names = {path.name for path in out.glob("*.mcap")}
+    assert names == {"same_r1.mcap", "same_r2.mcap", "same_2_r1.mcap", "same_2_r2.mcap"}
+    page = (out / "report.html").read_text()
+    assert page.count('<section id="same') == 2
+    table = json.loads((out / "draw.json").read_text())
+    assert [[run["repetition"] for run in one["runs"]] for one in table["drawings"]] == [[1, 2], [1, 2]]
+    assert "executed r2" in (out / "draw.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--plane", "ceiling"], "ceiling"),
+        (["--size", "large"], "give a number or max"),
+        (["--size", "-3"], "more than 0"),
+        (["--rotate", "left"], "give a number or auto"),
+        (["--lift", "0"], "lift of 0 mm"),
+        (["--time-unit", "min"], "no time unit"),
+        (["other.txt", "--save", "x.toml"], "one drawing"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_2(robot, file, words, said, capsys, tmp_path):
+    assert cli.run(["draw", str(file), "--robot", "127.0.0.1", "--out", str(tmp_path / "o"), *words]) == 2
+    assert said in one_line(capsys)
+    assert robot.programs == []
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("missing.txt", None, "cannot be read"),
+        ("dots.txt", "START\n1,2,0\nBREAK\n5,5,700\nBREAK\n", "only dots"),
+        ("words.txt", "hello\nworld\n", "words.txt"),
+        ("some.zip", None, "many recordings"),
+        ("some.zip:inside.txt", None, "inside.txt"),
+    ],
+)
+def test_what_cannot_be_drawn_is_one_line_and_moves_nothing(robot, name, content, said, capsys, tmp_path):
+    path = tmp_path / name
+    if content is not None:
+        path.write_text(content)
+    out = tmp_path / "o"
+    assert cli.run(["draw", str(path), "--robot", "127.0.0.1", "--out", str(out)]) == 1
+    assert said in one_line(capsys)
+    assert robot.programs == []
+    assert not out.exists()
+
+
+def test_an_unknown_controller_is_refused_before_any_work(robot, file, capsys, tmp_path):
+    words = ["draw", str(file), "--robot", "127.0.0.1", "--out", str(tmp_path / "o"), "--controller", "pid"]
+    assert cli.run(words) == 1
+    assert "preview" in one_line(capsys)
+
+
+def test_a_real_arm_does_not_move_before_the_answer(robot, file, tmp_path, capsys, monkeypatch):
+    def answer(question, abort):
+        assert robot.programs == []
+        raise cli.typer.Abort
+
+    monkeypatch.setattr(cli.typer, "confirm", answer)
+    out = tmp_path / "out"
+    assert cli.run(["draw", str(file), "--robot", "192.0.2.7", "--out", str(out), "--size", "50"]) == 1
+    assert robot.programs == []
+    assert not out.exists()
+    assert "box of motion" in capsys.readouterr().out
+
+
+def test_ctrl_c_leaves_the_arm_at_rest_and_what_is_recorded(robot, file, tmp_path, capsys):
+    def interrupt(r):
+        if r.program == "receiver" and len(r.received) == 300:
+            robot.on_tick = None
+            raise KeyboardInterrupt
+
+    robot.on_tick = interrupt
+    out = tmp_path / "out"
+    assert cli.run(["draw", str(file), "--robot", "127.0.0.1", "--out", str(out), "--size", "50"]) == 1
+    assert [line for line in capsys.readouterr().err.splitlines() if line][-1].startswith(
+        "ur-client: interrupted"
+    )
+    assert robot.at_rest
+    assert load_recording(out / "letter_a_r1.mcap").n_rows > 100
+
+
+def test_a_drawing_of_the_data_set(robot, tmp_path):
+    if not DATA.exists():
+        pytest.skip(f"the data set is not here: {DATA}")
+    inside = "strokes_background_small1/Latin/character10/0692_13.txt"
+    out = tmp_path / "out"
+    assert (
+        cli.run(["draw", f"{DATA}:{inside}", "--robot", "127.0.0.1", "--out", str(out), "--size", "60"]) == 0
+    )
+    (one,) = json.loads((out / "draw.json").read_text())["drawings"]
+    assert one["marks"] == 2  # a stroke and a dot
+    assert one["reconstruction"]["snr_v_db"] > 15.0
+    assert one["runs"][0]["human"]["snr_v_db"] > 10.0
