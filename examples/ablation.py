@@ -191,7 +191,7 @@ def draw(results: list[dict[str, Any]], path: Path) -> None:
     fidelities = [f for f in FIDELITIES if any(r["fidelity"] == f for r in _of_main(results))]
     with svg_figure(11.0, 4.4, simulated=True) as (page, _):
         for k, fidelity in enumerate(fidelities):
-            axes = page.add_axes((0.05 + 0.32 * k, 0.3, 0.285, 0.58))
+            axes = page.add_axes((0.05 + 0.32 * k, 0.25, 0.285, 0.64))
             cases = [r for r in _of_main(results) if r["fidelity"] == fidelity]
             for shift, kind, colour in ((-0.2, "lognormal", BLUE), (0.2, "uniform", ORANGE)):
                 for i, r in enumerate(cases):
@@ -201,7 +201,9 @@ def draw(results: list[dict[str, Any]], path: Path) -> None:
                     axes.scatter([i + shift] * len(runs), runs, s=[10, 22, 40], color=colour, label=label)
                 # The highest: an arm that still settles has noise at rest which is not its encoders'.
                 floor = max(_mean(r, kind, "noise_floor_db") for r in cases)
-                axes.axhline(floor, color=colour, lw=1.2, ls="--", label=f"noise floor, {kind}")
+                axes.axhline(floor, color=colour, lw=1.2, ls="--", label=f"encoders' noise floor, {kind}")
+                rest = _mean(cases[-1], kind, "unrepeatable_db")
+                axes.axhline(rest, color=colour, lw=1.2, ls=":", label=f"what does not repeat, {kind}")
             axes.set_xticks(range(len(cases)), [r["composition"] for r in cases], rotation=40, ha="right")
             axes.set_title(fidelity)
             axes.grid(axis="x", visible=False)

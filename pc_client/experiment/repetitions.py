@@ -93,7 +93,6 @@ class Repetitions:
         config: the controller.
         loop: the identified loop.
         learning: Q; None for a controller that does not learn.
-        gear: what is known of the gears by now, the same for all runs of the movement; None: nothing.
         model: the nominal arm.
         period: control cycle [s].
 
@@ -109,19 +108,28 @@ class Repetitions:
         config: ControllerConfig,
         loop: LoopModel,
         learning: LearningFilter | None,
-        gear: GearModel | None,
         model: RobotModel,
         period: float,
     ) -> None:
         self._config = config
         self._loop = loop
         self._learning = learning
-        self.gear = gear
+        self.gear: GearModel | None = None
         self._model = model
         self._period = period
+        self._refused = False
         self.learned: Array | None = None
         self.learned_from = 0
         self.remark = ""
+
+    def renew(self, gear: GearModel | None) -> None:
+        """Take what is known of the gears by now.
+
+        Not while something is learned, which goes with the gears that it was learned with, and not after a
+        limit has refused them.
+        """
+        if self.learned is None and not self._refused:
+            self.gear = gear
 
     def forget(self, remark: str) -> None:
         """Begin the next run without anything learned from the one before."""
@@ -175,7 +183,7 @@ class Repetitions:
         )
         if complaint:
             self.forget(f"what was learned is not used: {complaint}")
-            self.gear = None
+            self.gear, self._refused = None, True
         return not complaint
 
 

@@ -101,7 +101,9 @@ class ExperimentRunner:
                     pace = "lockstep" if stream.heartbeats else "realtime"
                     gears = GearObserver(found.loop, driver.info.period)
                 if repetitions is None:
-                    repetitions = self._repetitions(report.delay, gears)
+                    repetitions = self._repetitions(report.delay)
+                if self._config.compensates_gear:
+                    repetitions.renew(gears.model())
                 self._observer.running(planned.movement.name, repetition)
                 path = experiment.recording_path(planned, repetition)
                 provenance = self._provenance(planned, repetition, report.delay, pace)
@@ -124,11 +126,10 @@ class ExperimentRunner:
             )
         return approach.plan
 
-    def _repetitions(self, found: Identification, gears: GearObserver) -> Repetitions:
-        """The memory of one movement, empty but for what earlier movements have shown of the gears."""
+    def _repetitions(self, found: Identification) -> Repetitions:
+        """The memory of one movement, empty."""
         model, period = self._experiment.model, self._driver.info.period
-        gear = gears.model() if self._config.compensates_gear else None
-        return Repetitions(self._config, found.loop, found.learning, gear, model, period)
+        return Repetitions(self._config, found.loop, found.learning, model, period)
 
     def _table(
         self, planned: PlannedMovement, plan: JointPlan, found: Identification, repetitions: Repetitions

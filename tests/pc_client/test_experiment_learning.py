@@ -100,24 +100,28 @@ def test_preview_neither_learns_nor_tells_lag_from_delay(two, tmp_path):
     assert speed_error(recordings[1]) == pytest.approx(speed_error(recordings[0]), rel=1e-2)
 
 
-def test_a_run_with_a_lost_frame_teaches_nothing(two, tmp_path):
-    robot = WavyRobot(lockstep=False)
-    movements = []
+@pytest.mark.parametrize(("attribute", "count"), [("skip", "lost_frames"), ("hold", "late_frames")])
+def test_a_run_that_is_not_clean_teaches_no_command(two, tmp_path, attribute, count):
+    robot, done = WavyRobot(lockstep=False), []
 
-    def lose_one(r):
-        if r.program == "receiver" and len(r.received) == 200 and len(movements) < 1:
-            movements.append(r.tick)
-            r.skip = 1
+    def spoil_second_run(r):
+        runs = sum("velocity_receiver" in text for text in r.programs)  # the first is the excitation
+        if runs == 3 and r.program == "receiver" and len(r.received) % 200 == 0 and not done:
+            done.append(r.tick)
+            setattr(r, attribute, 1)
 
-    robot.on_tick = lose_one
+    robot.on_tick = spoil_second_run
     short = replace(two, planned=two.planned[:1])
     report, recordings = run(robot, short, tmp_path)
-    lost = [r.summary["lost_frames"] for r in recordings]
-    assert sum(lost) == 1
-    spoilt = lost.index(1)
-    learned = [r.summary["learned_from"] for r in recordings]
-    assert learned[spoilt + 1] == 0
-    assert report.remarks == [f"uniform_4_1: run {spoilt + 1} had 0 late and 1 lost frames: nothing learned"]
+    assert [r.summary[count] for r in recordings] == [0, 1, 0]
+    assert [r.summary["learned_from"] for r in recordings] == [0, 1, 0]
+    assert report.remarks == [
+        f"uniform_4_1: run 2 had {int(attribute == 'hold')} late and {int(attribute == 'skip')} lost frames: "
+        "nothing learned"
+    ]
+    # but the third run knows the gears by then
+    assert recordings[2].summary["gear_waves"] > 0
+    assert speed_error(recordings[2]) < 0.6 * speed_error(recordings[0])
 
 
 def test_an_estimating_controller_runs_as_well(two, tmp_path):
@@ -166,7 +170,8 @@ def test_a_learned_way_has_an_end(two, plan):
 
 def test_what_breaks_a_limit_is_forgotten_before_anything_is_sent(two, plan):
     gear = WavyRobot.gear
-    memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), gear, two.model, PERIOD)
+    memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), two.model, PERIOD)
+    memory.renew(gear)
     table, commands = commands_of(plan)
     assert memory.may_use(plan, table)
     memory.learned = np.full_like(commands, 0.19)
@@ -174,6 +179,21 @@ def test_what_breaks_a_limit_is_forgotten_before_anything_is_sent(two, plan):
     assert not memory.may_use(plan, table)
     assert (memory.learned, memory.learned_from, memory.gear) == (None, 0, None)
     assert "learned way" in memory.remark
+    memory.renew(gear)
+    assert memory.gear is None  # refused for the rest of this movement
+
+
+def test_gears_are_renewed_unless_something_was_learned_with_them(two):
+    memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), two.model, PERIOD)
+    memory.renew(None)
+    assert memory.gear is None
+    memory.renew(WavyRobot.gear)
+    memory.learned = np.zeros((10, 6))
+    memory.renew(None)
+    assert memory.gear is WavyRobot.gear
+    memory.forget("run 2 had a late frame")
+    memory.renew(None)
+    assert memory.gear is None
 
 
 def test_learning_that_might_not_converge_is_refused():
