@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from pc_client.extraction.chain import Bounds, Chain, sigma_lognormal
 from pc_client.extraction.fitting import FitOptions, fit_parts
 from pc_client.extraction.recording import PenPart, PenRecording
+from pc_client.extraction.refine import residuals
 from pc_client.extraction.smoothing import SmoothPart, moves, smooth_part, speed_peaks
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 
@@ -131,14 +132,14 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
 def _judge(part: SmoothPart, chain: Chain, n_peaks: int) -> tuple[PartExtraction, NDArray[np.float64]]:
     """A part's result, and its powers: of velocity and its error, of position and its error."""
     law = sigma_lognormal(chain, float(part.t[-1]))
-    dim = part.p.shape[1]
-    motion = law.evaluate(part.t)
+    # What law.evaluate leaves, but piece by piece: all strokes at all times are too many in a long recording.
+    p_left, v_left = residuals(chain, part.t, part.p, part.v)
     powers = np.array(
         [
             np.sum(part.v**2),
-            np.sum((part.v - motion.v[:, :dim]) ** 2),
+            np.sum(v_left**2),
             np.sum((part.p - part.p.mean(axis=0)) ** 2),
-            np.sum((part.p - motion.p[:, :dim]) ** 2),
+            np.sum(p_left**2),
         ]
     )
     snr_v, snr_t = _db(powers[0], powers[1]), _db(powers[2], powers[3])

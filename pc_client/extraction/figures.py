@@ -14,14 +14,18 @@ from typing import Any
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from pc_client.extraction.extract import Extraction, PartExtraction
 from pc_client.extraction.results import Row
+from pc_client.movements.stroke import Motion
 
 __all__ = ["draw_extraction", "draw_overview"]
 
 _RECORDED, _RECONSTRUCTED, _BELLS, _TARGETS = "#A8A29E", "#D55E00", "#56B4E9", "#0072B2"
 _DPI = 110
+#: A part of more strokes is drawn without its single bells; a longer one at no more than so many times.
+_MOST_BELLS, _MOST_TIMES = 500, 5000
 
 
 def draw_extraction(extraction: Extraction) -> bytes:
@@ -96,24 +100,32 @@ def _draw_path(axes: Any, part: PartExtraction, *, labelled: bool) -> None:
     dim = part.p.shape[1]
     labels = ("recorded", "reconstructed", "virtual targets") if labelled else (None, None, None)
     targets = part.law.target_points[:, :dim]
+    _, reconstruction = _reconstruction(part)
     axes.plot(*part.p.T, color=_RECORDED, linewidth=4.0, alpha=0.7, label=labels[0])
     axes.plot(*targets.T, color=_TARGETS, linewidth=0.5, linestyle=":")
     axes.plot(
         *targets.T, linestyle="none", marker="o", markersize=4, mfc="none", mec=_TARGETS, label=labels[2]
     )
-    axes.plot(*part.law.evaluate(part.t).p[:, :dim].T, color=_RECONSTRUCTED, linewidth=1.3, label=labels[1])
+    axes.plot(*reconstruction.p[:, :dim].T, color=_RECONSTRUCTED, linewidth=1.3, label=labels[1])
 
 
 def _draw_speed(axes: Any, part: PartExtraction, *, labelled: bool) -> None:
     labels = ("recorded, low-passed", "reconstructed", "single strokes") if labelled else (None, None, None)
-    bells = part.law.stroke_speeds(part.t)
-    axes.plot(
-        part.t, np.linalg.norm(part.v, axis=1), color=_RECORDED, linewidth=4.0, alpha=0.7, label=labels[0]
-    )
-    for index, bell in enumerate(bells.T):
-        axes.plot(part.t, bell, color=_BELLS, linewidth=0.8, label=labels[2] if index == 0 else None)
-    reconstructed = np.linalg.norm(part.law.evaluate(part.t).v, axis=1)
-    axes.plot(part.t, reconstructed, color=_RECONSTRUCTED, linewidth=1.3, label=labels[1])
+    speed = np.linalg.norm(part.v, axis=1)
+    t, reconstruction = _reconstruction(part)
+    axes.plot(part.t, speed, color=_RECORDED, linewidth=4.0, alpha=0.7, label=labels[0])
+    if part.n_strokes <= _MOST_BELLS:
+        for index, bell in enumerate(part.law.stroke_speeds(t).T):
+            axes.plot(t, bell, color=_BELLS, linewidth=0.8, label=labels[2] if index == 0 else None)
+    reconstructed = np.linalg.norm(reconstruction.v, axis=1)
+    axes.plot(t, reconstructed, color=_RECONSTRUCTED, linewidth=1.3, label=labels[1])
+
+
+def _reconstruction(part: PartExtraction) -> tuple[NDArray[np.float64], Motion]:
+    """The movement of the strokes at up to `_MOST_TIMES` times, worked out a few hundred at a time."""
+    t = part.t[:: 1 + len(part.t) // _MOST_TIMES]
+    blocks = [part.law.evaluate(block) for block in np.array_split(t, 1 + len(t) // 250)]
+    return t, Motion(*(np.concatenate(values) for values in zip(*blocks, strict=True)))
 
 
 def _png(figure: Figure) -> bytes:
