@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: ablation pictures help setup demo test check check-static bench format docs clean
+.PHONY: ablation pictures help setup demo draw test check check-static bench format docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -23,6 +23,9 @@ demo: $(STAMP) ## the paper's experiment: box and client, ten movements, three t
 
 ablation: $(STAMP) ## what each piece of the controller brings, into out/ablation (half an hour)
 	$(BIN)/python examples/ablation.py
+
+draw: $(STAMP) ## drawings of people on the emulated arm: extracted, executed, compared, into out/draw
+	$(BIN)/python examples/draw.py
 
 test: $(STAMP) ## all tests, in as many processes as there are cores, at most four
 	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile

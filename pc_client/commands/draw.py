@@ -71,6 +71,15 @@ def draw(
         bool,
         typer.Option("--y-up", help="The recording's y axis points up, as on tablets; down by default."),
     ] = False,
+    slower: Annotated[
+        float,
+        typer.Option(
+            "--slower",
+            metavar="X",
+            min=1.0,
+            help="Times slower than the arm's limits ask: room for what a controller adds.",
+        ),
+    ] = 1.0,
     time_unit: Annotated[
         str,
         typer.Option(
@@ -99,7 +108,7 @@ def draw(
     import matplotlib  # noqa: F401  # likewise
 
     recordings = [_read(file, None if time_unit == "auto" else time_unit) for file in files]
-    drawings = _make(recordings, options, robot, port_base)
+    drawings = _make(recordings, options, slower, robot, port_base)
     if save is not None:
         from pc_client.movements.files import save_movement
 
@@ -157,7 +166,7 @@ def _read(given: str, time_unit: str | None) -> PenRecording:
 
 
 def _make(
-    recordings: Sequence[PenRecording], options: PlacementOptions, robot: str, port_base: int
+    recordings: Sequence[PenRecording], options: PlacementOptions, slower: float, robot: str, port_base: int
 ) -> list[Drawing]:
     """Extract the strokes of recordings and make them ready for the arm that answers."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -188,7 +197,7 @@ def _make(
             bar.update(task, description=f"{name}: strokes")
             extraction = extract(recording)
             bar.update(task, advance=1, description=f"{name}: pace for the arm")
-            drawings.append(make_drawing(extraction, name, model, options))
+            drawings.append(make_drawing(extraction, name, model, options, slower))
             bar.advance(task)
     return drawings
 

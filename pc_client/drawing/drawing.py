@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from pc_client.drawing.joining import Joined, least_gaps
 from pc_client.drawing.marks import Mark, marks_of
 from pc_client.drawing.pacing import factor_needed, least_factor, paced
 from pc_client.drawing.placement import Placement, PlacementOptions, inverse, place
+from pc_client.errors import MovementError
 from pc_client.extraction.extract import Extraction
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.movements.movement import Movement
@@ -84,7 +86,11 @@ def spatial(p: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def make_drawing(
-    extraction: Extraction, name: str, arm: RobotModel, options: PlacementOptions | None = None
+    extraction: Extraction,
+    name: str,
+    arm: RobotModel,
+    options: PlacementOptions | None = None,
+    slower: float = 1.0,
 ) -> Drawing:
     """Make a drawing ready for an arm.
 
@@ -93,11 +99,14 @@ def make_drawing(
         name: of the movement: for file names and tables.
         arm: who shall do it.
         options: where and how large.
+        slower: times slower than the arm's limits ask, >= 1: leaves room for a controller's corrections.
 
     Raises:
-        MovementError: nothing in it moves.
+        MovementError: nothing in it moves, or `slower` is below 1.
         PlanningError: the arm cannot do it at any speed; the message is planning's.
     """
+    if not (math.isfinite(slower) and slower >= 1.0):
+        raise MovementError(f"{slower:g} times slower than the limits ask: give 1 or more")
     options = options or PlacementOptions()
     marks = marks_of(extraction)
     drawn = np.vstack(
@@ -115,7 +124,7 @@ def make_drawing(
         law = joined.law.stretched(factor)
         return Movement(name, law, _between_slow_moments(law), {**facts, "slower_than_the_hand": factor})
 
-    factor, _ = least_factor(slowed, guess, arm)
+    factor = slower * least_factor(slowed, guess, arm)[0]
     return Drawing(extraction, marks, placement, joined, factor, slowed(factor))
 
 

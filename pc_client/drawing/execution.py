@@ -2,8 +2,9 @@
 
 The similarity and the scaling of time are undone exactly; nothing is shifted or fitted. Of each part that
 moves there are two signals: the positions at the robot's own time stamps, as they were reported, for
-signal-to-noise ratios; and the same on the grid of the recording, through the low-pass that the recording
-itself went through, for everything that is differentiated.
+signal-to-noise ratios; and the same on the grid of the recording, low-passed, for everything that is
+differentiated. That low-pass takes the encoders' noise and no more: it is twice as high as the one that the
+recording went through, since that one would blunt the bells a second time.
 """
 
 from __future__ import annotations
@@ -13,15 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
 
 from pc_client.analysis.run import Run
 from pc_client.drawing.drawing import Drawing
 from pc_client.errors import RecordingError
-from pc_client.extraction.smoothing import RATE_HZ, low_passed, velocity
+from pc_client.extraction.smoothing import CUTOFF_HZ, RATE_HZ, velocity
 from pc_client.movements.geometry import read_only
 
-__all__ = ["ExecutedPart", "Execution", "executed"]
+__all__ = ["NOISE_HZ", "ExecutedPart", "Execution", "executed"]
 
+#: Cut-off of the low-pass, Hz in the time of the hand, and its order; it runs forwards and backwards.
+NOISE_HZ = 2.0 * CUTOFF_HZ
+_ORDER = 4
 #: This much of the movement (s of the hand) before and after a part goes through the low-pass with it.
 _MARGIN_S = 0.25
 
@@ -87,8 +92,16 @@ def executed(drawing: Drawing, run: Run, shift: float = 0.0) -> Execution:
         for index, part in zip(moving, drawing.extraction.parts, strict=True)
     )
     whole = np.arange(0.0, drawing.joined.law.duration, 1.0 / RATE_HZ)
-    p = low_passed(path(np.clip(whole * drawing.factor, path.x[0], path.x[-1])), RATE_HZ)
+    p = _less_noise(path(np.clip(whole * drawing.factor, path.x[0], path.x[-1])), RATE_HZ)
     return Execution(run, parts, read_only(whole), read_only(p), read_only(velocity(whole, p)))
+
+
+def _less_noise(p: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+    """Positions (n, 3) at a uniform rate, Hz of the hand, without what no hand does."""
+    sections = butter(_ORDER, NOISE_HZ, fs=rate, output="sos")
+    padding = min(len(p) - 1, round(_MARGIN_S * rate))
+    smooth: NDArray[np.float64] = sosfiltfilt(sections, p, axis=0, padtype="odd", padlen=padding)
+    return smooth
 
 
 def _part(drawing: Drawing, mark: int, grid: NDArray[np.float64], path: CubicSpline) -> ExecutedPart:
@@ -100,7 +113,7 @@ def _part(drawing: Drawing, mark: int, grid: NDArray[np.float64], path: CubicSpl
     step = (grid[-1] - grid[0]) / (len(grid) - 1)
     margin = round(_MARGIN_S / step)
     wide = grid[0] + step * np.arange(-margin, len(grid) + margin)
-    smooth = low_passed(positions(wide), 1.0 / step)
+    smooth = _less_noise(positions(wide), 1.0 / step)
     inside = slice(margin, margin + len(grid))
     frame_t = drawing.recording_time(path.x, mark)
     frame_t = frame_t[(frame_t >= grid[0]) & (frame_t <= grid[-1])]

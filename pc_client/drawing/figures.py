@@ -15,6 +15,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
@@ -162,7 +163,7 @@ def fill_speeds(figure: Figure, shown: Shown) -> None:
     _shade_pen_down(rows[4], shown)
     for name, width in zip(COLOURS, (4.5, 2.0, 1.4, 1.2), strict=True):
         _draw_speed(rows[4], shown, name, width, faint=name == "human", dashed=name == "planned")
-    rows[4].set(xlim=span, ylim=(0.0, 1.2 * top))
+    rows[4].set(xlim=span, ylim=(0.0, 1.22 * _top_speed(shown, bells=False)))
     rows[4].legend(loc="upper right", ncols=4, borderaxespad=0.2, columnspacing=1.2, handlelength=1.6)
     _shade_pen_down(rows[5], shown)
     for name in ("reconstructed", "executed"):
@@ -254,15 +255,38 @@ def _draw_targets(axes: Axes, shown: Shown, half: float) -> None:
         axes.plot(*points.T, ls="none", marker="o", ms=3.6, mfc="white", mec=BLUE, mew=0.9, zorder=3)
     outside = int(np.count_nonzero(np.abs(shown.on_page(_targets(shown))).max(axis=1) > half))
     text = "○ virtual targets" + (f", {outside} outside" if outside else "")
-    axes.text(0.03, 0.03, text, transform=axes.transAxes, fontsize=9, color="#355C7D")
+    axes.text(
+        0.03,
+        0.03,
+        text,
+        transform=axes.transAxes,
+        fontsize=9,
+        color="#355C7D",
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
+        zorder=4,
+    )
 
 
 def _draw_numbers(axes: Axes, shown: Shown) -> None:
     """The order of the marks, where there are several, beside their begins."""
-    begins = dict(zip(shown.moving, (part.p[:1] for part in shown.parts["human"]), strict=True))
+    begins = dict(
+        zip(shown.moving, (part.p[: 1 + len(part.p) // 8] for part in shown.parts["human"]), strict=True)
+    )
     for index, mark in enumerate(shown.drawing.marks if len(shown.drawing.marks) > 1 else ()):
-        at = shown.on_page(begins.get(index, mark.first[None]))[0]
-        axes.annotate(str(index + 1), at, (-5, 5), textcoords="offset points", ha="right", weight="bold")
+        path = shown.on_page(begins.get(index, mark.first[None]))
+        away = path[0] - path[-1]
+        length = float(np.linalg.norm(away))
+        x, y = (11.0 * away / length).tolist() if length > 0.0 else (11.0, 0.0)
+        label = axes.annotate(
+            str(index + 1),
+            path[0],
+            (x, y),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            weight="bold",
+        )
+        label.set_path_effects([withStroke(linewidth=3.0, foreground="white")])
 
 
 def _draw_start(axes: Axes, shown: Shown, part: Signal) -> None:
@@ -306,8 +330,8 @@ def _shade_pen_down(axes: Axes, shown: Shown) -> None:
 
 def _draw_bells(axes: Axes, shown: Shown) -> None:
     for index, part in zip(shown.moving, shown.drawing.extraction.parts, strict=True):
-        margin = 0.3
-        t = np.arange(part.t[0] - margin, part.t[-1] + margin, 0.004)
+        mark, nearly = shown.drawing.marks[index], 1e-3 * float(np.ptp(part.p, axis=0).max())
+        t = np.arange(mark.begin - mark.lead(nearly), mark.end + mark.lag(nearly), 0.002)
         for bell in shown.unit * part.law.stroke_speeds(t).T:
             axes.fill_between(shown.since_pen_down(t, index), bell, color=_BELL, alpha=0.28, lw=0)
             axes.plot(shown.since_pen_down(t, index), bell, color=_BELL, lw=0.8)
@@ -327,11 +351,11 @@ def _draw_speed(
         )
 
 
-def _top_speed(shown: Shown) -> float:
+def _top_speed(shown: Shown, *, bells: bool = True) -> float:
     """Highest speed (mm per s of the hand) of any signal and, unless it would dwarf them, of any bell."""
     top = max(float(part.speed.max()) for parts in shown.parts.values() for part in parts)
-    bells = [float(part.law.stroke_speeds(part.t).max()) for part in shown.drawing.extraction.parts]
-    return shown.unit * max(top, min(max(bells), _TALL * top))
+    highest = max(float(part.law.stroke_speeds(part.t).max()) for part in shown.drawing.extraction.parts)
+    return shown.unit * (max(top, min(highest, _TALL * top)) if bells else top)
 
 
 def _whole_speed(shown: Shown, *, executed: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -403,7 +427,8 @@ def _equal_axes(axes: Any, points: NDArray[np.float64]) -> None:
         (float(m - h), float(m + h)) for m, h in zip(middle, half, strict=True)
     ]
     axes.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
-    axes.set_box_aspect(tuple(half / half.max()), zoom=1.02)
+    # matplotlib keeps the diagonal of the box; here its longest edge is kept.
+    axes.set_box_aspect(tuple(half / half.max()), zoom=0.75 * float(np.linalg.norm(half / half.max())))
     axes.set(xlabel="x [mm]", ylabel="y [mm]")
     axes.zaxis.set_rotate_label(False)
     axes.set_zlabel("z [mm]", rotation=90)

@@ -5,7 +5,7 @@
 
 both over all parts that move, while the pen is down. What is compared with the arm is taken at the arm's own
 time stamps, all signals through the same first difference, neither shifted nor smoothed. The figures of
-fluency are those of `analysis.human_likeness`, on signals through one low-pass of 12 Hz (time of the hand).
+fluency are those of `analysis.human_likeness`; the executed signal is low-passed for them, see `execution`.
 
 Source: section 3.3 of the theory notes.
 """
