@@ -4,6 +4,7 @@
     preflight       what a bystander must know and agree to, before a real arm moves
     identification  the loop of this session, and the margins on it
     repetitions     what runs of one movement hand on, and when it may be used
+    command_check   the last look at a whole run of commands, before it is sent
     runner          approach, stream, record, for every movement and repetition
     observer        what the runner tells while it works
     progress        shows it on the terminal

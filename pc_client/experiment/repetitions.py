@@ -8,7 +8,7 @@ be sent is held against the limits that the plan itself was held against.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +21,12 @@ from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import TrackerStep
 from pc_client.driver.velocity_stream import StreamReport
-from pc_client.kinematics.clearance import clearance_model
+from pc_client.experiment.command_check import broken_limit
 from pc_client.kinematics.robot_model import RobotModel
-from pc_client.planning.checks import measure_joint_range
 from pc_client.planning.plan import JointPlan
 from protocol.realtime_layout import RealtimeFrame
 
 Array = NDArray[np.float64]
-
-_LEARNED_WAY = 0.25
-"""What was learned may lead a joint this share of the way to where the run would be aborted."""
-
-_CLEARANCE_STEP = 4
-"""Every so many cycles the arm's clearance is measured: 32 ms, in which it moves by less than a margin."""
 
 
 class RunLog:
@@ -100,7 +93,7 @@ class Repetitions:
         learned: (n, 6) what the next run adds to its feed-forward [rad/s]; None: nothing.
         gear: what is known of the gears; None: nothing, or not to be used.
         learned_from: repetition that it was learned from; 0: none.
-        remark: why nothing could be learned or used, one line; empty when all is well.
+        remarks: one line for each time that nothing could be learned or used, with the reason.
     """
 
     def __init__(
@@ -120,7 +113,7 @@ class Repetitions:
         self._refused = False
         self.learned: Array | None = None
         self.learned_from = 0
-        self.remark = ""
+        self.remarks: list[str] = []
 
     def renew(self, gear: GearModel | None) -> None:
         """Take what is known of the gears by now.
@@ -133,7 +126,8 @@ class Repetitions:
 
     def forget(self, remark: str) -> None:
         """Begin the next run without anything learned from the one before."""
-        self.learned, self.learned_from, self.remark = None, 0, remark
+        self.learned, self.learned_from = None, 0
+        self.remarks.append(remark)
 
     def take(self, repetition: int, log: RunLog, stream: StreamReport, lead: float, settle: float) -> None:
         """Learn from a run that came to its end.
@@ -163,7 +157,7 @@ class Repetitions:
             (0.5 * lead, 0.5 * settle),
             self._period,
         )
-        self.learned_from, self.remark = repetition, ""
+        self.learned_from = repetition
 
     def may_use(self, plan: JointPlan, table: ReferenceTable) -> bool:
         """Hold the whole of what would be sent against the limits, before anything is sent.
@@ -190,53 +184,3 @@ class Repetitions:
 def is_clean(stream: StreamReport) -> bool:
     """True for a run in which every frame came and got its command: one that may be learned from."""
     return not (stream.late_frames or stream.lost_frames)
-
-
-def broken_limit(
-    plan: JointPlan,
-    commands: Array,
-    learned: Array | None,
-    model: RobotModel,
-    config: ControllerConfig,
-    period: float,
-) -> str:
-    """Name the first limit that a whole run of commands breaks.
-
-    Args:
-        plan: where the run begins, and the limits.
-        commands: (n, 6) feed-forward of all cycles [rad/s].
-        learned: (m, 6) the part of it that was learned from the run before [rad/s], or None.
-        model: the nominal arm.
-        config: its shares of the limits.
-        period: control cycle [s].
-
-    Returns:
-        One phrase; empty when all limits are kept.
-    """
-    limits = plan.report.limits
-    way = plan.start_q + np.cumsum(commands, axis=0) * period
-    acceleration = np.abs(np.diff(commands, axis=0)) / period
-    learned_way = np.zeros(1) if learned is None else np.abs(np.cumsum(learned, axis=0)) * period
-    motion = {
-        "joint speed": np.abs(commands) / (config.speed_share * np.array(model.limits.qd_max)),
-        "joint acceleration": acceleration / np.minimum(limits.qdd_max, config.slew_limit),
-        "learned way": learned_way / (_LEARNED_WAY * config.abort_error),
-        "joint range": np.array(measure_joint_range(way, model.limits, limits).share),
-    }
-    if complaint := _first_beyond(motion):
-        return complaint  # what is no number must not come to the clearance
-    clearance = clearance_model(model).along(way[::_CLEARANCE_STEP])
-    return _first_beyond(
-        {
-            "clearance to itself": limits.own_clearance_min / np.maximum(clearance.own, 1e-6),
-            "clearance to the base plane": limits.floor_clearance_min / np.maximum(clearance.floor, 1e-6),
-        }
-    )
-
-
-def _first_beyond(shares: Mapping[str, Array]) -> str:
-    """Name the first quantity whose share of what is allowed is above 1, or no number; else empty."""
-    for what, share in shares.items():
-        if not float(np.max(share)) <= 1.0:
-            return f"{what} would be {float(np.max(share)):.0%} of what is allowed"
-    return ""

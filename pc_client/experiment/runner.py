@@ -87,33 +87,30 @@ class ExperimentRunner:
         driver.check_ready()
         clear_folder(experiment)
         self._observer.connected(driver.info)
-        report: ExperimentReport | None = None
-        pace = "realtime"
+        # The loop is identified where the first run begins; that run needs no further approach.
+        there: JointPlan | None = self._approach(experiment.planned[0].plan)
+        found, stream = identify(driver, self._config, self._qd_max)
+        self._observer.identified(found)
+        report = ExperimentReport(found)
+        # Only a robot whose time waits for its client repeats a frame.
+        pace = "lockstep" if stream.heartbeats else "realtime"
+        gears = GearObserver(found.loop, driver.info.period)
         for planned in experiment.planned:
-            repetitions: Repetitions | None = None
+            name = planned.movement.name
+            repetitions = self._repetitions(found)
             for repetition in range(1, experiment.repeat + 1):
-                plan = self._approach(planned.plan)
-                if report is None:
-                    found, stream = identify(driver, self._config, self._qd_max)
-                    self._observer.identified(found)
-                    report = ExperimentReport(found)
-                    # Only a robot whose time waits for its client repeats a frame.
-                    pace = "lockstep" if stream.heartbeats else "realtime"
-                    gears = GearObserver(found.loop, driver.info.period)
-                if repetitions is None:
-                    repetitions = self._repetitions(report.delay)
+                plan = self._approach(planned.plan) if there is None else there
+                there = None
                 if self._config.compensates_gear:
                     repetitions.renew(gears.model())
-                self._observer.running(planned.movement.name, repetition)
+                self._observer.running(name, repetition)
                 path = experiment.recording_path(planned, repetition)
-                provenance = self._provenance(planned, repetition, report.delay, pace)
-                stream = self._record(path, planned, plan, provenance, report.delay, repetitions, gears)
+                provenance = self._provenance(planned, repetition, found, pace)
+                stream = self._record(path, planned, plan, provenance, found, repetitions, gears)
                 report.paths.append(path)
                 report.streams.append(stream)
-                if repetitions.remark:
-                    report.remarks.append(f"{planned.movement.name}: {repetitions.remark}")
-                self._observer.finished(planned.movement.name, repetition, path, stream)
-        assert report is not None  # an experiment has at least one run
+                self._observer.finished(name, repetition, path, stream)
+            report.remarks += [f"{name}: {remark}" for remark in repetitions.remarks]
         return report
 
     def _approach(self, plan: JointPlan) -> JointPlan:

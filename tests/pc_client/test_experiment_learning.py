@@ -16,9 +16,10 @@ from pc_client.control.reference import ReferenceTable
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError
+from pc_client.experiment.command_check import broken_limit
 from pc_client.experiment.identification import learning_filter
 from pc_client.experiment.prepare import load_movements, prepare_experiment
-from pc_client.experiment.repetitions import Repetitions, broken_limit, is_clean
+from pc_client.experiment.repetitions import Repetitions, is_clean
 from pc_client.experiment.runner import LEAD, SETTLE, ExperimentRunner
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import load_recording
@@ -178,7 +179,7 @@ def test_what_breaks_a_limit_is_forgotten_before_anything_is_sent(two, plan):
     memory.learned_from = 1
     assert not memory.may_use(plan, table)
     assert (memory.learned, memory.learned_from, memory.gear) == (None, 0, None)
-    assert "learned way" in memory.remark
+    assert "learned way" in memory.remarks[0]
     memory.renew(gear)
     assert memory.gear is None  # refused for the rest of this movement
 

@@ -1,0 +1,75 @@
+"""The last look at a whole run of commands that nobody has planned: what was learned, before it is sent.
+
+The limits are those that the plan itself was held against, and the controller's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.control.controller_config import ControllerConfig
+from pc_client.kinematics.clearance import clearance_model
+from pc_client.kinematics.robot_model import RobotModel
+from pc_client.planning.checks import measure_joint_range
+from pc_client.planning.plan import JointPlan
+
+Array = NDArray[np.float64]
+
+_LEARNED_WAY = 0.25
+"""What was learned may lead a joint this share of the way to where the run would be aborted."""
+
+_CLEARANCE_STEP = 4
+"""Every so many cycles the arm's clearance is measured: 32 ms, in which it moves by less than a margin."""
+
+
+def broken_limit(
+    plan: JointPlan,
+    commands: Array,
+    learned: Array | None,
+    model: RobotModel,
+    config: ControllerConfig,
+    period: float,
+) -> str:
+    """Name the first limit that a whole run of commands breaks.
+
+    Args:
+        plan: where the run begins, and the limits.
+        commands: (n, 6) feed-forward of all cycles [rad/s].
+        learned: (m, 6) the part of it that was learned from the run before [rad/s], or None.
+        model: the nominal arm.
+        config: its shares of the limits.
+        period: control cycle [s].
+
+    Returns:
+        One phrase; empty when all limits are kept.
+    """
+    limits = plan.report.limits
+    way = plan.start_q + np.cumsum(commands, axis=0) * period
+    acceleration = np.abs(np.diff(commands, axis=0)) / period
+    learned_way = np.zeros(1) if learned is None else np.abs(np.cumsum(learned, axis=0)) * period
+    motion = {
+        "joint speed": np.abs(commands) / (config.speed_share * np.array(model.limits.qd_max)),
+        "joint acceleration": acceleration / np.minimum(limits.qdd_max, config.slew_limit),
+        "learned way": learned_way / (_LEARNED_WAY * config.abort_error),
+        "joint range": np.array(measure_joint_range(way, model.limits, limits).share),
+    }
+    if complaint := _first_beyond(motion):
+        return complaint  # what is no number must not come to the clearance
+    clearance = clearance_model(model).along(way[::_CLEARANCE_STEP])
+    return _first_beyond(
+        {
+            "clearance to itself": limits.own_clearance_min / np.maximum(clearance.own, 1e-6),
+            "clearance to the base plane": limits.floor_clearance_min / np.maximum(clearance.floor, 1e-6),
+        }
+    )
+
+
+def _first_beyond(shares: Mapping[str, Array]) -> str:
+    """Name the first quantity whose share of what is allowed is above 1, or no number; else empty."""
+    for what, share in shares.items():
+        if not float(np.max(share)) <= 1.0:
+            return f"{what} would be {float(np.max(share)):.0%} of what is allowed"
+    return ""
