@@ -16,7 +16,7 @@ Source: sections 1.5 and 3 of the theory notes.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +33,7 @@ __all__ = [
     "inserted",
     "normals_across",
     "sigma_lognormal",
+    "with_chords",
     "without",
 ]
 
@@ -160,6 +161,23 @@ def without(chain: Chain, drop: NDArray[np.bool_]) -> Chain:
         chain.normal[keep],
         targets,
     )
+
+
+def with_chords(chain: Chain, least: float) -> Chain:
+    """The chain without strokes whose chord is shorter than `least`; a last one gets a chord of that length.
+
+    A stroke without a chord has no direction, so no movement of the package could hold it.
+    """
+    sizes = np.linalg.norm(chain.chords, axis=1)
+    short = sizes < least
+    short[int(np.argmax(sizes))] = False
+    kept = without(chain, short) if short.any() else chain
+    if len(kept) == 1 and float(np.linalg.norm(kept.chords)) < least:
+        along = np.eye(kept.targets.shape[1])[0]
+        normal = normals_across(np.eye(3)[:1], kept.normal)
+        targets = np.vstack((kept.targets[0], kept.targets[0] + least * along))
+        return replace(kept, targets=targets, normal=normal)
+    return kept
 
 
 def in_order(chain: Chain) -> Chain:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.extraction.addition import best_candidates, idle_strokes
-from pc_client.extraction.chain import Bounds, Chain, inserted, without
+from pc_client.extraction.chain import Bounds, Chain, inserted, with_chords, without
 from pc_client.extraction.initial import TYPICAL_SIGMA, initial_chain
 from pc_client.extraction.refine import Aim, Fit, refine, residuals
 from pc_client.extraction.smoothing import CUTOFF_HZ, SmoothPart, low_passed, velocity
@@ -32,6 +32,8 @@ _CLEAN_DB = 35.0
 #: Above this SNR (dB) of the first strokes they may be all there are, blunted by the low-pass.
 _PERHAPS_CLEAN_DB = 25.0
 _GIVE_BACKS = 4
+#: Shortest chord of a stroke over the extent of its part.
+_LEAST_CHORD = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +90,7 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
     if _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_PERHAPS_CLEAN_DB / 10.0):
         sharp = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
         if _passed_cost(sharp, parts, scales) < 10.0 ** (-options.enough_db / 10.0):
-            return [fit.chain for fit in sharp]
+            return _told(sharp, parts)
     for round_ in range(options.rounds):
         left = budget - sum(len(fit.chain) for fit in fits)
         wanted = left if round_ == options.rounds - 1 else math.ceil(left / 2)
@@ -99,7 +101,15 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
     ]
     if _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_CLEAN_DB / 10.0):
         fits = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
-    return [fit.chain for fit in fits]
+    return _told(fits, parts)
+
+
+def _told(fits: Sequence[Fit], parts: Sequence[SmoothPart]) -> list[Chain]:
+    """The chains of the fits, every stroke with a chord."""
+    return [
+        with_chords(fit.chain, _LEAST_CHORD * float(np.linalg.norm(np.ptp(part.p, axis=0))))
+        for fit, part in zip(fits, parts, strict=True)
+    ]
 
 
 def _add(

@@ -49,6 +49,9 @@ PROMINENCE = 0.01
 #: A part shorter than this, s, holds no movement that a 12 Hz signal could tell from a touch.
 MIN_DURATION_S = 0.02
 
+#: A part smaller than this stands still, even if its unit is the metre.
+MIN_EXTENT = 1e-5
+
 _ORDER = 4
 #: The impulse response has died away (to 1e-6) after this time, s.
 _SETTLED_S = 0.5
@@ -88,7 +91,7 @@ class SmoothPart:
 
 def moves(part: PenPart) -> bool:
     """Whether a part holds a movement; a touch, a dot or a single sample does not."""
-    return len(part.t) >= 2 and part.duration >= MIN_DURATION_S and part.extent > 0.0
+    return len(part.t) >= 2 and part.duration >= MIN_DURATION_S and part.extent > MIN_EXTENT
 
 
 def smooth_part(part: PenPart) -> SmoothPart:

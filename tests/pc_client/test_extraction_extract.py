@@ -229,6 +229,18 @@ def test_short_parts_have_a_stroke(n, duration, dim):
     assert result.snr_v_db > 5.0
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("x", [[0, 1, 0], [0, 1, 0, -1, 0], [0, 0, 0, 1e-4, 0, 0, 0], [5, 5, 5, 6, 6, 6]])
+def test_there_and_back_again_has_a_stroke_with_a_chord(x, dim):
+    t = np.linspace(0.0, 0.1 * len(x), len(x))
+    p = np.zeros((len(x), dim))
+    p[:, 0] = x
+    result = extract(PenRecording("back", (PenPart(t, p),)))
+    assert result.n_strokes >= 1
+    assert math.isfinite(result.snr_v_db)
+    assert np.isfinite(result.parts[0].law.evaluate(t).p).all()
+
+
 rows = st.lists(
     st.tuples(
         st.one_of(st.integers(-30, 400), st.just(math.nan)),
