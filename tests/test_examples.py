@@ -34,6 +34,13 @@ def test_example(name, arguments, said):
 
 
 @pytest.mark.slow
+def test_draw(tmp_path):
+    said = run("draw.py", "--out", tmp_path, "--repeat", 1)
+    assert "executed, aligned" in said
+    assert (tmp_path / "report.html").exists()
+
+
+@pytest.mark.slow
 def test_demo_and_plot(tmp_path):
     said = run("demo.py", "--out", tmp_path, "--repeat", 1)
     assert "Table I" in said
@@ -44,6 +51,12 @@ def test_demo_and_plot(tmp_path):
 
 
 def test_no_example_is_left_out():
-    tested = {"demo.py", "01_run_a_program.py", "02_read_the_stream.py", "03_script_without_a_robot.py"}
+    tested = {
+        "demo.py",
+        "draw.py",
+        "01_run_a_program.py",
+        "02_read_the_stream.py",
+        "03_script_without_a_robot.py",
+    }
     tested |= {"04_plan_a_movement.py", "05_plot_a_recording.py", "06_contact.py"}
     assert {path.name for path in EXAMPLES.glob("*.py")} == tested

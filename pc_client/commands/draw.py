@@ -217,10 +217,11 @@ def _names(recordings: Sequence[PenRecording]) -> list[str]:
 def _summary(drawing: Drawing) -> str:
     extraction, placement = drawing.extraction, drawing.placement
     later = float(drawing.delays.max())
+    place = f"on a {placement.plane} sheet" if drawing.flat else "in space"
     return (
         f"{drawing.movement.name}: {len(drawing.marks)} marks, {extraction.n_strokes} strokes, "
-        f"SNR_v {extraction.snr_v_db:.1f} dB; {1e3 * placement.similarity.scale:.3f} mm a unit on a "
-        f"{placement.plane} sheet, turned by {math.degrees(placement.rotation):.1f} deg, "
+        f"SNR_v {extraction.snr_v_db:.1f} dB; {1e3 * placement.similarity.scale:.3f} mm a unit "
+        f"{place}, turned by {math.degrees(placement.rotation):.1f} deg, "
         f"{drawing.factor:.3f} times slower than the hand, {drawing.movement.duration:.1f} s"
         + (f"; later marks up to {later:.2f} s of the hand late" if later > 0.005 else "")
     )

@@ -82,7 +82,7 @@ class Shown:
         middle = 0.5 * (drawn.min(axis=0) + drawn.max(axis=0))
         if self.drawing.flat:
             axes = np.array([[1.0, 0.0, 0.0], [0.0, 1.0 if self.drawing.placement.y_up else -1.0, 0.0]])
-        else:  # a path in space is shown from where it is widest
+        else:
             axes = np.linalg.svd(drawn - drawn.mean(axis=0), full_matrices=False)[2][:2]
         page: NDArray[np.float64] = self.unit * (p - middle) @ axes.T
         return page
@@ -97,6 +97,8 @@ class Shown:
 def fill_paths(figure: Figure, shown: Shown) -> None:
     """The four paths side by side."""
     half = _half_width(shown)
+    # A path in space is shown from where it is widest.
+    across, up = ("x [mm]", "y [mm]") if shown.drawing.flat else ("widest [mm]", "second widest [mm]")
     titles = {
         "human": "human",
         "reconstructed": f"reconstructed, {shown.drawing.extraction.n_strokes} strokes",
@@ -121,12 +123,12 @@ def fill_paths(figure: Figure, shown: Shown) -> None:
             for part in shown.parts[name]:
                 _draw_start(axes, shown, part)
             _draw_numbers(axes, shown)
-        axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal", xlabel="x [mm]")
+        axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal", xlabel=across)
         axes.set_title(title, color=COLOURS[name], loc="center")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         if column == 0:
-            axes.set_ylabel("y [mm]")
+            axes.set_ylabel(up)
         else:
             axes.tick_params(labelleft=False)
 
@@ -333,8 +335,10 @@ def _draw_bells(axes: Axes, shown: Shown) -> None:
         mark, nearly = shown.drawing.marks[index], 1e-3 * float(np.ptp(part.p, axis=0).max())
         t = np.arange(mark.begin - mark.lead(nearly), mark.end + mark.lag(nearly), 0.002)
         for bell in shown.unit * part.law.stroke_speeds(t).T:
-            axes.fill_between(shown.since_pen_down(t, index), bell, color=_BELL, alpha=0.28, lw=0)
-            axes.plot(shown.since_pen_down(t, index), bell, color=_BELL, lw=0.8)
+            visible = bell > 1e-3 * bell.max()
+            at = shown.since_pen_down(t[visible], index)
+            axes.fill_between(at, bell[visible], color=_BELL, alpha=0.28, lw=0)
+            axes.plot(at, bell[visible], color=_BELL, lw=0.8)
 
 
 def _draw_speed(
@@ -428,7 +432,7 @@ def _equal_axes(axes: Any, points: NDArray[np.float64]) -> None:
     ]
     axes.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
     # matplotlib keeps the diagonal of the box; here its longest edge is kept.
-    axes.set_box_aspect(tuple(half / half.max()), zoom=0.75 * float(np.linalg.norm(half / half.max())))
+    axes.set_box_aspect(tuple(half / half.max()), zoom=0.69 * float(np.linalg.norm(half / half.max())))
     axes.set(xlabel="x [mm]", ylabel="y [mm]")
     axes.zaxis.set_rotate_label(False)
     axes.set_zlabel("z [mm]", rotation=90)
