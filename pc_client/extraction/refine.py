@@ -95,7 +95,7 @@ class _Equations(NamedTuple):
     error: float
 
 
-def refine(chain: Chain, aim: Aim, iterations: int, tolerance: float = 1e-3) -> Fit:
+def refine(chain: Chain, aim: Aim, iterations: int, tolerance: float = 3e-3) -> Fit:
     """Better the strokes for some iterations, or until one gains less than `tolerance` of the cost.
 
     The cost never grows. Every stroke stays inside the aim's bounds. The strokes come back sorted by their
