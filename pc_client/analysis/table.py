@@ -146,7 +146,7 @@ class Table:
             "rows": rows,
             "mean_snr_db": {kind: None if mean is None else _number(mean) for kind, mean in means.items()},
             "paper_mean_snr_db": {kind: self.paper_mean_of(kind) for kind in KINDS},
-            "loop": dict(self.loop),
+            "loop": {k: _number(v) if isinstance(v, float) else v for k, v in self.loop.items()},
         }
 
     def to_markdown(self) -> str:

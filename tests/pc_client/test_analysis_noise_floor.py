@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -102,6 +103,14 @@ def test_table_shows_the_floor(perfect: list[Run]) -> None:
     assert row["noise_floor_db"] == pytest.approx(table.rows[0].noise_floor_db, abs=1e-6)
     assert row["unrepeatable_db"] is not None
     assert f"| {table.rows[0].noise_floor_db:.2f} |" in table.to_markdown()
+
+
+def test_an_endless_margin_is_null_in_json(tmp_path: Path) -> None:
+    loop = {"dead_time_s": 0.02, "lag_s": 0.01, "gain_margin": math.inf, "learning_limited_by": "noise"}
+    path = record_movement(tmp_path / "a.mcap", prov=provenance(loop=loop))
+    written = build_table([analyse_run(load_recording(path))]).to_json()["loop"]
+    assert json.dumps(written, allow_nan=False)
+    assert written == {**loop, "gain_margin": None}
 
 
 def test_without_rest_or_a_known_arm_there_is_no_floor(tmp_path: Path, perfect: list[Run]) -> None:
