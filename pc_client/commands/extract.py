@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.options import console, say
+from pc_client.commands.options import DaskOption, WorkersOption, check_workers, console, say
 from pc_client.errors import ClientError, RecordingError
 
 if TYPE_CHECKING:
@@ -54,16 +54,8 @@ def extract(
             "--figures", metavar="few|all|none", help=f"Pictures: of the first {_FEW_FIGURES}, all or none."
         ),
     ] = "few",
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", metavar="N", min=1, help="Processes; as many as there are cores by default."
-        ),
-    ] = None,
-    dask: Annotated[
-        str | None,
-        typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler to work on, tcp://HOST:8786."),
-    ] = None,
+    workers: WorkersOption = None,
+    dask: DaskOption = None,
 ) -> None:
     """Find the strokes of recorded movements, and say how well they tell them."""
     from pc_client.extraction.extract import ExtractOptions
@@ -74,8 +66,7 @@ def extract(
         raise typer.BadParameter(f"no time unit {time_unit!r}: give auto or one of {', '.join(TIME_UNITS)}")
     if figures not in ("few", "all", "none"):
         raise typer.BadParameter(f"no figures {figures!r}: give few, all or none")
-    if workers is not None and dask is not None:
-        raise typer.BadParameter("--workers is for this machine, --dask for a cluster: give only one")
+    check_workers(workers, dask)
     if figures != "none":
         import matplotlib  # noqa: F401  # when it is missing, say so before the work is done
     sources, unusable = _look_up(files)

@@ -33,6 +33,14 @@ ControllerOption = Annotated[
     ),
 ]
 RepeatOption = Annotated[int, typer.Option("--repeat", min=1, max=99, help="Runs of each movement.")]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", min=1, help="Processes; as many as there are cores by default."),
+]
+DaskOption = Annotated[
+    str | None,
+    typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler to work on, tcp://HOST:8786."),
+]
 YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a real arm moves.")]
 
 
@@ -50,6 +58,16 @@ def show_report(folder: Path) -> None:
     for line in report.left_out:
         say(line)
     say(f"report: {report.paths[-1]}")
+
+
+def check_workers(workers: int | None, dask: str | None) -> None:
+    """Refuse both `--workers` and `--dask`.
+
+    Raises:
+        typer.BadParameter: both are given.
+    """
+    if workers is not None and dask is not None:
+        raise typer.BadParameter("--workers is for this machine, --dask for a cluster: give only one")
 
 
 def ports_of(port_base: int) -> Ports:

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.options import YesOption, console, ports_of, say
+from pc_client.commands.options import (
+    DaskOption,
+    WorkersOption,
+    YesOption,
+    check_workers,
+    console,
+    ports_of,
+    say,
+)
 from pc_client.errors import ClientError, SweepError
 
 if TYPE_CHECKING:
@@ -31,16 +39,8 @@ def sweep(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results, instead of `output`.")
     ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", metavar="N", min=1, help="Processes; as many as there are cores by default."
-        ),
-    ] = None,
-    dask: Annotated[
-        str | None,
-        typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler to work on, tcp://HOST:8786."),
-    ] = None,
+    workers: WorkersOption = None,
+    dask: DaskOption = None,
     format: Annotated[
         str | None,
         typer.Option(
@@ -58,8 +58,7 @@ def sweep(
     from pc_client.sweep.schedule import run_in_turn, run_side_by_side
     from pc_client.sweep.table import table_content, table_format
 
-    if workers is not None and dask is not None:
-        raise typer.BadParameter("--workers is for this machine, --dask for a cluster: give only one")
+    check_workers(workers, dask)
     plan = read_config(config)
     if plan.host is not None and (workers is not None or dask is not None):
         raise typer.BadParameter(f"robot = {plan.host!r} is one robot: no --workers and no --dask")
