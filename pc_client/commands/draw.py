@@ -67,10 +67,14 @@ def draw(
     lift: Annotated[
         float, typer.Option("--lift", metavar="MM", help="How far the pen is lifted between parts.")
     ] = 30.0,
-    y_up: Annotated[
-        bool,
-        typer.Option("--y-up", help="The recording's y axis points up, as on tablets; down by default."),
-    ] = False,
+    y: Annotated[
+        str,
+        typer.Option(
+            "--y",
+            metavar="auto|up|down",
+            help="Where the recording's y points; auto: down, as pixels are counted, unless one is below 0.",
+        ),
+    ] = "auto",
     slower: Annotated[
         float,
         typer.Option(
@@ -103,7 +107,7 @@ def draw(
         raise typer.BadParameter(f"no time unit {time_unit!r}: give auto or one of {', '.join(TIME_UNITS)}")
     if save is not None and len(files) > 1:
         raise typer.BadParameter("--save is for one drawing: give one FILE")
-    options = _options(plane, size, rotate, lift, y_up)
+    options = _options(plane, size, rotate, lift, y)
     controller_config(controller)  # complains before the work is done
     import matplotlib  # noqa: F401  # likewise
 
@@ -121,13 +125,15 @@ def draw(
     _report(_judge(drawings, out), out)
 
 
-def _options(plane: str, size: str, rotate: str, lift: float, y_up: bool) -> PlacementOptions:
+def _options(plane: str, size: str, rotate: str, lift: float, y: str) -> PlacementOptions:
     from pc_client.drawing.placement import PlacementOptions
 
+    if y not in ("auto", "up", "down"):
+        raise typer.BadParameter(f"--y {y!r}: give auto, up or down")
     try:
         return PlacementOptions(
             plane=plane,
-            y_up=y_up,
+            y_up=None if y == "auto" else y == "up",
             rotation=None if rotate == "auto" else math.radians(_number(rotate, "--rotate", "auto")),
             size=None if size == "max" else 1e-3 * _number(size, "--size", "max"),
             lift=1e-3 * lift,

@@ -189,7 +189,7 @@ def fill_speeds(figure: Figure, shown: Shown) -> None:
 
 def fill_space(figure: Figure, shown: Shown) -> None:
     """The movement in the base frame, with its lifts; and the height of the pen over the sheet."""
-    _draw_space(figure.add_axes((0.0, 0.02, 0.5, 0.9), projection="3d"), shown)
+    _draw_space(figure.add_axes((0.0, 0.04, 0.5, 0.9), projection="3d"), shown)
     axes = figure.add_axes((0.585, 0.14, 0.395, 0.72))
     _shade_pen_down(axes, shown)
     start = float(shown.drawing.joined.pen_down[0, 0])
@@ -432,7 +432,7 @@ def _equal_axes(axes: Any, points: NDArray[np.float64]) -> None:
     ]
     axes.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
     # matplotlib keeps the diagonal of the box; here its longest edge is kept.
-    axes.set_box_aspect(tuple(half / half.max()), zoom=0.69 * float(np.linalg.norm(half / half.max())))
+    axes.set_box_aspect(tuple(half / half.max()), zoom=0.66 * float(np.linalg.norm(half / half.max())))
     axes.set(xlabel="x [mm]", ylabel="y [mm]")
     axes.zaxis.set_rotate_label(False)
     axes.set_zlabel("z [mm]", rotation=90)

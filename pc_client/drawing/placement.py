@@ -1,9 +1,10 @@
 """Where in the workspace a drawing is done: a sheet, an angle and a scale.
 
 The sheet stands before the robot as a board before a person who looks the same way: right of the drawing is
--y of the base frame. A recording's own axes are x to the right and y down the sheet, as screens have it (or
-y up, as tablets have it); its third axis then points into the sheet (or out of it), so that the map is a
-proper rotation and no drawing is mirrored. A pen goes up against the direction into the sheet.
+-y of the base frame. A recording's own axes are x to the right and y down the sheet, as pixels are counted,
+or up, as everywhere else; its third axis then points into the sheet, or out of it, so that the map is a
+proper rotation and no drawing is mirrored. Pixels are never below 0: where a y is, y is taken to point up
+(Omniglot writes the rows of its screen as 0, -1, -2 ...). A pen goes up against the direction into the sheet.
 
 Recordings in space keep their axes: x, y, z are those of the base frame, and the pen goes up along +z.
 """
@@ -42,7 +43,7 @@ class PlacementOptions:
 
     Attributes:
         plane: a key of `PLANES`; only for flat recordings.
-        y_up: whether the recording's y axis points up the sheet; down otherwise.
+        y_up: whether the recording's y axis points up the sheet; None: when one of its y is below 0.
         rotation: turn of the drawing on its sheet, rad, positive to the left as it is looked at; None: the
             half degree that allows the largest scale.
         size: longest side of what the pen draws, m; None or too much: as large as the box allows.
@@ -51,7 +52,7 @@ class PlacementOptions:
     """
 
     plane: str = "vertical"
-    y_up: bool = False
+    y_up: bool | None = None
     rotation: float | None = 0.0
     size: float | None = 0.1
     lift: float = 0.03
@@ -114,12 +115,13 @@ def place(
     extent = float(np.ptp(drawn, axis=0).max())
     if not extent > 0.0:
         raise MovementError("a drawing of one point has no size: there is nothing to fit into a box")
-    frame = sheet_frame(options.plane, y_up=options.y_up) if flat else np.eye(3)
+    y_up = bool(drawn[:, 1].min() < 0.0) if options.y_up is None else options.y_up
+    frame = sheet_frame(options.plane, y_up=y_up) if flat else np.eye(3)
     out = -np.array(PLANES[options.plane]) if flat else np.array((0.0, 0.0, 1.0))
     lift = options.lift * out
     path = np.vstack([mark.path(_PATH_SHARE * extent) for mark in marks])
     # Seen from the side that the pen is on, the recording's third axis points away where y points down.
-    sense = 1.0 if options.y_up or not flat else -1.0
+    sense = 1.0 if y_up or not flat else -1.0
     if options.rotation is None:
         angles = [math.radians(0.5 * step) for step in range(360)]
     else:
@@ -134,7 +136,7 @@ def place(
     low = turned.min(axis=0) + np.minimum(lift, 0.0)
     high = turned.max(axis=0) + np.maximum(lift, 0.0)
     similarity = Similarity(scale, R, options.box.centre - 0.5 * (low + high))
-    return Placement(similarity, read_only(lift), angle, options.plane if flat else "space", options.y_up)
+    return Placement(similarity, read_only(lift), angle, options.plane if flat else "space", y_up)
 
 
 def inverse(similarity: Similarity) -> Similarity:

@@ -211,7 +211,7 @@ def _place(drawing: Drawing) -> str:
     placement = drawing.placement
     if not drawing.flat:
         return "in space, axes of the recording along those of the base frame"
-    y = "up" if placement.y_up else "down, as on a screen"
+    y = "up" if placement.y_up else "down, as pixels are counted"
     turned = f", turned by {math.degrees(placement.rotation):.1f}°" if placement.rotation else ", not turned"
     return f"{placement.plane} sheet before the robot{turned}; y of the recording points {y}; not mirrored"
 

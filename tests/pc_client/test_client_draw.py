@@ -127,6 +127,7 @@ def test_several_drawings_repeated_are_one_page_with_a_section_each(robot, tmp_p
         (["--rotate", "left"], "give a number or auto"),
         (["--lift", "0"], "lift of 0 mm"),
         (["--time-unit", "min"], "no time unit"),
+        (["--y", "left"], "auto, up or down"),
         (["other.txt", "--save", "x.toml"], "one drawing"),
     ],
 )
@@ -202,5 +203,6 @@ def test_a_drawing_of_the_data_set(robot, tmp_path):
     )
     (one,) = json.loads((out / "draw.json").read_text())["drawings"]
     assert one["marks"] == 2  # a stroke and a dot
+    assert one["y_up"] is True  # rows of the screen as 0, -1, -2 ...
     assert one["reconstruction"]["snr_v_db"] > 15.0
     assert one["runs"][0]["human"]["snr_v_db"] > 10.0

@@ -68,6 +68,15 @@ def test_all_of_the_path_and_the_lifts_lie_in_the_box(plane, rotation, size):
         assert np.any(np.isclose(high - low, UR3_BOX.size, rtol=1e-3))
 
 
+def test_y_points_down_as_pixels_are_counted_unless_one_is_below_0():
+    extraction = one_part()
+    marks, ink = marks_of(extraction), drawn(extraction)
+    assert not place(marks, ink, PlacementOptions()).y_up
+    assert place(marks, ink - [0.0, 90.0, 0.0], PlacementOptions()).y_up
+    assert not place(marks, ink - [0.0, 90.0, 0.0], PlacementOptions(y_up=False)).y_up
+    assert place(marks, ink, PlacementOptions(y_up=True)).y_up
+
+
 def test_auto_rotation_is_never_smaller_than_any_other():
     extraction = two_parts_and_a_dot()
     marks, ink = marks_of(extraction), drawn(extraction)
