@@ -45,9 +45,14 @@ def extract(
         ),
     ] = "auto",
     strokes_per_peak: Annotated[
-        float,
-        typer.Option("--strokes-per-peak", min=0.1, max=10.0, help="Most strokes per peak of the speed."),
-    ] = 1.2,
+        float | None,
+        typer.Option(
+            "--strokes-per-peak",
+            min=0.1,
+            max=10.0,
+            help="Most strokes per peak of the speed; 1.2 by default, more where that tells too little.",
+        ),
+    ] = None,
     figures: Annotated[
         str,
         typer.Option(
@@ -71,7 +76,7 @@ def extract(
         import matplotlib  # noqa: F401  # when it is missing, say so before the work is done
     sources, unusable = _look_up(files)
     n_pictures = {"few": _FEW_FIGURES, "all": len(sources), "none": 0}[figures]
-    options = ExtractOptions(strokes_per_peak=strokes_per_peak)
+    options = ExtractOptions() if strokes_per_peak is None else ExtractOptions.strict(strokes_per_peak)
     unit = None if time_unit == "auto" else time_unit
     outcomes = _run(sources, options, unit, n_pictures, workers, dask)
     rows = [outcome.row for outcome in outcomes if outcome.row is not None]

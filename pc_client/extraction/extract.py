@@ -37,12 +37,17 @@ class ExtractOptions:
 
     Attributes:
         strokes_per_peak: most strokes per speed peak of a recording. Every moving part gets one stroke in any
-            case.
+            case, and a recording as many as it takes to be told with `fit.least_db`.
         fit: effort of the fit.
     """
 
     strokes_per_peak: float = 1.2
     fit: FitOptions = field(default_factory=FitOptions)
+
+    @classmethod
+    def strict(cls, strokes_per_peak: float) -> ExtractOptions:
+        """No more strokes than this per peak, but one for each bell, however little they tell."""
+        return cls(strokes_per_peak, FitOptions(least_db=-math.inf))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,6 +121,8 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
     powers = np.sum([power for _, power in judged], axis=0)
     snr_v, snr_t = _db(powers[0], powers[1]), _db(powers[2], powers[3])
     n_strokes = sum(len(chain) for chain in chains)
+    if n_strokes > budget:
+        remarks.append(f"{n_strokes} strokes, {n_strokes - budget} more than asked: fewer told too little")
     return Extraction(
         recording.name,
         tuple(part for part, _ in judged),

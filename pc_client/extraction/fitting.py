@@ -32,6 +32,8 @@ _CLEAN_DB = 35.0
 #: Above this SNR (dB) of the first strokes they may be all there are, blunted by the low-pass.
 _PERHAPS_CLEAN_DB = 25.0
 _GIVE_BACKS = 4
+#: Times that a tenth of the strokes is added beyond the budget, at most.
+_RESCUES = 12
 #: Shortest chord of a stroke over the extent of its part.
 _LEAST_CHORD = 1e-6
 
@@ -46,12 +48,16 @@ class FitOptions:
         iterations: of the refinement after each round.
         last_iterations: of the last refinement.
         enough_db: SNR of the velocity, dB, above which no stroke is added.
+        least_db: SNR of the velocity, dB, below which strokes are added beyond the budget, as long as they
+            pay: what is told so badly is not told at all. Below it others refit too (section 3.4 of the
+            theory notes).
     """
 
     rounds: int = 3
     iterations: int = 6
     last_iterations: int = 40
     enough_db: float = 40.0
+    least_db: float = 15.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +85,8 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
 
     Args:
         parts: at least one; all move.
-        budget: most strokes of all parts together. Every part gets one for each of its bells in any case.
+        budget: most strokes of all parts together, unless these would tell too little, see `FitOptions`.
+            Every part gets one for each of its bells in any case.
         options: effort.
     """
     scales = Scales.of(parts)
@@ -95,6 +102,12 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
         left = budget - sum(len(fit.chain) for fit in fits)
         wanted = left if round_ == options.rounds - 1 else math.ceil(left / 2)
         if left <= 0 or not _add(fits, parts, aims, scales, wanted, options):
+            break
+    for _ in range(_RESCUES):
+        chains = [fit.chain for fit in fits]
+        if _velocity_cost(chains, parts, scales) < 10.0 ** (-options.least_db / 10.0):
+            break
+        if not _add(fits, parts, aims, scales, math.ceil(0.1 * sum(map(len, chains))), options):
             break
     fits = [
         refine(_tidy(fit, aim), aim, options.last_iterations) for fit, aim in zip(fits, aims, strict=True)

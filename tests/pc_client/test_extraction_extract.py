@@ -131,6 +131,26 @@ def test_the_budget_of_strokes_is_kept(ratio):
     assert result.n_strokes <= max(ratio, 1.0) * result.n_speed_peaks
 
 
+def cut_off_at_both_ends():
+    """A movement that begins and ends at speed, with one peak between."""
+    t = np.arange(0.0, 1.5, 0.01)
+    path = np.column_stack([10.0 * t + 3.0 * np.sin(6.0 * t), 4.0 * np.cos(5.0 * t)])
+    return PenRecording("cut off", (PenPart(t, path),))
+
+
+def test_what_few_strokes_cannot_tell_gets_more_and_says_so():
+    result = extract(cut_off_at_both_ends())
+    assert result.snr_v_db > 15.0
+    assert result.n_strokes > 1.2 * result.n_speed_peaks
+    assert any("more than asked" in remark for remark in result.remarks)
+
+
+def test_a_budget_by_hand_is_strict():
+    result = extract(cut_off_at_both_ends(), ExtractOptions.strict(1.2))
+    assert result.n_strokes == result.n_speed_peaks == 1
+    assert not result.remarks
+
+
 def test_more_strokes_tell_more():
     few, many = (extract(hand(), ExtractOptions(strokes_per_peak=ratio)) for ratio in (1.0, 1.5))
     assert many.n_strokes > few.n_strokes
