@@ -262,9 +262,9 @@ def _report(entries: Sequence[Entry], out: Path) -> None:
 
     from rich.progress import track
 
-    from pc_client.drawing.figures import Shown
     from pc_client.drawing.figures import draw as draw_pictures
     from pc_client.drawing.page import render_page
+    from pc_client.drawing.shown import Shown
     from pc_client.drawing.table import to_json, to_markdown, to_rich
 
     pictures = {

@@ -6,7 +6,8 @@ import base64
 from collections.abc import Mapping, Sequence
 from importlib import resources
 
-from pc_client.drawing.figures import COLOURS, FIGURES
+from pc_client.drawing.figures import FIGURES
+from pc_client.drawing.shown import COLOURS
 from pc_client.drawing.table import COLUMNS, Entry, facts_of, provenance_facts, rows_of
 
 __all__ = ["render_page"]

@@ -14,10 +14,11 @@ from drawing_samples import two_parts_and_a_dot
 
 from pc_client.drawing.drawing import make_drawing
 from pc_client.drawing.execution import executed
-from pc_client.drawing.figures import FIGURES, Shown, draw
+from pc_client.drawing.figures import FIGURES, draw
 from pc_client.drawing.judgement import judge, signals
 from pc_client.drawing.page import render_page
 from pc_client.drawing.placement import PlacementOptions
+from pc_client.drawing.shown import Shown
 from pc_client.drawing.table import COLUMNS, Entry, rows_of, to_json, to_markdown
 from pc_client.errors import RecordingError
 from pc_client.kinematics.robot_model import robot_model
