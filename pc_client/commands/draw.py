@@ -223,7 +223,7 @@ def _names(recordings: Sequence[PenRecording]) -> list[str]:
 def _summary(drawing: Drawing) -> str:
     extraction, placement = drawing.extraction, drawing.placement
     later = float(drawing.delays.max())
-    place = f"on a {placement.plane} sheet" if drawing.flat else "in space"
+    place = f"on the {placement.plane} sheet" if drawing.flat else "in space"
     return (
         f"{drawing.movement.name}: {len(drawing.marks)} marks, {extraction.n_strokes} strokes, "
         f"SNR_v {extraction.snr_v_db:.1f} dB; {1e3 * placement.similarity.scale:.3f} mm a unit "

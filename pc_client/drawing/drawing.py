@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +48,11 @@ class Drawing:
     def flat(self) -> bool:
         """Whether the recording is flat."""
         return _is_flat(self.extraction)
+
+    @property
+    def drawn(self) -> NDArray[np.float64]:
+        """What the pen draws, dots included, in the recording's frame and unit, (n, 3)."""
+        return _drawn(self.extraction, self.marks)
 
     @property
     def law(self) -> SigmaLognormal:
@@ -109,9 +115,7 @@ def make_drawing(
         raise MovementError(f"{slower:g} times slower than the limits ask: give 1 or more")
     options = options or PlacementOptions()
     marks = marks_of(extraction)
-    drawn = np.vstack(
-        [spatial(part.p) for part in extraction.parts] + [mark.first for mark in marks if mark.law is None]
-    )
+    drawn = _drawn(extraction, marks)
     flat = _is_flat(extraction)
     placement = place(marks, drawn, options, flat=flat)
     on_arm = [mark.transformed(placement.similarity) for mark in marks]
@@ -126,6 +130,11 @@ def make_drawing(
 
     factor = slower * least_factor(slowed, guess, arm)[0]
     return Drawing(extraction, marks, placement, joined, factor, slowed(factor))
+
+
+def _drawn(extraction: Extraction, marks: Sequence[Mark]) -> NDArray[np.float64]:
+    lines = [spatial(part.p) for part in extraction.parts]
+    return np.vstack([*lines, *(mark.first for mark in marks if mark.law is None)])
 
 
 def _is_flat(extraction: Extraction) -> bool:

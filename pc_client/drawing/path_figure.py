@@ -48,6 +48,8 @@ def fill_paths(figure: Figure, shown: Shown) -> None:
                 _draw_start(axes, shown, part)
             _draw_numbers(axes, shown)
         axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal", xlabel=across)
+        if name == "reconstructed":
+            axes.set_xlabel(f"{across}    {_targets_text(shown, half)}")
         axes.set_title(title, color=COLOURS[name], loc="center")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
@@ -60,6 +62,7 @@ def fill_paths(figure: Figure, shown: Shown) -> None:
 def _half_width(shown: Shown) -> float:
     """Half the width (mm) of a square page that holds the drawing and the near virtual targets."""
     paths = [shown.on_page(part.p) for parts in shown.parts.values() for part in parts]
+    paths.append(shown.on_page(shown.drawing.drawn))
     reach = float(np.abs(np.vstack(paths)).max())
     targets = np.abs(shown.on_page(_targets(shown))).max(axis=1)
     near = targets[targets <= (1.0 + _FAR) * reach]
@@ -84,18 +87,12 @@ def _draw_targets(axes: Axes, shown: Shown, half: float) -> None:
             mew=0.9,
             zorder=3,
         )
+
+
+def _targets_text(shown: Shown, half: float) -> str:
+    """What the circles are, and how many the page does not show."""
     outside = int(np.count_nonzero(np.abs(shown.on_page(_targets(shown))).max(axis=1) > half))
-    text = "○ virtual targets" + (f", {outside} outside" if outside else "")
-    axes.text(
-        0.03,
-        0.03,
-        text,
-        transform=axes.transAxes,
-        fontsize=9,
-        color="#355C7D",
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
-        zorder=4,
-    )
+    return "○ virtual targets" + (f", {outside} outside" if outside else "")
 
 
 def _draw_numbers(axes: Axes, shown: Shown) -> None:

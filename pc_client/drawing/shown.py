@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from pc_client.analysis.figures import BLUE, GREEN, RED
-from pc_client.drawing.drawing import Drawing, spatial
+from pc_client.drawing.drawing import Drawing
 from pc_client.drawing.execution import Execution
 from pc_client.drawing.judgement import Signal, Verdict, signals
 
@@ -60,7 +60,7 @@ class Shown:
 
     def on_page(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (n, 3) in the recording's frame, on the page: (n, 2), mm, from the middle of the drawing."""
-        drawn = np.vstack([spatial(part.p) for part in self.drawing.extraction.parts])
+        drawn = self.drawing.drawn
         middle = 0.5 * (drawn.min(axis=0) + drawn.max(axis=0))
         if self.drawing.flat:
             axes = np.array([[1.0, 0.0, 0.0], [0.0, 1.0 if self.drawing.placement.y_up else -1.0, 0.0]])

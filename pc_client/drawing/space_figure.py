@@ -11,7 +11,6 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
-from pc_client.drawing.drawing import spatial
 from pc_client.drawing.shown import AIR, COLOURS, Shown, pen_is_down, shade_pen_down
 
 __all__ = ["fill_space"]
@@ -74,7 +73,7 @@ def _draw_space(axes: Any, shown: Shown) -> None:
 
 def _sheet(shown: Shown) -> NDArray[np.float64]:
     """Corners of the sheet, (4, 3), mm, base frame: around what is drawn, with a margin."""
-    drawn = np.vstack([spatial(part.p) for part in shown.drawing.extraction.parts])
+    drawn = shown.drawing.drawn
     margin = 0.12 * float(np.ptp(drawn, axis=0).max())
     low, high = drawn.min(axis=0) - margin, drawn.max(axis=0) + margin
     corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]

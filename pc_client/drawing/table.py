@@ -86,7 +86,7 @@ def facts_of(entry: Entry) -> dict[str, str]:
     drawing, verdict = entry.drawing, entry.verdict
     placement = drawing.placement
     scale, run = placement.similarity.scale, verdict.best
-    drawn = np.ptp(np.vstack([part.p for part in drawing.extraction.parts]), axis=0) * 1e3 * scale
+    drawn = 1e3 * scale * np.ptp(drawing.drawn, axis=0)[: 2 if drawing.flat else 3]
     dots = sum(mark.law is None for mark in drawing.marks)
     later = float(drawing.delays.max())
     lift = 1e3 * float(np.linalg.norm(placement.lift))

@@ -125,6 +125,16 @@ def test_pictures_are_svg_and_say_that_the_arm_is_simulated(entry):
     assert again == pictures
 
 
+def test_what_is_drawn_lies_on_the_page_and_dots_are_drawn(entry):
+    shown = Shown.of(entry.drawing, entry.executions[0], entry.verdict)
+    np.testing.assert_array_equal(entry.drawing.drawn[-1], [50.0, 95.0, 0.0])
+    page = shown.on_page(entry.drawing.drawn)
+    np.testing.assert_allclose(page.max(axis=0), -page.min(axis=0))  # in its middle
+    assert np.ptp(page, axis=0).max() == pytest.approx(120.0)  # mm, as was asked
+    top = shown.on_page(np.array([[50.0, 0.0, 0.0]]))[0]
+    assert top[1] > page[:, 1].max()  # y of pixels points down: row 0 is above all that is drawn
+
+
 def test_the_page_needs_no_network_and_holds_every_figure(entry):
     pictures = {"sample": draw(Shown.of(entry.drawing, entry.executions[0], entry.verdict))}
     page = render_page([entry], pictures)
