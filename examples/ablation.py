@@ -12,7 +12,7 @@ import argparse
 import json
 import multiprocessing
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -21,6 +21,7 @@ from statistics import fmean
 from typing import Any
 
 from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
+from pc_client.movements.files import library_names
 from protocol.ur_types import Ports
 
 HOST = "127.0.0.1"
@@ -49,16 +50,20 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="What each piece of the controller brings.")
     parser.add_argument("--out", type=Path, default=Path("out/ablation"))
     parser.add_argument("--seed", type=int, default=7)
+    parser.add_argument("--quick", action="store_true", help="two movements, two compositions, one box")
     options = parser.parse_args()
+    movements = ["lognorm_4_1", "uniform_4_1"] if options.quick else library_names()
     cases = [
         *((name, fidelity, options.seed, "lockstep") for fidelity in FIDELITIES for name in COMPOSITIONS),
         *(("best", "typical", seed, "lockstep") for seed in SEEDS if seed != options.seed),
         ("best", "typical", options.seed, "realtime"),
     ]
-    results = []
+    if options.quick:
+        cases = [(name, "typical", options.seed, "lockstep") for name in ("preview", "best")]
+    results: list[dict[str, Any]] = []
     for name, fidelity, seed, pace in cases:
         folder = options.out / f"{name.replace(', ', '_').replace(' ', '_')}-{fidelity}-{seed}-{pace}"
-        result = run_case(name, fidelity, seed, pace, folder)
+        result = run_case(name, fidelity, seed, pace, folder, movements)
         print(f"{name:18} {fidelity:8} seed {seed} {pace:8}  {result['summary']}", flush=True)
         results.append(result)
         write(results, options.out)
@@ -72,18 +77,19 @@ def write(results: list[dict[str, Any]], out: Path) -> None:
     draw(results, out / "ablation.png")
 
 
-def run_case(name: str, fidelity: str, seed: int, pace: str, folder: Path) -> dict[str, Any]:
-    """Run the ten movements with one composition on one box; returns figures by movement."""
+def run_case(
+    name: str, fidelity: str, seed: int, pace: str, folder: Path, movements: Sequence[str]
+) -> dict[str, Any]:
+    """Run movements three times with one composition on one box; returns figures by movement."""
     from pc_client.analysis.budget import PARTS
     from pc_client.analysis.run import analyse_run
     from pc_client.analysis.table import build_table
     from pc_client.driver.ur_driver import UrDriver
     from pc_client.experiment.prepare import load_movements, prepare_experiment
     from pc_client.experiment.runner import ExperimentRunner
-    from pc_client.movements.files import library_names
     from pc_client.recording.loader import load_recording
 
-    planned = prepare_experiment(load_movements(library_names()), repeat=3, out=folder)
+    planned = prepare_experiment(load_movements(movements), repeat=3, out=folder)
     with box(fidelity, seed, pace) as ports, UrDriver(HOST, ports) as driver:
         report = ExperimentRunner(driver, planned, COMPOSITIONS[name][0]).run()
     table = build_table([analyse_run(load_recording(path)) for path in report.paths])

@@ -50,8 +50,17 @@ def test_demo_and_plot(tmp_path):
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
+def test_ablation(tmp_path):
+    said = run("ablation.py", "--quick", "--out", tmp_path)
+    assert len(said.splitlines()) == 2
+    assert "| best | lag + gear + learning | typical |" in (tmp_path / "ablation.md").read_text()
+    assert (tmp_path / "ablation.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_no_example_is_left_out():
     tested = {
+        "ablation.py",
         "demo.py",
         "draw.py",
         "01_run_a_program.py",
