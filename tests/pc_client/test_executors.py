@@ -60,6 +60,7 @@ def cluster():
 
 def test_processes_do_jobs_and_hand_over_errors(monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    handler = signal.getsignal(signal.SIGINT)
     with open_executor(2, None) as executor:
         assert list(executor.map(square, range(5))) == [0, 1, 4, 9, 16]
         with pytest.raises(ClientError, match="what went wrong"):
@@ -69,7 +70,7 @@ def test_processes_do_jobs_and_hand_over_errors(monkeypatch):
     assert ignored
     assert pid != os.getpid()
     assert "OMP_NUM_THREADS" not in os.environ
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) is handler
     assert multiprocessing.active_children() == []
 
 
