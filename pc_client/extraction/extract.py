@@ -9,6 +9,9 @@ The figures, over all parts of a recording that move, against the recording low-
     SNR_t        10 log10( sum |p - mean p|^2 / sum |p - p_hat|^2 ), mean p of each part by itself
     lognormality SNR_v / number of strokes
 
+A signal so clean that the strokes could be fitted through the low-pass is judged through it, too: the filter
+blunts fast bells, and so the recording shows them.
+
 Source: sections 3.1 and 3.3 of the theory notes.
 """
 
@@ -22,9 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.extraction.chain import Bounds, Chain, sigma_lognormal
-from pc_client.extraction.fitting import FitOptions, fit_parts
+from pc_client.extraction.fitting import FitOptions, fit_parts, left_over
 from pc_client.extraction.recording import PenPart, PenRecording
-from pc_client.extraction.refine import residuals
 from pc_client.extraction.smoothing import SmoothPart, moves, smooth_part, speed_peaks
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 
@@ -115,9 +117,13 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
         return Extraction(recording.name, (), None, None, 0, 0, None, tuple(remarks), still)
     n_peaks = [len(speed_peaks(part)) for part in smooth]
     budget = max(len(smooth), math.floor(options.strokes_per_peak * sum(n_peaks) + 1e-9))
-    chains = fit_parts(smooth, budget, options.fit)
+    fitted = fit_parts(smooth, budget, options.fit)
+    chains = fitted.chains
     remarks += _degenerate(chains)
-    judged = [_judge(part, chain, count) for part, chain, count in zip(smooth, chains, n_peaks, strict=True)]
+    judged = [
+        _judge(part, chain, count, fitted.through)
+        for part, chain, count in zip(smooth, chains, n_peaks, strict=True)
+    ]
     powers = np.sum([power for _, power in judged], axis=0)
     snr_v, snr_t = _db(powers[0], powers[1]), _db(powers[2], powers[3])
     n_strokes = sum(len(chain) for chain in chains)
@@ -136,11 +142,12 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
     )
 
 
-def _judge(part: SmoothPart, chain: Chain, n_peaks: int) -> tuple[PartExtraction, NDArray[np.float64]]:
+def _judge(
+    part: SmoothPart, chain: Chain, n_peaks: int, through: bool
+) -> tuple[PartExtraction, NDArray[np.float64]]:
     """A part's result, and its powers: of velocity and its error, of position and its error."""
     law = sigma_lognormal(chain, float(part.t[-1]))
-    # What law.evaluate leaves, but piece by piece: all strokes at all times are too many in a long recording.
-    p_left, v_left = residuals(chain, part.t, part.p, part.v)
+    p_left, v_left = left_over(chain, part, through=through)
     powers = np.array(
         [
             np.sum(part.v**2),

@@ -19,7 +19,7 @@ from pc_client.extraction.initial import TYPICAL_SIGMA, initial_chain
 from pc_client.extraction.refine import Aim, Fit, refine, residuals
 from pc_client.extraction.smoothing import CUTOFF_HZ, SmoothPart, low_passed, velocity
 
-__all__ = ["FitOptions", "Scales", "fit_parts"]
+__all__ = ["FitOptions", "Fitted", "Scales", "fit_parts", "left_over"]
 
 #: The fit looks at every fourth sample of the 200 Hz signal: twice 12 Hz is 24 Hz, 50 Hz is enough.
 _DECIMATION = 4
@@ -80,7 +80,21 @@ class Scales:
         return cls(p, v)
 
 
-def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> list[Chain]:
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """What a fit came to.
+
+    Attributes:
+        chains: the strokes of each part.
+        through: True: the signal is so clean that the strokes were fitted through the low-pass: it is what
+            the filter makes of them that is the recording, and so they have to be judged.
+    """
+
+    chains: list[Chain]
+    through: bool
+
+
+def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> Fitted:
     """Strokes for all parts.
 
     Args:
@@ -97,7 +111,7 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
     if _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_PERHAPS_CLEAN_DB / 10.0):
         sharp = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
         if _passed_cost(sharp, parts, scales) < 10.0 ** (-options.enough_db / 10.0):
-            return _told(sharp, parts)
+            return Fitted(_told(sharp, parts), through=True)
     for round_ in range(options.rounds):
         left = budget - sum(len(fit.chain) for fit in fits)
         wanted = left if round_ == options.rounds - 1 else math.ceil(left / 2)
@@ -112,9 +126,28 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
     fits = [
         refine(_tidy(fit, aim), aim, options.last_iterations) for fit, aim in zip(fits, aims, strict=True)
     ]
-    if _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_CLEAN_DB / 10.0):
+    is_clean = _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_CLEAN_DB / 10.0)
+    if is_clean:
         fits = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
-    return _told(fits, parts)
+    return Fitted(_told(fits, parts), through=is_clean)
+
+
+def left_over(
+    chain: Chain, part: SmoothPart, *, through: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What strokes leave of a part's positions and velocities, (n, dim) each.
+
+    Args:
+        chain: the strokes.
+        part: low-passed.
+        through: the strokes go through the same low-pass first.
+    """
+    # What law.evaluate leaves, but piece by piece: all strokes at all times are too many in a long recording.
+    p_left, v_left = residuals(chain, part.t, part.p, part.v)
+    if not through:
+        return p_left, v_left
+    passed = low_passed(part.p - p_left, 1.0 / part.step)
+    return part.p - passed, part.v - velocity(part.t, passed)
 
 
 def _told(fits: Sequence[Fit], parts: Sequence[SmoothPart]) -> list[Chain]:
@@ -184,9 +217,7 @@ def _passed_cost(fits: Sequence[Fit], parts: Sequence[SmoothPart], scales: Scale
     """Share of the velocity that the strokes do not tell when they are seen through the same low-pass."""
     energy = 0.0
     for fit, part in zip(fits, parts, strict=True):
-        p_left, _ = residuals(fit.chain, part.t, part.p, part.v)
-        passed = low_passed(part.p - p_left, 1.0 / part.step)
-        energy += float(np.sum((part.v - velocity(part.t, passed)) ** 2))
+        energy += float(np.sum(left_over(fit.chain, part, through=True)[1] ** 2))
     return energy / scales.v**2
 
 

@@ -34,10 +34,10 @@ __all__ = ["Aim", "Fit", "moved", "refine", "residuals"]
 #: A bell counts as begun and as done at this deviation: Phi(-4.5) = 3.4e-6 of its way.
 _TAIL = 4.5
 #: Samples a piece of the time axis.
-_PIECE = 96
-#: OpenBLAS spreads larger products (in multiplications) over threads. At the sizes here that gains nothing,
-#: and on a busy machine it takes ten times as long.
-_SMALL_PRODUCT = 2**17
+_PIECE = 48
+#: OpenBLAS spreads larger products (above 2^18 multiplications) over threads. At the sizes here that gains
+#: nothing, and on a busy machine it takes ten times as long.
+_SMALL_PRODUCT = 230_000
 _DAMPING = 1e-3
 #: Longest step of median/width, ln width, sigma, turn and bending in one iteration.
 _STEP_LIMITS = (1.0, 0.7, 0.2, 1.0, 1.0)

@@ -57,7 +57,10 @@ def test_strokes_as_fast_as_handwriting_come_back_though_the_low_pass_blunts_the
     law = own_strokes(102, 2, stroke_time=stroke_time)
     result = extract(recorded(law, 2))
     assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
-    assert 30.0 < result.snr_v_db < 65.0
+    # Judged through the same low-pass; without it the blunted bells would stand against sharp ones.
+    part = result.parts[0]
+    sharp = part.law.evaluate(part.t).v[:, :2]
+    assert result.snr_v_db > 60.0 > 10.0 * math.log10(np.sum(part.v**2) / np.sum((part.v - sharp) ** 2))
 
 
 def test_own_strokes_come_back_from_an_irregular_clock():
