@@ -72,7 +72,7 @@ def _python_loop(rounds: int) -> float:
     return x
 
 
-_SYNC_THREADS = """
+SYNC_THREADS = """
 def p():
   thread idle():
     while True:
@@ -141,7 +141,7 @@ def _run_to_its_end(running: RunningProgram) -> None:
 def _cycle(n_threads: int) -> float:
     """Seconds that a cycle of a program takes whose threads, main among them, only sync()."""
     runs = "  ".join(["run idle()\n"] * (n_threads - 1))
-    running = compile_program(_SYNC_THREADS.format(runs=runs)).start(_QuietHost())
+    running = compile_program(SYNC_THREADS.format(runs=runs)).start(_QuietHost())
 
     def some_cycles() -> None:
         for _ in range(CYCLES):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from bench.script import SYNC_THREADS
 from ur_emulator.controller.commands import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
@@ -17,20 +18,6 @@ ROUNDS = 20  # of each measurement; the best one counts, the others were disturb
 N_THREADS = 20
 CYCLES = 200
 N_LOCALS = 20_000
-
-_THREADS = """
-def p():
-  thread idle():
-    while True:
-      sync()
-    end
-  end
-{runs}
-  while True:
-    sync()
-  end
-end
-"""
 
 _BURST = """
 def p():
@@ -71,7 +58,7 @@ def _box_running(n_threads: int) -> Controller:
     """A box in whose program so many threads, and main, do nothing but sync()."""
     box = _box()
     runs = "  run idle()\n" * n_threads
-    box.tick([StartProgram(compile_program(_THREADS.format(runs=runs)))])
+    box.tick([StartProgram(compile_program(SYNC_THREADS.format(runs=runs)))])
     return box
 
 

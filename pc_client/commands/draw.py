@@ -17,6 +17,7 @@ from pc_client.commands.options import (
     PortBaseOption,
     RepeatOption,
     RobotOption,
+    TimeUnitOption,
     YesOption,
     console,
     ports_of,
@@ -84,14 +85,7 @@ def draw(
             help="Times slower than the arm's limits ask: room for what a controller adds.",
         ),
     ] = 1.0,
-    time_unit: Annotated[
-        str,
-        typer.Option(
-            "--time-unit",
-            metavar="auto|s|ms|us|ns",
-            help="Of the time column; auto: by its name, or by the typical step between samples.",
-        ),
-    ] = "auto",
+    time_unit: TimeUnitOption = "auto",
     save: Annotated[
         Path | None,
         typer.Option("--save", metavar="FILE", help="Write the movement as a .toml for `ur-client run`."),

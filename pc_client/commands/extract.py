@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.options import DaskOption, WorkersOption, check_workers, console, say
+from pc_client.commands.options import (
+    DaskOption,
+    TimeUnitOption,
+    WorkersOption,
+    check_workers,
+    console,
+    say,
+)
 from pc_client.errors import ClientError, RecordingError
 
 if TYPE_CHECKING:
@@ -36,14 +43,7 @@ def extract(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for the figures and the strokes.")
     ],
-    time_unit: Annotated[
-        str,
-        typer.Option(
-            "--time-unit",
-            metavar="auto|s|ms|us|ns",
-            help="Of the time column; auto: by its name, or by the typical step between samples.",
-        ),
-    ] = "auto",
+    time_unit: TimeUnitOption = "auto",
     strokes_per_peak: Annotated[
         float | None,
         typer.Option(

@@ -33,6 +33,14 @@ ControllerOption = Annotated[
     ),
 ]
 RepeatOption = Annotated[int, typer.Option("--repeat", min=1, max=99, help="Runs of each movement.")]
+TimeUnitOption = Annotated[
+    str,
+    typer.Option(
+        "--time-unit",
+        metavar="auto|s|ms|us|ns",
+        help="Of the time column; auto: by its name, or by the typical step between samples.",
+    ),
+]
 WorkersOption = Annotated[
     int | None,
     typer.Option("--workers", metavar="N", min=1, help="Processes; as many as there are cores by default."),

@@ -5,7 +5,7 @@ No number here may depend on the movement; a controller is chosen once for a who
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from pc_client.errors import ClientError
@@ -56,55 +56,42 @@ class ControllerConfig:
     learning_acceleration: float = 20.0
 
 
-CONTROLLERS = MappingProxyType(
-    {
-        # As published (Fig. 3): PI and feed-forward of the current time. The paper gives no numbers. Gains as
-        # a cautious user sets them: a tenth of the bound pi/2T of a 30-45 ms loop, gain_i = gain_p^2 / 8 so
-        # that the integral does not overshoot. One acceleration for all joints and movements, between movej's
-        # default of 1.4 that UR's manual shows in its speedj examples and the 5 that users raise it to.
-        "paper": ControllerConfig(
-            name="paper",
-            gain_p=4.0,
-            gain_i=2.0,
-            looks_ahead=False,
-            speedj_acceleration=3.0,
-            slew_limit=15.0,
-            integral_limit=0.1,
-            speed_share=0.95,
-            abort_error=0.2,
-        ),
-        # Feed-forward ahead by the identified delay; the robot's own ramp is made short (UR's client library
-        # streams with a = 40), so that the delay is the only thing between command and motion.
-        "preview": ControllerConfig(
-            name="preview",
-            gain_p=5.0,
-            gain_i=3.0,
-            looks_ahead=True,
-            speedj_acceleration=40.0,
-            slew_limit=30.0,
-            integral_limit=0.1,
-            speed_share=0.95,
-            abort_error=0.2,
-        ),
-        # All that the identified loop allows: its lag made up for as well, the waves of the gears once a
-        # movement has shown them, and each repetition of a movement learns from the one before. The feedback
-        # is that of `preview`: it has little left to do.
-        "best": ControllerConfig(
-            name="best",
-            gain_p=5.0,
-            gain_i=3.0,
-            looks_ahead=True,
-            speedj_acceleration=40.0,
-            slew_limit=30.0,
-            integral_limit=0.1,
-            speed_share=0.95,
-            abort_error=0.2,
-            compensates_lag=True,
-            compensates_gear=True,
-            learns=True,
-        ),
-    }
+# As published (Fig. 3): PI and feed-forward of the current time. The paper gives no numbers. Gains as
+# a cautious user sets them: a tenth of the bound pi/2T of a 30-45 ms loop, gain_i = gain_p^2 / 8 so
+# that the integral does not overshoot. One acceleration for all joints and movements, between movej's
+# default of 1.4 that UR's manual shows in its speedj examples and the 5 that users raise it to.
+_PAPER = ControllerConfig(
+    name="paper",
+    gain_p=4.0,
+    gain_i=2.0,
+    looks_ahead=False,
+    speedj_acceleration=3.0,
+    slew_limit=15.0,
+    integral_limit=0.1,
+    speed_share=0.95,
+    abort_error=0.2,
 )
+
+# Feed-forward ahead by the identified delay; the robot's own ramp is made short (UR's client library
+# streams with a = 40), so that the delay is the only thing between command and motion.
+_PREVIEW = ControllerConfig(
+    name="preview",
+    gain_p=5.0,
+    gain_i=3.0,
+    looks_ahead=True,
+    speedj_acceleration=40.0,
+    slew_limit=30.0,
+    integral_limit=0.1,
+    speed_share=0.95,
+    abort_error=0.2,
+)
+
+# All that the identified loop allows: its lag made up for as well, the waves of the gears once a movement has
+# shown them, and each repetition of a movement learns from the one before. The feedback is that of `preview`:
+# it has little left to do.
+_BEST = replace(_PREVIEW, name="best", compensates_lag=True, compensates_gear=True, learns=True)
+
+CONTROLLERS = MappingProxyType({config.name: config for config in (_PAPER, _PREVIEW, _BEST)})
 
 
 def controller_config(name: str) -> ControllerConfig:
