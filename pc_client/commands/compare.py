@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pc_client.commands.experiment import execute
-from pc_client.commands.options import ControllerOption, OutOption, PortBaseOption, YesOption, console, say
+from pc_client.commands.options import OutOption, console, say
+from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import ClientError
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pc_client.comparison.table import Comparison
 
 
+@takes_run_settings
 def compare(
     out: OutOption,
     robot: Annotated[
@@ -32,9 +34,8 @@ def compare(
             "--sets", min=1, max=99, help="Sets of target points, seeds in a row; the table has means."
         ),
     ] = 1,
-    controller: ControllerOption = "preview",
-    port_base: PortBaseOption = 0,
-    yes: YesOption = False,
+    *,
+    settings: RunSettings,
 ) -> None:
     """Compare all generators of movements: smoothness, power law, peaks; planned and executed."""
     from pc_client.comparison.movement_set import make_sets, save_sets
@@ -45,7 +46,7 @@ def compare(
     movements = [movement for one in made for movement in one.movements.values()]
     runs = None
     if robot is not None:
-        execute(movements, robot, out, 1, controller, port_base, yes)
+        execute(movements, robot, out, 1, settings)
         runs = _read_runs(out)
     save_sets(made, out / "movements")
     with console.status("measuring"):

@@ -11,18 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pc_client.commands.experiment import execute
-from pc_client.commands.options import (
-    ControllerOption,
-    OutOption,
-    PortBaseOption,
-    RepeatOption,
-    RobotOption,
-    TimeUnitOption,
-    YesOption,
-    console,
-    ports_of,
-    say,
-)
+from pc_client.commands.options import OutOption, RepeatOption, RobotOption, TimeUnitOption, console, say
+from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import ClientError, MovementError
 
 if TYPE_CHECKING:
@@ -30,8 +20,10 @@ if TYPE_CHECKING:
     from pc_client.drawing.placement import PlacementOptions
     from pc_client.drawing.table import Entry
     from pc_client.extraction.recording import PenRecording
+    from protocol.ur_types import Ports
 
 
+@takes_run_settings
 def draw(
     files: Annotated[
         list[str],
@@ -41,7 +33,6 @@ def draw(
     ],
     robot: RobotOption,
     out: OutOption,
-    controller: ControllerOption = "preview",
     repeat: RepeatOption = 1,
     plane: Annotated[
         str,
@@ -90,11 +81,10 @@ def draw(
         Path | None,
         typer.Option("--save", metavar="FILE", help="Write the movement as a .toml for `ur-client run`."),
     ] = None,
-    port_base: PortBaseOption = 0,
-    yes: YesOption = False,
+    *,
+    settings: RunSettings,
 ) -> None:
     """Draw what people drew: extract strokes, fit them into the workspace, execute, compare."""
-    from pc_client.control.controller_config import controller_config
     from pc_client.extraction.files import TIME_UNITS
 
     if time_unit != "auto" and time_unit not in TIME_UNITS:
@@ -102,11 +92,10 @@ def draw(
     if save is not None and len(files) > 1:
         raise typer.BadParameter("--save is for one drawing: give one FILE")
     options = _options(plane, size, rotate, lift, y)
-    controller_config(controller)  # complains before the work is done
-    import matplotlib  # noqa: F401  # likewise
+    import matplotlib  # noqa: F401  # complains before the work is done
 
     recordings = [_read(file, None if time_unit == "auto" else time_unit) for file in files]
-    drawings = _make(recordings, options, slower, robot, port_base)
+    drawings = _make(recordings, options, slower, robot, settings.ports)
     if save is not None:
         from pc_client.movements.files import save_movement
 
@@ -115,7 +104,7 @@ def draw(
     for drawing in drawings:
         say(_summary(drawing))
     movements = [drawing.movement for drawing in drawings]
-    execute(movements, robot, out, repeat, controller, port_base, yes)
+    execute(movements, robot, out, repeat, settings)
     _report(_judge(drawings, out), out)
 
 
@@ -166,7 +155,7 @@ def _read(given: str, time_unit: str | None) -> PenRecording:
 
 
 def _make(
-    recordings: Sequence[PenRecording], options: PlacementOptions, slower: float, robot: str, port_base: int
+    recordings: Sequence[PenRecording], options: PlacementOptions, slower: float, robot: str, ports: Ports
 ) -> list[Drawing]:
     """Extract the strokes of recordings and make them ready for the arm that answers."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -178,7 +167,7 @@ def _make(
     from pc_client.extraction.extract import extract
     from pc_client.kinematics.robot_model import robot_model
 
-    arm = read_info(TcpNetwork(), robot, ports_of(port_base)).model
+    arm = read_info(TcpNetwork(), robot, ports).model
     if arm == UNKNOWN:
         raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")
     model = robot_model(arm.lower())

@@ -8,18 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.options import (
-    ControllerOption,
-    OutOption,
-    PortBaseOption,
-    RepeatOption,
-    RobotOption,
-    YesOption,
-    console,
-    ports_of,
-    say,
-    show_report,
-)
+from pc_client.commands.options import OutOption, RepeatOption, RobotOption, console, say, show_report
+from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import ClientError
 
 if TYPE_CHECKING:
@@ -28,6 +18,7 @@ if TYPE_CHECKING:
     from protocol.ur_types import Ports
 
 
+@takes_run_settings
 def experiment(
     robot: RobotOption,
     out: OutOption,
@@ -35,48 +26,37 @@ def experiment(
         str | None, typer.Option("--movements", metavar="A,B,...", help="Names or files; all ten by default.")
     ] = None,
     repeat: RepeatOption = 3,
-    controller: ControllerOption = "preview",
-    port_base: PortBaseOption = 0,
-    yes: YesOption = False,
+    *,
+    settings: RunSettings,
 ) -> None:
     """Run the paper's experiment: ten movements, three times each, Table I and a report."""
     from pc_client.movements.files import library_names
 
     chosen = [name.strip() for name in movements.split(",")] if movements else library_names()
-    _run([name for name in chosen if name], robot, out, repeat, controller, port_base, yes)
+    _run([name for name in chosen if name], robot, out, repeat, settings)
 
 
+@takes_run_settings
 def run(
     file: Annotated[str, typer.Argument(metavar="FILE", help="Movement file, or a name of the library.")],
     robot: RobotOption,
     out: OutOption,
     repeat: RepeatOption = 1,
-    controller: ControllerOption = "preview",
-    port_base: PortBaseOption = 0,
-    yes: YesOption = False,
+    *,
+    settings: RunSettings,
 ) -> None:
     """Run one movement."""
-    _run([file], robot, out, repeat, controller, port_base, yes)
+    _run([file], robot, out, repeat, settings)
 
 
-def _run(
-    movements: Sequence[str], robot: str, out: Path, repeat: int, controller: str, port_base: int, yes: bool
-) -> None:
+def _run(movements: Sequence[str], robot: str, out: Path, repeat: int, settings: RunSettings) -> None:
     from pc_client.experiment.prepare import load_movements
 
-    execute(load_movements(movements), robot, out, repeat, controller, port_base, yes)
+    execute(load_movements(movements), robot, out, repeat, settings)
     show_report(out)
 
 
-def execute(
-    movements: Sequence[Movement],
-    robot: str,
-    out: Path,
-    repeat: int,
-    controller: str,
-    port_base: int,
-    yes: bool,
-) -> None:
+def execute(movements: Sequence[Movement], robot: str, out: Path, repeat: int, settings: RunSettings) -> None:
     """Plan movements, ask where a real arm would move, run them, and say how it went.
 
     Args:
@@ -84,14 +64,11 @@ def execute(
         robot: name or address of the control box.
         out: folder of the recordings.
         repeat: runs of each.
-        controller: its name.
-        port_base: offset of all ports.
-        yes: do not ask.
+        settings: how to move.
 
     Raises:
         ClientError: a check failed, the robot stopped or the user interrupted; the arm rests.
     """
-    from pc_client.control.controller_config import controller_config
     from pc_client.driver.probe import read_info
     from pc_client.driver.robot_info import UNKNOWN
     from pc_client.driver.transport import TcpNetwork
@@ -101,18 +78,17 @@ def execute(
     from pc_client.experiment.progress import Progress
     from pc_client.experiment.runner import ExperimentRunner
 
-    config = controller_config(controller)
-    ports = ports_of(port_base)
+    ports = settings.ports
     with console.status("planning"):
         arm = read_info(TcpNetwork(), robot, ports).model
         if arm == UNKNOWN:
             raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")
         planned = prepare_experiment(movements, repeat=repeat, out=out, robot=arm.lower())
-    if not yes and not is_loopback(robot):
+    if not settings.yes and not is_loopback(robot):
         ask_before_motion(planned, robot, ports)
     try:
         with Progress(console, planned.n_runs) as progress, UrDriver(robot, ports) as driver:
-            report = ExperimentRunner(driver, planned, config, progress).run()
+            report = ExperimentRunner(driver, planned, settings.controller, progress).run()
     except KeyboardInterrupt as interrupt:
         doubts = "; ".join(getattr(interrupt, "__notes__", ())) or "the arm rests"
         raise ClientError(f"interrupted; {doubts}; recordings finished so far are in {out}") from interrupt

@@ -1,0 +1,65 @@
+"""How a command moves the arm: one record, and the options that all such commands share, declared once.
+
+A command that moves an arm has a keyword parameter `settings: RunSettings` and stands under
+`@takes_run_settings`; the options of `read_settings` are then its own. A new option is a parameter of
+`read_settings` and, if it says how to move, a field of the record.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from typing import Any
+
+from pc_client.commands.options import ControllerOption, PortBaseOption, YesOption, ports_of
+from pc_client.control.controller_config import ControllerConfig, controller_config
+from protocol.ur_types import Ports
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """How to move an arm, whatever the movements and whichever the robot.
+
+    Attributes:
+        controller: the same for all runs.
+        ports: where the control box listens.
+        yes: do not ask before a real arm moves.
+    """
+
+    controller: ControllerConfig
+    ports: Ports
+    yes: bool
+
+
+def read_settings(
+    controller: ControllerOption = "preview", port_base: PortBaseOption = 0, yes: YesOption = False
+) -> RunSettings:
+    """Make the record from what was given on the command line.
+
+    Raises:
+        ClientError: there is no such controller.
+        typer.BadParameter: an option makes no sense.
+    """
+    return RunSettings(controller_config(controller), ports_of(port_base), yes)
+
+
+def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `read_settings` in place of its keyword parameter `settings`.
+
+    Typer reads a command's options from its signature: the two signatures are put together here.
+    """
+    shared = inspect.signature(read_settings, eval_str=True).parameters
+    own = dict(inspect.signature(command, eval_str=True).parameters)
+    del own["settings"]
+    together = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in (*own.values(), *shared.values())]
+
+    @wraps(command)
+    def with_options(**given: Any) -> None:
+        settings = read_settings(**{name: given.pop(name) for name in shared})
+        command(**given, settings=settings)
+
+    vars(with_options)["__signature__"] = inspect.Signature(together)
+    with_options.__annotations__ = {p.name: p.annotation for p in together}
+    return with_options
