@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pc_client.movements.files import LIBRARY_NAMES, load_movement
+from pc_client.movements.files import library_names, load_movement
 from pc_client.movements.geometry import UR3_BOX
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal
@@ -28,7 +28,7 @@ def draw_library(path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    numbers = [name.removeprefix("lognorm_") for name in LIBRARY_NAMES if name.startswith("lognorm_")]
+    numbers = [name.removeprefix("lognorm_") for name in library_names() if name.startswith("lognorm_")]
     figure = plt.figure(figsize=(13.0, 3.0 * len(numbers)), layout="constrained")
     figure.suptitle(
         "The ten movements: human-like and robot-like twins, same target points, same stroke durations"

@@ -1,4 +1,4 @@
-"""Movement files: TOML for movements with a law, CSV for samples; and the library of ten.
+"""Movement files: TOML for movements with a law, CSV for samples; and the library, two sets of ten.
 
 The format is described in `docs/movements.md`. Reading checks everything and names file and field (or line)
 of what is wrong.
@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -21,9 +22,11 @@ from pc_client.movements.samples import SampledLaw, parse_samples, write_samples
 from pc_client.movements.tables import TableReader, toml_value
 
 __all__ = [
+    "DEFAULT_SET",
     "LIBRARY_FOLDER",
-    "LIBRARY_NAMES",
+    "LIBRARY_SETS",
     "library_names",
+    "library_path",
     "load_movement",
     "movement_text",
     "save_movement",
@@ -31,35 +34,62 @@ __all__ = [
 
 LIBRARY_FOLDER = Path(__file__).parent / "library"
 #: The ten movements of the paper's Table I, in its order.
-LIBRARY_NAMES = tuple(
+_TEN = tuple(
     f"{kind}_{number}" for kind in ("uniform", "lognorm") for number in ("4_1", "4_2", "5_1", "5_2", "5_3")
+)
+#: The set that is run when none is named; its movements go by their bare names.
+DEFAULT_SET = "paper"
+#: Every named set of the library: what `load_movement` takes for its movements, in the order of Table I.
+LIBRARY_SETS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {DEFAULT_SET: _TEN, "arcs": tuple(f"arcs/{name}" for name in _TEN)}
 )
 
 _FORMAT = 1
 _FIELDS = f"format, name, kind, duration, stroke_durations, target_points, provenance, {LAW_FIELDS}"
 
 
-def library_names() -> list[str]:
-    """Names of the movements that come with the package, in the order of Table I."""
-    return list(LIBRARY_NAMES)
+def library_names(set_name: str = DEFAULT_SET) -> list[str]:
+    """What `load_movement` takes for the movements of a set, in the order of Table I.
+
+    Args:
+        set_name: "paper", the ten by the paper's own recipe; "arcs", ten of arcs that overlap in time.
+
+    Raises:
+        MovementError: there is no such set.
+    """
+    if set_name not in LIBRARY_SETS:
+        raise MovementError(f'no set of movements "{set_name}": give one of {", ".join(LIBRARY_SETS)}')
+    return list(LIBRARY_SETS[set_name])
+
+
+def library_path(name: str) -> Path | None:
+    """The file of a movement of the library, or None if there is none of that name."""
+    if not any(name in names for names in LIBRARY_SETS.values()):
+        return None
+    return LIBRARY_FOLDER / (f"{name}.toml" if "/" in name else f"{DEFAULT_SET}/{name}.toml")
 
 
 def load_movement(name_or_path: str | Path) -> Movement:
     """A movement of the library by its name, or one from a .toml or .csv file by its path.
 
+    Args:
+        name_or_path: "lognorm_4_1" (set "paper"), "arcs/lognorm_4_1" (set "arcs"), "mine.toml".
+
     Raises:
         MovementError: unknown name, unreachable file, or content that makes no sense, naming file and field
             or line.
     """
-    if isinstance(name_or_path, str) and name_or_path in LIBRARY_NAMES:
-        return _read(LIBRARY_FOLDER / f"{name_or_path}.toml")
+    found = library_path(name_or_path) if isinstance(name_or_path, str) else None
+    if found:
+        return _read(found)
     path = Path(name_or_path)
     if not path.suffix and not path.exists():
-        near = difflib.get_close_matches(str(name_or_path), LIBRARY_NAMES, n=1)
+        known = [name for names in LIBRARY_SETS.values() for name in names]
+        near = difflib.get_close_matches(str(name_or_path), known, n=1)
         hint = f"did you mean {near[0]}? " if near else ""
         raise MovementError(
             f'no movement "{name_or_path}": {hint}give the path of a .toml or .csv file, '
-            f"or one of {', '.join(LIBRARY_NAMES)}"
+            f"or one of {', '.join(known)}"
         )
     return _read(path)
 

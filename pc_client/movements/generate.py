@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.errors import MovementError
-from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_NAMES, save_movement
+from pc_client.movements.files import DEFAULT_SET, LIBRARY_FOLDER, LIBRARY_SETS, library_names, save_movement
 from pc_client.movements.geometry import UR3_BOX, Box
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal
@@ -111,26 +111,33 @@ def generate_movement(
     return GENERATORS[kind].make(human, seed, name)
 
 
-def generate_library(seed: int = LIBRARY_SEED) -> dict[str, Movement]:
-    """The ten movements by name, made afresh; with the default seed they are those of the package's files.
+def generate_library(set_name: str = DEFAULT_SET, seed: int = LIBRARY_SEED) -> dict[str, Movement]:
+    """The ten movements of a set by their library names, made afresh.
 
     Args:
-        seed: of the first pair; the other four take the next four.
+        set_name: as of `library_names`.
+        seed: of the first pair; the other four take the next four. With the default the movements are those
+            of the package's files.
     """
+    prefix = "" if set_name == DEFAULT_SET else f"{set_name}_"
     made: dict[str, Movement] = {}
-    for offset, number in enumerate(
-        name.removeprefix("lognorm_") for name in LIBRARY_NAMES if "lognorm" in name
-    ):
-        human = generate_movement("lognormal", int(number[0]), seed + offset, name=f"lognorm_{number}")
-        made[human.name] = human
-        made[f"uniform_{number}"] = robotic_twin(human, f"uniform_{number}")
-    return {name: made[name] for name in LIBRARY_NAMES}
+    names = library_names(set_name)
+    for human_name, robot_name in zip(names[5:], names[:5], strict=True):
+        number = human_name[-3:]
+        human = generate_movement(
+            "lognormal", int(number[0]), seed + len(made) // 2, name=f"{prefix}lognorm_{number}"
+        )
+        made[human_name] = human
+        made[robot_name] = robotic_twin(human, f"{prefix}uniform_{number}")
+    return {name: made[name] for name in names}
 
 
-def write_library(folder: Path = LIBRARY_FOLDER, seed: int = LIBRARY_SEED) -> None:
-    """Write the ten files into a folder."""
-    for name, movement in generate_library(seed).items():
-        save_movement(movement, folder / f"{name}.toml")
+def write_library(folder: Path = LIBRARY_FOLDER) -> None:
+    """Write the files of all sets, each set in a folder of its name."""
+    for set_name in LIBRARY_SETS:
+        (folder / set_name).mkdir(parents=True, exist_ok=True)
+        for name, movement in generate_library(set_name).items():
+            save_movement(movement, folder / set_name / f"{Path(name).name}.toml")
 
 
 def _draw_strokes(targets: NDArray[np.float64], source: random.Random, rules: HumanRules) -> SigmaLognormal:

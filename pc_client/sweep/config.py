@@ -15,7 +15,7 @@ from typing import Any
 from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
 from pc_client.errors import MovementError, SweepError
 from pc_client.kinematics.robot_model import ROBOTS
-from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_NAMES, load_movement
+from pc_client.movements.files import library_names, library_path, load_movement
 from pc_client.sweep.case import MovementFile, SimulatedArm
 from pc_client.sweep.controller_axes import check_distinct, grid, read_axes, samples, sweepable_fields
 from pc_client.sweep.spelling import check_keys, nearest
@@ -146,9 +146,11 @@ def _movements(reader: _Reader, folder: Path) -> tuple[MovementFile, ...]:
         raise reader.error("movements", f"missing; {KEYS['movements']}")
     files = []
     for word in reader.words("movements", ()):
-        path = LIBRARY_FOLDER / f"{word}.toml" if word in LIBRARY_NAMES else folder / word
+        path = library_path(word) or folder / word
         if not path.suffix:
-            raise reader.error("movements", f"no movement is called {word!r}; {nearest(word, LIBRARY_NAMES)}")
+            raise reader.error(
+                "movements", f"no movement is called {word!r}; {nearest(word, library_names())}"
+            )
         try:
             name = load_movement(path).name
             files.append(MovementFile(name, path.name, path.read_text(encoding="utf-8")))

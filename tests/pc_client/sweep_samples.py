@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pc_client.control.controller_config import CONTROLLERS
 from pc_client.errors import GainMarginError
-from pc_client.movements.files import LIBRARY_FOLDER
+from pc_client.movements.files import library_path
 from pc_client.sweep.case import Case, MovementFile, SimulatedArm
 from pc_client.sweep.outcome import Outcome, failed
 
@@ -16,7 +16,7 @@ PREVIEW = CONTROLLERS["preview"]
 
 
 def movement(name="uniform_4_1"):
-    return MovementFile(name, f"{name}.toml", (LIBRARY_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    return MovementFile(name, f"{name}.toml", library_path(name).read_text(encoding="utf-8"))
 
 
 def case(movement_name="uniform_4_1", fidelity="typical", seed=7, repeat=1, **settings):

@@ -19,7 +19,7 @@ from pc_client.movements import (
     robotic_twin,
     save_movement,
 )
-from pc_client.movements.files import LIBRARY_FOLDER, movement_text
+from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_SETS, movement_text
 from pc_client.movements.generate import RobotRules, write_library
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.samples import SampledLaw
@@ -32,15 +32,29 @@ NAMES = [
 ]
 
 
-def test_library_has_the_ten_of_table_one() -> None:
-    assert library_names() == NAMES
-    assert sorted(path.stem for path in LIBRARY_FOLDER.glob("*.toml")) == sorted(NAMES)
+def test_each_set_has_the_ten_of_table_one() -> None:
+    assert library_names() == library_names("paper") == NAMES
+    assert library_names("arcs") == [f"arcs/{name}" for name in NAMES]
+    assert sorted(path.name for path in LIBRARY_FOLDER.iterdir()) == sorted(LIBRARY_SETS) == ["arcs", "paper"]
+    for set_name in LIBRARY_SETS:
+        assert sorted(path.stem for path in (LIBRARY_FOLDER / set_name).iterdir()) == sorted(NAMES)
+    with pytest.raises(MovementError, match='no set of movements "arc": give one of paper, arcs'):
+        library_names("arc")
+
+
+def test_only_the_paper_set_has_the_names_of_table_one() -> None:
+    """So nothing compares a movement of another set with the paper's figure."""
+    for name in NAMES:
+        assert load_movement(name).name == name
+        assert load_movement(f"arcs/{name}").name == f"arcs_{name}"
 
 
 def test_generation_reproduces_the_files_to_the_byte(tmp_path: Path) -> None:
     write_library(tmp_path)
-    for name in NAMES:
-        assert (tmp_path / f"{name}.toml").read_bytes() == (LIBRARY_FOLDER / f"{name}.toml").read_bytes()
+    for set_name in LIBRARY_SETS:
+        for name in NAMES:
+            file = Path(set_name, f"{name}.toml")
+            assert (tmp_path / file).read_bytes() == (LIBRARY_FOLDER / file).read_bytes()
 
 
 def test_another_seed_gives_other_movements() -> None:

@@ -13,7 +13,7 @@ from sweep_samples import PREVIEW, write
 
 from pc_client.control.controller_config import ControllerConfig
 from pc_client.errors import ClientError
-from pc_client.movements.files import LIBRARY_FOLDER
+from pc_client.movements.files import library_path
 from pc_client.sweep.case import SimulatedArm, all_cases
 from pc_client.sweep.config import FIDELITIES, KEYS, read_config
 from pc_client.sweep.controller_axes import Range, grid, samples, sweepable_fields
@@ -58,7 +58,7 @@ def test_every_combination(tmp_path):
 
 
 def test_movement_files_lie_beside_the_configuration(tmp_path):
-    shutil.copy(LIBRARY_FOLDER / "uniform_5_1.toml", tmp_path / "mine.toml")
+    shutil.copy(library_path("uniform_5_1"), tmp_path / "mine.toml")
     config = read_config(write(tmp_path, 'movements = ["mine.toml"]'))
     assert config.movements[0].name == "uniform_5_1"
     assert config.movements[0].file_name == "mine.toml"
