@@ -11,7 +11,7 @@ Source: UR "Primary/Secondary Client Interface" (2021); order and sizes from cap
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
@@ -30,6 +30,7 @@ __all__ = [
     "decode_sub_package",
     "encode_state",
     "encode_sub_package",
+    "split_state",
     "state_size",
     "state_types",
 ]
@@ -132,10 +133,15 @@ def decode_state(body: bytes) -> RobotState:
     Raises:
         RemoteProtocolError: sub-package sizes do not add up, or one is shorter than its oldest form.
     """
-    return RobotState(tuple(_sub_packages(body)))
+    return RobotState(tuple(decode_sub_package(*part) for part in split_state(body)))
 
 
-def _sub_packages(body: bytes) -> Iterable[SubPackage | UnknownSubPackage]:
+def split_state(body: bytes) -> Iterator[tuple[int, bytes]]:
+    """Cut the body of a state package into sub-packages: sub-type and what follows the five-byte header.
+
+    Raises:
+        RemoteProtocolError: sub-package sizes do not add up.
+    """
     position = 0
     while position < len(body):
         left = len(body) - position
@@ -144,7 +150,7 @@ def _sub_packages(body: bytes) -> Iterable[SubPackage | UnknownSubPackage]:
             raise RemoteProtocolError(
                 f"sub-package at byte {position + HEADER.size} of a state says {size} bytes, {left} are left"
             )
-        yield decode_sub_package(sub_type, body[position + HEADER.size : position + size])
+        yield sub_type, body[position + HEADER.size : position + size]
         position += size
 
 

@@ -1,16 +1,19 @@
 """Ports 30001 and 30002: the robot's messages come in, our programs go out.
 
-State packages are passed over, but for the type of the arm in the first one: the realtime port tells more,
-and in time. Both connections must be read now and then, or the robot has to hold back what it wants to tell.
+Of the robot states the newest sub-package of each type is kept, for what the realtime port does not tell: the
+speed slider, the TCP offset, the type of the arm. Both connections must be read now and then, or the robot
+has to hold back what it wants to tell.
 """
 
 from __future__ import annotations
+
+from typing import TypeVar
 
 from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError, RobotStoppedError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_layout import ConfigurationData
+from protocol.primary_layout import ConfigurationData, SubPackage
 from protocol.primary_messages import (
     ErrorCodeMessage,
     ReportLevel,
@@ -19,8 +22,10 @@ from protocol.primary_messages import (
     VersionMessage,
     decode_message,
 )
-from protocol.primary_state import decode_state
+from protocol.primary_state import decode_sub_package, split_state
 from protocol.ur_types import RobotType, SoftwareVersion
+
+S = TypeVar("S", bound=SubPackage)
 
 VERSION_TIMEOUT = 5.0
 """The version message is the first package of a connection; a box sends it at once."""
@@ -43,10 +48,9 @@ class PackageStream:
 
     Attributes:
         version: software of the controller, once its version message came.
-        robot_type: the arm, once a state told it; the first state of a connection does.
     """
 
-    __slots__ = ("_buffer", "_early", "_name", "_network", "_transport", "robot_type", "version")
+    __slots__ = ("_buffer", "_early", "_name", "_network", "_newest", "_transport", "version")
 
     def __init__(self, transport: Transport, network: Network, name: str) -> None:
         self._transport = transport
@@ -55,7 +59,7 @@ class PackageStream:
         self._buffer = FrameBuffer(_LONGEST_PACKAGE, _HEADER_SIZE)
         self._early: list[RobotMessage] = []
         self.version: SoftwareVersion | None = None
-        self.robot_type: RobotType | None = None
+        self._newest: dict[int, bytes] = {}
 
     def wait_for_version(self) -> SoftwareVersion:
         """Return the controller's software version from its greeting.
@@ -75,9 +79,29 @@ class PackageStream:
     def wait_for_robot_type(self) -> RobotType | None:
         """Return the type of the arm from the first state; None if the robot does not send it in time."""
         deadline = self._network.now() + VERSION_TIMEOUT
-        while self.robot_type is None and self._network.now() <= deadline:
+        while ConfigurationData.SUB_TYPE not in self._newest and self._network.now() <= deadline:
             self._early += self._read(0.1) or []
-        return self.robot_type
+        configuration = self.newest(ConfigurationData)
+        try:
+            return None if configuration is None else RobotType(configuration.robot_type)
+        except ValueError:  # an arm that was built after this was written
+            return None
+
+    def newest(self, record: type[S]) -> S | None:
+        """The newest sub-package of a type that has been read, or None; `poll` reads.
+
+        Raises:
+            DriverError: it is shorter than its oldest form.
+        """
+        data = self._newest.get(record.SUB_TYPE)
+        if data is None:
+            return None
+        try:
+            found = decode_sub_package(record.SUB_TYPE, data)
+        except RemoteProtocolError as error:
+            raise DriverError(f"the {self._name} port does not speak its protocol: {error}") from error
+        assert isinstance(found, record)
+        return found
 
     def poll(self) -> list[RobotMessage]:
         """Messages that have arrived, without waiting.
@@ -113,8 +137,8 @@ class PackageStream:
         try:
             self._buffer.feed(data)
             while (package := self._buffer.next_frame()) is not None:
-                if package[4] == _ROBOT_STATE and self.robot_type is None:
-                    self.robot_type = _robot_type(package)
+                if package[4] == _ROBOT_STATE:
+                    self._newest.update(split_state(package[_HEADER_SIZE:]))
                 if package[4] != _ROBOT_MESSAGE:
                     continue
                 message = decode_message(package[_HEADER_SIZE:], self.version or _OLDEST)
@@ -150,14 +174,6 @@ def raise_on_error(messages: list[RobotMessage], program: str = "") -> None:
             raise RobotStoppedError(
                 f"the robot reports C{message.code}A{message.argument} {message.text}".rstrip()
             )
-
-
-def _robot_type(package: bytes) -> RobotType | None:
-    configuration = decode_state(package[_HEADER_SIZE:]).find(ConfigurationData)
-    try:
-        return None if configuration is None else RobotType(configuration.robot_type)
-    except ValueError:  # an arm that was built after this was written
-        return None
 
 
 def _is_serious(level: int) -> bool:

@@ -16,7 +16,7 @@ from pc_client.driver.receiver_script import fill_template, receiver_script
 from pc_client.driver.reverse_server import ReverseServer
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
-from protocol.primary_layout import ConfigurationData
+from protocol.primary_layout import CartesianInfo, ConfigurationData, RobotModeData
 from protocol.primary_messages import TextMessage
 from protocol.primary_state import encode_state
 from protocol.ur_types import RobotType, SoftwareVersion
@@ -196,6 +196,23 @@ def test_a_port_that_is_no_control_box():
     pipe.incoming.append(b"SSH-2.0-OpenSSH_9.2\r\n")
     with pytest.raises(DriverError, match="does not speak its protocol"):
         PackageStream(pipe, robot, "primary").wait_for_version()
+
+
+def test_of_the_states_the_newest_sub_package_of_each_type_is_kept():
+    robot = FakeRobot()
+    pipe = Pipe(robot, "primary")
+    stream = PackageStream(pipe, robot, "primary")
+    version = SoftwareVersion(3, 15, 8)
+    for records in ([RobotModeData(), ConfigurationData()], [RobotModeData(target_speed_fraction=0.5)]):
+        pipe.incoming.append(encode_state(records, version))
+    stream.poll()
+    assert stream.newest(RobotModeData).target_speed_fraction == 0.5
+    assert stream.newest(ConfigurationData) == ConfigurationData()
+    assert stream.newest(CartesianInfo) is None
+    pipe.incoming.append(b"\0\0\0\x0b\x10\0\0\0\x06\x04\0")
+    stream.poll()
+    with pytest.raises(DriverError, match="does not speak its protocol"):
+        stream.newest(CartesianInfo)
 
 
 def test_messages_before_the_question_for_the_version_are_kept():
