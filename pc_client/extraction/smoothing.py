@@ -60,6 +60,10 @@ _SETTLED_S = 0.5
 _STEADY_RATIO = 2.0
 _STEADY_SHARE = 0.9
 _LEAST_STEPS = 3
+#: A curve that leaves the straight lines by more than this share of the run's size is not drawn: it swings
+#: between samples that are too few, or too far from even, to tell where the pen was.
+_MOST_SWING = 0.5
+_ROUNDING = 1e-9
 _MAX_OVERSAMPLING = 16
 
 
@@ -130,7 +134,8 @@ def _interpolated(part: PenPart, t: NDArray[np.float64]) -> NDArray[np.float64]:
     """Positions at the times t: cubic splines where the clock is steady, straight lines elsewhere.
 
     A cubic spline is exact to the fourth order, but swings out where two time stamps lie close together and
-    the clock is not to be trusted. There nothing but the straight line is known between two samples.
+    the clock is not to be trusted, or where few samples jump. There nothing but the straight line is known
+    between two samples.
     """
     points: NDArray[np.float64] = make_interp_spline(part.t, part.p, k=1)(t)
     steps = np.diff(part.t)
@@ -143,7 +148,10 @@ def _interpolated(part: PenPart, t: NDArray[np.float64]) -> NDArray[np.float64]:
         if last - first >= _LEAST_STEPS:
             inside = (t >= part.t[first]) & (t <= part.t[last])
             run = slice(first, last + 1)
-            points[inside] = CubicSpline(part.t[run], part.p[run])(t[inside])
+            curve = CubicSpline(part.t[run], part.p[run])(t[inside])
+            most = _MOST_SWING * np.ptp(part.p[run], axis=0) + _ROUNDING
+            if np.all(np.abs(curve - points[inside]) <= most):
+                points[inside] = curve
     return points
 
 
@@ -151,11 +159,12 @@ def low_passed(points: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
     """Positions (n, dim) at a uniform rate (Hz), low-passed at 12 Hz without a shift in time."""
     # A straight line passes as it is; without it the filter starts and ends nearly at rest.
     line = np.linspace(points[0], points[-1], len(points))
-    padding = min(len(points) - 1, math.ceil(_SETTLED_S * rate))
-    filtered: NDArray[np.float64] = sosfiltfilt(
-        _filter(rate), points - line, axis=0, padtype="odd", padlen=padding
-    )
-    return line + filtered
+    # A part may be shorter than the filter takes to settle: then it is reflected again and again.
+    padding = math.ceil(_SETTLED_S * rate)
+    continued = np.pad(points - line, ((padding, padding), (0, 0)), mode="reflect", reflect_type="odd")
+    filtered = sosfiltfilt(_filter(rate), continued, axis=0, padtype=None, padlen=0)
+    low: NDArray[np.float64] = line + filtered[padding:-padding]
+    return low
 
 
 @lru_cache(maxsize=32)

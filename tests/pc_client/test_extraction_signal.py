@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from pc_client.extraction.addition import best_candidates
@@ -55,9 +55,11 @@ def test_times_begin_and_end_with_the_part():
 @given(
     st.lists(st.tuples(st.integers(1, 300), st.integers(-9, 9), st.integers(-9, 9)), min_size=2, max_size=40)
 )
+@example([(1, 0, 0), (10, 0, 0), (28, 0, 1), (11, 0, 0), (39, 0, 0)])
+@example([(1, 0, 0), (46, 0, 0), (12, 0, 1), (24, 0, 0)])
 @settings(max_examples=60, deadline=None)
 def test_no_clock_makes_the_signal_leave_the_path_far(rows):
-    """No overshoot of a curve between close time stamps: never more than the size of the path itself."""
+    """No overshoot of a curve between close time stamps: never more than the size of the path itself; ends stay."""
     steps, x, y = np.array(rows, dtype=float).T
     part = PenPart(np.cumsum(steps) * 1e-3, np.column_stack((x, y)))
     if not moves(part):
@@ -67,6 +69,7 @@ def test_no_clock_makes_the_signal_leave_the_path_far(rows):
     slack = size + 1e-9
     assert (smooth.p >= part.p.min(axis=0) - slack).all()
     assert (smooth.p <= part.p.max(axis=0) + slack).all()
+    assert smooth.p[[0, -1]] == pytest.approx(part.p[[0, -1]], abs=1e-6 * size.max())
 
 
 @pytest.mark.parametrize(
