@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: ablation pictures help setup demo draw test check check-static bench format docs clean
+.PHONY: ablation pictures help setup demo draw explore test check check-static bench format docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -29,6 +29,9 @@ draw: $(STAMP) ## drawings of people on the emulated arm: extracted, executed, c
 
 test: $(STAMP) ## all tests, in as many processes as there are cores, at most four
 	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
+
+explore: $(STAMP) ## the property tests with new random cases (make test draws the same ones every time)
+	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile -m hypothesis
 
 check-static: $(STAMP)
 	$(BIN)/ruff check .

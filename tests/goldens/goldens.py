@@ -99,7 +99,10 @@ def story():
 
 def demo():
     for controller in ("paper", "preview", "best"):
-        with tempfile.TemporaryDirectory() as folder, ControlBox(pace="lockstep", seed=7, port_base=None) as box:
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            ControlBox(pace="lockstep", seed=7, port_base=None) as box,
+        ):
             experiment = prepare_experiment(load_movements(DEMO), repeat=2, out=Path(folder))
             with UrDriver(box.host, box.ports) as driver:
                 ExperimentRunner(driver, experiment, controller_config(controller)).run()

@@ -13,8 +13,7 @@ from urscript.program import ProgramStatus, check_program, compile_program
 from urscript.recording_host import RecordingHost
 from urscript.source import Source
 
-settings.register_profile("urscript", deadline=None, suppress_health_check=list(HealthCheck), max_examples=80)
-settings.load_profile("urscript")
+several = settings(suppress_health_check=list(HealthCheck), max_examples=80)
 
 # --- random trees --------------------------------------------------------------------------------------
 
@@ -109,6 +108,7 @@ functions = st.builds(
 threads = st.builds(nodes.Function, st.just("thread"), st.just("t"), st.just(()), blocks)
 
 
+@several
 @given(st.lists(st.one_of(statements, functions, threads), max_size=6).map(tuple))
 def test_a_printed_tree_parses_to_the_same_tree(tree):
     text = print_program(tree)
@@ -193,7 +193,7 @@ more_lines = st.recursive(
 )
 
 
-@settings(max_examples=300)
+@settings(several, max_examples=300)
 @given(more_lines, more_lines, more_lines, more_lines)
 def test_a_random_program_ends_or_runs_on_but_never_breaks_the_interpreter(f, g, t, body):
     text = f"{PRELUDE}\ndef f(x):\n{f}\nend\ndef g(x, c=b):\n{g}\nend\nthread t():\n{t}\nend\n{body}\n"
@@ -235,6 +235,7 @@ def _assert_has_a_place(error, text):
     assert (all_errors[0].line, all_errors[0].column) == (error.line, error.column)
 
 
+@several
 @given(st.text(st.characters(max_codepoint=255), max_size=60))
 @example("\x00")
 @example('"')
@@ -247,6 +248,7 @@ def test_random_bytes_give_an_error_with_a_place(text):
         _assert_has_a_place(error, text)
 
 
+@several
 @given(st.lists(st.sampled_from([*WORDS.split(), "\n"]), max_size=25).map(" ".join))
 def test_random_words_give_an_error_with_a_place(text):
     error = _error_of(text)

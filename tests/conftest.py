@@ -1,0 +1,10 @@
+"""Property tests: `make test` runs the same cases every time, `make explore` draws new ones. None looks at a clock."""
+
+import os
+
+from hypothesis import HealthCheck, settings
+
+_COMMON = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("fixed", _COMMON, derandomize=True)
+settings.register_profile("explore", _COMMON, print_blob=True)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
