@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from bench.box_process import box_process
-from pc_client.control.controller_config import controller_config
+from pc_client.control.controller_config import CONTROLLERS
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
@@ -18,7 +18,7 @@ def measure_lockstep() -> dict[str, float]:
     with box_process("--pace", "lockstep", "--seed", "7") as box, tempfile.TemporaryDirectory() as folder:
         experiment = prepare_experiment(load_movements(library_names()), repeat=1, out=Path(folder))
         with UrDriver("127.0.0.1", box.ports) as driver:
-            report = ExperimentRunner(driver, experiment, controller_config("preview")).run()
+            report = ExperimentRunner(driver, experiment, CONTROLLERS["preview"]).run()
         robot_time = sum(stream.robot_time for stream in report.streams)
         wall_time = sum(stream.wall_time for stream in report.streams)
         cycles = robot_time / driver.info.period

@@ -2,6 +2,7 @@
 
 ClientError
 ├── MovementError      a movement file or its parameters make no sense
+├── ControllerError    the numbers of a controller, or its file, make no sense
 ├── PlanningError      a path leaves reach or limits; nothing has moved
 ├── DriverError        the robot cannot be reached, or the stream broke
 │   ├── RobotStoppedError  the robot stopped itself (protective stop, program error)
@@ -21,6 +22,10 @@ class ClientError(Exception):
 
 class MovementError(ClientError):
     """A movement file, or the parameters of a movement, make no sense."""
+
+
+class ControllerError(ClientError):
+    """The numbers of a controller, or its file, make no sense."""
 
 
 class PlanningError(ClientError):

@@ -26,10 +26,22 @@ ControllerOption = Annotated[
     str,
     typer.Option(
         "--controller",
-        metavar="NAME",
+        metavar="NAME|FILE.toml",
         help="paper (as published), preview (ahead by the loop delay) or best (makes up for the drives' lag "
-        "and the gears' waves, and learns from one run of a movement to the next).",
+        "and the gears' waves, and learns from one run of a movement to the next), or a file with numbers.",
         show_default=True,
+    ),
+]
+GainPOption = Annotated[
+    float | None, typer.Option("--gain-p", metavar="X", help="Proportional gain, 1/s, instead of its own.")
+]
+GainIOption = Annotated[
+    float | None, typer.Option("--gain-i", metavar="X", help="Integral gain, 1/s2, instead of its own.")
+]
+AccelerationOption = Annotated[
+    float | None,
+    typer.Option(
+        "--acceleration", metavar="X", help="The a of the robot's speedj, rad/s2, instead of its own."
     ),
 ]
 RepeatOption = Annotated[int, typer.Option("--repeat", min=1, max=99, help="Runs of each movement.")]

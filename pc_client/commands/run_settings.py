@@ -13,9 +13,24 @@ from dataclasses import dataclass
 from functools import wraps
 from typing import Any
 
-from pc_client.commands.options import ControllerOption, PortBaseOption, YesOption, ports_of
-from pc_client.control.controller_config import ControllerConfig, controller_config
+import typer
+
+from pc_client.commands.options import (
+    AccelerationOption,
+    ControllerOption,
+    GainIOption,
+    GainPOption,
+    PortBaseOption,
+    YesOption,
+    ports_of,
+)
+from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller_fields import changed
+from pc_client.control.controller_file import DEFAULT, load_controller
+from pc_client.errors import ControllerError
 from protocol.ur_types import Ports
+
+_OPTIONS = {"gain_p": "--gain-p", "gain_i": "--gain-i", "speedj_acceleration": "--acceleration"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,15 +49,27 @@ class RunSettings:
 
 
 def read_settings(
-    controller: ControllerOption = "preview", port_base: PortBaseOption = 0, yes: YesOption = False
+    controller: ControllerOption = DEFAULT,
+    gain_p: GainPOption = None,
+    gain_i: GainIOption = None,
+    acceleration: AccelerationOption = None,
+    port_base: PortBaseOption = 0,
+    yes: YesOption = False,
 ) -> RunSettings:
     """Make the record from what was given on the command line.
 
     Raises:
-        ClientError: there is no such controller.
+        ControllerError: there is no such controller, or its file makes no sense.
         typer.BadParameter: an option makes no sense.
     """
-    return RunSettings(controller_config(controller), ports_of(port_base), yes)
+    given = {"gain_p": gain_p, "gain_i": gain_i, "speedj_acceleration": acceleration}
+    numbers = {name: value for name, value in given.items() if value is not None}
+    base = load_controller(controller)
+    try:
+        config = changed(base, numbers, _OPTIONS.__getitem__)
+    except ControllerError as error:
+        raise typer.BadParameter(str(error)) from error
+    return RunSettings(config, ports_of(port_base), yes)
 
 
 def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:

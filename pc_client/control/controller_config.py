@@ -5,10 +5,8 @@ No number here may depend on the movement; a controller is chosen once for a who
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
-
-from pc_client.errors import ClientError
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +14,7 @@ class ControllerConfig:
     """One velocity controller: qd_cmd = feed-forward + gain_p * e + gain_i * integral of e, limited.
 
     Attributes:
-        name: what `--controller` calls it.
+        name: what `--controller` calls it, or what the numbers started from.
         gain_p: proportional gain [1/s].
         gain_i: integral gain [1/s2].
         looks_ahead: True: the feed-forward is the mean reference velocity over the cycle in which the
@@ -54,6 +52,17 @@ class ControllerConfig:
     learning_gain: float = 0.8
     learning_speed: float = 0.2
     learning_acceleration: float = 20.0
+
+    @property
+    def title(self) -> str:
+        """The name, and all in which this differs from the controller of that name.
+
+        Two controllers with the same title have the same numbers: no table puts different ones together.
+        """
+        own = asdict(self)
+        named = asdict(CONTROLLERS.get(self.name, self))
+        changes = [f"{field} {_short(own[field])}" for field in own if own[field] != named[field]]
+        return f"{self.name} with {', '.join(changes)}" if changes else self.name
 
 
 # As published (Fig. 3): PI and feed-forward of the current time. The paper gives no numbers. Gains as
@@ -94,13 +103,6 @@ _BEST = replace(_PREVIEW, name="best", compensates_lag=True, compensates_gear=Tr
 CONTROLLERS = MappingProxyType({config.name: config for config in (_PAPER, _PREVIEW, _BEST)})
 
 
-def controller_config(name: str) -> ControllerConfig:
-    """Return the controller called `name`.
-
-    Raises:
-        ClientError: no such controller.
-    """
-    config = CONTROLLERS.get(name)
-    if config is None:
-        raise ClientError(f"no controller is called {name!r}; choose one of {', '.join(CONTROLLERS)}")
-    return config
+def _short(value: object) -> str:
+    """A value to the last digit, but 4 for 4.0 and true for True."""
+    return str(value).lower() if isinstance(value, bool) else str(value).removesuffix(".0")

@@ -196,7 +196,7 @@ class ExperimentRunner:
             movement=movement.name,
             kind=movement.kind,
             repetition=repetition,
-            controller=self._config.name,
+            controller=self._config.title,
             robot_model=info.model,
             firmware=str(info.version),
             serial=info.serial.text,

@@ -2,7 +2,6 @@
 
     config            the TOML file, read strictly
     controller_axes   its table [controller]: a grid or random samples of settings
-    spelling          hints for words that nobody knows
     case              one experiment, with an identity that depends on nothing but its content
     box               a simulated arm of a case's own, in a process that never outlives its user
     guard             the little program between the two

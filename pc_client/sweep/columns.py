@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pc_client.analysis.budget import PARTS
-from pc_client.sweep.controller_axes import sweepable_fields
+from pc_client.control.controller_fields import FIELDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ FACTORS = (
     Column("seed", int, "which simulated arm of its kind"),
     Column("movement", str, "name of the movement"),
     Column("controller", str, "named controller that the settings start from"),
-    *(Column(name, kind, "as in ControllerConfig") for name, kind in sweepable_fields().items()),
+    *(Column(name, field.kind, f"as in ControllerConfig: {field.text}") for name, field in FIELDS.items()),
 )
 """What a case is made of; the axes of a sweep are those of them that vary."""
 

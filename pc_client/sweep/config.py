@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
+from pc_client.control.controller_fields import FIELDS
 from pc_client.errors import MovementError, SweepError
 from pc_client.kinematics.robot_model import ROBOTS
 from pc_client.movements.files import library_names, library_path, load_movement
+from pc_client.spelling import check_keys, nearest
 from pc_client.sweep.case import MovementFile, SimulatedArm
-from pc_client.sweep.controller_axes import check_distinct, grid, read_axes, samples, sweepable_fields
-from pc_client.sweep.spelling import check_keys, nearest
+from pc_client.sweep.controller_axes import check_distinct, grid, read_axes, samples
 
 FIDELITIES = ("ideal", "typical", "poor")
 """What `ur-emulator serve --fidelity` knows."""
@@ -77,6 +78,7 @@ def read_config(path: Path) -> SweepConfig:
 
     Raises:
         SweepError: the file cannot be read, or what it says makes no sense.
+        ControllerError: a field of the controller cannot hold a value.
         MovementError: a movement file makes no sense.
     """
     try:
@@ -182,9 +184,9 @@ class _Reader:
     def check_keys(self) -> None:
         """Refuse keys that do not exist."""
         for key in self._values:
-            if key in sweepable_fields():
+            if key in FIELDS:
                 raise self.error(key, "is a field of the controller; put it under [controller]")
-        check_keys(self._values, KEYS, f"{self.source}: ")
+        check_keys(self._values, KEYS, f"{self.source}: ", SweepError)
 
     def table(self, key: str) -> Mapping[str, Any]:
         """A table; empty when it is not there."""

@@ -10,22 +10,17 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-import typing
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller_fields import FIELDS, Value, checked
 from pc_client.errors import SweepError
-from pc_client.sweep.spelling import check_keys
-
-Value = float | int | bool | str | None
-
-#: Fields that hold a share of something.
-_AT_MOST_ONE = ("speed_share", "learning_gain")
+from pc_client.spelling import check_keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +41,6 @@ class Range:
 Axis = tuple[Value, ...] | Range
 
 
-def sweepable_fields() -> dict[str, type]:
-    """Fields of `ControllerConfig` that a sweep may set, and their types; all but its name."""
-    hints = typing.get_type_hints(ControllerConfig)
-    fields = {}
-    for field in dataclasses.fields(ControllerConfig):
-        hint = hints[field.name]
-        plain = [kind for kind in typing.get_args(hint) or (hint,) if kind in _CHECKS]
-        if field.name != "name" and plain:
-            fields[field.name] = plain[0]
-    return fields
-
-
 def read_axes(table: Mapping[str, Any], source: str) -> dict[str, Axis]:
     """Check the table [controller].
 
@@ -69,11 +52,11 @@ def read_axes(table: Mapping[str, Any], source: str) -> dict[str, Axis]:
         One axis a field, in the order of the file.
 
     Raises:
-        SweepError: unknown field, or a value that the field cannot have.
+        SweepError: unknown field, or a range or list that makes no sense.
+        ControllerError: a value that the field cannot hold.
     """
-    fields = sweepable_fields()
-    check_keys(table, fields, f"{source}: controller.")
-    return {name: _read_axis(value, fields[name], name, source) for name, value in table.items()}
+    check_keys(table, FIELDS, f"{source}: controller.", SweepError)
+    return {name: _read_axis(value, name, f"{source}: controller.{name}") for name, value in table.items()}
 
 
 def grid(base: ControllerConfig, axes: Mapping[str, Axis], source: str) -> list[ControllerConfig]:
@@ -110,26 +93,25 @@ def _draw(axis: Axis, n: int, seed: int, name: str) -> list[Value]:
     return [axis[int(rng.integers(len(axis)))] for _ in range(n)]
 
 
-def _read_axis(value: Any, kind: type, name: str, source: str) -> Axis:
-    where = f"{source}: controller.{name}"
+def _read_axis(value: Any, name: str, where: str) -> Axis:
     if isinstance(value, dict):
-        return _read_range(value, kind, name, where)
+        return _read_range(value, name, where)
     values = value if isinstance(value, list) else [value]
     if not values:
         raise SweepError(f"{where}: an empty list; give at least one value")
-    read = tuple(_CHECKS[kind](item, name, where) for item in values)
+    read = tuple(checked(name, item, where) for item in values)
     check_distinct(read, where)
     return read
 
 
-def _read_range(table: Mapping[str, Any], kind: type, name: str, where: str) -> Range:
-    if kind is not float:
+def _read_range(table: Mapping[str, Any], name: str, where: str) -> Range:
+    if FIELDS[name].kind is not float:
         raise SweepError(f"{where}: a range is of numbers; give a list of values")
-    check_keys(table, ("from", "to", "scale"), f"{where}.")
+    check_keys(table, ("from", "to", "scale"), f"{where}.", SweepError)
     for key in ("from", "to"):
         if key not in table:
             raise SweepError(f"{where}: a range without {key!r}; give {{ from = A, to = B }}")
-    low, high = (_number(table[key], name, f"{where}.{key}") for key in ("from", "to"))
+    low, high = (checked(name, table[key], f"{where}.{key}") for key in ("from", "to"))
     scale = table.get("scale", "linear")
     if scale not in ("linear", "log"):
         raise SweepError(f'{where}.scale: {scale!r}; give "linear" or "log"')
@@ -149,37 +131,3 @@ def check_distinct(values: Sequence[object], where: str) -> None:
     for i, value in enumerate(values):
         if value in values[:i]:
             raise SweepError(f"{where}: {value!r} is there twice; name each value once")
-
-
-def _number(value: object, name: str, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value < 0:
-        raise SweepError(f"{where}: {value!r}; give a number, 0 or above")
-    if name in _AT_MOST_ONE and value > 1:
-        raise SweepError(f"{where}: {value!r}; a share is from 0 to 1")
-    return float(value)
-
-
-def _integer(value: object, name: str, where: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise SweepError(f"{where}: {value!r}; give a whole number, 0 or above")
-    return value
-
-
-def _truth(value: object, name: str, where: str) -> bool:
-    if not isinstance(value, bool):
-        raise SweepError(f"{where}: {value!r}; give true or false")
-    return value
-
-
-def _text(value: object, name: str, where: str) -> str:
-    if not isinstance(value, str):
-        raise SweepError(f"{where}: {value!r}; give a text")
-    return value
-
-
-_CHECKS: Mapping[type, Callable[[object, str, str], Value]] = {
-    float: _number,
-    int: _integer,
-    bool: _truth,
-    str: _text,
-}

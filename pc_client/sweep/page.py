@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
-from pc_client.sweep.controller_axes import sweepable_fields
+from pc_client.control.controller_fields import FIELDS
 from pc_client.sweep.ranking import rank_settings, spans_grid, varying
 
 Rows = Sequence[Mapping[str, Any]]
@@ -66,8 +66,7 @@ def render_page(name: str, rows: Rows) -> str:
 
 def map_axes(rows: Rows) -> tuple[str, str] | None:
     """The axes of the map: both gains if they vary, else the controller's first two numbers that do."""
-    fields = sweepable_fields()
-    numbers = [axis for axis in varying(rows) if fields.get(axis) in (float, int)]
+    numbers = [axis for axis in varying(rows) if axis in FIELDS and FIELDS[axis].kind is float]
     numbers.sort(key=lambda axis: axis not in ("gain_p", "gain_i"))
     return (numbers[0], numbers[1]) if len(numbers) > 1 else None
 

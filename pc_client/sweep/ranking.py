@@ -12,8 +12,8 @@ from math import prod
 from statistics import fmean
 from typing import Any
 
+from pc_client.control.controller_fields import FIELDS
 from pc_client.sweep.columns import FACTORS
-from pc_client.sweep.controller_axes import sweepable_fields
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -63,11 +63,11 @@ def varying(rows: Rows) -> list[str]:
     axes = [column.name for column in FACTORS if len({row.get(column.name) for row in rows}) > 1]
     if "controller" not in axes:
         return axes
-    fields, names = sweepable_fields(), {row["controller"] for row in rows}
+    names = {row["controller"] for row in rows}
     return [
         axis
         for axis in axes
-        if axis not in fields or len({(row["controller"], row[axis]) for row in rows}) > len(names)
+        if axis not in FIELDS or len({(row["controller"], row[axis]) for row in rows}) > len(names)
     ]
 
 
@@ -94,7 +94,7 @@ def rank_settings(rows: Rows) -> list[Setting]:
 
 
 def _controller_axes(rows: Rows) -> list[str]:
-    of_controller = {"controller", *sweepable_fields()}
+    of_controller = {"controller", *FIELDS}
     return [name for name in varying(rows) if name in of_controller]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import subprocess
 import sys
@@ -12,8 +13,10 @@ from fake_robot import FakeRobot
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
+from pc_client.recording.loader import load_recording
 
 COMMANDS = (["experiment"], ["run"], ["movements"], ["movements", "list"], ["report"], ["doctor"], ["export"])
+RUN = ("run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o")
 
 
 @pytest.fixture
@@ -55,6 +58,10 @@ def test_every_command_has_help(command, capsys):
         (["movements"], "command"),
         (["doctor", "--robot", "x", "--quickly"], "quickly"),
         (["export", "x.mcap", "--to", "xlsx"], "csv or parquet"),
+        ([*RUN, "--gain-p", "300"], "--gain-p: 300.0; give a number from 0 to 200 1/s"),
+        ([*RUN, "--gain-i", "nan"], "--gain-i: nan; give a number"),
+        ([*RUN, "--acceleration", "0"], "--acceleration: 0.0; give a number from 0.1 to 100 rad/s2"),
+        ([*RUN, "--gain-p", "much"], "--gain-p"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(arguments, words, capsys):
@@ -74,6 +81,7 @@ def free_offset():
         (["run", "lognorm_9_9", "--robot", "127.0.0.1", "--out", "o"], "no movement"),
         (["run", "nowhere.toml", "--robot", "127.0.0.1", "--out", "o"], "nowhere.toml"),
         (["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o", "--controller", "pid"], "preview"),
+        ([*RUN, "--controller", "mine.toml"], "mine.toml: cannot be read"),
         (["report", "empty"], "no recordings"),
         (["export", "missing.mcap"], "missing.mcap"),
         (["movements", "show", "lognorm_9_9"], "no movement"),
@@ -110,6 +118,28 @@ def test_run_records_and_reports(robot, tmp_path, capsys):
     header, *rows = recording.with_suffix(".csv").read_text().splitlines()
     assert header.startswith("timestamp,")
     assert len(rows) > 500
+
+
+def test_own_numbers_reach_robot_recording_and_table(robot, tmp_path, capsys):
+    (tmp_path / "mine.toml").write_text('base = "paper"\ngain_i = 3\nspeed_share = 0.9')
+    out = tmp_path / "out"
+    own = ["--controller", str(tmp_path / "mine.toml"), "--gain-p", "5", "--acceleration", "3"]
+    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", str(out), *own]) == 0
+    title = "paper with gain_p 5, gain_i 3, speed_share 0.9"
+    assert json.loads((out / "table1.json").read_text())["controller"] == title
+    assert " ".join(title.split()) in " ".join(capsys.readouterr().out.split())
+    provenance = load_recording(out / "uniform_4_1_r1.mcap").provenance
+    assert provenance.controller == title
+    assert provenance.controller_config["gain_p"] == 5.0
+    assert provenance.controller_config["gain_i"] == 3.0
+
+
+@pytest.mark.parametrize("command", ["experiment", "run", "draw", "compare"])
+def test_commands_that_move_an_arm_share_their_options(command, capsys):
+    assert cli.run([command, "--help"]) == 0
+    text = capsys.readouterr().out
+    for option in ("--controller", "--gain-p", "--gain-i", "--acceleration", "--port-base", "--yes"):
+        assert option in text
 
 
 def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, monkeypatch):

@@ -5,24 +5,25 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-from pc_client.errors import SweepError
+from pc_client.errors import ClientError
 
 
-def check_keys(given: Iterable[str], known: Iterable[str], prefix: str) -> None:
+def check_keys(given: Iterable[str], known: Iterable[str], prefix: str, error: type[ClientError]) -> None:
     """Refuse keys that do not exist.
 
     Args:
         given: keys of a table.
         known: those that there are.
         prefix: file and table, for the message.
+        error: what is raised.
 
     Raises:
-        SweepError: the first that does not exist, with the nearest one that does.
+        ClientError: the first that does not exist, with the nearest one that does; of the type `error`.
     """
     known = list(known)
     for key in given:
         if key not in known:
-            raise SweepError(f"{prefix}{key}: no such key; {nearest(key, known)}")
+            raise error(f"{prefix}{key}: no such key; {nearest(key, known)}")
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
