@@ -71,7 +71,7 @@ def draw_profiles(axes: Axes) -> None:
 
 
 def main() -> None:
-    with svg_figure(11.0, 3.6, simulated=False) as (figure, page):
+    with svg_figure(11.0, 3.6, mark="") as (figure, page):
         draw_bell(figure.add_axes((0.055, 0.14, 0.4, 0.76)))
         draw_profiles(figure.add_axes((0.53, 0.14, 0.455, 0.76)))
     (IMG / "theory.svg").write_text(page.getvalue(), encoding="utf-8", newline="\n")

@@ -42,7 +42,7 @@ def plot(axis, path):
     axis.plot(t[1:], actual, color="#0072b2", linewidth=0.9, label="actual")
     run = analyse_run(recording)
     provenance = recording.provenance
-    mark = ", SIMULATED" if provenance.simulated else ""
+    mark = provenance.origin.mark and f", {provenance.origin.mark}"
     axis.set_title(f"{provenance.movement}: SNR {run.snr.speed_db:.1f} dB{mark}", loc="left", fontsize=10)
     axis.set_ylabel("TCP speed [mm/s]")
     axis.grid(alpha=0.3)

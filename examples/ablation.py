@@ -195,7 +195,7 @@ def draw(results: list[dict[str, Any]], path: Path) -> None:
     from pc_client.analysis.figures import BLUE, ORANGE, svg_figure
 
     fidelities = [f for f in FIDELITIES if any(r["fidelity"] == f for r in _of_main(results))]
-    with svg_figure(11.0, 4.4, simulated=True) as (page, _):
+    with svg_figure(11.0, 4.4, mark="SIMULATED") as (page, _):
         for k, fidelity in enumerate(fidelities):
             axes = page.add_axes((0.05 + 0.32 * k, 0.25, 0.285, 0.64))
             cases = [r for r in _of_main(results) if r["fidelity"] == fidelity]

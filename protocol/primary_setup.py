@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from protocol.filled import Filled
 from protocol.primary_sub_package import SubPackage
+from protocol.ur_types import SIMULATED_MASTERBOARD, SIMULATOR_CHECKSUM
 from protocol.wire_record import Since, since, wire
 
 __all__ = [
@@ -31,7 +32,7 @@ class KinematicsInfo(SubPackage):
     FIRST_STATE_ONLY: ClassVar[bool] = True
 
     checksum: tuple[int, ...] = wire(
-        "I", "all ones on simulators", count=6, default=0xFFFFFFFF, filled=_PROPERTY
+        "I", "all ones on the maker's simulator", count=6, default=SIMULATOR_CHECKSUM, filled=_PROPERTY
     )
     dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
     dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
@@ -69,7 +70,10 @@ class ConfigurationData(SubPackage):
     dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
     dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
     masterboard_version: int = wire(
-        "i", "6 in a UR5e capture; the CB3 value is unknown", default=6, filled=_CONSTANT
+        "i",
+        f"{SIMULATED_MASTERBOARD} of this box, by which clients know it; 6 in a UR5e capture, CB3 unknown",
+        default=6,
+        filled=_CONSTANT,
     )
     controller_box_type: int = wire("i", "4 UR5, 5 UR10, 6 UR3", default=6, filled=_PROPERTY)
     robot_type: int = wire("i", "RobotType", default=3, filled=_PROPERTY)

@@ -15,7 +15,9 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 
 __all__ = [
     "JOINT_NAMES",
+    "SIMULATED_MASTERBOARD",
     "SIMULATED_SERIAL_PREFIX",
+    "SIMULATOR_CHECKSUM",
     "ControlMode",
     "JointMode",
     "LegacyRobotMode",
@@ -239,6 +241,12 @@ class Ports:
 
 SIMULATED_SERIAL_PREFIX = "2099"
 """Serial numbers start with the year of make (seen: 2017...); no arm was made in 2099."""
+
+SIMULATED_MASTERBOARD = 2099
+"""Masterboard version of an emulated box: software before 3.12 tells no serial number. A UR5e has 6."""
+
+SIMULATOR_CHECKSUM = 0xFFFFFFFF
+"""Calibration checksum of each joint in the maker's own simulator. Source: URCL, captures of URSim."""
 
 _SIMULATED_SERIAL = re.compile(SIMULATED_SERIAL_PREFIX + r"([1-9])(\d{6})")
 _SEED_MODULUS = 10**6

@@ -2,8 +2,8 @@
 
 The only module that loads matplotlib; import it where a plot is drawn, never from what the control loop
 imports. Colours are those of Okabe and Ito, which colour-blind readers can tell apart; the reference is
-always the thick grey line, so that a plot can be read without its legend. Every plot of simulated data says
-so.
+always the thick grey line, so that a plot can be read without its legend. Every plot of
+data that are not known to be of a real arm says so.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def draw_movement(row: Row) -> str:
     Returns:
         SVG text.
     """
-    with svg_figure(11.0, 8.4, row.runs[0].provenance.simulated) as (figure, page):
+    with svg_figure(11.0, 8.4, row.runs[0].provenance.origin.mark) as (figure, page):
         speed_axes = figure.add_axes((0.065, 0.645, 0.575, 0.3))
         _draw_speed(speed_axes, row.runs)
         _draw_speed_error(figure.add_axes((0.065, 0.425, 0.575, 0.165), sharex=speed_axes), row.runs)
@@ -78,7 +78,7 @@ def draw_movement(row: Row) -> str:
 
 def draw_table(table: Table) -> str:
     """Draw Table I: our repetitions and mean beside the paper's figure, for each movement."""
-    with svg_figure(11.0, 3.4, table.simulated) as (figure, page):
+    with svg_figure(11.0, 3.4, table.origin.mark) as (figure, page):
         axes = figure.add_axes((0.06, 0.2, 0.925, 0.68))
         x = np.arange(len(table.rows))
         paper = [np.nan if row.paper_snr_db is None else row.paper_snr_db for row in table.rows]
@@ -115,7 +115,7 @@ def draw_definitions(table: Table) -> str:
         ("velocity vector", "s", RED, lambda run: run.snr.velocity_db),
         ("velocity vector, after best time shift", "D", ORANGE, lambda run: run.snr.velocity_shifted_db),
     )
-    with svg_figure(11.0, 3.1, table.simulated) as (figure, page):
+    with svg_figure(11.0, 3.1, table.origin.mark) as (figure, page):
         axes = figure.add_axes((0.06, 0.21, 0.925, 0.63))
         for i, (label, marker, colour, value) in enumerate(series):
             x = np.arange(len(table.rows)) + 0.16 * (i - 1.5)
@@ -132,7 +132,7 @@ def draw_definitions(table: Table) -> str:
 
 def draw_budget(table: Table) -> str:
     """Draw where the error power of each movement lies: bars of shares, and the level of the whole."""
-    with svg_figure(11.0, 0.34 * len(table.rows) + 1.25, table.simulated) as (figure, page):
+    with svg_figure(11.0, 0.34 * len(table.rows) + 1.25, table.origin.mark) as (figure, page):
         height = figure.get_figheight()
         axes = figure.add_axes((0.115, 0.55 / height, 0.755, 1.0 - 1.15 / height))
         y = np.arange(len(table.rows))
@@ -267,13 +267,13 @@ def _colours(runs: Sequence[Run]) -> list[str]:
 
 
 @contextmanager
-def svg_figure(width_in: float, height_in: float, simulated: bool) -> Iterator[tuple[Figure, io.StringIO]]:
+def svg_figure(width_in: float, height_in: float, mark: str) -> Iterator[tuple[Figure, io.StringIO]]:
     """Give a figure in the report's style; on leaving, its SVG text is in the page.
 
     Args:
         width_in: width [inch].
         height_in: height [inch].
-        simulated: whether the data are, which is then written on it.
+        mark: what the data are, written on it; empty for those of a real arm, or none at all.
 
     Yields:
         The figure, and the page that the text will be in.
@@ -283,7 +283,7 @@ def svg_figure(width_in: float, height_in: float, simulated: bool) -> Iterator[t
         figure = Figure(figsize=(width_in, height_in))
         FigureCanvasSVG(figure)
         yield figure, page
-        if simulated:
+        if mark:
             box = {
                 "boxstyle": "round,pad=0.3",
                 "facecolor": "#FFF3CD",
@@ -293,7 +293,7 @@ def svg_figure(width_in: float, height_in: float, simulated: bool) -> Iterator[t
             figure.text(
                 0.992,
                 1.0 - 0.08 / height_in,
-                "SIMULATED",
+                mark,
                 ha="right",
                 va="top",
                 fontsize=8.5,

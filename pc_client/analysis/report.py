@@ -174,10 +174,8 @@ def _provenance_facts(table: Table) -> Mapping[str, Any]:
         "robot": first.robot_model,
         "controller software": first.firmware,
         "serial number": ", ".join(sorted({run.provenance.serial for run in runs})),
-        "data": "SIMULATED: an emulated arm, no real robot moved"
-        if first.simulated
-        else "measured on a real arm",
-        "seed of the emulated arm": "none" if first.seed is None else str(first.seed),
+        "data": first.origin.says,
+        **({} if first.seed is None else {"seed of the emulated arm": str(first.seed)}),
         "pace": first.pace,
         "control cycle": f"{1e3 * first.cycle_time_s:g} ms",
         "controller": first.controller,

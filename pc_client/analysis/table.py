@@ -19,6 +19,7 @@ from rich.text import Text
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
 from pc_client.analysis.run import Run
 from pc_client.errors import RecordingError
+from pc_client.recording.origin import Origin
 
 # Source: A. Wolniakowski et al., "Towards human-like kinematics in industrial robotic arms: a case study on a
 # UR3 robot", Table I, in its order. One figure a movement, over three repetitions on a real UR3.
@@ -98,7 +99,7 @@ class Table:
     robot: str
     seed: int | None
     pace: str
-    simulated: bool
+    simulated: bool | None
     rows: tuple[Row, ...]
 
     def rows_of(self, kind: str) -> list[Row]:
@@ -180,15 +181,19 @@ class Table:
         return table
 
     @property
+    def origin(self) -> Origin:
+        """The words for simulated, real, or not known."""
+        return self.rows[0].runs[0].provenance.origin
+
+    @property
     def loop(self) -> Mapping[str, float | str]:
         """What the client identified of the loop and its margins; empty for old recordings."""
         return self.rows[0].runs[0].provenance.loop
 
     @property
     def title(self) -> str:
-        """One line that says what the table shows, and that it is a simulation when it is."""
-        arm = f"SIMULATED {self.robot}, seed {self.seed}" if self.simulated else self.robot
-        return f"Table I: {arm}, controller {self.controller}"
+        """One line that says what the table shows, and whether the arm was a real one."""
+        return f"Table I: {self.rows[0].runs[0].provenance.arm}, controller {self.controller}"
 
     def _cells(self) -> tuple[list[str], list[list[str]]]:
         """Return headings and texts; the mean of a kind follows its rows."""

@@ -36,4 +36,5 @@ def export(
     if recording.damage:
         say(f"{file}: {recording.damage}; exporting {recording.n_rows} rows")
     path = write_table(recording, out or file.with_suffix(f".{to}"), "csv" if to == "csv" else "parquet")
+    say(f"data: {recording.provenance.origin.says}")
     say(str(path))

@@ -132,7 +132,7 @@ def _given_robot(plan: SweepConfig, host: str) -> GivenRobot:
     info = read_info(TcpNetwork(), host, ports_of(plan.port_base))
     if info.model == UNKNOWN:
         raise ClientError(f"{host} does not tell which arm it is: there is no plan for it")
-    return GivenRobot(host, plan.port_base, info.model.lower(), info.serial.text)
+    return GivenRobot(host, plan.port_base, info.model.lower(), info.serial)
 
 
 def _ask(host: str, port_base: int, cases: Sequence[Case]) -> None:

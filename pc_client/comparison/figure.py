@@ -32,9 +32,9 @@ def draw_comparison(one: MovementSet, runs: Mapping[str, Run] | None = None) -> 
     Returns:
         SVG text.
     """
-    simulated = bool(runs) and any(run.provenance.simulated for run in (runs or {}).values())
+    mark = next(iter(runs.values())).provenance.origin.mark if runs else ""
     rows = -(-len(one.movements) // _COLUMNS)
-    with svg_figure(12.0, _PANEL_HEIGHT * rows + 0.75, simulated) as (figure, page):
+    with svg_figure(12.0, _PANEL_HEIGHT * rows + 0.75, mark) as (figure, page):
         fill_page(figure, one, runs)
     return page.getvalue()
 

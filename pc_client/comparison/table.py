@@ -223,12 +223,7 @@ def build_comparison(
     if runs:
         provenance = next(iter(runs.values())).provenance
         rate = 1.0 / provenance.cycle_time_s
-        arm = (
-            f"SIMULATED {provenance.robot}, seed {provenance.seed}"
-            if provenance.simulated
-            else provenance.robot
-        )
-        robot: str | None = f"{arm}, controller {provenance.controller}"
+        robot: str | None = f"{provenance.arm}, controller {provenance.controller}"
     else:
         robot = None
     rows = tuple(_row(kind, movement, runs, rate) for one in sets for kind, movement in one.movements.items())

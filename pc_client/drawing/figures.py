@@ -38,14 +38,14 @@ def draw(shown: Shown) -> dict[str, str]:
     """All pictures of a drawing as SVG texts by name."""
     pictures = {}
     for name, size, fill, _ in FIGURES:
-        with _talk_figure(size, shown.execution.run.provenance.simulated) as (figure, page):
+        with _talk_figure(size, shown.execution.run.provenance.origin.mark) as (figure, page):
             fill(figure, shown)
         pictures[name] = page.getvalue()
     return pictures
 
 
 @contextmanager
-def _talk_figure(size: tuple[float, float], simulated: bool) -> Iterator[tuple[Figure, Any]]:
+def _talk_figure(size: tuple[float, float], mark: str) -> Iterator[tuple[Figure, Any]]:
     """The report's style with letters that the last row of a lecture hall can read."""
-    with svg_figure(*size, simulated) as (figure, page), mpl.rc_context(_LARGER):
+    with svg_figure(*size, mark) as (figure, page), mpl.rc_context(_LARGER):
         yield figure, page

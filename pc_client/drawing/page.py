@@ -49,7 +49,7 @@ def render_page(entries: Sequence[Entry], pictures: Mapping[str, Mapping[str, st
         columns=COLUMNS,
         colours=COLOURS,
         provenance=provenance_facts(entries),
-        simulated=entries[0].executions[0].run.provenance.simulated,
+        origin=entries[0].executions[0].run.provenance.origin,
     )
 
 

@@ -121,10 +121,8 @@ def provenance_facts(entries: Sequence[Entry]) -> dict[str, str]:
     delay = first.identified_delay_s
     return {
         "robot": first.robot,
-        "data": "SIMULATED: an emulated arm, no real robot moved"
-        if first.simulated
-        else "measured on a real arm",
-        "seed of the emulated arm": "none" if first.seed is None else str(first.seed),
+        "data": first.origin.says,
+        **({} if first.seed is None else {"seed of the emulated arm": str(first.seed)}),
         "serial number": first.serial,
         "pace": first.pace,
         "control cycle": f"{1e3 * first.cycle_time_s:g} ms",
@@ -166,9 +164,8 @@ def to_markdown(entries: Sequence[Entry]) -> str:
 def to_rich(entry: Entry) -> RichTable:
     """The table of one drawing for the terminal."""
     first = _provenance(entry)
-    data = f"SIMULATED {first.robot}, seed {first.seed}" if first.simulated else first.robot
     table = RichTable(
-        title=Text(f"{entry.name}: {data}, controller {first.controller}; SNR in dB"),
+        title=Text(f"{entry.name}: {first.arm}, controller {first.controller}; SNR in dB"),
         box=SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
     )

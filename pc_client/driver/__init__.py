@@ -4,7 +4,7 @@ transport        connections as a tiny interface: TCP here, memory in tests
 realtime_client  frames of port 30003: newest first, heartbeats, lost and late frames
 package_stream   messages of ports 30001 and 30002: programs, errors, version
 dashboard_query  questions to the dashboard server, port 29999
-robot_info       which robot answers: firmware, serial number, simulated or not
+robot_info       which robot answers: firmware, serial number, simulated, real or not known
 watchdog         what a frame must say for the arm to go on moving
 receiver_script  the program that runs on the robot, filled in
 approach_script  the programs that move to a posture and that stop the arm

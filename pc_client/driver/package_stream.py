@@ -23,7 +23,7 @@ from protocol.primary_messages import (
     decode_message,
 )
 from protocol.primary_state import decode_sub_package, split_state
-from protocol.ur_types import RobotType, SoftwareVersion
+from protocol.ur_types import SoftwareVersion
 
 S = TypeVar("S", bound=SubPackage)
 
@@ -76,16 +76,12 @@ class PackageStream:
             self._early += self._read(0.1) or []
         return self.version
 
-    def wait_for_robot_type(self) -> RobotType | None:
-        """Return the type of the arm from the first state; None if the robot does not send it in time."""
+    def wait_for_configuration(self) -> ConfigurationData | None:
+        """Return the configuration, which the first state has; None if the robot does not send it in time."""
         deadline = self._network.now() + VERSION_TIMEOUT
         while ConfigurationData.SUB_TYPE not in self._newest and self._network.now() <= deadline:
             self._early += self._read(0.1) or []
-        configuration = self.newest(ConfigurationData)
-        try:
-            return None if configuration is None else RobotType(configuration.robot_type)
-        except ValueError:  # an arm that was built after this was written
-            return None
+        return self.newest(ConfigurationData)
 
     def newest(self, record: type[S]) -> S | None:
         """The newest sub-package of a type that has been read, or None; `poll` reads.

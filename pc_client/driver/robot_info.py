@@ -1,4 +1,4 @@
-"""Which robot answers: firmware, model, serial number, and whether it says of itself that it is simulated."""
+"""Which robot answers: firmware, model, serial number, and whether it is simulated, real, or nobody knows."""
 
 from __future__ import annotations
 
@@ -7,8 +7,17 @@ from dataclasses import dataclass
 from pc_client.driver.dashboard_query import ask_dashboard
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.transport import Network
+from pc_client.recording.origin import origin_of
 from protocol.errors import RemoteProtocolError
-from protocol.ur_types import SerialNumber, SoftwareVersion, parse_serial
+from protocol.primary_layout import ConfigurationData, KinematicsInfo
+from protocol.ur_types import (
+    SIMULATED_MASTERBOARD,
+    SIMULATOR_CHECKSUM,
+    RobotType,
+    SerialNumber,
+    SoftwareVersion,
+    parse_serial,
+)
 
 _SERIAL, _MODEL = "get serial number", "get robot model"
 
@@ -26,12 +35,17 @@ class RobotInfo:
     Attributes:
         version: controller software.
         model: e.g. `UR3`, or "unknown" when the robot does not tell.
-        serial: serial number; its text is "unknown" when the dashboard server does not tell.
+        serial: serial number, or "unknown" when the dashboard server does not tell.
+        simulated: True when the robot says so; False when its serial number is that of a real arm and it has
+            no mark of a simulator; None when it does not tell.
+        seed: of an emulated arm; None for another, and when the robot does not tell.
     """
 
     version: SoftwareVersion
     model: str
-    serial: SerialNumber
+    serial: str
+    simulated: bool | None
+    seed: int | None
 
     @property
     def period(self) -> float:
@@ -39,31 +53,55 @@ class RobotInfo:
         return _E_SERIES_PERIOD if self.version.major >= 5 else _CB3_PERIOD
 
     def __str__(self) -> str:
-        kind = "simulated" if self.serial.simulated else "serial number"
-        return f"{self.model}, software {self.version}, {kind} {self.serial.text}"
+        origin = origin_of(self.simulated).name
+        return f"{self.model}, software {self.version}, serial number {self.serial}, {origin}"
 
 
 def read_robot_info(network: Network, host: str, dashboard_port: int, primary: PackageStream) -> RobotInfo:
-    """Ask the robot who it is; what it does not answer stays "unknown".
+    """Ask the robot who it is; what it does not answer stays unknown.
 
     Args:
         network: makes the connection.
         host: the robot.
         dashboard_port: its dashboard port.
-        primary: a fresh connection to the primary port: its greeting tells the software, its first state the
-            arm when the dashboard server, before 3.12, does not.
+        primary: a fresh connection to the primary port: its greeting tells the software; its first state the
+            marks of a simulator, and the arm when the dashboard server, before 3.12, does not.
 
     Raises:
         DriverError: the primary port does not tell its version.
     """
     version = primary.wait_for_version()
     answers = ask_dashboard(network, host, dashboard_port, (_SERIAL, _MODEL))
+    configuration = primary.wait_for_configuration()
     try:
         serial = parse_serial(answers.get(_SERIAL, ""))
     except RemoteProtocolError:  # software before 3.12 does not know the question
-        serial = SerialNumber(UNKNOWN, simulated=False, seed=None)
+        serial = None
     model = answers.get(_MODEL, "")
-    if not model.startswith("UR"):
-        robot_type = primary.wait_for_robot_type()
-        model = UNKNOWN if robot_type is None else robot_type.name
-    return RobotInfo(version, model, serial)
+    return RobotInfo(
+        version,
+        model if model.startswith("UR") else _model_in(configuration),
+        UNKNOWN if serial is None else serial.text,
+        _is_simulated(serial, configuration, primary.newest(KinematicsInfo)),
+        None if serial is None else serial.seed,
+    )
+
+
+def _is_simulated(
+    serial: SerialNumber | None, configuration: ConfigurationData | None, kinematics: KinematicsInfo | None
+) -> bool | None:
+    """Whether the robot is a simulated one; None when it neither says so nor proves the contrary."""
+    if configuration is not None and configuration.masterboard_version == SIMULATED_MASTERBOARD:
+        return True
+    if kinematics is not None and set(kinematics.checksum) == {SIMULATOR_CHECKSUM}:
+        return True
+    if serial is None:
+        return None
+    return True if serial.simulated else None if configuration is None else False
+
+
+def _model_in(configuration: ConfigurationData | None) -> str:
+    try:
+        return UNKNOWN if configuration is None else RobotType(configuration.robot_type).name
+    except ValueError:  # an arm that was built after this was written
+        return UNKNOWN

@@ -105,10 +105,12 @@ def prepare_experiment(
 def clear_folder(experiment: Experiment) -> None:
     """Make the folder ready: create it, take away recordings that this experiment records again.
 
-    Only simulated ones are taken away: they can be made again by the seed, those of a real arm cannot.
+    Only simulated ones are taken away: they can be made again by the seed, those of a real arm cannot, and
+    where it is not known, the arm may have been a real one.
 
     Raises:
-        RecordingError: the folder cannot be written, or holds recordings of another experiment or a real arm.
+        RecordingError: the folder cannot be written, or holds recordings of another experiment, or of an arm
+            that is not known to be simulated.
     """
     ours = {
         experiment.recording_path(planned, k + 1)
@@ -123,22 +125,25 @@ def clear_folder(experiment: Experiment) -> None:
                 f"{experiment.out} holds recordings of another experiment ({foreign[0].name}); "
                 "give another folder, or delete them"
             )
-        if real := sorted(path for path in old if _is_of_a_real_arm(path)):
-            raise RecordingError(
-                f"{experiment.out} holds recordings of a real arm ({real[0].name}); "
-                "they are not overwritten, give another folder"
-            )
+        for path in sorted(old):
+            _refuse_to_lose(path)
         for path in old:
             path.unlink()
     except OSError as error:
         raise RecordingError(f"cannot use the folder {experiment.out}: {error.strerror or error}") from error
 
 
-def _is_of_a_real_arm(path: Path) -> bool:
+def _refuse_to_lose(path: Path) -> None:
     try:
-        return not load_recording(path).provenance.simulated
+        provenance = load_recording(path).provenance
     except RecordingError:  # cut off before it said anything: nothing is lost with it
-        return False
+        return
+    if not provenance.simulated:
+        whose = "of a real arm" if provenance.simulated is False else "of an arm that may be a real one"
+        raise RecordingError(
+            f"{path} is a recording {whose} ({provenance.origin.says}); it is not overwritten, "
+            "give another folder"
+        )
 
 
 def _text_of(movement: Movement) -> str:

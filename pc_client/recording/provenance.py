@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from pc_client.errors import RecordingError
+from pc_client.recording.origin import Origin, origin_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +27,10 @@ class Provenance:
         controller_config: its numbers (gains, limits), by name.
         robot_model: e.g. "UR3".
         firmware: controller software as it reports itself, e.g. "3.15.8".
-        serial: serial number of the arm.
-        simulated: True when the arm is an emulated one.
-        seed: seed of the emulated arm; None for a real arm.
+        serial: serial number of the arm, or "unknown".
+        simulated: True for an emulated arm, False for one that is known to be real, None where the robot did
+            not tell.
+        seed: seed of the emulated arm; None for a real arm, and where the robot did not tell.
         pace: "realtime" or "lockstep".
         cycle_time_s: control cycle of the robot in s.
         identified_delay_s: loop delay that the client measured, in s; None when it did not.
@@ -45,7 +47,7 @@ class Provenance:
     robot_model: str
     firmware: str
     serial: str
-    simulated: bool
+    simulated: bool | None
     seed: int | None
     pace: str
     client_version: str
@@ -60,6 +62,16 @@ class Provenance:
     def robot(self) -> str:
         """Model and firmware in one phrase, e.g. "UR3 3.15.8"."""
         return f"{self.robot_model} {self.firmware}"
+
+    @property
+    def origin(self) -> Origin:
+        """The words for simulated, real, or not known."""
+        return origin_of(self.simulated)
+
+    @property
+    def arm(self) -> str:
+        """The robot behind its mark, for titles, e.g. "SIMULATED UR3 3.15.8, seed 7"."""
+        return self.origin.prefix + self.robot + ("" if self.seed is None else f", seed {self.seed}")
 
     def to_metadata(self) -> dict[str, str]:
         """Return the flat string map that goes into the file: texts as they are, all else as JSON."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from pc_client.analysis.budget import PARTS
 from pc_client.control.controller_fields import FIELDS
+from pc_client.recording.origin import Origin, origin_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +42,7 @@ FACTORS = (
 """What a case is made of; the axes of a sweep are those of them that vary."""
 
 FIGURES = (
+    Column("simulated", bool, "true: the robot says so; false: a real arm; missing: not known"),
     Column("kind", str, "law of the movement: lognormal, uniform ..."),
     Column("repetition", int, "run within the case, from 1"),
     Column("snr_db", float, "SNR of the TCP speed, Eq. 10 of the paper: neither shifted nor smoothed"),
@@ -64,3 +68,9 @@ COLUMNS = (
     *FACTORS,
     *FIGURES,
 )
+
+
+def origin_of_rows(rows: Sequence[Mapping[str, Any]]) -> Origin:
+    """Return the words for a whole table: a real arm only if all its rows are known to be of one."""
+    states = {True if row["fidelity"] is not None else row.get("simulated") for row in rows}
+    return origin_of(True if True in states else None if None in states else False)

@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pc_client.analysis.figures import BLUE, GREEN, ORANGE, PURPLE, RED, SKY, svg_figure
+from pc_client.sweep.columns import origin_of_rows
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -43,7 +44,7 @@ def draw_axis(rows: Rows, axis: str, *, connect: bool) -> str:
     positions = dict(zip(values, values if scale else range(len(values)), strict=True))
     splits = [c for c in ("controller", "fidelity") if c != axis and len(_in_order(rows, c)) > 1]
     groups = list(dict.fromkeys(tuple(row[c] for c in splits) for row in rows))
-    with svg_figure(_WIDTH, 3.2, _simulated(rows)) as (figure, page):
+    with svg_figure(_WIDTH, 3.2, origin_of_rows(rows).mark) as (figure, page):
         axes = figure.add_axes((0.06, 0.2 if scale else 0.27, 0.73, 0.68 if scale else 0.61))
         for kind, colour in zip(_in_order(rows, "kind"), cycle(_COLOURS)):
             for group, (marker, line) in zip(groups, cycle(_STYLES)):
@@ -88,7 +89,7 @@ def draw_map(rows: Rows, x: str, y: str) -> str:
     """
     panels = _in_order(rows, "fidelity")
     xs, ys = _in_order(rows, x), _in_order(rows, y)
-    with svg_figure(_WIDTH, 4.2, _simulated(rows)) as (figure, page):
+    with svg_figure(_WIDTH, 4.2, origin_of_rows(rows).mark) as (figure, page):
         grid = figure.add_gridspec(1, len(panels), left=0.06, right=0.95, bottom=0.14, top=0.86, wspace=0.2)
         for i, panel in enumerate(panels):
             axes = figure.add_subplot(grid[0, i])
@@ -174,7 +175,3 @@ def _in_order(rows: Rows, column: str) -> list[Any]:
     """The values of a column: numbers rising, others as they come."""
     values = list(dict.fromkeys(row[column] for row in rows))
     return sorted(values) if all(isinstance(value, int | float) for value in values) else values
-
-
-def _simulated(rows: Rows) -> bool:
-    return any(row["fidelity"] is not None for row in rows)

@@ -30,6 +30,7 @@ def measure_run(path: Path, stream: StreamReport) -> Row:
     """
     run = analyse_run(load_recording(path))
     figures: dict[str, Value] = {
+        "simulated": run.provenance.simulated,
         "kind": run.provenance.kind,
         "repetition": run.provenance.repetition,
         "snr_db": run.snr.speed_db,

@@ -8,6 +8,7 @@ from importlib import resources
 from typing import Any
 
 from pc_client.control.controller_fields import FIELDS
+from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.ranking import rank_settings, spans_grid, varying
 
 Rows = Sequence[Mapping[str, Any]]
@@ -51,7 +52,7 @@ def render_page(name: str, rows: Rows) -> str:
         axes={axis: len({row[axis] for row in rows}) for axis in axes},
         n_runs=sum(row["status"] == "done" for row in rows),
         n_cases=len({row["case"] for row in rows}),
-        simulated=any(row["fidelity"] is not None for row in rows),
+        origin=origin_of_rows(rows),
         settings=settings[:_MOST_SETTINGS],
         n_settings=len(settings),
         map_figure=_data_uri(figures.draw_map(rows, *pair)) if pair and done else None,

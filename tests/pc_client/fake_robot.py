@@ -12,12 +12,14 @@ from collections import deque
 from types import SimpleNamespace
 
 from pc_client.errors import DriverError
+from protocol.primary_layout import ConfigurationData
 from protocol.primary_messages import (
     ErrorCodeMessage,
     RuntimeExceptionMessage,
     encode_message,
     version_message,
 )
+from protocol.primary_state import encode_state
 from protocol.realtime_layout import SNAPSHOT_FIELDS, layout_for_version
 from protocol.ur_types import Ports, SoftwareVersion
 from protocol.velocity_stream import VelocityMode, decode_velocity, encode_hello
@@ -98,7 +100,9 @@ class FakeRobot:
         self.q = [0.0] * 6
         self.qd = [0.0] * 6
         self.robot_mode, self.safety_mode = 7, 1
-        self.state = None  # what the primary port sends behind its greeting
+        self.serial = "20993000007"  # None: software that does not know the question
+        # What the primary port sends behind its greeting.
+        self.state = encode_state([ConfigurationData()], VERSION)
         self.program = None  # None, "approach", "receiver", "stop"
         self.programs = []
         self.listener = None
@@ -147,9 +151,8 @@ class FakeRobot:
             self.commands.append(decode_velocity(data))
             self.received.append(self.commands[-1])
         elif pipe.kind == "dashboard":
-            answer = {"get serial number": "20993000007", "get robot model": self.model}.get(
-                data.decode().strip()
-            )
+            answers = {"get serial number": self.serial, "get robot model": self.model}
+            answer = answers.get(data.decode().strip())
             if answer:
                 pipe.incoming.append(answer.encode() + b"\n")
 

@@ -163,12 +163,24 @@ def test_report_is_one_page_that_needs_nothing_else(tmp_path: Path) -> None:
     assert again.paths[2].read_text() == html
 
 
+def test_report_of_an_arm_that_may_be_a_real_one_says_so(tmp_path: Path) -> None:
+    record(tmp_path, "lognorm_4_1", 1, simulated=None, seed=None, serial="unknown")
+    report = build_report(tmp_path)
+    mark = "NOT KNOWN whether real or simulated"
+    html = report.paths[2].read_text()
+    assert html.count(mark) >= 3  # title, banner, movement, provenance
+    assert "measured on a real arm" not in html
+    assert all(f"<!-- {mark} -->" in svg for svg in figures_of(html))
+    assert report.table.to_json()["simulated"] is None
+    assert report.table.title == f"Table I: {mark}: UR3 3.15.8, controller preview"
+
+
 def test_report_of_a_real_arm_does_not_say_simulated(tmp_path: Path) -> None:
     record(tmp_path, "lognorm_4_1", 1, simulated=False, seed=None, serial="2016330001")
     html = build_report(tmp_path).paths[2].read_text()
     assert "SIMULATED" not in html
     assert "measured on a real arm" in html
-    assert not any("SIMULATED" in svg for svg in figures_of(html))
+    assert not any("SIMULATED" in svg or "NOT KNOWN" in svg for svg in figures_of(html))
 
 
 def test_names_from_a_recording_cannot_break_the_page(tmp_path: Path) -> None:

@@ -115,6 +115,7 @@ def test_run_records_and_reports(robot, tmp_path, capsys):
     assert "uniform_4_1" in capsys.readouterr().out
     recording = out / "uniform_4_1_r1.mcap"
     assert cli.run(["export", str(recording), "--to", "csv"]) == 0
+    assert "data: SIMULATED" in capsys.readouterr().out
     header, *rows = recording.with_suffix(".csv").read_text().splitlines()
     assert header.startswith("timestamp,")
     assert len(rows) > 500
@@ -198,7 +199,7 @@ def test_doctor_says_ready(robot, capsys):
     assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.5"]) == 0
     out = capsys.readouterr().out
     assert "30003  realtime      open" in out
-    assert "UR3, software 3.15.8, simulated 20993000007" in out
+    assert "UR3, software 3.15.8, serial number 20993000007, SIMULATED" in out
     assert "1140 bytes" in out
     assert "streaming   ready" in out
 

@@ -212,8 +212,6 @@ def test_command_without_a_robot_plans_only(tmp_path, capsys):
 
 
 def test_a_movement_without_a_recording_is_named(sets):
-    another = SimpleNamespace(
-        provenance=SimpleNamespace(cycle_time_s=0.008, simulated=False, robot="UR3", controller="preview")
-    )
+    another = SimpleNamespace(provenance=SimpleNamespace(cycle_time_s=0.008, arm="UR3", controller="preview"))
     with pytest.raises(ClientError, match="no recording of lognormal_4_seed1"):
         build_comparison(sets[:1], {"another": another})

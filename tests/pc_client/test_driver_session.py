@@ -16,10 +16,11 @@ from pc_client.driver.receiver_script import fill_template, receiver_script
 from pc_client.driver.reverse_server import ReverseServer
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
-from protocol.primary_layout import CartesianInfo, ConfigurationData, RobotModeData
+from pc_client.recording.origin import origin_of
+from protocol.primary_layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.primary_messages import TextMessage
 from protocol.primary_state import encode_state
-from protocol.ur_types import RobotType, SoftwareVersion
+from protocol.ur_types import SIMULATED_MASTERBOARD, RobotType, SoftwareVersion
 
 GOAL = [0.1, -1.5, -2.0, 0.2, 1.3, 1.8]
 
@@ -34,7 +35,7 @@ def test_session_says_who_answered():
     with UrDriver("robot", network=robot) as driver:
         assert driver.info.version == SoftwareVersion(3, 15, 8)
         assert driver.info.model == "UR3"
-        assert (driver.info.serial.simulated, driver.info.serial.seed) == (True, 7)
+        assert (driver.info.serial, driver.info.simulated, driver.info.seed) == ("20993000007", True, 7)
         assert driver.info.period == 0.008
         assert driver.layout is LAYOUT
         assert driver.actual_q().tolist() == [0.0] * 6
@@ -44,9 +45,9 @@ def test_session_says_who_answered():
 
 def test_session_without_dashboard_server():
     with UrDriver("robot", network=FakeRobot(has_dashboard=False)) as driver:
-        assert driver.info.model == "unknown"
-        assert driver.info.serial.text == "unknown"
-        assert not driver.info.serial.simulated
+        assert (driver.info.model, driver.info.serial) == ("UR3", "unknown")
+        assert driver.info.simulated is None
+        assert "NOT KNOWN whether real or simulated" in str(driver.info)
 
 
 def test_configuration_data_tell_the_arm_when_the_dashboard_does_not():
@@ -54,6 +55,42 @@ def test_configuration_data_tell_the_arm_when_the_dashboard_does_not():
     robot.state = encode_state([ConfigurationData(robot_type=RobotType.UR10)], SoftwareVersion(3, 4))
     with UrDriver("robot", network=robot) as driver:
         assert driver.info.model == "UR10"
+
+
+V3_11 = SoftwareVersion(3, 11)
+OURS = ConfigurationData(masterboard_version=SIMULATED_MASTERBOARD)
+URSIM = KinematicsInfo()
+CALIBRATED = KinematicsInfo(checksum=(0x1234ABCD,) * 6)
+
+
+@pytest.mark.parametrize(
+    ("serial", "setup", "simulated"),
+    [
+        ("20993000007", [ConfigurationData(), CALIBRATED], True),
+        ("2017355123", [ConfigurationData(), CALIBRATED], False),
+        ("2017355123", [ConfigurationData(), URSIM], True),
+        ("2017355123", [OURS, CALIBRATED], True),
+        ("2017355123", [], None),
+        (None, [OURS, CALIBRATED], True),
+        (None, [ConfigurationData(), URSIM], True),
+        (None, [ConfigurationData(), CALIBRATED], None),
+        (None, [], None),
+    ],
+)
+def test_an_arm_is_real_only_if_that_is_known(serial, setup, simulated):
+    robot = FakeRobot()
+    robot.serial = serial
+    robot.state = encode_state(setup, V3_11)
+    with UrDriver("robot", network=robot) as driver:
+        assert driver.info.simulated is simulated
+        assert origin_of(simulated).name in str(driver.info)
+
+
+def test_an_arm_that_was_built_later_is_unknown():
+    robot = FakeRobot(has_dashboard=False)
+    robot.state = encode_state([ConfigurationData(robot_type=99)], V3_11)
+    with UrDriver("robot", network=robot) as driver:
+        assert driver.info.model == "unknown"
 
 
 def test_software_that_does_not_tell_whether_a_program_runs_is_refused():

@@ -189,14 +189,20 @@ def test_folder_of_another_experiment_is_left_alone(two, tmp_path):
     assert foreign.exists()
 
 
-def test_recordings_of_a_real_arm_are_never_overwritten(two, tmp_path):
+@pytest.mark.parametrize(
+    ("simulated", "words"), [(False, "measured on a real arm"), (None, "NOT KNOWN whether real or simulated")]
+)
+def test_only_recordings_that_are_known_to_be_simulated_are_replaced(two, tmp_path, simulated, words):
     experiment = with_folder(two, tmp_path)
-    real = tmp_path / "uniform_4_1_r2.mcap"
-    with Recorder(real, provenance(simulated=False, serial="2017355123", seed=None), SIGNALS):
+    ours, kept = tmp_path / "uniform_4_1_r1.mcap", tmp_path / "uniform_4_1_r2.mcap"
+    with Recorder(ours, provenance(), SIGNALS), Recorder(kept, provenance(simulated=simulated), SIGNALS):
         pass
-    with pytest.raises(RecordingError, match="real arm"):
+    with pytest.raises(RecordingError, match=words):
         clear_folder(experiment)
-    assert real.exists()
+    assert ours.exists()
+    kept.unlink()
+    clear_folder(experiment)
+    assert not ours.exists()
 
 
 def test_folder_that_cannot_be_made(two, tmp_path):

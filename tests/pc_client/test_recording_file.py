@@ -127,8 +127,11 @@ def test_signals_that_cannot_be_recorded_are_refused(
     assert not (tmp_path / "a.mcap").exists()
 
 
-def test_provenance_of_a_real_arm_has_no_seed(tmp_path: Path) -> None:
-    real = provenance(simulated=False, seed=None, identified_delay_s=None)
+@pytest.mark.parametrize("simulated", [True, False, None])
+def test_provenance_tells_a_real_arm_from_one_that_is_not_known(
+    tmp_path: Path, simulated: bool | None
+) -> None:
+    real = provenance(simulated=simulated, seed=None, identified_delay_s=None)
     with Recorder(tmp_path / "a.mcap", real, SIGNALS) as recorder:
         append_rows(recorder, 1)
     assert load_recording(tmp_path / "a.mcap").provenance == real

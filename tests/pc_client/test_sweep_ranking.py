@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from sweep_samples import case, invented
 
 from pc_client.control.controller_config import CONTROLLERS
+from pc_client.recording.origin import origin_of
+from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.folder import table_rows
 from pc_client.sweep.outcome import failed
 from pc_client.sweep.page import map_axes
@@ -54,6 +56,20 @@ def test_a_setting_with_a_case_missing_stands_below_all_complete_ones():
 def test_without_anything_to_compare_the_controller_is_named():
     (setting,) = rank_settings(rows_of(case(), case("lognorm_4_1")))
     assert setting.name == "controller = preview"
+
+
+@pytest.mark.parametrize(
+    ("own", "states", "simulated"),
+    [
+        (True, [None], True),  # a box of the sweep's own, whatever came of the case
+        (False, [True, False], True),
+        (False, [None, False], None),
+        (False, [False, False], False),
+    ],
+)
+def test_a_table_is_of_a_real_arm_only_if_every_row_is(own, states, simulated):
+    rows = [{"fidelity": "typical" if own else None, "simulated": state} for state in states]
+    assert origin_of_rows(rows) is origin_of(simulated)
 
 
 def test_axes_are_what_varies():

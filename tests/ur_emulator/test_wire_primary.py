@@ -19,7 +19,7 @@ from protocol.primary_packages import (
     state_size,
 )
 from protocol.primary_program import ProgramStateMessage
-from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
+from protocol.ur_types import SIMULATED_MASTERBOARD, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.controller import commands as cmd
 from ur_emulator.controller import events
 from ur_emulator.controller import safety_commands as safe
@@ -105,6 +105,14 @@ def test_the_greeting_of_every_version(version):
         assert all(isinstance(package, ProgramStateMessage) for package, _ in rest)
         assert bool(rest) == is_primary
         assert state_size(version, first=True) < 2000  # python-urx holds no longer ones
+
+
+@pytest.mark.parametrize("version", VERSIONS, ids=str)
+def test_the_box_marks_itself_in_every_version(version):
+    bench = PortBench(version)
+    for port in bench.ports:
+        (state,) = (package for package, _ in Client(port).take(version) if isinstance(package, RobotState))
+        assert state.find(L.ConfigurationData).masterboard_version == SIMULATED_MASTERBOARD
 
 
 @pytest.mark.parametrize("version", [SoftwareVersion(3, 0), SoftwareVersion(3, 4), V3_15], ids=str)

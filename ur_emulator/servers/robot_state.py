@@ -24,7 +24,14 @@ from protocol.primary_layout import (
 )
 from protocol.primary_packages import encode_state
 from protocol.rtde_types import RobotStatusBits
-from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode, SoftwareVersion
+from protocol.ur_types import (
+    SIMULATED_MASTERBOARD,
+    ControlMode,
+    ProgramState,
+    RobotMode,
+    SafetyMode,
+    SoftwareVersion,
+)
 from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety_modes import EMERGENCY_MODES, MOVING_MODES
@@ -201,6 +208,7 @@ def setup_records(
             dh_d=tuple(row.d for row in robot.dh),
             dh_alpha=tuple(row.alpha for row in robot.dh),
             dh_theta=tuple(row.theta for row in robot.dh),
+            masterboard_version=SIMULATED_MASTERBOARD,
             controller_box_type=robot.box_type,
             robot_type=robot.robot_type,
             robot_sub_type=robot.robot_subtype,

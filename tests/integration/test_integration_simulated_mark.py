@@ -1,0 +1,27 @@
+"""Data of a box are marked as simulated with every software, from the connection to the page."""
+
+import json
+
+import pytest
+from integration_support import at, free_port_base
+
+from pc_client.recording.loader import load_recording
+from ur_emulator import ControlBox
+
+
+@pytest.mark.parametrize("version", ["3.2.0", "3.11.0"])  # no serial number before 3.12
+def test_a_box_that_tells_no_serial_number_is_simulated_and_may_be_run_again(ur_client, tmp_path, version):
+    out = tmp_path / "out"
+    with ControlBox(pace="lockstep", port_base=free_port_base(), seed=7, version=version) as box:
+        doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
+        assert f"UR3, software {version}, serial number unknown, SIMULATED" in doctor.out
+        for _ in range(2):
+            done = ur_client("run", "uniform_4_1", *at(box), "--out", out)
+            assert done.code == 0, done.err
+    assert "Table I: SIMULATED UR3" in done.out
+    provenance = load_recording(out / "uniform_4_1_r1.mcap").provenance
+    assert (provenance.simulated, provenance.serial, provenance.seed) == (True, "unknown", None)
+    assert json.loads((out / "table1.json").read_text())["simulated"] is True
+    page = (out / "report.html").read_text()
+    assert "SIMULATED: an emulated arm, no real robot moved" in page
+    assert "measured on a real arm" not in page
