@@ -6,11 +6,9 @@ same recordings give the same page. The plotting libraries are loaded only when 
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,6 +16,7 @@ from rich.console import Console
 from rich.progress import track as progress
 
 from pc_client.analysis.budget import PARTS, SPLIT_HZ
+from pc_client.analysis.page import data_uri, render
 from pc_client.analysis.run import Run, analyse_run
 from pc_client.analysis.table import KINDS, Row, Table, build_table
 from pc_client.errors import RecordingError
@@ -25,7 +24,7 @@ from pc_client.recording.loader import Recording, load_recording
 from protocol.ur_types import JOINT_NAMES
 
 TABLE_JSON, TABLE_MARKDOWN, REPORT_HTML = "table1.json", "table1.md", "report.html"
-_TEMPLATE = "report.html.j2"
+_TEMPLATE = "analysis/report.html.j2"
 _T = TypeVar("_T")
 
 
@@ -92,25 +91,19 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         RecordingError: matplotlib or jinja2 is not installed.
     """
     try:
-        from jinja2 import Environment, StrictUndefined
+        import jinja2  # noqa: F401 - what is missing is said before anything is drawn
 
         from pc_client.analysis import figures
     except ImportError as error:
         raise RecordingError(
             f"the report needs {error.name}; install it with: pip install 'ur-hil[report]'"
         ) from error
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters["db"] = _decibels
-    template = environment.from_string(
-        resources.files("pc_client.analysis").joinpath(_TEMPLATE).read_text(encoding="utf-8")
-    )
     movements = [
-        {"row": row, "figure": _data_uri(figures.draw_movement(row)), "parts": _parts(row)}
+        {"row": row, "figure": data_uri(figures.draw_movement(row)), "parts": _parts(row)}
         for row in _shown(table.rows, "drawing", console)
     ]
-    return template.render(
+    return render(
+        _TEMPLATE,
         table=table,
         groups=[(kind, rows) for kind in _kinds(table) if (rows := table.rows_of(kind))],
         n_runs=max(len(row.runs) for row in table.rows),
@@ -118,9 +111,9 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         part_names=PARTS,
         split_hz=SPLIT_HZ,
         joint_names=JOINT_NAMES,
-        table_figure=_data_uri(figures.draw_table(table)),
-        definitions_figure=_data_uri(figures.draw_definitions(table)),
-        budget_figure=_data_uri(figures.draw_budget(table)),
+        table_figure=data_uri(figures.draw_table(table)),
+        definitions_figure=data_uri(figures.draw_definitions(table)),
+        budget_figure=data_uri(figures.draw_budget(table)),
         provenance=_provenance_facts(table),
         learned=_learned(table),
         left_out=list(left_out),
@@ -212,15 +205,6 @@ def _learned(table: Table) -> str:
     runs = [run for row in table.rows for run in row.runs]
     learned = sum(bool(run.recording.summary.get("learned_from")) for run in runs)
     return f"{learned} of {len(runs)}" if learned else ""
-
-
-def _data_uri(svg: str) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode()
-
-
-def _decibels(value: float | None) -> str:
-    """Format a level; one that is beyond all measure (no error at all) is a dash."""
-    return "–" if value is None or not -200.0 < value < 200.0 else f"{value:.1f}"
 
 
 def _shown(items: Iterable[_T], what: str, console: Console | None) -> Iterable[_T]:

@@ -37,6 +37,9 @@ PAPER_SNR_DB = {
 }
 KINDS = ("uniform", "lognormal")
 
+SHARED = "paper: its points are not published; rows share name, kind and number of targets only"
+"""Why no differences are given."""
+
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -68,11 +71,6 @@ class Row:
     def paper_snr_db(self) -> float | None:
         """The paper's figure, or None when the paper did not run this movement."""
         return PAPER_SNR_DB.get(self.name)
-
-    @property
-    def difference_db(self) -> float | None:
-        """Ours less the paper's."""
-        return None if self.paper_snr_db is None else self.mean_snr_db - self.paper_snr_db
 
     @property
     def unrepeatable_db(self) -> float | None:
@@ -163,14 +161,15 @@ class Table:
             *["| " + " | ".join(row) + " |" for row in rows],
             "",
             "floor: SNR that the noise of the arm's encoders at rest alone would leave a perfect arm.",
+            "",
+            SHARED,
         ]
         return "\n".join(lines) + "\n"
 
     def to_rich(self) -> RichTable:
         """Return the table for the terminal."""
         columns, rows = self._cells()
-        caption = "SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed"
-        caption = "SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed"
+        caption = f"SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed\n{SHARED}"
         table = RichTable(title=self.title, caption=caption, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for i, column in enumerate(columns):
             heading = Text(column.replace(" [", "\n["))
@@ -199,19 +198,16 @@ class Table:
         """Return headings and texts; the mean of a kind follows its rows."""
         n_runs = max((len(row.runs) for row in self.rows), default=0)
         repetitions = [f"r{k}" for k in range(1, n_runs + 1)]
-        columns = ["movement", *repetitions, "mean", "paper", "diff", "floor", "error [mm]", "lag [ms]"]
+        columns = ["movement", *repetitions, "mean", "paper", "floor", "error [mm]", "lag [ms]"]
         rows = []
         for kind, group in groupby(self.rows, key=lambda row: row.kind):
             for row in group:
                 figures = [f"{v:.2f}" for v in row.snr_db] + [""] * (n_runs - len(row.runs))
-                compared = _compare(row.mean_snr_db, row.paper_snr_db)
-                floor = "" if row.noise_floor_db is None else f"{row.noise_floor_db:.2f}"
-                errors = [floor, f"{row.max_position_error_mm:.2f}", f"{row.lag_ms:.1f}"]
-                rows.append([row.name, *figures, *compared, *errors])
-            mean = self.mean_of(kind)
-            assert mean is not None  # the group has at least one row
-            compared = _compare(mean, self.paper_mean_of(kind))
-            rows.append([f"mean {kind}", *[""] * n_runs, *compared, "", "", ""])
+                levels = map(_decibels, (row.mean_snr_db, row.paper_snr_db, row.noise_floor_db))
+                errors = [f"{row.max_position_error_mm:.2f}", f"{row.lag_ms:.1f}"]
+                rows.append([row.name, *figures, *levels, *errors])
+            means = map(_decibels, (self.mean_of(kind), self.paper_mean_of(kind)))
+            rows.append([f"mean {kind}", *[""] * n_runs, *means, "", "", ""])
         return columns, rows
 
 
@@ -257,11 +253,9 @@ def _rank(run: Run) -> tuple[int, str, int, str]:
     )
 
 
-def _compare(ours: float, paper: float | None) -> list[str]:
-    """Return the cells mean, paper, difference."""
-    if paper is None:
-        return [f"{ours:.2f}", "", ""]
-    return [f"{ours:.2f}", f"{paper:.2f}", f"{ours - paper:+.2f}"]
+def _decibels(value: float | None) -> str:
+    """Return a cell; empty where there is no figure."""
+    return "" if value is None else f"{value:.2f}"
 
 
 def _number(value: float) -> float | None:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from typing import Any
 
+from pc_client.analysis.page import data_uri, render
 from pc_client.control.controller_fields import FIELDS
 from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.ranking import rank_settings, spans_grid, varying
 
 Rows = Sequence[Mapping[str, Any]]
 
-_TEMPLATE = "sweep.html.j2"
+_TEMPLATE = "sweep/sweep.html.j2"
 _MOST_SETTINGS = 25
 """Settings in the ranking; the table has all."""
 
@@ -30,16 +29,8 @@ def render_page(name: str, rows: Rows) -> str:
     Raises:
         ModuleNotFoundError: matplotlib or jinja2 is not installed (extra `report`).
     """
-    from jinja2 import Environment, StrictUndefined
-
     from pc_client.sweep import figures
 
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    template = environment.from_string(
-        resources.files("pc_client.sweep").joinpath(_TEMPLATE).read_text(encoding="utf-8")
-    )
     axes = varying(rows)
     done = [row for row in rows if row["status"] == "done" and row["snr_db"] is not None]
     pair = map_axes(rows)
@@ -47,7 +38,8 @@ def render_page(name: str, rows: Rows) -> str:
     connect = spans_grid(rows)
     # Repetitions are no axis of the sweep, but a controller may learn from one to the next.
     plotted = [axis for axis in (*axes, "repetition") if len({row[axis] for row in done}) > 1]
-    return template.render(
+    return render(
+        _TEMPLATE,
         name=name,
         axes={axis: len({row[axis] for row in rows}) for axis in axes},
         n_runs=sum(row["status"] == "done" for row in rows),
@@ -55,9 +47,9 @@ def render_page(name: str, rows: Rows) -> str:
         origin=origin_of_rows(rows),
         settings=settings[:_MOST_SETTINGS],
         n_settings=len(settings),
-        map_figure=_data_uri(figures.draw_map(rows, *pair)) if pair and done else None,
+        map_figure=data_uri(figures.draw_map(rows, *pair)) if pair and done else None,
         axis_figures=[
-            (axis, _data_uri(figures.draw_axis(done, axis, connect=connect or axis == "repetition")))
+            (axis, data_uri(figures.draw_axis(done, axis, connect=connect or axis == "repetition")))
             for axis in plotted
         ],
         not_done=[row for row in rows if row["status"] != "done"][:_MOST_ERRORS],
@@ -70,7 +62,3 @@ def map_axes(rows: Rows) -> tuple[str, str] | None:
     numbers = [axis for axis in varying(rows) if axis in FIELDS and FIELDS[axis].kind is float]
     numbers.sort(key=lambda axis: axis not in ("gain_p", "gain_i"))
     return (numbers[0], numbers[1]) if len(numbers) > 1 else None
-
-
-def _data_uri(svg: str) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode()

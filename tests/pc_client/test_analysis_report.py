@@ -118,7 +118,7 @@ def test_terminal_table_fits_eighty_columns(table: Table) -> None:
     assert "…" not in text
     assert "[mm]" in text
     assert "SIMULATED" in text
-    assert f"{table.rows[0].difference_db:+.2f}" in text
+    assert not re.search(r"[+]\d", text)  # no differences: the points are not the paper's
 
 
 @pytest.mark.parametrize(
