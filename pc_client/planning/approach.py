@@ -1,7 +1,7 @@
 """The slow way from where the arm is to where a plan begins.
 
-A movej of the control box moves all joints on a straight line in joint space, whatever stands there; so the
-line is checked here, posture by posture, before it is asked for. Two rules keep it short and harmless: of the
+All joints move together on a straight line in joint space, whatever stands there; so the line is checked
+here, posture by posture, before the arm moves. Two rules keep it short and harmless: of the
 start postures that differ by whole turns the nearest is taken (the plan is shifted to match), and when the
 direct line is not clear, ways by raised postures are tried: up, turn, and down.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise, product
-from math import pi, sqrt
+from math import pi
 from types import MappingProxyType
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from pc_client.errors import PlanningError
 from pc_client.kinematics.clearance import ClearanceModel, clearance_model
 from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.planning.joint_lines import JointLines
 from pc_client.planning.plan import JointPlan
 from protocol.ur_types import JOINT_NAMES
 
@@ -51,10 +52,9 @@ class Approach:
     Attributes:
         plan: the plan to run afterwards, shifted by whole turns to begin where the way ends.
         q_from: (6,) joint angles where the way begins [rad].
-        waypoints: one movej each, resting in between; the last is `plan.start_q` [rad].
-        v: speed of the leading joint for movej [rad/s].
-        a: acceleration of the leading joint for movej [rad/s²].
-        duration: expected time of all movej together [s].
+        waypoints: a straight joint line to each, resting in between; the last is `plan.start_q` [rad].
+        v: speed of the leading joint [rad/s].
+        a: acceleration of the leading joint [rad/s²].
         floor_clearance: least distance from the base plane on the way [m].
         own_clearance: least distance of the arm from itself on the way [m].
     """
@@ -64,9 +64,18 @@ class Approach:
     waypoints: tuple[Array, ...] = field(repr=False)
     v: float
     a: float
-    duration: float
     floor_clearance: float
     own_clearance: float
+
+    @property
+    def motion(self) -> JointLines:
+        """The way over time."""
+        return JointLines((self.q_from, *self.waypoints), self.v, self.a)
+
+    @property
+    def duration(self) -> float:
+        """How long the way takes [s]."""
+        return self.motion.duration
 
 
 def plan_approach(
@@ -105,23 +114,9 @@ def plan_approach(
             if isinstance(clearance, PlanningError):
                 refusals.append(clearance)
                 continue
-            duration = sum(movej_duration(begin, end, v, a) for begin, end in pairwise((q_from, *waypoints)))
-            return Approach(start, q_from, waypoints, v, a, duration, *clearance)
+            return Approach(start, q_from, waypoints, v, a, *clearance)
     # The direct way tells best what is wrong.
     raise refusals[0]
-
-
-def movej_duration(q_from: ArrayLike, q_to: ArrayLike, v: float, a: float) -> float:
-    """Return the time of a movej with a trapezoid of speed for the leading joint [s].
-
-    Args:
-        q_from: (6,) begin [rad].
-        q_to: (6,) end [rad].
-        v: speed of the leading joint [rad/s].
-        a: its acceleration [rad/s²].
-    """
-    way = float(np.abs(np.subtract(q_to, q_from)).max())
-    return way / v + v / a if way >= v * v / a else 2.0 * sqrt(way / a)
 
 
 def _refuse_arguments(plan: JointPlan, arm: RobotModel, q_from: Array, v: float, a: float) -> None:
