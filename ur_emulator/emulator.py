@@ -18,6 +18,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, Unpack
 
+from protocol.errors import LocalProtocolError
+from protocol.primary_messages import ReportLevel
 from protocol.ur_types import Ports, RobotMode, SoftwareVersion, simulated_serial
 from ur_emulator.box_log import LogEntry
 from ur_emulator.control.box_operations import BoxOperations
@@ -33,6 +35,7 @@ from ur_emulator.realtime.loop_runner import LoopRunner
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.servers.box_access import BUILD, BoxAccess, BoxIdentity
+from ur_emulator.servers.box_reports import BoxReports
 from ur_emulator.servers.dashboard_answers import DashboardAnswers
 from ur_emulator.servers.dashboard_port import DashboardPort
 from ur_emulator.servers.modbus_loading import CodecLoader
@@ -65,6 +68,7 @@ class ControlBox(BoxOperations):
         port_base: what was added to the standard ones.
         serial_number: as the dashboard gives it; simulated boxes are recognisable by it.
         is_shut_down: a dashboard client has switched the box off: its ports are closed.
+        failure: the error that has ended this box of a rack, None while it runs.
     """
 
     def __init__(
@@ -121,7 +125,7 @@ class ControlBox(BoxOperations):
             )
         self.host = host
         self.port_base = port_base or 0
-        self.ports = Ports.standard(self.port_base)
+        self.ports = _standard_ports(self.port_base)
         self.serial_number = simulated_serial(model.robot_type, seed)
         self._free_ports = port_base is None
         self._owns_loop = loop is None
@@ -138,6 +142,7 @@ class ControlBox(BoxOperations):
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         desk = ProgramDesk(self._access, ProgramFolder(None if programs is None else Path(programs)))
+        self._reports = BoxReports(desk.folder)
         states = StateEncoder(software, controller.state.arm)
         # In the order in which they hear of a cycle: first those whose clients act on it.
         ports: dict[str, ServedPort] = {
@@ -149,7 +154,7 @@ class ControlBox(BoxOperations):
             "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
             "dashboard": DashboardPort(
                 self._access,
-                DashboardAnswers(self._access, desk, self._shut_down),
+                DashboardAnswers(self._access, desk, self._reports, self._shut_down),
             ),
             "modbus": ModbusPort(controller, self._box.submit, modbus),
             "realtime_ro": RealtimePort(software, None),
@@ -175,6 +180,7 @@ class ControlBox(BoxOperations):
             ports[CONTROL] = ControlPort(self._desk, host)
         self._port_set = PortSet(self._loop, host, self._box, ports)
         self.is_shut_down = False
+        self.failure: Exception | None = None
         self.on_shut_down: Callable[[], None] = self._loop.stop if self._owns_loop else self.close
 
     @staticmethod
@@ -287,6 +293,17 @@ class ControlBox(BoxOperations):
         self.is_shut_down = True
         self._loop.call_soon_threadsafe(self.on_shut_down)
 
+    def fail_alone(self, then: Callable[[], None]) -> None:
+        """Let an error in a cycle end this box and not the loop, for a rack; `then` is called afterwards."""
+
+        def note(error: Exception) -> None:
+            self.failure = error
+            text = f"the box has ended: {type(error).__name__}: {error}"
+            self._box.log.write(self._access.snapshot.tick, "Controller", text, ReportLevel.FAULT)
+            then()
+
+        self._box.on_failure = note
+
     def _must_be_alone(self) -> None:
         if not self._owns_loop:
             raise EmulatorError("this box is one of several in a rack: start the rack, it runs them all")
@@ -297,6 +314,7 @@ class ControlBox(BoxOperations):
         self._desk.close()
         self._intake.close()
         self._access.close()
+        self._reports.close()
         self._network.close()
         self._port_set.close()
         if self._owns_loop:
@@ -313,6 +331,13 @@ def _parse_version(text: str) -> SoftwareVersion:
             f"version {text} given: this box is a CB3, its software is 3.x, for example {DEFAULT_VERSION}"
         )
     return version
+
+
+def _standard_ports(base: int) -> Ports:
+    try:
+        return Ports.standard(base)
+    except LocalProtocolError as error:
+        raise EmulatorError(str(error)) from None
 
 
 def _parse_pace(pace: str | Pace) -> Pace:

@@ -7,7 +7,8 @@
     with BoxRack([{"host": "127.0.0.2"}, {"host": "127.0.0.3", "fidelity": "poor"}]) as boxes:
         ...
 
-The boxes know nothing of each other. In real time they take turns: their cycles are spread over the period.
+The boxes know nothing of each other; an error ends the box in which it came up, the
+others go on. In real time they take turns: their cycles are spread over the period.
 """
 
 from __future__ import annotations
@@ -69,7 +70,8 @@ class BoxRack(Sequence[ControlBox]):
             self._loop.close()
             raise
         for box in self._boxes:
-            box.on_shut_down = partial(self._shut_down, box)
+            box.on_shut_down = partial(self._end, box)
+            box.fail_alone(partial(self._end, box))
 
     @overload
     def __getitem__(self, index: int) -> ControlBox: ...
@@ -95,8 +97,14 @@ class BoxRack(Sequence[ControlBox]):
             raise
 
     def serve_forever(self) -> None:
-        """Run in the calling thread until `stop`; the ports must be open."""
+        """Run in the calling thread until `stop`; the ports must be open.
+
+        An error that ended one of the boxes is raised after the others have ended.
+        """
         self._runner.run()
+        failure = self._failure_of_a_box()
+        if failure is not None:
+            raise failure
 
     def stop(self) -> None:
         """Let the loop end, from any thread."""
@@ -111,15 +119,18 @@ class BoxRack(Sequence[ControlBox]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the loop; an error that ended it earlier is raised here."""
-        failure = self._runner.finish()
+        """End the loop; an error that ended it or one of the boxes earlier is raised here."""
+        failure = self._runner.finish() or self._failure_of_a_box()
         if failure is not None and error is None:
             raise failure
 
-    def _shut_down(self, box: ControlBox) -> None:
-        """Close a box that was switched off; after the last one the rack has nothing to do."""
+    def _failure_of_a_box(self) -> Exception | None:
+        return next((box.failure for box in self._boxes if box.failure is not None), None)
+
+    def _end(self, box: ControlBox) -> None:
+        """Close a box that was switched off or has failed; after the last one the rack has nothing to do."""
         box.close()
-        if all(other.is_shut_down for other in self._boxes):
+        if all(other.is_shut_down or other.failure is not None for other in self._boxes):
             self.stop()
 
     def _close(self) -> None:

@@ -135,6 +135,11 @@ def is_number(value: Any) -> bool:
     return kind is float or kind is int or (isinstance(value, (int, float)) and not isinstance(value, bool))
 
 
+def script_text(text: str) -> str:
+    """A text from outside as scripts have it: one character for each byte of its UTF-8 form."""
+    return text.encode("utf-8", "replace").decode("latin-1")
+
+
 def wrap_int(value: int) -> int:
     """`value` folded into 32 bits, two's complement (see `dialect.INT_OVERFLOW`)."""
     if dialect.INT_OVERFLOW == "error" and not INT_MIN <= value <= INT_MAX:

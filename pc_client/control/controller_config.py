@@ -100,6 +100,21 @@ _PREVIEW = ControllerConfig(
 # it has little left to do.
 _BEST = replace(_PREVIEW, name="best", compensates_lag=True, compensates_gear=True, learns=True)
 
+# Of the way to a start, before anything is known of the loop: feedback that is stable with a delay of up to
+# 300 ms (pi/2T), slow, and soon at its end where the arm does not follow. Not for movements, so it has no
+# place in the table.
+APPROACH = ControllerConfig(
+    name="approach",
+    gain_p=5.0,
+    gain_i=0.0,
+    looks_ahead=False,
+    speedj_acceleration=5.0,
+    slew_limit=5.0,
+    integral_limit=0.0,
+    speed_share=0.3,
+    abort_error=0.05,
+)
+
 CONTROLLERS = MappingProxyType({config.name: config for config in (_PAPER, _PREVIEW, _BEST)})
 
 

@@ -7,9 +7,9 @@ dashboard_query  questions to the dashboard server, port 29999
 robot_info       which robot answers: firmware, serial number, simulated, real or not known
 watchdog         what a frame must say for the arm to go on moving
 receiver_script  the program that runs on the robot, filled in
-approach_script  the programs that move to a posture and that stop the arm
+stop_script      the program that stops the arm when the receiver does not
 reverse_server   waits for the robot's program to dial back
 velocity_stream  the control loop: one frame in, one command out
 probe            what answers at an address, for `doctor`
-ur_driver        a session with one robot: connect, move, stream, always stop
+ur_driver        a session with one robot: connect, stream, always stop
 """

@@ -1,12 +1,13 @@
-"""A session with one robot: connect, move to a posture, stream, and always leave the arm stopped.
+"""A session with one robot: connect, stream, and always leave the arm stopped.
 
-Works by the real protocol only. Every way out of a motion (done, refused, Ctrl-C, lost robot) goes through
+Works by the real protocol only. Whatever moves the arm is streamed, so that the program on the robot stops it
+when we fall silent. Every way out of a motion (done, refused, Ctrl-C, lost robot) goes through
 `stop`: first the stop word to the program, then a program of our own that stops the arm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
 from typing import Self
@@ -15,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.control.tracker import Tracker
-from pc_client.driver.approach_script import STOP_WORD, approach_script, stop_script
 from pc_client.driver.package_stream import PackageStream, raise_on_error
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import receiver_script
 from pc_client.driver.reverse_server import ReverseServer
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
+from pc_client.driver.stop_script import STOP_WORD, stop_script
 from pc_client.driver.transport import Network, TcpNetwork, Transport
 from pc_client.driver.velocity_stream import RowSink, StreamReport, VelocityStream, collector_paused
 from pc_client.driver.waiting import REST_TIMEOUT, wait_for_rest, wait_until
@@ -34,19 +35,8 @@ CONNECT_TIMEOUT = 5.0
 START_TIMEOUT = 5.0
 """A program that does not show as running within this [s] was not accepted."""
 
-_ARRIVAL_TOLERANCE = 5e-3
-"""Largest distance of a joint from the posture after an approach [rad]; a blocked arm is far off."""
-
-_NO_MOVE = 1e-4
-"""A way shorter than this [rad] is no way: its program would be over before a frame shows it running."""
-
-_APPROACH_RESERVE = 10.0
-"""An approach may take this many seconds longer than computed."""
-
-
 _NEEDED_COLUMNS = (
     "timestamp",
-    "target_q",
     "actual_q",
     "actual_qd",
     "robot_mode",
@@ -133,38 +123,6 @@ class UrDriver:
         check_idle(frame)
         return frame
 
-    def move_to(self, q: Sequence[float], *, speed: float, acceleration: float, expected: float) -> None:
-        """Move the joints straight to a posture and wait until the arm rests there.
-
-        The way must have been checked by the caller (`planning.approach`).
-
-        Args:
-            q: (6,) where to [rad].
-            speed: of the joint with the longest way [rad/s].
-            acceleration: of the same joint [rad/s2].
-            expected: how long it should take [s]; much longer is an error.
-
-        Raises:
-            RobotStoppedError: the robot stopped or refused the program.
-            DriverError: the arm did not arrive, or the connection broke.
-        """
-        text = approach_script(q, speed, acceleration)
-        goal = np.asarray(q, dtype=np.float64)
-        if np.abs(self.check_ready().target_q - goal).max() < _NO_MOVE:
-            return
-        with _AlwaysStopped(self, None):
-            self._start(text)
-            limit = expected + _APPROACH_RESERVE
-            self._wait(is_stopped, limit, f"the approach did not end within {limit:.0f} s")
-            at_rest = wait_for_rest(self._frames, self._network)
-        error = float(np.abs(at_rest.actual_q - goal).max())
-        if not error <= _ARRIVAL_TOLERANCE:
-            self._raise_robot_errors()
-            raise DriverError(
-                f"the arm is {error:.4f} rad away from the posture it was sent to, allowed is "
-                f"{_ARRIVAL_TOLERANCE} rad: is it blocked?"
-            )
-
     def stream(self, tracker: Tracker, on_row: RowSink, *, acceleration: float) -> StreamReport:
         """Run one reference: start the receiver program, stream, stop, wait for rest.
 
@@ -184,8 +142,8 @@ class UrDriver:
         server = ReverseServer(self._network, self._frames.local_address, self._frames.robot_address)
         reverse: Transport | None = None
         try:
-            with _AlwaysStopped(self, None) as guard:
-                self._send(receiver_script(server.address, server.port, acceleration=acceleration))
+            with _AlwaysStopped(self) as guard:
+                self._start(receiver_script(server.address, server.port, acceleration=acceleration))
                 reverse = server.accept_program(self._look_after)
                 guard.reverse = reverse
                 stream = VelocityStream(
@@ -274,17 +232,13 @@ class UrDriver:
                 "streaming needs 3.2 or later"
             )
 
-    def _send(self, text: str) -> None:
-        """Send a program; what was reported before it is of no interest any more."""
+    def _start(self, text: str) -> None:
+        """Send a program and wait until it shows as running; what was reported before is of no interest."""
+        self._frames.drain()
         self._primary.poll()
         self._scripts.poll()
         self._program = text
         self._scripts.send_program(text)
-
-    def _start(self, text: str) -> None:
-        """Send a program and wait until it shows as running."""
-        self._frames.drain()
-        self._send(text)
         self._wait(
             lambda frame: not is_stopped(frame),
             START_TIMEOUT,
@@ -316,9 +270,9 @@ class UrDriver:
 class _AlwaysStopped:
     """Stops the arm when the block is left by an exception of any kind, Ctrl-C included."""
 
-    def __init__(self, driver: UrDriver, reverse: Transport | None) -> None:
+    def __init__(self, driver: UrDriver) -> None:
         self._driver = driver
-        self.reverse = reverse
+        self.reverse: Transport | None = None
 
     def __enter__(self) -> Self:
         self._driver._in_motion = True

@@ -2,6 +2,8 @@
 
 Paced by frames alone. A heartbeat (repeated time stamp) is neither answered nor logged; when several new
 frames wait, we were late: all are logged, the newest is answered. So at most one command is on its way.
+Where we were silent for so long that the robot's program has given us up, the run is over: what the arm does
+next is not decided on frames from before.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from dataclasses import dataclass
 
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.realtime_client import RealtimeClient
+from pc_client.driver.receiver_script import READ_TIMEOUT
 from pc_client.driver.transport import Network, Transport
 from pc_client.driver.watchdog import check_streaming
 from pc_client.errors import DriverError
@@ -21,9 +24,6 @@ from protocol.velocity_stream import VelocityMode, encode_velocity
 
 RowSink = Callable[[RealtimeFrame, TrackerStep], None]
 """Takes every new frame with what the tracker made of it."""
-
-LONGEST_GAP = 0.25
-"""A hole in the time stamps longer than this [s] ends the run; by then the program has stopped the arm."""
 
 LONGEST_STANDSTILL = 5.0
 """Seconds of our clock that the robot's time may stand still: a command must have been lost."""
@@ -95,7 +95,7 @@ class VelocityStream:
 
         Raises:
             RobotStoppedError: safety stop, or the program ended.
-            DriverError: lost frames, closed sockets, a command that is not safe to send.
+            DriverError: silence of either side, closed sockets, a command that is not safe to send.
         """
         report = StreamReport()
         frame = self._wait_for_trigger(report)
@@ -109,7 +109,11 @@ class VelocityStream:
             if step.finished:
                 break
             check_command(step.qd_cmd, limits)
-            send(encode_velocity(VelocityMode.VELOCITY, step.qd_cmd))
+            try:
+                send(encode_velocity(VelocityMode.VELOCITY, step.qd_cmd))
+            except DriverError:
+                self._check_waiting(stamp)  # what the robot says tells more than that the connection is gone
+                raise
             on_row(frame, step)
             report.n_commands += 1
             if report.n_commands % _HOUSEKEEPING == 0:
@@ -121,12 +125,15 @@ class VelocityStream:
                 report.heartbeats += arrival.n_heartbeats
                 if not new:
                     new = self._wait_for_new(report)
+            if len(new) > 1 and (waiting := self._frames.drain()) is not None:
+                new = new + waiting.new
             last_stamp = self._count_gaps(new, last_stamp, report)
             if len(new) > 1:
                 report.late_frames += len(new) - 1
                 for late in new[:-1]:
                     on_row(late, tracker.observe(late.timestamp))
             frame = new[-1]
+            _check_silence(stamp, last_stamp)
         self.send_stop()
         report.robot_time = last_stamp - first_stamp
         report.wall_time = self._network.now() - began
@@ -171,20 +178,41 @@ class VelocityStream:
                     f"the robot's time has stood still for {LONGEST_STANDSTILL:g} s although it has a command"
                 )
 
+    def _check_waiting(self, answered: float) -> None:
+        """Look for the reason of a broken connection in the frames that wait; raise it if there is one."""
+        waiting = self._frames.drain()
+        if waiting is not None:
+            _check_silence(answered, waiting.latest.timestamp)
+            check_streaming(waiting.latest)
+
     def _count_gaps(self, new: list[RealtimeFrame], last_stamp: float, report: StreamReport) -> float:
         """Count the cycles that are missing; returns the newest stamp."""
         for frame in new:
             stamp = frame.timestamp
             gap = stamp - last_stamp
-            if gap > 1.5 * self._period or gap < 0.0:
-                if not 0.0 < gap <= LONGEST_GAP:
-                    raise DriverError(
-                        f"the robot's frames jump from {last_stamp:.3f} s to {stamp:.3f} s: "
-                        "the stream is broken"
-                    )
+            if gap <= 0.0:
+                raise DriverError(
+                    f"the robot's frames jump back from {last_stamp:.3f} s to {stamp:.3f} s: "
+                    "the stream is broken"
+                )
+            if gap > 1.5 * self._period:
                 report.lost_frames += round(gap / self._period) - 1
             last_stamp = stamp
         return last_stamp
+
+
+def _check_silence(answered: float, newest: float) -> None:
+    """Refuse to go on when the robot had no command for so long that its program has ended.
+
+    Args:
+        answered: time stamp of the last frame that was answered [s].
+        newest: time stamp of the newest frame [s].
+    """
+    if newest - answered > READ_TIMEOUT:
+        raise DriverError(
+            f"the robot had no command for {newest - answered:.2f} s, allowed is {READ_TIMEOUT} s: "
+            "this computer or the network stood still; the robot's program has stopped the arm"
+        )
 
 
 @contextmanager

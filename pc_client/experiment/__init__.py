@@ -2,6 +2,7 @@
 
     prepare         plan all movements and look at the folder, before anything moves
     preflight       what a bystander must know and agree to, before a real arm moves
+    approach_run    the slow way to a start, streamed like everything that moves the arm
     identification  the loop of this session, and the margins on it
     repetitions     what runs of one movement hand on, and when it may be used
     command_check   the last look at a whole run of commands, before it is sent

@@ -17,12 +17,13 @@ from pc_client.control.state_estimate import StateEstimator
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
+from pc_client.experiment.approach_run import run_approach
 from pc_client.experiment.identification import Identification, identify
 from pc_client.experiment.observer import Observer, Silent
 from pc_client.experiment.preflight import check_model
 from pc_client.experiment.prepare import Experiment, PlannedMovement, clear_folder
 from pc_client.experiment.repetitions import Repetitions, RunLog
-from pc_client.planning.approach import Approach, plan_approach
+from pc_client.planning.approach import plan_approach
 from pc_client.planning.plan import JointPlan
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recorder import Recorder
@@ -115,12 +116,9 @@ class ExperimentRunner:
 
     def _approach(self, plan: JointPlan) -> JointPlan:
         """Move slowly to the begin of the plan; returns it in the turns where the arm is."""
-        approach: Approach = plan_approach(plan, self._driver.actual_q(), model=self._experiment.model)
+        approach = plan_approach(plan, self._driver.actual_q(), model=self._experiment.model)
         self._observer.approaching(approach)
-        for waypoint in approach.waypoints:
-            self._driver.move_to(
-                waypoint.tolist(), speed=approach.v, acceleration=approach.a, expected=approach.duration
-            )
+        run_approach(self._driver, approach, self._qd_max)
         return approach.plan
 
     def _repetitions(self, found: Identification) -> Repetitions:

@@ -1,7 +1,7 @@
 """The slow way from where the arm is to where a plan begins.
 
-A movej of the control box moves all joints on a straight line in joint space, whatever stands there; so the
-line is checked here, posture by posture, before it is asked for. Two rules keep it short and harmless: of the
+All joints move together on a straight line in joint space, whatever stands there; so the line is checked
+here, posture by posture, before the arm moves. Two rules keep it short and harmless: of the
 start postures that differ by whole turns the nearest is taken (the plan is shifted to match), and when the
 direct line is not clear, ways by raised postures are tried: up, turn, and down.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise, product
-from math import pi, sqrt
+from math import pi
 from types import MappingProxyType
 
 import numpy as np
@@ -19,16 +19,26 @@ from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.clearance import ClearanceModel, clearance_model
-from pc_client.kinematics.robot_model import RobotModel
-from pc_client.planning.limits import PlanLimits
+from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.planning.joint_lines import JointLines
 from pc_client.planning.plan import JointPlan
 from protocol.ur_types import JOINT_NAMES
 
 Array = NDArray[np.float64]
 
-_CHECK_STEP = 0.01
-"""Largest way of the stretched arm's flange between checked postures [m]."""
+APPROACH_SPEED = 0.5
+"""Speed of the leading joint on the way [rad/s]: 29 deg/s, the order of UR's recovery mode (30 deg/s)."""
 
+APPROACH_ACCELERATION = 0.8
+"""Acceleration of the leading joint [rad/s²]."""
+
+FLOOR_MARGIN = 0.02
+"""Least distance of forearm and wrists from the base plane on the way [m]."""
+
+OWN_MARGIN = 0.01
+"""Least distance of the arm from itself on the way [m]."""
+
+_CHECK_STEP = 0.02  # rad between checked postures: at most 10 mm at the reach of a UR3
 _TURN = 2.0 * pi
 _FOLDING_JOINTS = (1, 2)
 # UR's home posture (0, -90, 0, -90, 0, 0) deg: far from the plane, and the wrist far from the forearm.
@@ -42,13 +52,11 @@ class Approach:
     Attributes:
         plan: the plan to run afterwards, shifted by whole turns to begin where the way ends.
         q_from: (6,) joint angles where the way begins [rad].
-        waypoints: one movej each, resting in between; the last is `plan.start_q` [rad].
-        v: speed of the leading joint for movej [rad/s].
-        a: acceleration of the leading joint for movej [rad/s²].
-        duration: expected time of all movej together [s].
-        floor_clearance: least distance from the floor on the way [m].
-        own_clearance: least distance of the arm and its tool from themselves on the way [m].
-        cell_clearance: least distance from walls and solids of the cell on the way [m]; infinite without any.
+        waypoints: a straight joint line to each, resting in between; the last is `plan.start_q` [rad].
+        v: speed of the leading joint [rad/s].
+        a: acceleration of the leading joint [rad/s²].
+        floor_clearance: least distance from the base plane on the way [m].
+        own_clearance: least distance of the arm from itself on the way [m].
     """
 
     plan: JointPlan
@@ -56,19 +64,36 @@ class Approach:
     waypoints: tuple[Array, ...] = field(repr=False)
     v: float
     a: float
-    duration: float
     floor_clearance: float
     own_clearance: float
-    cell_clearance: float
+
+    @property
+    def motion(self) -> JointLines:
+        """The way over time."""
+        return JointLines((self.q_from, *self.waypoints), self.v, self.a)
+
+    @property
+    def duration(self) -> float:
+        """How long the way takes [s]."""
+        return self.motion.duration
 
 
-def plan_approach(plan: JointPlan, q_now: ArrayLike, *, model: RobotModel) -> Approach:
+def plan_approach(
+    plan: JointPlan,
+    q_now: ArrayLike,
+    *,
+    model: RobotModel | None = None,
+    v: float = APPROACH_SPEED,
+    a: float = APPROACH_ACCELERATION,
+) -> Approach:
     """Plan a slow joint move from the present posture to the begin of a plan.
 
     Args:
         plan: the plan that shall begin afterwards.
         q_now: (6,) present joint angles [rad].
-        model: nominal arm that the plan was made for.
+        model: nominal arm; by default the one that the plan was made for.
+        v: speed of the leading joint [rad/s], at most APPROACH_SPEED.
+        a: acceleration of the leading joint [rad/s²], at most APPROACH_ACCELERATION.
 
     Returns:
         One waypoint, up to three if the direct line is not clear. Use `.plan` instead of `plan` from then on.
@@ -76,41 +101,31 @@ def plan_approach(plan: JointPlan, q_now: ArrayLike, *, model: RobotModel) -> Ap
     Raises:
         PlanningError: the present posture or every tried way is not clear; names posture and joint.
     """
+    arm = robot_model(plan.report.robot) if model is None else model
     q_from = np.array(q_now, dtype=np.float64)
-    _refuse_posture(plan, model, q_from)
-    limits = plan.report.limits
-    v, a = limits.approach_speed, limits.approach_acceleration
-    hulls = clearance_model(model)
+    _refuse_arguments(plan, arm, q_from, v, a)
+    hulls = clearance_model(arm)
     starts = _starts(plan, q_from)
     refusals = []
     for way in _WAYS:
         for start in starts:
             waypoints = (*way(q_from, start.start_q), start.start_q)
-            clearance = _check_way(plan.name, hulls, limits, (q_from, *waypoints))
+            clearance = _check_way(plan.name, hulls, (q_from, *waypoints))
             if isinstance(clearance, PlanningError):
                 refusals.append(clearance)
                 continue
-            duration = sum(movej_duration(begin, end, v, a) for begin, end in pairwise((q_from, *waypoints)))
-            return Approach(start, q_from, waypoints, v, a, duration, *clearance)
+            return Approach(start, q_from, waypoints, v, a, *clearance)
     # The direct way tells best what is wrong.
     raise refusals[0]
 
 
-def movej_duration(q_from: ArrayLike, q_to: ArrayLike, v: float, a: float) -> float:
-    """Return the time of a movej with a trapezoid of speed for the leading joint [s].
-
-    Args:
-        q_from: (6,) begin [rad].
-        q_to: (6,) end [rad].
-        v: speed of the leading joint [rad/s].
-        a: its acceleration [rad/s²].
-    """
-    way = float(np.abs(np.subtract(q_to, q_from)).max())
-    return way / v + v / a if way >= v * v / a else 2.0 * sqrt(way / a)
-
-
-def _refuse_posture(plan: JointPlan, arm: RobotModel, q_from: Array) -> None:
-    """Raise for a present posture that no arm can have."""
+def _refuse_arguments(plan: JointPlan, arm: RobotModel, q_from: Array, v: float, a: float) -> None:
+    """Raise for speeds above the slow ones, and for a present posture that no arm can have."""
+    if not (0.0 < v <= APPROACH_SPEED and 0.0 < a <= APPROACH_ACCELERATION):
+        raise PlanningError(
+            f"{plan.name}: approach with v = {v!r} rad/s, a = {a!r} rad/s²; allowed are"
+            f" 0 < v <= {APPROACH_SPEED} and 0 < a <= {APPROACH_ACCELERATION}"
+        )
     if q_from.shape != (6,):
         raise PlanningError(
             f"{plan.name}: the present posture must be six joint angles, not shape {q_from.shape}"
@@ -163,37 +178,33 @@ def _raised(q: Array) -> Array:
 
 
 def _check_way(
-    name: str, hulls: ClearanceModel, limits: PlanLimits, postures: tuple[Array, ...]
-) -> tuple[float, float, float] | PlanningError:
-    """Return the least clearances on straight joint lines, or the first bad posture's error."""
-    step = _CHECK_STEP / hulls.robot.description.reach
+    name: str, hulls: ClearanceModel, postures: tuple[Array, ...]
+) -> tuple[float, float] | PlanningError:
+    """Return the least floor and own clearance on straight joint lines, or the first bad posture's error."""
     lines = []
     for begin, end in pairwise(postures):
-        n = max(2, int(np.ceil(np.abs(end - begin).max() / step)) + 1)
+        n = max(2, int(np.ceil(np.abs(end - begin).max() / _CHECK_STEP)) + 1)
         lines.append(begin + np.linspace(0.0, 1.0, n)[:, None] * (end - begin))
     q = np.concatenate(lines)
     clearance = hulls.along(q)
-    for distances, least in zip(
-        clearance,
-        (limits.floor_clearance_min, limits.own_clearance_min, limits.cell_clearance_min),
-        strict=True,
+    for distance, nearest, margin, what in (
+        (clearance.floor, clearance.floor_nearest, FLOOR_MARGIN, "above the base plane"),
+        (clearance.own, clearance.own_nearest, OWN_MARGIN, "between them"),
     ):
-        bad = np.flatnonzero(distances.least < least)
+        bad = np.flatnonzero(distance < margin)
         if bad.size:
             k = int(bad[0])
-            nearest = distances.nearest[k]
             where = (
                 "the present posture"
                 if k == 0
                 else f"the way to the start, {100 * k / (len(q) - 1):.0f} % along"
             )
             return PlanningError(
-                f"{name}: {where} is not clear: {nearest.says(float(distances.least[k]), least)};"
-                " move the arm by hand to an open posture, elbow up",
-                joint=nearest.joint,
+                f"{name}: {where} is not clear: {nearest[k].name}, {distance[k] * 1e3:.0f} mm {what}"
+                f" (at least {margin * 1e3:.0f} mm); move the arm by hand to an open posture, elbow up",
+                joint=nearest[k].joint,
             )
-    floor, own, cell = (float(distances.least.min()) for distances in clearance)
-    return floor, own, cell
+    return float(clearance.floor.min()), float(clearance.own.min())
 
 
 _WAYS: tuple[Callable[[Array, Array], tuple[Array, ...]], ...] = (

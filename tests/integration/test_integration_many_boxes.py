@@ -140,6 +140,38 @@ def test_one_box_can_be_closed_and_the_others_go_on():
             connect(one, "dashboard")
 
 
+def test_an_error_ends_its_own_box_only_and_is_raised_at_the_end():
+    with pytest.raises(ZeroDivisionError), ControlBox.many(2, pace="realtime", port_base=None) as (one, two):
+        with connect(one, "dashboard") as gone, Frames(two) as frames:
+            assert gone.recv(100).startswith(b"Connected")
+            one._loop.call_soon_threadsafe(lambda: setattr(one._box.controller, "tick", lambda _: 1 // 0))
+            assert is_closed(gone)
+            assert any("the box has ended: ZeroDivisionError" in str(entry) for entry in one.log)
+            for _ in range(20):
+                frames.new()
+            assert frames.lost() == 0
+            assert two.failure is None
+
+
+def test_a_box_that_compiles_is_closed_without_waiting_for_it():
+    """Another box of the loop would miss its cycles meanwhile."""
+    with ControlBox.many(2, pace="lockstep", port_base=None) as (one, two):
+        begun, may_end = threading.Event(), threading.Event()
+
+        def compile_slowly(item):
+            begun.set()
+            assert may_end.wait(TIMEOUT)
+
+        one._intake._translate = compile_slowly
+        send(one, "secondary", MOVE)
+        assert begun.wait(TIMEOUT)
+        one._loop.call_soon_threadsafe(one.close)
+        with Frames(two) as frames:
+            frames.raw()
+            assert not may_end.is_set()
+        may_end.set()
+
+
 def test_a_box_of_a_rack_is_not_started_by_itself():
     rack = ControlBox.many(2, port_base=None)
     with pytest.raises(EmulatorError, match="start the rack"), rack[0]:
@@ -173,6 +205,7 @@ def test_a_taken_port_of_one_box_leaves_no_port_open():
         (2, {"host": ""}, "'' given for 2 boxes"),
         (2, {"fidelity": "perfect"}, "perfect"),
         (2, {"seed": -1}, "seed -1"),
+        (1, {"port_base": 100_000}, "port offset 100000 leaves the TCP ports: use"),
     ],
 )
 def test_what_cannot_be_counted_is_one_line(count, options, words):

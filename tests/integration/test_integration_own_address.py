@@ -2,9 +2,14 @@
 
 import socket
 
+import numpy as np
 import pytest
 
+from pc_client.control.controller_config import APPROACH
+from pc_client.control.reference import ReferenceTable
+from pc_client.control.tracker import Tracker
 from pc_client.driver.ur_driver import UrDriver
+from pc_client.planning.joint_lines import JointLines
 from ur_emulator import ControlBox
 
 ELSEWHERE = "127.0.37.1"
@@ -43,6 +48,8 @@ def test_a_name_is_called_from_there_too(box):
 def test_the_client_moves_an_arm_at_any_loopback_address(box):
     with UrDriver(ELSEWHERE, box.ports) as driver:
         q = driver.actual_q()
-        goal = [q[0] + 0.05, *q[1:]]
-        driver.move_to(goal, speed=0.5, acceleration=1.0, expected=1.0)
+        goal = q + np.array([0.05, 0, 0, 0, 0, 0])
+        lines = JointLines([q, goal], v=0.5, a=1.0)
+        table = ReferenceTable(lines, period=driver.info.period, lead=0.0, settle=0.8)
+        driver.stream(Tracker(table, APPROACH, (3.0,) * 6), lambda frame, step: None, acceleration=5.0)
         assert driver.actual_q()[0] == pytest.approx(goal[0], abs=1e-3)

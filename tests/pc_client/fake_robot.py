@@ -7,7 +7,6 @@ Tests spoil it through `on_tick`, or by setting its attributes.
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from types import SimpleNamespace
 
@@ -103,7 +102,7 @@ class FakeRobot:
         self.serial = "20993000007"  # None: software that does not know the question
         # What the primary port sends behind its greeting.
         self.state = encode_state([ConfigurationData()], VERSION)
-        self.program = None  # None, "approach", "receiver", "stop"
+        self.program = None  # None, "receiver", "stop"
         self.programs = []
         self.listener = None
         self.reverse = None
@@ -170,11 +169,7 @@ class FakeRobot:
         if self.reverse is not None:
             self.reverse.broken = True
         self.commands.clear()
-        if "movej(" in text:
-            goal = re.search(r"movej\(\[(.*?)\]", text)[1]
-            self.goal, self.program = [float(x) for x in goal.split(",")], "approach"
-            self.remaining = 5
-        elif "socket_open" in text:
+        if "socket_open" in text:
             self.program = "receiver"
             self.pipeline = deque([[0.0] * 6] * self.delay)
             if self.dials:
@@ -221,10 +216,6 @@ class FakeRobot:
             self.qd = [0.0] * 6
             if not self.pauses:
                 self.program = None
-        elif self.program == "approach":
-            self.remaining -= 1
-            if not self.remaining:
-                self.q, self.program = list(self.goal), None
         elif self.program == "receiver":
             self.follow()
         elif self.program == "stop":

@@ -1,4 +1,4 @@
-"""Opening a session, moving to a posture, the small programs and questions around it: a robot in memory."""
+"""Opening a session, the programs and questions around it: a robot in memory."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import sys
 import pytest
 from fake_robot import LAYOUT, FakeRobot, Pipe
 
-from pc_client.driver.approach_script import approach_script, stop_script
 from pc_client.driver.dashboard_query import ask_dashboard
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.receiver_script import fill_template, receiver_script
 from pc_client.driver.reverse_server import ReverseServer
+from pc_client.driver.stop_script import stop_script
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
 from pc_client.recording.origin import origin_of
@@ -22,12 +22,10 @@ from protocol.primary_messages import TextMessage
 from protocol.primary_state import encode_state
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotType, SoftwareVersion
 
-GOAL = [0.1, -1.5, -2.0, 0.2, 1.3, 1.8]
 
-
-def move(robot, q=GOAL):
+def stream_nothing(robot):
     with UrDriver("robot", network=robot) as driver:
-        driver.move_to(q, speed=0.5, acceleration=0.8, expected=3.0)
+        driver.stream(None, None, acceleration=1.0)
 
 
 def test_session_says_who_answered():
@@ -101,22 +99,6 @@ def test_software_that_does_not_tell_whether_a_program_runs_is_refused():
     assert set(robot.closed) == {"dashboard", "primary", "secondary", "realtime"}
 
 
-@pytest.mark.parametrize("lockstep", [True, False])
-def test_move_to_arrives(lockstep):
-    robot = FakeRobot(lockstep=lockstep)
-    move(robot)
-    assert robot.q == pytest.approx(GOAL)
-    assert len(robot.programs) == 1
-    assert robot.programs[0].startswith("def ur_client_approach():\n  movej([0.1")
-
-
-def test_an_arm_that_is_there_already_is_not_sent():
-    robot = FakeRobot()
-    robot.q = list(GOAL)
-    move(robot)
-    assert robot.programs == []
-
-
 @pytest.mark.parametrize(
     ("spoil", "error", "words"),
     [
@@ -133,7 +115,7 @@ def test_nothing_is_sent_to_a_robot_that_is_not_ready(spoil, error, words):
     for name, value in spoil.items():
         setattr(robot, name, value)
     with pytest.raises(error, match=words):
-        move(robot)
+        stream_nothing(robot)
     assert robot.programs == []
 
 
@@ -144,54 +126,21 @@ def test_a_reduced_robot_may_move():
         driver.check_ready()
 
 
-def test_protective_stop_on_the_way_is_reported_and_nothing_left_moving():
-    def spoil(robot):
-        if robot.program == "approach" and robot.remaining == 3:
-            robot.safety_mode = 3
-
-    robot = FakeRobot(on_tick=spoil)
-    with pytest.raises(RobotStoppedError, match="PROTECTIVE_STOP"):
-        move(robot)
-    assert robot.at_rest
-
-
 def test_program_that_does_not_start_is_reported_and_replaced():
     robot = FakeRobot()
     robot.refuses = True
     with pytest.raises(DriverError, match="local control"):
-        move(robot)
+        stream_nothing(robot)
     assert "stopj" in robot.programs[-1]
 
 
 def test_script_error_is_reported_with_its_line():
     robot = FakeRobot()
-    robot.error_in = "movej"
+    robot.error_in = "velocity_receiver"
     with pytest.raises(
-        RobotStoppedError, match=r"line 2, column 3: compile_error_name_not_found:foo: \(movej"
+        RobotStoppedError, match=r"line 2, column 3: compile_error_name_not_found:foo: \(# Follows joint"
     ):
-        move(robot)
-
-
-def test_arm_that_stops_elsewhere_is_reported():
-    def spoil(robot):
-        if robot.program == "approach":
-            robot.goal = [0.0] * 6
-
-    with pytest.raises(DriverError, match="is it blocked"):
-        move(FakeRobot(on_tick=spoil))
-
-
-def test_ctrl_c_on_the_way_stops_the_arm():
-    def spoil(robot):
-        if robot.program == "approach":
-            raise KeyboardInterrupt
-
-    robot = FakeRobot(on_tick=spoil)
-    with pytest.raises(KeyboardInterrupt):
-        move(robot)
-    assert robot.programs[-1] == stop_script()
-    robot.on_tick = None
-    assert robot.at_rest
+        stream_nothing(robot)
 
 
 def test_program_that_cannot_dial_back():
@@ -265,22 +214,6 @@ def test_dashboard_answers_only_what_it_knows():
     answers = ask_dashboard(robot, "robot", 29999, ("get robot model", "make coffee", "get serial number"))
     assert answers == {"get robot model": "UR3"}
     assert robot.closed == ["dashboard"]
-
-
-def test_approach_script_holds_nine_digits_and_slow_speeds():
-    text = approach_script(GOAL, 0.5, 0.8)
-    assert "a=0.8000, v=0.5000" in text
-    assert text.endswith("\nend\n")
-    for q, v, a in [
-        ([0.0] * 5, 0.5, 0.8),
-        ([float("nan")] * 6, 0.5, 0.8),
-        ([7.0] * 6, 0.5, 0.8),
-        (GOAL, 3.0, 0.8),
-        (GOAL, 0.5, 50.0),
-        (GOAL, 0.0, 0.8),
-    ]:
-        with pytest.raises(DriverError):
-            approach_script(q, v, a)
 
 
 def test_receiver_program_is_filled_in():

@@ -168,7 +168,17 @@ def reverse_socket_closes(robot):
 
 
 def long_gap(robot):
-    robot.skip = 50
+    robot.skip = 70
+
+
+def long_freeze(robot):
+    """The frames are there all at once when the client wakes up."""
+    robot.hold = 70
+
+
+def time_runs_back(robot):
+    robot.on_tick = None
+    robot.tick -= 20
 
 
 @pytest.mark.parametrize(
@@ -183,7 +193,9 @@ def long_gap(robot):
         (script_socket_closes, DriverError, "closed the secondary"),
         (everything_closes, DriverError, "closed the"),
         (reverse_socket_closes, DriverError, "closed the connection"),
-        (long_gap, DriverError, "jump"),
+        (long_gap, DriverError, r"no command for 0\.57 s, allowed is 0\.5 s"),
+        (long_freeze, DriverError, r"no command for 0\.57 s, allowed is 0\.5 s"),
+        (time_runs_back, DriverError, "jump back"),
     ],
 )
 def test_what_goes_wrong_ends_the_run_with_one_line_and_a_stopped_arm(action, error, words):
@@ -200,6 +212,32 @@ def test_what_goes_wrong_ends_the_run_with_one_line_and_a_stopped_arm(action, er
         assert not getattr(caught.value, "__notes__", [])
     assert robot.listener.closed
     assert "reverse" in robot.closed
+
+
+def test_the_frames_of_a_freeze_are_recorded_before_the_run_ends():
+    rows = Rows()
+    with pytest.raises(DriverError, match="no command for"):
+        stream(FakeRobot(lockstep=False, on_tick=spoil_at(1040, long_freeze)), rows=rows)
+    stamps = [round(stamp / PERIOD) for stamp, _ in rows]
+    assert stamps == list(range(stamps[0], 1040 + 70))
+
+
+def test_a_client_that_wakes_up_to_a_closed_connection_says_how_long_it_was_silent():
+    robot = FakeRobot(lockstep=False)
+    take = robot.took
+
+    def freeze_before_sending(pipe, data):
+        if pipe.kind == "reverse" and robot.tick == 1040:
+            robot.hold = 70
+            robot.live()
+            robot.program, pipe.broken = None, True
+            raise DriverError("the other end closed the connection")
+        take(pipe, data)
+
+    robot.took = freeze_before_sending
+    with pytest.raises(DriverError, match=r"no command for 0\.57 s"):
+        stream(robot)
+    assert robot.at_rest
 
 
 @pytest.mark.parametrize("lockstep", [False, True])
@@ -266,7 +304,7 @@ def test_when_the_stop_word_does_not_help_a_stop_program_is_sent():
     robot.deaf_to_stop = True
     with pytest.raises(RuntimeError, match="spoilt"):
         stream(robot, Spoilt(fail))
-    assert robot.programs[-1] == "def ur_client_stop():\n  stopj(2.0)\nend\n"
+    assert robot.programs[-1] == "def ur_client_stop():\n  stopj(14.0)\nend\n"
     assert robot.at_rest
 
 

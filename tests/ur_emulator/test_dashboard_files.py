@@ -87,13 +87,15 @@ def test_equal_runs_write_equal_bytes(tmp_path):
     assert written[0] == written[1]
 
 
-def test_without_a_folder_the_files_go_to_a_temporary_one(tmp_path, monkeypatch):
+def test_without_a_folder_the_files_go_to_a_temporary_one_that_goes_with_the_box(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    replies, log = session(None, "saveLog", "generate support file .", "generate support file .")
-    assert replies[0] == "Log saved to disk"
-    (written,) = tmp_path.iterdir()
-    assert sorted(path.suffix for path in written.iterdir()) == ["", ".txt", ".zip", ".zip"]
-    assert any(str(written) in line for line in log)
+    with ControlBox(pace="lockstep", port_base=None) as box, Dashboard(box) as dashboard:
+        replies = dashboard.ask_all("saveLog", "generate support file .", "generate support file .")
+        assert replies[0] == "Log saved to disk"
+        (written,) = tmp_path.iterdir()
+        assert sorted(path.suffix for path in written.iterdir()) == ["", ".txt", ".zip", ".zip"]
+        assert any(str(written) in str(entry) for entry in box.log)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("directory", ["", "..", "/etc", "/programs/..", "no/such", "wait.urp", "a\0b"])

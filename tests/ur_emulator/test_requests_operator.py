@@ -47,8 +47,17 @@ def test_a_program_waits_for_its_answer(kind, requested, answer, text):
     assert not bench.controller.state.operator.requests
 
 
+@pytest.mark.parametrize(("answer", "text"), [("\u20acuro", "6"), ("\ud800", "1"), ("", "0")])
+def test_a_text_has_one_character_for_each_byte_of_utf_8(answer, text):
+    bench = Bench()
+    bench.start('def p():\n  textmsg(str_len(request_string_from_primary_client("?")))\nend\n')
+    bench.tick(2, AnswerRequest(answer))
+    assert printed(bench) == [text]
+
+
 @pytest.mark.parametrize(
-    "wrong", [AnswerRequest(True), AnswerRequest(1.5), AnswerRequest(1, 99), ClosePopup()]
+    "wrong",
+    [AnswerRequest(True), AnswerRequest(1.5), AnswerRequest(10**12), AnswerRequest(1, 99), ClosePopup()],
 )
 def test_wrong_answers_change_nothing(wrong):
     bench = asking("integer")

@@ -9,18 +9,28 @@ from collections import deque
 from dataclasses import dataclass
 
 from protocol.primary_messages import RequestedType
+from urscript.values import INT_MAX, INT_MIN, script_text
 
 # Popups for which nobody waits: older ones than the last so many are forgotten.
 MAX_SHOWN = 20
 
 Answer = bool | int | float | str
 
-_TYPES: dict[RequestedType, tuple[type, ...]] = {
-    RequestedType.BOOLEAN: (bool,),
-    RequestedType.INTEGER: (int,),
-    RequestedType.FLOAT: (float, int),
-    RequestedType.STRING: (str,),
-}
+
+def _as_asked(kind: RequestedType, value: Answer) -> Answer | None:
+    """Return an answer as the program gets it, None if it does not fit the question."""
+    match kind, value:
+        case RequestedType.BOOLEAN, bool():
+            return value
+        case ((RequestedType.INTEGER | RequestedType.FLOAT), bool()):
+            return None
+        case RequestedType.INTEGER, int() if INT_MIN <= value <= INT_MAX:
+            return value
+        case RequestedType.FLOAT, int() | float():
+            return float(value)
+        case RequestedType.STRING, str():
+            return script_text(value)
+    return None
 
 
 @dataclass(slots=True)
@@ -77,10 +87,12 @@ class Operator:
     def answer(self, value: Answer, request_id: int | None = None) -> None:
         """Answer a question, or the oldest; one that does not exist or wants another type stays as it is."""
         for request in self.requests:
-            if request_id in (None, request.request_id) and type(value) in _TYPES.get(request.kind, ()):
-                request.answer = float(value) if request.kind is RequestedType.FLOAT else value
-                self._finish(request)
-                return
+            if request_id in (None, request.request_id):
+                answer = _as_asked(request.kind, value)
+                if answer is not None:
+                    request.answer = answer
+                    self._finish(request)
+                    return
 
     def close_popups(self) -> None:
         """Press the button of every popup."""

@@ -17,8 +17,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
 
-from ur_emulator.realtime.garbage import settled_heap
 from ur_emulator.realtime.guests import Guests
+from ur_emulator.realtime.interpreter import loop_settings
 
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
 # microseconds.
@@ -136,7 +136,7 @@ class EventLoop:
         self.is_running = True
         self._thread = threading.get_ident()
         try:
-            with settled_heap():
+            with loop_settings():
                 while not self._stopping:
                     now = time.monotonic()
                     deadline = now + 1.0
@@ -165,8 +165,12 @@ class EventLoop:
                 self.guests.fall_asleep()
                 ready = self._selector.select(timeout)
                 self.guests.wake_up()
+        watched = self._selector.get_map()
         for key, events in ready:
-            key.data(events)
+            # A callback before this one may have closed the socket, and another may have its number by now.
+            now = watched.get(key.fd)
+            if now is not None and now.fileobj is key.fileobj:
+                key.data(events)
         while self._calls:
             self._calls.popleft()()
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Callable
 
+from ur_emulator.errors import EmulatorError
 from ur_emulator.realtime.event_loop import EventLoop
 
-# The compile worker shares the interpreter with the loop; short turns keep the loop on time.
-_SWITCH_INTERVAL = 1e-4  # s
 _JOIN_TIMEOUT = 10.0  # s
 
 
@@ -30,7 +28,6 @@ class LoopRunner:
 
     def run(self) -> None:
         """Run in the calling thread until `stop`; an error that ends the loop is raised here."""
-        sys.setswitchinterval(_SWITCH_INTERVAL)
         try:
             self._loop.run()
         finally:
@@ -47,10 +44,18 @@ class LoopRunner:
         self._loop.stop()
 
     def finish(self) -> BaseException | None:
-        """Stop the loop, wait for its thread; return the error that had ended it earlier, if one had."""
+        """Stop the loop, wait for its thread; return the error that had ended it earlier, if one had.
+
+        A loop that does not end in time is such an error: its ports are still open.
+        """
         self.stop()
         if self._thread is not None:
             self._thread.join(_JOIN_TIMEOUT)
+            if self._thread.is_alive():
+                return EmulatorError(
+                    f"the loop of the box did not end within {_JOIN_TIMEOUT:g} s: its ports are still open; "
+                    "end the process"
+                )
         return self._failure
 
     def _run_and_keep_failure(self) -> None:

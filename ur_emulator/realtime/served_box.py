@@ -39,6 +39,7 @@ class ServedBox:
         controller: the box without its ports.
         log: of everything that was said.
         backlog: the connections that have not read all they were sent; they keep themselves up to date in it.
+        on_failure: told of the error that has ended a cycle, where the loop has other boxes to go on with.
     """
 
     def __init__(self, controller: Controller, pacer: Pacer, expect_soon: Callable[[], None]) -> None:
@@ -57,6 +58,7 @@ class ServedBox:
         self._publishers: list[Publisher] = []
         self._commands: list[Command] = []
         self.backlog: set[Connection] = set()
+        self.on_failure: Callable[[Exception], None] | None = None
         self._given_up: set[Connection] = set()
         self._last_frame = -math.inf
 
@@ -115,7 +117,19 @@ class ServedBox:
     # --- the loop
 
     def advance(self, now: float) -> float:
-        """Tick if it is time to, or repeat the last frame if time stands still; return the next deadline."""
+        """Tick if it is time to, or repeat the last frame if time stands still; return the next deadline.
+
+        What fails in it ends the loop, or only this box where somebody wants to be told of it.
+        """
+        if self.on_failure is None:
+            return self._advance(now)
+        try:
+            return self._advance(now)
+        except Exception as error:
+            self.on_failure(error)
+            return math.inf
+
+    def _advance(self, now: float) -> float:
         if self._pacer.may_tick(now, self):
             commands, self._commands = self._commands, []
             self._publish(self.controller.tick(commands), now)

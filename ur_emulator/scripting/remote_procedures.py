@@ -13,7 +13,7 @@ from typing import Any, Final
 from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, RemoteServer
 from urscript.errors import ScriptRuntimeError
 from urscript.threads import ScriptThread
-from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type
+from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type, script_text
 from urscript.waits import Blocked
 
 _POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
@@ -92,7 +92,7 @@ def _from_wire(value: Any) -> Any:
         case int() if INT_MIN <= value <= INT_MAX:
             return value
         case str():
-            return value.encode("utf-8").decode("latin-1")
+            return script_text(value)
         case dict() if set(value) == set(_POSE_KEYS):
             numbers = [value[key] for key in _POSE_KEYS]
             if all(type(number) in (int, float) for number in numbers):

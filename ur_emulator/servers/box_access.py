@@ -118,6 +118,6 @@ class BoxAccess:
             tell()
 
     def close(self) -> None:
-        """End the worker; what is still queued is dropped."""
+        """End the worker; what is queued is dropped, what is being done comes to nothing."""
         if self._worker is not None:
-            self._worker.shutdown(wait=True, cancel_futures=True)
+            self._worker.shutdown(wait=False, cancel_futures=True)

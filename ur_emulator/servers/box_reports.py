@@ -1,6 +1,7 @@
 """Files that the box writes for people: the log, flight reports, support files.
 
-They go into the folder of programs, or into a temporary one. What stands in them comes from the controller:
+They go into the folder of programs, or into a temporary one that is removed with the box. What stands in them
+comes from the controller:
 the same run writes the same bytes. Name of the support file: UR dashboard documents; of the log: PolyScope's
 own; the rest is ours.
 """
@@ -59,6 +60,12 @@ class BoxReports:
 
     def __init__(self, folder: ProgramFolder) -> None:
         self._folder = folder
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
+
+    def close(self) -> None:
+        """Remove the temporary folder, if there is one, with what was written into it."""
+        if self._temporary is not None:
+            self._temporary.cleanup()
 
     def save_log(self, facts: BoxFacts) -> Path:
         """Write the log, in place of what was written before; return the file."""
@@ -115,7 +122,8 @@ class BoxReports:
 
     def _root(self) -> Path:
         if self._folder.root is None:
-            self._folder = ProgramFolder(Path(tempfile.mkdtemp(prefix="ur-emulator-")))
+            self._temporary = tempfile.TemporaryDirectory(prefix="ur-emulator-", ignore_cleanup_errors=True)
+            self._folder = ProgramFolder(Path(self._temporary.name))
         root = self._folder.root
         assert root is not None
         return root

@@ -32,18 +32,21 @@ T = TypeVar("T")
 class DashboardAnswers:
     """Finds the answer to a command."""
 
-    def __init__(self, access: BoxAccess, desk: ProgramDesk, shut_down: Callable[[], None]) -> None:
+    def __init__(
+        self, access: BoxAccess, desk: ProgramDesk, reports: BoxReports, shut_down: Callable[[], None]
+    ) -> None:
         """Bind the commands to a box.
 
         Args:
             access: of the box.
             desk: holds the loaded program.
+            reports: writes the log and reports.
             shut_down: closes the box.
         """
         self._access = access
         self._desk = desk
         self._shut_down = shut_down
-        self._reports = BoxReports(desk.folder)
+        self._reports = reports
         self._user_role = "NONE"
         self._methods: dict[str, Callable[[DashboardCommand, str, str], Answer]] = {
             "load": self._load,

@@ -19,7 +19,7 @@ from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
 from ur_emulator.controller.hands import GuideByHand
 from ur_emulator.controller.safety_commands import ConfirmSafety
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.realtime.garbage import collection_put_off
+from ur_emulator.realtime.interpreter import collection_put_off
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.courtesy import giving_way
@@ -74,6 +74,7 @@ class ProgramIntake:
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="compile")
         self._waiting: Counter[object] = Counter()
         self._flooding: set[object] = set()
+        self._is_closed = False
 
     def take(self, sender: object, items: Iterable[ScriptItem]) -> None:
         """Queue what one connection has sent: words always, programs as long as not too much waits."""
@@ -89,8 +90,9 @@ class ProgramIntake:
             self._worker.submit(self._process, item, sender, cost)
 
     def close(self) -> None:
-        """End the worker; what is still queued is dropped."""
-        self._worker.shutdown(wait=True, cancel_futures=True)
+        """Take nothing more; what is queued is dropped, what is being compiled comes to nothing."""
+        self._is_closed = True
+        self._worker.shutdown(wait=False, cancel_futures=True)
 
     def _process(self, item: ScriptItem, sender: object, cost: int) -> None:
         """Compile or translate one item; runs in the worker, hands the result to the loop."""
@@ -103,6 +105,8 @@ class ProgramIntake:
 
     def _finish(self, result: cmd.Command | Event | None, sender: object, cost: int) -> None:
         """Hand on a result; runs in the loop."""
+        if self._is_closed:
+            return
         self._waiting[sender] -= cost
         if not self._waiting[sender]:
             del self._waiting[sender]

@@ -1,38 +1,51 @@
-"""Python's garbage collector and the control cycle: while it runs, nothing else does."""
+"""Settings of the Python interpreter that a control loop needs; they are the process's own again afterwards.
+
+While the garbage collector runs, nothing else does. A thread with long work, such as the compile worker,
+shares the interpreter with the loop, so turns must be short.
+"""
 
 from __future__ import annotations
 
 import gc
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 # Collect rarely: a full collection over a large heap costs more than a cycle has to spare.
 _RARELY = (50_000, 20, 100)
+_SWITCH_INTERVAL = 1e-4  # s
 
 _lock = threading.Lock()
 _running_loops = 0
+_before = (gc.get_threshold(), sys.getswitchinterval())
 
 
 @contextmanager
-def settled_heap() -> Iterator[None]:
-    """Let the collector never look, while this block runs, at what exists when it begins.
+def loop_settings() -> Iterator[None]:
+    """Let the collector never look, in this block, at what exists when it begins; take short turns.
 
-    Blocks of several loops may overlap. When the last one ends everything is looked at again, so that boxes
-    that are gone, in a process that makes many of them one after the other, leave nothing behind.
+    Blocks of several loops may overlap. When the last one ends, the settings are again what they were before
+    the first, and everything is looked at again: a process that makes many boxes keeps nothing of them.
     """
-    global _running_loops
+    global _running_loops, _before
     with _lock:
+        if not _running_loops:
+            _before = (gc.get_threshold(), sys.getswitchinterval())
+        _running_loops += 1
         gc.collect()
         gc.freeze()
         gc.set_threshold(*_RARELY)
-        _running_loops += 1
+        sys.setswitchinterval(_SWITCH_INTERVAL)
     try:
         yield
     finally:
         with _lock:
             _running_loops -= 1
             if not _running_loops:
+                thresholds, interval = _before
+                gc.set_threshold(*thresholds)
+                sys.setswitchinterval(interval)
                 gc.unfreeze()
 
 

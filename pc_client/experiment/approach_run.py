@@ -1,0 +1,54 @@
+"""The way to a start: streamed like a run, so that the arm stops when we fall silent; checked on arrival."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pc_client.control.controller_config import APPROACH
+from pc_client.control.reference import ReferenceTable
+from pc_client.control.tracker import Tracker, TrackerStep
+from pc_client.driver.ur_driver import UrDriver
+from pc_client.errors import DriverError
+from pc_client.planning.approach import Approach
+from protocol.realtime_layout import RealtimeFrame
+
+_SETTLE = 0.8
+"""Time at the end, position loop closed [s]: four time constants of the feedback."""
+
+_ARRIVAL_TOLERANCE = 5e-3
+"""Largest distance of a joint from the posture after an approach [rad]; a blocked arm is far off."""
+
+_NO_MOVE = 1e-4
+"""A way shorter than this [rad] is no way."""
+
+
+def run_approach(driver: UrDriver, approach: Approach, qd_max: Sequence[float]) -> None:
+    """Move the arm along a checked way and wait until it rests at its end.
+
+    Args:
+        driver: a session; the arm rests where the way begins.
+        approach: the way.
+        qd_max: (6,) joint speed limits [rad/s]; an approach uses a small share of them.
+
+    Raises:
+        RobotStoppedError: the robot stopped.
+        DriverError: the arm did not follow or arrive, or the connection broke; it has been stopped.
+    """
+    goal = approach.waypoints[-1]
+    if np.abs(approach.waypoints - approach.q_from).max() < _NO_MOVE:
+        return
+    table = ReferenceTable(approach.motion, period=driver.info.period, lead=0.0, settle=_SETTLE)
+    tracker = Tracker(table, APPROACH, qd_max)
+    driver.stream(tracker, _ignore, acceleration=APPROACH.speedj_acceleration)
+    error = float(np.abs(driver.actual_q() - goal).max())
+    if not error <= _ARRIVAL_TOLERANCE:
+        raise DriverError(
+            f"the arm is {error:.4f} rad away from the posture it was sent to, allowed is "
+            f"{_ARRIVAL_TOLERANCE} rad: is it blocked?"
+        )
+
+
+def _ignore(frame: RealtimeFrame, step: TrackerStep) -> None:
+    """Nothing of an approach is kept."""

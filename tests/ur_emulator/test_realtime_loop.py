@@ -1,0 +1,66 @@
+"""The loop itself, with real sockets: who is called, and what an error ends."""
+
+import selectors
+import socket
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from ur_emulator.realtime import loop_runner
+from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.realtime.loop_runner import LoopRunner
+
+
+@pytest.fixture
+def pairs():
+    made = [socket.socketpair() for _ in range(2)]
+    yield made
+    for pair in made:
+        for end in pair:
+            end.close()
+
+
+def run_once(loop):
+    """Let the loop take one turn."""
+    loop.call_soon_threadsafe(loop.stop)
+    loop.run()
+    loop.close()
+
+
+@pytest.mark.parametrize("number_is_taken", [False, True])
+def test_a_socket_that_was_closed_in_the_same_turn_is_not_called(pairs, number_is_taken):
+    loop, called, spare = EventLoop(), [], []
+    ends = {pair[0]: pair[0].fileno() for pair in pairs}
+
+    def ready(sock):
+        called.append(sock)
+        for other, number in ends.items():
+            if other is not sock:
+                loop.unwatch(other)
+                other.close()
+                if number_is_taken:  # the system gives the lowest free number
+                    new, far = socket.socketpair()
+                    spare.extend((new, far))
+                    assert number in (new.fileno(), far.fileno())
+                    loop.watch(new if new.fileno() == number else far, selectors.EVENT_READ, called.append)
+
+    for near, far in pairs:
+        far.send(b"x")
+        loop.watch(near, selectors.EVENT_READ, lambda events, near=near: ready(near))
+    run_once(loop)
+    for sock in spare:
+        sock.close()
+    assert len(called) == 1
+
+
+def test_a_loop_that_does_not_end_is_an_error(monkeypatch):
+    monkeypatch.setattr(loop_runner, "_JOIN_TIMEOUT", 0.0)
+    may_end = threading.Event()
+    loop = EventLoop()
+    loop.add(SimpleNamespace(advance=lambda now: may_end.wait(20.0)))
+    runner = LoopRunner(loop, loop.close)
+    runner.start("stuck")
+    assert "its ports are still open; end the process" in str(runner.finish())
+    may_end.set()
+    runner._thread.join()
