@@ -141,16 +141,19 @@ def test_one_box_can_be_closed_and_the_others_go_on():
 
 
 def test_an_error_ends_its_own_box_only_and_is_raised_at_the_end():
-    with pytest.raises(ZeroDivisionError), ControlBox.many(2, pace="realtime", port_base=None) as (one, two):
-        with connect(one, "dashboard") as gone, Frames(two) as frames:
-            assert gone.recv(100).startswith(b"Connected")
-            one._loop.call_soon_threadsafe(lambda: setattr(one._box.controller, "tick", lambda _: 1 // 0))
-            assert is_closed(gone)
-            assert any("the box has ended: ZeroDivisionError" in str(entry) for entry in one.log)
-            for _ in range(20):
-                frames.new()
-            assert frames.lost() == 0
-            assert two.failure is None
+    rack = ControlBox.many(2, pace="realtime", port_base=None)
+    one, two = rack.__enter__()
+    with connect(one, "dashboard") as gone, Frames(two) as frames:
+        assert gone.recv(100).startswith(b"Connected")
+        one._loop.call_soon_threadsafe(lambda: setattr(one._box.controller, "tick", lambda _: 1 // 0))
+        assert is_closed(gone)
+        assert any("the box has ended: ZeroDivisionError" in str(entry) for entry in one.log)
+        for _ in range(20):
+            frames.new()
+        assert frames.lost() == 0
+        assert two.failure is None
+    with pytest.raises(ZeroDivisionError):
+        rack.__exit__(None, None, None)
 
 
 def test_a_box_that_compiles_is_closed_without_waiting_for_it():
