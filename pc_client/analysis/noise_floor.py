@@ -120,14 +120,12 @@ def unrepeatable_power(runs: Sequence[Run]) -> float | None:
 
 def _as_driven_like(first: Run, second: Run) -> Array | None:
     """Return the positions (n, 3) [m] of the second run as they would be with the commands of the first."""
-    loop, name = first.provenance.loop, first.provenance.robot_model.lower()
-    if not loop or name not in ROBOTS or len(first.track.t) != len(second.track.t):
+    loop, name = _loop_of(first), first.provenance.robot_model.lower()
+    if loop is None or name not in ROBOTS or len(first.track.t) != len(second.track.t):
         return None
     model, period = robot_model(name), float(np.median(np.diff(first.track.t)))
     commands = [run.recording.column("cmd_qd")[run.track.rows] for run in (first, second)]
-    response = velocity_response(
-        LoopModel(float(loop["dead_time_s"]), float(loop["lag_s"]), 0.0, 0.0), period
-    )
+    response = velocity_response(loop, period)
     more = commands[1] - commands[0]
     further = np.cumsum(
         np.stack([np.convolve(column, response)[: len(more)] for column in more.T], axis=1), axis=0
@@ -137,3 +135,12 @@ def _as_driven_like(first: Run, second: Run) -> Array | None:
     moved = np.einsum("nij,nj->ni", jacobians, further * period)
     positions: Array = second.track.p_actual - moved
     return positions
+
+
+def _loop_of(run: Run) -> LoopModel | None:
+    """The loop that the client identified; None in old recordings."""
+    loop, delay = run.provenance.loop, run.provenance.identified_delay_s
+    if "lag_s" in loop:
+        dead_time, lag, spread = (float(loop[x]) for x in ("dead_time_s", "lag_s", "joint_spread_s"))
+        return LoopModel(dead_time, lag, spread, 0.0)
+    return LoopModel.of_delay(delay, 0.0) if loop and delay is not None else None

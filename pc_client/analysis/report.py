@@ -184,10 +184,14 @@ def _loop_facts(loop: Mapping[str, float | str]) -> Mapping[str, str]:
     """Return the identified loop and its margins as texts by name; nothing for old recordings."""
     if not loop:
         return {}
-    facts = {
-        "identified loop": f"dead time {1e3 * float(loop['dead_time_s']):.1f} ms, "
-        f"lag {1e3 * float(loop['lag_s']):.1f} ms, "
-        f"single joints within {1e3 * float(loop['joint_spread_s']):.1f} ms",
+    facts: dict[str, str] = {}
+    if "lag_s" in loop:  # by a controller that tells dead time and lag apart
+        facts["identified loop"] = (
+            f"dead time {1e3 * float(loop['dead_time_s']):.1f} ms, "
+            f"lag {1e3 * float(loop['lag_s']):.1f} ms, "
+            f"single joints within {1e3 * float(loop['joint_spread_s']):.1f} ms"
+        )
+    facts |= {
         "margins of the feedback": f"gain {float(loop['gain_margin']):.1f}, phase "
         f"{float(loop['phase_margin_deg']):.0f}°, delay {1e3 * float(loop['delay_margin_s']):.0f} ms, "
         f"sensitivity at most {float(loop['sensitivity_peak']):.2f}",

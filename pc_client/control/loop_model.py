@@ -33,22 +33,42 @@ class LoopModel:
         dead_time: from a command to the first effect in a reported position [s].
         lag: time constant of the first-order lag behind it [s].
         spread: largest difference of a single joint's delay from the common one [s]; what the model leaves
-            open.
+            open. None when dead time and lag were not told apart: all of the delay is `dead_time` then, and
+            `lag` is no measurement.
         residual: rms of what the model does not explain [rad].
     """
 
     dead_time: float
     lag: float
-    spread: float
+    spread: float | None
     residual: float
+
+    @classmethod
+    def of_delay(cls, delay: float, residual: float) -> LoopModel:
+        """The loop of a controller that knows one delay [s] and nothing of a lag."""
+        return cls(delay, 0.0, None, residual)
 
     @property
     def delay(self) -> float:
         """Dead time and lag together: by how much slow motion trails [s]."""
         return self.dead_time + self.lag
 
+    def __str__(self) -> str:
+        """The loop in one phrase; only what was identified."""
+        if self.spread is None:
+            return f"delay {1e3 * self.dead_time:.1f} ms"
+        return (
+            f"dead time {1e3 * self.dead_time:.1f} ms, lag {1e3 * self.lag:.1f} ms, "
+            f"joints within {1e3 * self.spread:.1f} ms"
+        )
+
     def corners(self) -> Iterator[LoopModel]:
-        """The loops at the edges of what `spread` leaves open: later or earlier, more or less lag."""
+        """The loops at the edges of what `spread` leaves open: later or earlier, more or less lag.
+
+        None for a loop whose dead time and lag were not told apart.
+        """
+        if self.spread is None:
+            return
         for shift in (-self.spread, self.spread):
             for share in (0.0, 0.5, 1.0):  # of the shift that is lag rather than dead time
                 yield replace(

@@ -1,81 +1,45 @@
 """How much gain the loop bears: the arm integrates velocity, and everything takes the loop delay.
 
-Open loop of one joint: L(s) = (gain_p + gain_i / s) / s * exp(-s T), T from command to report. For the
-identified loop, dead time and lag apart and sampled as it is, `loop_margins` measures L where it matters.
+Open loop of one joint: L(s) = (gain_p + gain_i / s) / s * P(s), P from command to reported velocity. All is
+measured on the loop as it is sampled, and there is no other definition of a margin: what is accepted,
+recorded and tabled comes from `loop_margins`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan, hypot, inf, pi, sqrt
+from math import inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.control.loop_model import LoopModel, frequency_response
 
+LEAST_GAIN_MARGIN = 2.0
+"""A controller needs at least this gain margin on the identified loop: 6 dB, the usual one."""
+
+_LOWEST = 1e-3
+"""Frequencies from this on are looked at [Hz]; no loop with a delay of milliseconds turns below it."""
+
+_N_FREQUENCIES = 4000
+
 
 @dataclass(frozen=True, slots=True)
 class LoopMargins:
-    """How far a sampled feedback loop is from oscillating.
+    """How far a sampled feedback loop is from oscillating; of an unstable one, how far it is beyond.
 
     Attributes:
-        gain: factor by which both gains may grow.
-        phase_deg: phase that may be lost at the crossover [deg].
-        delay: time that the loop may take longer [s].
-        peak: largest |S| = |1 / (1 + L)|: by how much the feedback amplifies an error at worst.
+        gain: factor by which both gains may grow; above 1 exactly when the loop is stable.
+        phase_deg: phase that may be lost at the crossover [deg]; not above 0 for an unstable loop.
+        delay: time that the loop may take longer [s]; not above 0 for an unstable loop.
+        peak: largest |S| = |1 / (1 + L)|: by how much the feedback amplifies an error at worst; infinite for
+            an unstable loop.
     """
 
     gain: float
     phase_deg: float
     delay: float
     peak: float
-
-
-def largest_gain(loop_delay: float) -> float:
-    """Proportional gain at which an integrator with delay begins to oscillate, pi / (2 T).
-
-    Args:
-        loop_delay: delay from command to reported position [s], > 0.
-
-    Returns:
-        The gain [1/s].
-
-    Source: phase of exp(-s T) / s reaches -180 deg at w = pi / (2 T), where its modulus is 1 / w.
-    """
-    return pi / (2.0 * loop_delay)
-
-
-def gain_margin(gain_p: float, gain_i: float, loop_delay: float) -> float:
-    """By which factor both gains may grow before the loop oscillates; below 1 it is unstable.
-
-    Args:
-        gain_p: proportional gain [1/s], >= 0.
-        gain_i: integral gain [1/s2], >= 0.
-        loop_delay: delay from command to reported position [s], > 0.
-
-    Returns:
-        The gain margin; infinite without feedback, 0 when the integral part alone is too strong.
-    """
-    if gain_p == 0.0:
-        return inf if gain_i == 0.0 else 0.0
-    corner = gain_i / gain_p
-
-    def phase_margin(w: float) -> float:
-        return pi / 2.0 - atan(corner / w) - w * loop_delay
-
-    if corner * loop_delay >= 1.0:
-        return 0.0
-    # The phase rises up to this frequency and falls through -180 deg beyond it.
-    low = max(sqrt(corner / loop_delay - corner * corner), 1e-9)
-    high = largest_gain(loop_delay)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if phase_margin(middle) > 0.0:
-            low = middle
-        else:
-            high = middle
-    return low * low / hypot(gain_p * low, gain_i)
 
 
 def sensitivity(
@@ -91,29 +55,57 @@ def loop_margins(loop: LoopModel, gain_p: float, gain_i: float, period: float) -
 
     Args:
         loop: dead time and lag.
-        gain_p: proportional gain [1/s], > 0.
-        gain_i: integral gain [1/s2].
+        gain_p: proportional gain [1/s], >= 0.
+        gain_i: integral gain [1/s2], >= 0.
         period: control cycle [s].
 
     Returns:
-        The margins; all are infinite, and the peak is 1, without feedback.
+        The margins; without feedback all are infinite and the peak is 1.
     """
-    if gain_p == 0.0:
+    if gain_p == 0.0 and gain_i == 0.0:
         return LoopMargins(inf, inf, inf, 1.0)
-    hertz = np.geomspace(0.01, 0.5 / period, 4000)
+    hertz = np.geomspace(_LOWEST, 0.5 / period, _N_FREQUENCIES)
     values = _open_loop(loop, gain_p, gain_i, period, hertz)
+    gain = _gain_margin(loop, gain_p, gain_i, period, hertz, values)
     size, phase = np.abs(values), np.unwrap(np.angle(values))
-    # A double integrator begins at -180 deg; unwrapping may have begun a turn off.
-    phase -= 2.0 * pi * round((phase[0] + pi / 2.0) / (2.0 * pi))
-    crossing = int(np.argmax(size < 1.0))
-    turning = np.flatnonzero((phase[:-1] > -pi) & (phase[1:] <= -pi))
-    phase_margin = pi + float(phase[crossing])
+    if phase[0] > 0.0:  # a double integrator begins at -180 deg, and may begin beyond
+        phase -= 2.0 * pi
+    # Where |L| is 1 for the last time; at an end of the range when it is never or always above.
+    last = int(np.flatnonzero(np.append(True, size[1:] >= 1.0))[-1])
+    near = slice(last, last + 2)
+    crossover = float(np.interp(0.0, -np.log(size[near]), hertz[near]))
+    phase_margin = pi + float(np.interp(crossover, hertz[near], phase[near]))
     return LoopMargins(
-        gain=1.0 / float(size[turning[-1]]) if len(turning) else inf,
+        gain=gain,
         phase_deg=float(np.degrees(phase_margin)),
-        delay=phase_margin / (2.0 * pi * float(hertz[crossing])),
-        peak=float(np.max(1.0 / np.abs(1.0 + values))),
+        delay=phase_margin / (2.0 * pi * crossover),
+        peak=float(np.max(1.0 / np.abs(1.0 + values))) if gain > 1.0 else inf,
     )
+
+
+def _gain_margin(
+    loop: LoopModel,
+    gain_p: float,
+    gain_i: float,
+    period: float,
+    hertz: NDArray[np.float64],
+    values: NDArray[np.complex128],
+) -> float:
+    """The smallest factor k with a pole of 1 + k L on the unit circle: 1 over the largest crossing.
+
+    Both gains together move the poles along root loci. For small k a pole leaves z = 1 inwards or outwards,
+    which is the sign of Im L near 0; the first crossing of the negative real axis is where a loop that was
+    stable is no more.
+    """
+    if values[0].imag >= 0.0:
+        return 0.0  # the integral part alone is too strong: unstable with gains however small
+    side = values.imag
+    turns = np.flatnonzero((side[:-1] < 0.0) != (side[1:] < 0.0))
+    share = side[turns] / (side[turns] - side[turns + 1])
+    between = hertz[turns] + share * (hertz[turns + 1] - hertz[turns])
+    # At half the sampling frequency L is real: the curve may end on the axis without crossing it.
+    crossings = _open_loop(loop, gain_p, gain_i, period, np.append(between, hertz[-1])).real
+    return float(-1.0 / crossings.min())
 
 
 def _open_loop(

@@ -18,7 +18,7 @@ from pc_client.control.lag import identify_loop
 from pc_client.control.learning_filter import LearningFilter, design_filter
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
-from pc_client.control.stability import LoopMargins, gain_margin, loop_margins
+from pc_client.control.stability import LEAST_GAIN_MARGIN, LoopMargins, loop_margins
 from pc_client.control.state_estimate import EstimatorGains, identify_estimator
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
@@ -33,9 +33,6 @@ _AT_REST = 12
 _RETURN_TOLERANCE = 2e-3
 """How far from where it began the excitation may leave a joint [rad]."""
 
-_LEAST_MARGIN = 2.0
-"""A controller needs at least this gain margin with the identified delay: 6 dB, the usual one."""
-
 
 @dataclass(frozen=True, slots=True)
 class Identification:
@@ -43,7 +40,7 @@ class Identification:
 
     Attributes:
         estimate: dead time and lag as one delay.
-        loop: dead time and lag apart, for a controller that uses them; else all of it dead time.
+        loop: dead time and lag apart, for a controller that uses them; else the delay alone.
         margins: of the feedback on this loop.
         learning: the filter of a controller that learns; None for another.
         estimator: the gains of a controller that estimates; None for another.
@@ -61,11 +58,15 @@ class Identification:
         return self.estimate.delay
 
     def facts(self) -> Mapping[str, float | str]:
-        """Return what belongs into provenance and report, by name."""
-        facts: dict[str, float | str] = {
-            "dead_time_s": self.loop.dead_time,
-            "lag_s": self.loop.lag,
-            "joint_spread_s": self.loop.spread,
+        """Return what belongs into provenance and report, by name; what was not identified is absent."""
+        facts: dict[str, float | str] = {}
+        if self.loop.spread is not None:
+            facts |= {
+                "dead_time_s": self.loop.dead_time,
+                "lag_s": self.loop.lag,
+                "joint_spread_s": self.loop.spread,
+            }
+        facts |= {
             "gain_margin": self.margins.gain,
             "phase_margin_deg": self.margins.phase_deg,
             "delay_margin_s": self.margins.delay,
@@ -131,22 +132,22 @@ def identify(
             f"the excitation left a joint {drift:.4f} rad from where it began, "
             f"allowed is {_RETURN_TOLERANCE} rad"
         )
-    margin = gain_margin(config.gain_p, config.gain_i, max(estimate.delay, period))
-    if margin < _LEAST_MARGIN:
-        raise GainMarginError(
-            f"with a loop delay of {estimate.delay * 1e3:.0f} ms the controller {config.name!r} has a "
-            f"gain margin of {margin:.1f}, needed is {_LEAST_MARGIN}: the loop is too slow for it",
-            margin=margin,
-            delay=estimate.delay,
-        )
     if knows_lag:
         loop = identify_loop(t, qd_cmd, q, period)
-    else:  # one delay is all that this controller wants to know
-        loop = LoopModel(estimate.delay, 0.0, 0.0, estimate.residual)
+    else:
+        loop = LoopModel.of_delay(estimate.delay, estimate.residual)
+    margins = loop_margins(loop, config.gain_p, config.gain_i, period)
+    if not margins.gain >= LEAST_GAIN_MARGIN:
+        raise GainMarginError(
+            f"with a loop delay of {estimate.delay * 1e3:.0f} ms the controller {config.title!r} has a gain "
+            f"margin of {margins.gain:.2f}, needed is {LEAST_GAIN_MARGIN}: give it smaller gains",
+            margin=margins.gain,
+            delay=estimate.delay,
+        )
     return Identification(
         estimate=estimate,
         loop=loop,
-        margins=loop_margins(loop, config.gain_p, config.gain_i, period),
+        margins=margins,
         learning=learning_filter(config, loop, period),
         estimator=identify_estimator(qd_cmd, q, loop, period, _AT_REST) if config.estimates else None,
     ), report
@@ -170,7 +171,7 @@ def learning_filter(config: ControllerConfig, loop: LoopModel, period: float) ->
     if not learning.contraction < 1.0:
         raise DriverError(
             f"learning would not converge: from run to run an error may grow by {learning.contraction:.2f}, "
-            f"allowed is less than 1; single joints differ by {loop.spread * 1e3:.1f} ms from the loop's "
-            "delay, use --controller preview"
+            f"allowed is less than 1; single joints differ too much from the loop ({loop}): use "
+            "--controller preview"
         )
     return learning

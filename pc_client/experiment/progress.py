@@ -64,10 +64,8 @@ class Progress:
             soft_wrap=True,
         )
         if found.learning is not None:
-            loop = found.loop
             self._console.print(
-                f"learning: dead time {loop.dead_time * 1e3:.1f} ms, lag {loop.lag * 1e3:.1f} ms, "
-                f"joints within {loop.spread * 1e3:.1f} ms; up to {found.learning.cut_off:.0f} Hz "
+                f"learning: {found.loop}; up to {found.learning.cut_off:.0f} Hz "
                 f"(set by the {found.learning.limited_by}), contraction {found.learning.contraction:.2f}",
                 soft_wrap=True,
             )

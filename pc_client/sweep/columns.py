@@ -55,7 +55,7 @@ FIGURES = (
     Column("max_path_error_mm", float, "the same after the best shift and without the constant offset"),
     *(Column(budget_column(part), float, f"share of {part} in the error power, 0..1") for part in PARTS),
     Column("delay_ms", float, "loop delay that the client identified before the first run"),
-    Column("gain_margin", float, "factor by which both gains may grow with this delay; refused below 2"),
+    Column("gain_margin", float, "factor by which both gains may grow on this loop; refused below 2"),
     Column("late_frames", int, "frames that came late"),
     Column("lost_frames", int, "frames that never came"),
 )

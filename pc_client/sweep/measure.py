@@ -7,9 +7,8 @@ from pathlib import Path
 
 from pc_client.analysis.budget import PARTS
 from pc_client.analysis.run import analyse_run
-from pc_client.control.controller_config import ControllerConfig
-from pc_client.control.stability import gain_margin
 from pc_client.driver.velocity_stream import StreamReport
+from pc_client.experiment.identification import Identification
 from pc_client.recording.loader import load_recording
 from pc_client.sweep.columns import budget_column
 from pc_client.sweep.outcome import Row, Value
@@ -48,16 +47,9 @@ def measure_run(path: Path, stream: StreamReport) -> Row:
     return {name: _finite(value) for name, value in figures.items()}
 
 
-def loop_figures(config: ControllerConfig, delay: float, period: float) -> Row:
-    """Delay and gain margin of a loop.
-
-    Args:
-        config: the controller.
-        delay: identified loop delay [s].
-        period: control cycle [s]; no loop is faster.
-    """
-    margin = gain_margin(config.gain_p, config.gain_i, max(delay, period))
-    return {"delay_ms": 1e3 * delay, "gain_margin": _finite(margin)}
+def loop_figures(found: Identification) -> Row:
+    """Delay and gain margin of an identified loop."""
+    return {"delay_ms": 1e3 * found.delay, "gain_margin": _finite(found.margins.gain)}
 
 
 def _finite(value: Value) -> Value:

@@ -65,7 +65,7 @@ def _run(case: Case, host: str, ports: Ports, folder: Path, keep_recordings: boo
     experiment = Experiment(planned.model, planned.planned, planned.repeat, folder / "recordings")
     with UrDriver(host, ports) as driver:
         report = ExperimentRunner(driver, experiment, case.controller).run()
-        loop = loop_figures(case.controller, report.delay.delay, driver.info.period)
+    loop = loop_figures(report.delay)
     rows = tuple(
         {**measure_run(path, stream), **loop}
         for path, stream in zip(report.paths, report.streams, strict=True)

@@ -41,7 +41,9 @@ def record_joints(path: Path, seed: int, *, ripple: float = 0.0, push: float = 0
     q = q + np.cumsum([np.convolve(column, response)[: len(t)] for column in cmd_qd.T], axis=1).T
     q = q + random.normal(0.0, SIGMA, q.shape)
     p_ref, p = tcp_positions(model, q_ref), tcp_positions(model, q)
-    prov = provenance(robot_model="UR3", repetition=seed, loop={"dead_time_s": 0.02, "lag_s": 0.01})
+    prov = provenance(
+        robot_model="UR3", repetition=seed, loop={"dead_time_s": 0.02, "lag_s": 0.01, "joint_spread_s": 0.0}
+    )
     with Recorder(path, prov, SIGNALS) as recorder:
         for i, now in enumerate(t):
             frame = np.zeros(N_VALUES)

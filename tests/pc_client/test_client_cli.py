@@ -108,6 +108,8 @@ def test_run_records_and_reports(robot, tmp_path, capsys):
     }
     text = capsys.readouterr().out
     assert "loop delay" in text
+    assert "lag 0.0" not in text  # preview knows no lag, so none is shown
+    assert "within 0.0" not in text + (out / "report.html").read_text()
     assert "19.02" in text  # the paper's figure stands beside ours
     assert robot.at_rest
 

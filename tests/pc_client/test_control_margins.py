@@ -1,4 +1,4 @@
-"""Margins of the sampled loop: against the known bound, and against a loop that is run to its edge."""
+"""Margins of the sampled loop: against its poles, the known bound, and a loop that is run to its edge."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from control_loop import PERIOD, DelayedArm
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from pc_client.control.controller_config import CONTROLLERS
-from pc_client.control.loop_model import LoopModel
+from pc_client.control.loop_model import LoopModel, velocity_response
 from pc_client.control.pi_feedforward import PiState, step_pi
-from pc_client.control.stability import gain_margin, loop_margins, sensitivity
+from pc_client.control.stability import LEAST_GAIN_MARGIN, loop_margins, sensitivity
 
 BEST = CONTROLLERS["best"]
 
@@ -51,12 +52,68 @@ def test_delay_margin_is_the_delay_that_the_loop_still_bears():
     assert last_error(config, 3 + math.ceil(1.1 * more), 0.01) > 1e-2
 
 
-@settings(max_examples=30, deadline=None)
-@given(delay=st.floats(0.04, 0.1), gain=st.floats(1.0, 10.0))
-def test_near_the_continuous_loop_for_long_delays(delay, gain):
+def continuous_gain_margin(gain_p, gain_i, delay):
+    """Of L(s) = (gain_p + gain_i / s) / s exp(-s delay), by its phase: atan(w gain_p / gain_i) = w delay."""
+    w = brentq(
+        lambda w: math.atan2(w * gain_p, gain_i) - w * delay, 1e-3 / delay, 0.5 * math.pi / delay + 1e-9
+    )
+    return w * w / math.hypot(gain_p * w, gain_i)
+
+
+@given(delay=st.floats(0.04, 0.1), gain_p=st.floats(1.0, 10.0), gain_i=st.floats(0.0, 10.0))
+def test_near_the_continuous_loop_for_long_delays(delay, gain_p, gain_i):
+    assume(gain_i * delay < 0.5 * gain_p)
     # the hold adds half a cycle, and the step in which a command shows another half
-    ours = loop_margins(LoopModel(delay, 0.0, 0.0, 0.0), gain, 0.0, PERIOD)
-    assert ours.gain == pytest.approx(gain_margin(gain, 0.0, delay + 0.5 * PERIOD), rel=0.05)
+    ours = loop_margins(LoopModel.of_delay(delay, 0.0), gain_p, gain_i, PERIOD)
+    theirs = continuous_gain_margin(gain_p, gain_i, delay + 0.5 * PERIOD)
+    assert ours.gain == pytest.approx(theirs, rel=0.05)
+
+
+def largest_pole(loop, gain_p, gain_i):
+    """Of 1 + L = 0, as a polynomial in 1 / z; below 1 the loop is stable."""
+    response = velocity_response(loop, PERIOD)
+    if gain_i == 0.0:  # a single integrator
+        open_loop, integrators = gain_p * PERIOD * response, [1.0, -1.0]
+    else:
+        controller = [gain_p, gain_i * PERIOD - gain_p]
+        open_loop, integrators = PERIOD * np.convolve(controller, response), [1.0, -2.0, 1.0]
+    open_loop[: len(integrators)] += integrators
+    return np.abs(np.roots(open_loop)).max()
+
+
+loops = st.builds(
+    LoopModel,
+    st.floats(0.0, 0.2) | st.integers(0, 20).map(lambda cycles: cycles * PERIOD),
+    st.just(0.0) | st.floats(0.001, 0.06),
+    st.just(0.0),
+    st.just(0.0),
+)
+gains_p = st.just(0.0) | st.floats(-2.0, 2.5).map(lambda x: 10.0**x)
+gains_i = st.just(0.0) | st.floats(-2.0, 4.0).map(lambda x: 10.0**x)
+
+
+@settings(deadline=None)
+@given(loop=loops, gain_p=gains_p, gain_i=gains_i)
+def test_the_gain_margin_is_above_one_exactly_when_all_poles_are_inside(loop, gain_p, gain_i):
+    assume(gain_p > 0.0 or gain_i > 0.0)
+    margins = loop_margins(loop, gain_p, gain_i, PERIOD)
+    assert 0.0 <= margins.gain < math.inf
+    if abs(margins.gain - 1.0) > 1e-3:
+        assert (margins.gain > 1.0) == (largest_pole(loop, gain_p, gain_i) < 1.0)
+        assert (margins.gain > 1.0) == (margins.phase_deg > 0.0) == (margins.delay > 0.0)
+    assert (margins.gain > 1.0) == (margins.peak < math.inf)
+
+
+@settings(deadline=None)
+@given(loop=loops, gain_p=gains_p, gain_i=gains_i)
+def test_gains_that_grow_by_the_margin_put_a_pole_on_the_unit_circle(loop, gain_p, gain_i):
+    assume(gain_p > 0.0 or gain_i > 0.0)
+    margin = loop_margins(loop, gain_p, gain_i, PERIOD).gain
+    if margin == 0.0:  # too much integral part: no pair of this ratio is stable
+        assert largest_pole(loop, 0.01 * gain_p, 0.01 * gain_i) > 1.0
+    else:
+        assert largest_pole(loop, 0.99 * margin * gain_p, 0.99 * margin * gain_i) < 1.0
+        assert largest_pole(loop, 1.01 * margin * gain_p, 1.01 * margin * gain_i) > 1.0
 
 
 def test_peak_is_the_largest_amplification():
@@ -80,3 +137,12 @@ def test_every_controller_has_room_on_a_slow_loop(name):
     assert margins.gain > 4.0
     assert margins.phase_deg > 55.0
     assert margins.delay > 0.1
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_every_controller_is_accepted_on_the_slowest_loop_it_is_meant_for(name):
+    config = CONTROLLERS[name]
+    # 45 ms is the bad end of what UR users report for a CB3.
+    margins = loop_margins(LoopModel.of_delay(0.045, 0.0), config.gain_p, config.gain_i, PERIOD)
+    assert margins.gain > 2.0 * LEAST_GAIN_MARGIN
+    assert config.gain_i <= config.gain_p**2 / 8  # the integral does not overshoot

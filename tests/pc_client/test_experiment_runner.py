@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from fake_robot import PERIOD, FakeRobot
 from recording_samples import SIGNALS, provenance
 
 from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.loop_model import LoopModel
+from pc_client.control.stability import loop_margins
 from pc_client.driver.ur_driver import UrDriver
-from pc_client.errors import ClientError, DriverError, MovementError, RecordingError, RobotStoppedError
+from pc_client.errors import (
+    ClientError,
+    DriverError,
+    GainMarginError,
+    MovementError,
+    RecordingError,
+    RobotStoppedError,
+)
 from pc_client.experiment.preflight import experiment_text, is_loopback
 from pc_client.experiment.prepare import clear_folder, load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import Recorder
+from pc_client.sweep.measure import loop_figures
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
 
@@ -100,6 +112,28 @@ def test_two_movements_twice(two, tmp_path):
     speed = recording.column("ref_tcp_velocity")
     assert abs(speed[recording.rows_of(Phase.SETTLE_BEFORE)]).max() == 0.0
     assert recording.summary["late_frames"] == 0
+
+
+def test_accepted_recorded_and_tabled_gain_margins_are_one(two, tmp_path):
+    preview = CONTROLLERS["preview"]
+    edge = loop_margins(LoopModel.of_delay(4 * PERIOD, 0.0), preview.gain_p, preview.gain_i, PERIOD).gain
+    experiment = replace(two, planned=two.planned[:1], repeat=1, out=tmp_path)
+
+    def at_margin(margin):
+        factor = edge / margin
+        own = replace(preview, gain_p=factor * preview.gain_p, gain_i=factor * preview.gain_i)
+        robot = FakeRobot(delay=4)
+        robot.q = list(POSTURE)
+        with UrDriver("robot", network=robot) as driver:
+            return ExperimentRunner(driver, experiment, own).run()
+
+    report = at_margin(2.05)
+    recorded = load_recording(report.paths[0]).provenance.loop["gain_margin"]
+    assert recorded == pytest.approx(2.05, abs=0.03)
+    assert recorded == report.delay.margins.gain == loop_figures(report.delay)["gain_margin"]
+    with pytest.raises(GainMarginError, match=r"gain margin of 1\.9") as caught:
+        at_margin(1.95)
+    assert caught.value.margin == pytest.approx(1.95, abs=0.03)
 
 
 def test_the_same_experiment_gives_the_same_bytes(two, tmp_path):
