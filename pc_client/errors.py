@@ -3,6 +3,7 @@
 ClientError
 ├── MovementError      a movement file or its parameters make no sense
 ├── ControllerError    the numbers of a controller, or its file, make no sense
+├── CellError          a cell file makes no sense
 ├── PlanningError      a path leaves reach or limits; nothing has moved
 ├── DriverError        the robot cannot be reached, or the stream broke
 │   ├── RobotStoppedError  the robot stopped itself (protective stop, program error)
@@ -26,6 +27,10 @@ class MovementError(ClientError):
 
 class ControllerError(ClientError):
     """The numbers of a controller, or its file, make no sense."""
+
+
+class CellError(ClientError):
+    """The file of an arm's surroundings and tool makes no sense."""
 
 
 class PlanningError(ClientError):

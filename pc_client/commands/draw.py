@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated
 
@@ -166,11 +167,13 @@ def _make(
     from pc_client.driver.transport import TcpNetwork
     from pc_client.extraction.extract import extract
     from pc_client.kinematics.robot_model import robot_model
+    from pc_client.movements.geometry import WORKING_BOXES
 
     arm = read_info(TcpNetwork(), robot, ports).model
     if arm == UNKNOWN:
         raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")
     model = robot_model(arm.lower())
+    options = replace(options, box=WORKING_BOXES[model.name])
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),

@@ -18,7 +18,7 @@ from pc_client.drawing.joining import Joined, join
 from pc_client.drawing.marks import Mark
 from pc_client.errors import PlanningError
 from pc_client.kinematics.robot_model import RobotModel
-from pc_client.planning.limits import DEFAULT_LIMITS, PlanLimits
+from pc_client.planning.limits import limits_of
 from pc_client.planning.plan import JointPlan, PlannableMovement, plan_movement
 
 __all__ = ["ACCURACY", "LawMovement", "factor_needed", "least_factor", "paced"]
@@ -32,10 +32,6 @@ _LONGER = (1.03, 1.5)
 _ATTEMPTS = 40
 #: Speed, m/s, at which a path is planned first: far from any limit, so that its samples lie close.
 _EASY_SPEED = 0.3
-
-_OPEN_LIMITS = replace(
-    DEFAULT_LIMITS, speed_fraction=1e6, qdd_max=(1e9,) * 6, tcp_speed_max=1e6, rest_speed_max=1e6
-)
 
 
 class LawMovement:
@@ -63,7 +59,7 @@ class LawMovement:
 
 
 def factor_needed(
-    name: str, joined: Joined, arm: RobotModel, limits: PlanLimits = DEFAULT_LIMITS
+    name: str, joined: Joined, arm: RobotModel
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The factor that each moment of a movement needs.
 
@@ -71,7 +67,6 @@ def factor_needed(
         name: for messages.
         joined: the movement, as fast as the hand was.
         arm: who shall do it.
-        limits: on speeds and accelerations.
 
     Returns:
         Times (n,), s of the hand, and factors (n,); below 1 there is room.
@@ -81,7 +76,9 @@ def factor_needed(
     """
     t = np.linspace(0.0, joined.law.duration, 2001)
     easy = max(1.0, float(np.linalg.norm(joined.law.evaluate(t).v, axis=1).max()) / _EASY_SPEED)
-    plan = plan_movement(LawMovement(name, joined, easy), model=arm, limits=_OPEN_LIMITS)
+    limits = limits_of(arm)
+    no_speeds = replace(limits, speed_fraction=1e6, qdd_max=(1e9,) * 6, tcp_speed_max=1e6, rest_speed_max=1e6)
+    plan = plan_movement(LawMovement(name, joined, easy), model=arm, limits=no_speeds)
     qd = np.abs(plan.spline.sample(plan.t)[1]) / (limits.speed_fraction * np.array(arm.limits.qd_max))
     qdd = np.abs(plan.spline.qdd(plan.t)) / np.array(limits.qdd_max)
     tcp = np.linalg.norm(joined.law.stretched(easy).evaluate(plan.t).v, axis=1) / limits.tcp_speed_max

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.control.controller_config import ControllerConfig
-from pc_client.kinematics.clearance import clearance_model
+from pc_client.kinematics.clearance import Distances, clearance_model
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.checks import measure_joint_range
 from pc_client.planning.plan import JointPlan
@@ -58,13 +58,20 @@ def broken_limit(
     }
     if complaint := _first_beyond(motion):
         return complaint  # what is no number must not come to the clearance
-    clearance = clearance_model(model).along(way[::_CLEARANCE_STEP])
+    clearance = clearance_model(model).along(way)
     return _first_beyond(
         {
-            "clearance to itself": limits.own_clearance_min / np.maximum(clearance.own, 1e-6),
-            "clearance to the base plane": limits.floor_clearance_min / np.maximum(clearance.floor, 1e-6),
+            "clearance to itself": _share(clearance.own, limits.own_clearance_min),
+            "clearance to the floor": _share(clearance.floor, limits.floor_clearance_min),
+            "clearance to the cell": _share(clearance.cell, limits.cell_clearance_min),
         }
     )
+
+
+def _share(distances: Distances, limit: float) -> Array:
+    """Return (n,) limit over distance: above 1 is too near."""
+    share: Array = limit / np.maximum(distances.least, 1e-6)
+    return share
 
 
 def _first_beyond(shares: Mapping[str, Array]) -> str:

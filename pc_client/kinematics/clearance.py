@@ -1,23 +1,29 @@
-"""How far the arm stays from itself and from the surface it stands on.
+"""How far the arm and its tool stay from themselves, from the surface under them and from what stands around.
 
-Convex hulls of the published collision meshes, moved by the nominal kinematics; distances by Pinocchio's
-collision library (coal). Tools and the surroundings are not known here: the bare arm on a plane z = 0.
+Convex hulls of the published collision meshes, moved by the nominal kinematics, against the bodies of a cell;
+distances by Pinocchio's collision library (coal).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from pc_client.kinematics.cell import Solid, Three
 from pc_client.kinematics.robot_data import find_robot_file, find_share_folder
 from pc_client.kinematics.robot_model import RobotModel, load_pinocchio_model
 
 Array = NDArray[np.float64]
+
+# The joint that carries a body, as Pinocchio counts: 0 nothing, 3 the forearm's, 4 to 6 the wrists'.
+_FIXED, _WRIST_3 = 0, 6
 
 # The shoulder end of the upper arm cannot move up or down (on a UR5 it is 30 mm above the plane in every
 # posture), and its elbow end lies beside the forearm's: from the forearm on, links are watched.
@@ -25,44 +31,82 @@ _FIRST_LINK_ABOVE_FLOOR = 3
 
 # Neighbours touch at their common joint. Of the wrist's links those two joints apart pass each other closely
 # but freely: the full meshes of a UR3 keep 6.7 mm in every posture, while the forearm's hull, which bridges
-# its hollow side, would not. Numbers are the joints that carry the links (forearm 3, wrist 3 is 6).
+# its hollow side, would not.
 _FREE_BY_DESIGN = {(3, 5), (4, 6)}
+
+_COAL_SHAPES = MappingProxyType(
+    {
+        "boxes": pin.coal.Box,
+        "cylinders": pin.coal.Cylinder,
+        "spheres": pin.coal.Sphere,
+        "capsules": pin.coal.Capsule,
+    }
+)
 
 
 class Nearest(NamedTuple):
-    """What came near: its name for people, and the joint 0..5 that carries it (the outer of two links)."""
+    """Two bodies that came near: their names for people, and the joint 0..5 that carries the outer one."""
 
-    name: str
+    first: str
+    second: str
     joint: int
+
+    def says(self, distance: float, least: float) -> str:
+        """Say that a distance [m] is below the least one that is allowed [m]."""
+        return (
+            f"{self.first} comes within {distance * 1e3:.0f} mm of {self.second},"
+            f" at least {least * 1e3:.0f} mm is asked"
+        )
+
+
+class Distances(NamedTuple):
+    """Smallest distances along a joint path.
+
+    Attributes:
+        least: (n,) smallest distance at each posture [m]; negative when bodies overlap, infinite without any.
+        nearest: the two bodies that come closest at each posture; empty without any.
+    """
+
+    least: Array
+    nearest: tuple[Nearest, ...]
 
 
 class Clearance(NamedTuple):
-    """Distances along a joint path; negative when bodies overlap.
+    """What was measured along a joint path.
 
     Attributes:
-        floor: (n,) lowest point of forearm and wrists above the base plane [m].
-        floor_nearest: (n,) the link that comes lowest.
-        own: (n,) smallest distance between links that are not neighbours [m].
-        own_nearest: (n,) the two links that come closest.
+        floor: forearm, wrists and tool above the floor.
+        own: links that are not neighbours, and the tool, from each other.
+        cell: moving links and tool from walls and solids of the cell.
     """
 
-    floor: Array
-    floor_nearest: tuple[Nearest, ...]
-    own: Array
-    own_nearest: tuple[Nearest, ...]
+    floor: Distances
+    own: Distances
+    cell: Distances
+
+
+class _Pairs(NamedTuple):
+    """Bodies whose distances are asked for together.
+
+    Attributes:
+        geometry: Pinocchio's geometry model.
+        data: its scratch memory.
+        names: one for each pair.
+    """
+
+    geometry: Any
+    data: Any
+    names: tuple[Nearest, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class ClearanceModel:
-    """The hulls of one arm, ready for distance queries. Like RobotModel: one per thread."""
+    """The bodies of one arm in its cell, ready for distance queries. Like RobotModel: one per thread."""
 
     robot: RobotModel
-    _own_pairs: Any = field(repr=False)
-    _own_data: Any = field(repr=False)
-    _floor_pairs: Any = field(repr=False)
-    _floor_data: Any = field(repr=False)
-    _own_names: tuple[Nearest, ...] = field(repr=False)
-    _floor_names: tuple[Nearest, ...] = field(repr=False)
+    _floor: _Pairs = field(repr=False)
+    _own: _Pairs = field(repr=False)
+    _cell: _Pairs = field(repr=False)
 
     def along(self, q: ArrayLike) -> Clearance:
         """Measure the clearance at each posture of a joint path.
@@ -74,71 +118,107 @@ class ClearanceModel:
             The distances, one per posture.
         """
         path = np.atleast_2d(np.asarray(q, dtype=np.float64))
-        own, floor = np.empty(len(path)), np.empty(len(path))
-        own_nearest, floor_nearest = [], []
+        return Clearance(*(self._distances(pairs, path) for pairs in (self._floor, self._own, self._cell)))
+
+    def _distances(self, pairs: _Pairs, path: Array) -> Distances:
+        least = np.full(len(path), np.inf)
+        if not pairs.names:
+            return Distances(least, ())
+        nearest = []
         model, data = self.robot.pin_model, self.robot.pin_data
         for k, q_k in enumerate(path):
-            nearest = pin.computeDistances(model, data, self._own_pairs, self._own_data, q_k)
-            own[k] = self._own_data.distanceResults[nearest].min_distance
-            own_nearest.append(self._own_names[nearest])
-            lowest = pin.computeDistances(model, data, self._floor_pairs, self._floor_data, q_k)
-            floor[k] = self._floor_data.distanceResults[lowest].min_distance
-            floor_nearest.append(self._floor_names[lowest])
-        return Clearance(floor, tuple(floor_nearest), own, tuple(own_nearest))
+            index = pin.computeDistances(model, data, pairs.geometry, pairs.data, q_k)
+            least[k] = pairs.data.distanceResults[index].min_distance
+            nearest.append(pairs.names[index])
+        return Distances(least, tuple(nearest))
 
 
 def clearance_model(robot: RobotModel) -> ClearanceModel:
-    """Return the hulls of `robot`.
+    """Return the bodies of `robot` in its cell.
 
     Raises:
         PlanningError: example-robot-data is not installed.
     """
-    own_pairs, floor_pairs = _load_hulls(robot.description.urdf)
+    cell = robot.cell
+    hulls = _load_hulls(robot.description.urdf)
+    links = [_Body(str(hull.name).split("_link")[0].replace("_", " "), hull) for hull in hulls]
+    tool = [_Body(f"tool {solid.title}", _geometry(solid, robot)) for solid in cell.tool.solids]
+    around = [_Body(f"wall '{wall.name}'", _half_space(wall.normal, wall.offset)) for wall in cell.walls]
+    around += [_Body(solid.title, _geometry(solid, None)) for solid in cell.solids]
+    floor = _Body(f"the floor at z = {cell.floor_z:g} m", _half_space((0.0, 0.0, 1.0), cell.floor_z))
+
+    above_floor = [body for body in (*links, *tool) if body.joint >= _FIRST_LINK_ABOVE_FLOOR]
+    moving = [body for body in (*links, *tool) if body.joint > _FIXED]
+    own = [
+        (outer, inner)
+        for inner in links
+        for outer in links
+        if outer.joint > inner.joint + 1 and (inner.joint, outer.joint) not in _FREE_BY_DESIGN
+    ]
+    # A tool begins where wrist 3 ends. Everything else it can reach, wrist 2 with a part that stands back.
+    own += [(part, link) for part in tool for link in links if link.joint != _WRIST_3]
     return ClearanceModel(
         robot,
-        own_pairs,
-        own_pairs.createData(),
-        floor_pairs,
-        floor_pairs.createData(),
-        tuple(_nearest(own_pairs, pair.first, pair.second) for pair in own_pairs.collisionPairs),
-        tuple(_nearest(floor_pairs, pair.second) for pair in floor_pairs.collisionPairs),
+        _pairs((body, floor) for body in above_floor),
+        _pairs(own),
+        _pairs((body, other) for body in moving for other in around),
     )
 
 
+class _Body(NamedTuple):
+    """A body with its name for people."""
+
+    name: str
+    geometry: Any
+
+    @property
+    def joint(self) -> int:
+        """The joint that carries it; 0 for what does not move."""
+        return int(self.geometry.parentJoint)
+
+
+def _pairs(bodies: Iterable[tuple[_Body, _Body]]) -> _Pairs:
+    """Make a geometry model of pairs of bodies: what moves, and what it must not touch."""
+    geometry, index, names = pin.GeometryModel(), {}, []
+    for pair in bodies:
+        for body in pair:
+            if body.name not in index:
+                index[body.name] = geometry.addGeometryObject(body.geometry)
+        moving, other = pair
+        geometry.addCollisionPair(pin.CollisionPair(index[other.name], index[moving.name]))
+        names.append(Nearest(moving.name, other.name, moving.joint - 1))
+    return _Pairs(geometry, geometry.createData(), tuple(names))
+
+
+def _half_space(normal: Three, offset: float) -> Any:
+    """Return what lies behind a plane in `base`."""
+    shape = pin.coal.Halfspace(np.array(normal), offset)
+    return pin.GeometryObject("half space", _FIXED, 0, pin.SE3.Identity(), shape)
+
+
+def _geometry(solid: Solid, carrier: RobotModel | None) -> Any:
+    """Return a solid that stands in `base`, or at the flange of the arm that carries it."""
+    placement = pin.SE3(pin.rpy.rpyToMatrix(*solid.rpy), np.array(solid.centre))
+    joint = _FIXED
+    if carrier is not None:
+        flange = carrier.pin_model.frames[carrier.tcp_frame]
+        joint, placement = flange.parentJoint, flange.placement * placement
+    shape = _COAL_SHAPES[solid.kind](*solid.sizes)
+    return pin.GeometryObject(solid.name, joint, 0, placement, shape)
+
+
 @lru_cache(maxsize=4)
-def _load_hulls(urdf: str) -> tuple[Any, Any]:
-    """Read the meshes of a URDF: link-against-link and floor-against-link pairs (shared, never changed)."""
+def _load_hulls(urdf: str) -> tuple[Any, ...]:
+    """Read the meshes of a URDF as convex hulls, one a link (shared, never changed)."""
     model = load_pinocchio_model(urdf)  # its frames place the meshes, so they are in `base` already
     meshes = pin.buildGeomFromUrdf(
         model, str(find_robot_file(urdf)), pin.GeometryType.COLLISION, package_dirs=[str(find_share_folder())]
     )
-    own_pairs, floor_pairs = pin.GeometryModel(), pin.GeometryModel()
-    floor_pairs.addGeometryObject(
-        pin.GeometryObject(
-            "floor", 0, 0, pin.SE3.Identity(), pin.coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-        )
-    )
+    hulls = []
     for mesh in meshes.geometryObjects:
         if not isinstance(mesh.geometry, pin.coal.BVHModelBase):
             continue  # ee_link carries a token box, not a part of the arm
         mesh.geometry.buildConvexHull(True, "Qt")  # Qt: triangles only, as coal needs
-        hull = pin.GeometryObject(
-            mesh.name, mesh.parentJoint, mesh.parentFrame, mesh.placement, mesh.geometry.convex
-        )
-        own_pairs.addGeometryObject(hull)
-        if mesh.parentJoint >= _FIRST_LINK_ABOVE_FLOOR:
-            index = floor_pairs.addGeometryObject(hull)
-            floor_pairs.addCollisionPair(pin.CollisionPair(0, index))
-    joints = [hull.parentJoint for hull in own_pairs.geometryObjects]
-    for i, joint_i in enumerate(joints):
-        for j, joint_j in enumerate(joints):
-            if joint_j > joint_i + 1 and (joint_i, joint_j) not in _FREE_BY_DESIGN:
-                own_pairs.addCollisionPair(pin.CollisionPair(i, j))
-    return own_pairs, floor_pairs
-
-
-def _nearest(geometry: Any, *indices: int) -> Nearest:
-    """Name one link or two of a geometry model: `wrist_1_link_0` becomes `wrist 1`."""
-    links = [geometry.geometryObjects[index] for index in indices]
-    names = [str(link.name).split("_link")[0].replace("_", " ") for link in links]
-    return Nearest(" and ".join(names), max(int(link.parentJoint) for link in links) - 1)
+        hull = mesh.geometry.convex
+        hulls.append(pin.GeometryObject(mesh.name, mesh.parentJoint, mesh.parentFrame, mesh.placement, hull))
+    return tuple(hulls)

@@ -20,6 +20,7 @@ from typing import Any
 import pinocchio as pin
 
 from pc_client.errors import PlanningError
+from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.robot_data import find_robot_file
 
 Six = tuple[float, float, float, float, float, float]
@@ -33,11 +34,13 @@ class JointLimits:
         q_min: lowest joint angles [rad].
         q_max: highest joint angles [rad].
         qd_max: joint speed limits [rad/s].
+        qdd_max: joint acceleration limits [rad/s²].
     """
 
     q_min: Six
     q_max: Six
     qd_max: Six
+    qdd_max: Six
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,28 +52,34 @@ class RobotDescription:
         urdf: file below `example-robot-data/robots/`.
         limits: joint limits.
         q_branch: a posture on the IK branch that is preferred for drawing in front of the arm [rad].
+        tcp_speed_max: TCP speed limit [m/s].
+        reach: distance from the base axis to the flange of the stretched arm [m].
     """
 
     name: str
     urdf: str
     limits: JointLimits
     q_branch: Six
+    tcp_speed_max: float
+    reach: float
 
 
 @dataclass(frozen=True, slots=True)
 class RobotModel:
-    """One arm as Pinocchio computes it.
+    """One arm as Pinocchio computes it, in its cell.
 
     `pin_data` is scratch memory that every computation overwrites: give each thread a model of its own.
 
     Attributes:
         description: names, limits, preferred branch.
+        cell: what stands around it and what it carries.
         pin_model: Pinocchio model whose world frame is UR's `base`.
         pin_data: its scratch memory.
         tcp_frame: index of the frame `tool0`.
     """
 
     description: RobotDescription
+    cell: Cell = field(repr=False)
     pin_model: Any = field(repr=False)
     pin_data: Any = field(repr=False)
     tcp_frame: int
@@ -102,6 +111,14 @@ _ANY_TURN_MAX: Six = (2 * pi,) * 6
 # The larger arms have the same shape, so the same posture names the same branch.
 _ELBOW_UP = _six_degrees(22.6, -101.1, -120.3, -5.9, 74.2, 106.4)
 
+# Accelerations: UR publishes none. UR's own driver streams speedj with a = 40 rad/s²
+# (Universal_Robots_Client_Library, external_control.urscript); no joint gets more. For the large joints it
+# is less, from torque: what UR's "max joint torques" leave after gravity of the bare arm in its worst
+# posture and friction at 1 rad/s, over the inertia of the arm before its base with the rotor. Masses: UR's
+# DH article; rotor inertia and friction: identified sets of real arms (.45 kg m² for joints of size 2 on a
+# UR3, 1.93 for size 3, 5.9 for size 4). The base gets what the shoulder gets.
+#
+# TCP speeds: the data sheets of all three arms, "typical tool speed 1 m/s". Reach: the same.
 ROBOTS = MappingProxyType(
     {
         # Speeds: UR3 manual CB3 3.13: base, shoulder, elbow 180 deg/s, wrists 360 deg/s
@@ -109,32 +126,57 @@ ROBOTS = MappingProxyType(
         "ur3": RobotDescription(
             name="ur3",
             urdf="ur_description/urdf/ur3_robot.urdf",
-            limits=JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _six_degrees(180, 180, 180, 360, 360, 360)),
+            limits=JointLimits(
+                _ANY_TURN_MIN,
+                _ANY_TURN_MAX,
+                qd_max=_six_degrees(180, 180, 180, 360, 360, 360),
+                # (56 - 19 gravity - 10 friction) Nm over .95 kg m²; elbow (28 - 7 - 4) over .4.
+                qdd_max=(28.0, 28.0, 40.0, 40.0, 40.0, 40.0),
+            ),
             q_branch=_ELBOW_UP,
+            tcp_speed_max=1.0,
+            reach=0.5,
         ),
         # UR5 manual CB3 3.13: all joints 180 deg/s (= config/ur5/joint_limits.yaml).
         "ur5": RobotDescription(
             name="ur5",
             urdf="ur_description/urdf/ur5_robot.urdf",
-            limits=JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _six_degrees(180, 180, 180, 180, 180, 180)),
+            limits=JointLimits(
+                _ANY_TURN_MIN,
+                _ANY_TURN_MAX,
+                qd_max=_six_degrees(180, 180, 180, 180, 180, 180),
+                # (150 - 55 - 14) Nm over 3.7 kg m²; elbow (150 - 17 - 17) over 2.6.
+                qdd_max=(22.0, 22.0, 40.0, 40.0, 40.0, 40.0),
+            ),
             q_branch=_ELBOW_UP,
+            tcp_speed_max=1.0,
+            reach=0.85,
         ),
         # UR10 manual CB3 3.13: base, shoulder 120 deg/s, others 180 deg/s (config/ur10/joint_limits.yaml).
         "ur10": RobotDescription(
             name="ur10",
             urdf="ur_description/urdf/ur10_robot.urdf",
-            limits=JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _six_degrees(120, 120, 180, 180, 180, 180)),
+            limits=JointLimits(
+                _ANY_TURN_MIN,
+                _ANY_TURN_MAX,
+                qd_max=_six_degrees(120, 120, 180, 180, 180, 180),
+                # (330 - 122 - 29) Nm over 11.8 kg m²; elbow (150 - 41 - 17) over 4.3.
+                qdd_max=(15.0, 15.0, 21.0, 40.0, 40.0, 40.0),
+            ),
             q_branch=_ELBOW_UP,
+            tcp_speed_max=1.0,
+            reach=1.3,
         ),
     }
 )
 
 
-def robot_model(name: str = "ur3") -> RobotModel:
+def robot_model(name: str = "ur3", cell: Cell = NO_CELL) -> RobotModel:
     """Return a fresh nominal model of the arm called `name`.
 
     Args:
         name: one of `ur3`, `ur5`, `ur10`.
+        cell: what stands around it and what it carries.
 
     Raises:
         PlanningError: unknown name, or example-robot-data is not installed.
@@ -143,7 +185,7 @@ def robot_model(name: str = "ur3") -> RobotModel:
     if description is None:
         raise PlanningError(f"no nominal model is called {name!r}; choose one of {', '.join(sorted(ROBOTS))}")
     model = load_pinocchio_model(description.urdf)
-    return RobotModel(description, model, model.createData(), int(model.getFrameId("tool0")))
+    return RobotModel(description, cell, model, model.createData(), int(model.getFrameId("tool0")))
 
 
 @lru_cache(maxsize=len(ROBOTS))

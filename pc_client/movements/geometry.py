@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import MovementError
 
-__all__ = ["UR3_BOX", "Box", "Similarity", "read_only"]
+__all__ = ["UR3_BOX", "WORKING_BOXES", "Box", "Similarity", "read_only"]
 
 
 def read_only(values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
@@ -63,10 +65,17 @@ class Box:
         )
 
 
-#: Where a UR3 with the tool at RPY(0, 3/4 pi, 0) runs .35 m/s in every direction below its joint speed
-#: limits, in one branch of its inverse kinematics, clear of itself and of the table. Source: a search on a 25
-#: mm grid with the nominal kinematics.
-UR3_BOX = Box((0.275, -0.2, 0.15), (0.425, 0.2, 0.35))
+#: Where an arm with its tool at RPY(0, 3/4 pi, 0) runs .35 m/s in every direction below its joint speed
+#: limits, in one branch of its inverse kinematics, clear of itself and of the table. Source: a search for the
+#: largest box on a grid (UR3 25 mm, others 50 mm) with the nominal kinematics.
+WORKING_BOXES: Mapping[str, Box] = MappingProxyType(
+    {
+        "ur3": Box((0.275, -0.2, 0.15), (0.425, 0.2, 0.35)),
+        "ur5": Box((0.3, -0.4, 0.15), (0.65, 0.4, 0.55)),
+        "ur10": Box((0.4, -0.7, 0.15), (0.85, 0.7, 0.8)),
+    }
+)
+UR3_BOX = WORKING_BOXES["ur3"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.errors import MovementError
+from pc_client.errors import ClientError, MovementError
 
 __all__ = ["TableReader", "toml_value"]
 
@@ -25,19 +25,27 @@ class TableReader:
         values: the table as `tomllib` gives it.
         source: the file's name, for messages.
         prefix: the table's own name within the file, for messages.
+        error_type: the kind of error that a file of this kind raises.
     """
 
-    def __init__(self, values: Mapping[str, Any], source: str, prefix: str = "") -> None:
+    def __init__(
+        self,
+        values: Mapping[str, Any],
+        source: str,
+        prefix: str = "",
+        error_type: type[ClientError] = MovementError,
+    ) -> None:
         self._values = dict(values)
         self._source = source
         self._prefix = prefix
+        self._error_type = error_type
 
     def __contains__(self, key: str) -> bool:
         return key in self._values
 
-    def error(self, key: str, problem: str) -> MovementError:
+    def error(self, key: str, problem: str) -> ClientError:
         """An error about one field."""
-        return MovementError(f"{self._source}: {self._prefix}{key}: {problem}")
+        return self._error_type(f"{self._source}: {self._prefix}{key}: {problem}")
 
     def text(self, key: str) -> str:
         """A text that is not empty."""
@@ -79,17 +87,14 @@ class TableReader:
         value = self._take(key, f"a table [{key}]")
         if not isinstance(value, dict):
             raise self.error(key, f"{value!r}; give a table [{key}]")
-        return TableReader(value, self._source, f"{self._prefix}{key}.")
+        return self._inner(value, key)
 
     def tables(self, key: str) -> list[TableReader]:
         """A list of tables inside this one, at least one."""
         value = self._take(key, f"tables [[{key}]]")
         if not isinstance(value, list) or not value or not all(isinstance(item, dict) for item in value):
             raise self.error(key, f"give one or more tables [[{key}]]")
-        return [
-            TableReader(item, self._source, f"{self._prefix}{key}[{index}].")
-            for index, item in enumerate(value)
-        ]
+        return [self._inner(item, f"{key}[{index}]") for index, item in enumerate(value)]
 
     def facts(self) -> dict[str, str | int | float]:
         """All that is left, which must be texts and numbers."""
@@ -104,15 +109,24 @@ class TableReader:
         if self._values:
             raise self.error(next(iter(self._values)), f"no such field; known are {known}")
 
+    def _inner(self, values: Mapping[str, Any], name: str) -> TableReader:
+        return TableReader(values, self._source, f"{self._prefix}{name}.", self._error_type)
+
     def _take(self, key: str, wanted: str) -> Any:
         if key not in self._values:
             raise self.error(key, f"missing; give {wanted}")
         return self._values.pop(key)
 
     def _number(self, key: str, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f"{value!r}; give a finite number")
-        return float(value)
+        try:
+            number = float(value)
+        except OverflowError:  # a whole number of more than 308 digits
+            number = math.inf
+        if not math.isfinite(number):
+            raise self.error(key, f"{number}; give a finite number")
+        return number
 
 
 def toml_value(value: str | int | float | list[Any]) -> str:

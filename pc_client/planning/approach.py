@@ -19,26 +19,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.clearance import ClearanceModel, clearance_model
-from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.joint_lines import JointLines
+from pc_client.planning.limits import PlanLimits
 from pc_client.planning.plan import JointPlan
 from protocol.ur_types import JOINT_NAMES
 
 Array = NDArray[np.float64]
 
-APPROACH_SPEED = 0.5
-"""Speed of the leading joint on the way [rad/s]: 29 deg/s, the order of UR's recovery mode (30 deg/s)."""
+_CHECK_STEP = 0.01
+"""Largest way of the stretched arm's flange between checked postures [m]."""
 
-APPROACH_ACCELERATION = 0.8
-"""Acceleration of the leading joint [rad/s²]."""
-
-FLOOR_MARGIN = 0.02
-"""Least distance of forearm and wrists from the base plane on the way [m]."""
-
-OWN_MARGIN = 0.01
-"""Least distance of the arm from itself on the way [m]."""
-
-_CHECK_STEP = 0.02  # rad between checked postures: at most 10 mm at the reach of a UR3
 _TURN = 2.0 * pi
 _FOLDING_JOINTS = (1, 2)
 # UR's home posture (0, -90, 0, -90, 0, 0) deg: far from the plane, and the wrist far from the forearm.
@@ -55,8 +46,9 @@ class Approach:
         waypoints: a straight joint line to each, resting in between; the last is `plan.start_q` [rad].
         v: speed of the leading joint [rad/s].
         a: acceleration of the leading joint [rad/s²].
-        floor_clearance: least distance from the base plane on the way [m].
-        own_clearance: least distance of the arm from itself on the way [m].
+        floor_clearance: least distance from the floor on the way [m].
+        own_clearance: least distance of the arm and its tool from themselves on the way [m].
+        cell_clearance: least distance from walls and solids of the cell on the way [m]; infinite without any.
     """
 
     plan: JointPlan
@@ -66,6 +58,7 @@ class Approach:
     a: float
     floor_clearance: float
     own_clearance: float
+    cell_clearance: float
 
     @property
     def motion(self) -> JointLines:
@@ -78,22 +71,13 @@ class Approach:
         return self.motion.duration
 
 
-def plan_approach(
-    plan: JointPlan,
-    q_now: ArrayLike,
-    *,
-    model: RobotModel | None = None,
-    v: float = APPROACH_SPEED,
-    a: float = APPROACH_ACCELERATION,
-) -> Approach:
+def plan_approach(plan: JointPlan, q_now: ArrayLike, *, model: RobotModel) -> Approach:
     """Plan a slow joint move from the present posture to the begin of a plan.
 
     Args:
         plan: the plan that shall begin afterwards.
         q_now: (6,) present joint angles [rad].
-        model: nominal arm; by default the one that the plan was made for.
-        v: speed of the leading joint [rad/s], at most APPROACH_SPEED.
-        a: acceleration of the leading joint [rad/s²], at most APPROACH_ACCELERATION.
+        model: nominal arm that the plan was made for.
 
     Returns:
         One waypoint, up to three if the direct line is not clear. Use `.plan` instead of `plan` from then on.
@@ -101,16 +85,17 @@ def plan_approach(
     Raises:
         PlanningError: the present posture or every tried way is not clear; names posture and joint.
     """
-    arm = robot_model(plan.report.robot) if model is None else model
     q_from = np.array(q_now, dtype=np.float64)
-    _refuse_arguments(plan, arm, q_from, v, a)
-    hulls = clearance_model(arm)
+    _refuse_posture(plan, model, q_from)
+    limits = plan.report.limits
+    v, a = limits.approach_speed, limits.approach_acceleration
+    hulls = clearance_model(model)
     starts = _starts(plan, q_from)
     refusals = []
     for way in _WAYS:
         for start in starts:
             waypoints = (*way(q_from, start.start_q), start.start_q)
-            clearance = _check_way(plan.name, hulls, (q_from, *waypoints))
+            clearance = _check_way(plan.name, hulls, limits, (q_from, *waypoints))
             if isinstance(clearance, PlanningError):
                 refusals.append(clearance)
                 continue
@@ -119,13 +104,8 @@ def plan_approach(
     raise refusals[0]
 
 
-def _refuse_arguments(plan: JointPlan, arm: RobotModel, q_from: Array, v: float, a: float) -> None:
-    """Raise for speeds above the slow ones, and for a present posture that no arm can have."""
-    if not (0.0 < v <= APPROACH_SPEED and 0.0 < a <= APPROACH_ACCELERATION):
-        raise PlanningError(
-            f"{plan.name}: approach with v = {v!r} rad/s, a = {a!r} rad/s²; allowed are"
-            f" 0 < v <= {APPROACH_SPEED} and 0 < a <= {APPROACH_ACCELERATION}"
-        )
+def _refuse_posture(plan: JointPlan, arm: RobotModel, q_from: Array) -> None:
+    """Raise for a present posture that no arm can have."""
     if q_from.shape != (6,):
         raise PlanningError(
             f"{plan.name}: the present posture must be six joint angles, not shape {q_from.shape}"
@@ -178,33 +158,37 @@ def _raised(q: Array) -> Array:
 
 
 def _check_way(
-    name: str, hulls: ClearanceModel, postures: tuple[Array, ...]
-) -> tuple[float, float] | PlanningError:
-    """Return the least floor and own clearance on straight joint lines, or the first bad posture's error."""
+    name: str, hulls: ClearanceModel, limits: PlanLimits, postures: tuple[Array, ...]
+) -> tuple[float, float, float] | PlanningError:
+    """Return the least clearances on straight joint lines, or the first bad posture's error."""
+    step = _CHECK_STEP / hulls.robot.description.reach
     lines = []
     for begin, end in pairwise(postures):
-        n = max(2, int(np.ceil(np.abs(end - begin).max() / _CHECK_STEP)) + 1)
+        n = max(2, int(np.ceil(np.abs(end - begin).max() / step)) + 1)
         lines.append(begin + np.linspace(0.0, 1.0, n)[:, None] * (end - begin))
     q = np.concatenate(lines)
     clearance = hulls.along(q)
-    for distance, nearest, margin, what in (
-        (clearance.floor, clearance.floor_nearest, FLOOR_MARGIN, "above the base plane"),
-        (clearance.own, clearance.own_nearest, OWN_MARGIN, "between them"),
+    for distances, least in zip(
+        clearance,
+        (limits.floor_clearance_min, limits.own_clearance_min, limits.cell_clearance_min),
+        strict=True,
     ):
-        bad = np.flatnonzero(distance < margin)
+        bad = np.flatnonzero(distances.least < least)
         if bad.size:
             k = int(bad[0])
+            nearest = distances.nearest[k]
             where = (
                 "the present posture"
                 if k == 0
                 else f"the way to the start, {100 * k / (len(q) - 1):.0f} % along"
             )
             return PlanningError(
-                f"{name}: {where} is not clear: {nearest[k].name}, {distance[k] * 1e3:.0f} mm {what}"
-                f" (at least {margin * 1e3:.0f} mm); move the arm by hand to an open posture, elbow up",
-                joint=nearest[k].joint,
+                f"{name}: {where} is not clear: {nearest.says(float(distances.least[k]), least)};"
+                " move the arm by hand to an open posture, elbow up",
+                joint=nearest.joint,
             )
-    return float(clearance.floor.min()), float(clearance.own.min())
+    floor, own, cell = (float(distances.least.min()) for distances in clearance)
+    return floor, own, cell
 
 
 _WAYS: tuple[Callable[[Array, Array], tuple[Array, ...]], ...] = (

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.kinematics.clearance import clearance_model
+from pc_client.kinematics.clearance import Distances, clearance_model
 from pc_client.kinematics.forward import tcp_positions
 from pc_client.kinematics.robot_model import JointLimits, RobotModel
 from pc_client.planning.joint_path import JointPath
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PlanLimits
-from pc_client.planning.plan_report import Extreme, PlanReport
+from pc_client.planning.plan_report import Extreme, LeastClearance, PlanReport
 from pc_client.planning.refusal import PathNames
 
 Array = NDArray[np.float64]
@@ -115,12 +115,11 @@ def check_motion(
     clearance = clearance_model(model).along(q)
     between_error = np.linalg.norm(tcp_positions(model, q_between) - samples.p_between, axis=1)
 
-    own = _lowest(clearance.own, limits.own_clearance_min)
-    floor = _lowest(clearance.floor, limits.floor_clearance_min)
     report = PlanReport(
         robot=model.name,
         joint_limits=model.limits,
         limits=limits,
+        cell=model.cell,
         duration=spline.duration,
         samples=len(t),
         path_length=float(np.linalg.norm(np.diff(samples.p, axis=0), axis=1).sum()),
@@ -137,19 +136,15 @@ def check_motion(
         sigma_min=_lowest(path.singularity.sigma_min, limits.sigma_min),
         condition_max=_highest(path.singularity.condition, np.inf),
         manipulability_min=_lowest(path.singularity.manipulability, 0.0),
-        floor_clearance=floor._replace(joint=clearance.floor_nearest[floor.sample].joint),
-        own_clearance=own._replace(joint=clearance.own_nearest[own.sample].joint),
+        floor_clearance=_least(clearance.floor, limits.floor_clearance_min),
+        own_clearance=_least(clearance.own, limits.own_clearance_min),
+        cell_clearance=_least(clearance.cell, limits.cell_clearance_min),
         position_error=_highest(path.position_error, limits.position_error_max),
         rotation_error=_highest(path.rotation_error, limits.rotation_error_max),
         interpolation_error=_highest(between_error, limits.interpolation_error_max),
         ik_iterations=path.iterations / len(t),
     )
-    _judge(
-        names,
-        report,
-        floor_link=clearance.floor_nearest[floor.sample].name,
-        own_links=clearance.own_nearest[own.sample].name,
-    )
+    _judge(names, report)
     return report
 
 
@@ -159,27 +154,21 @@ def measure_joint_range(q: Array, joint_limits: JointLimits, limits: PlanLimits)
     return _lowest(left, limits.position_margin)
 
 
-def _judge(names: PathNames, report: PlanReport, *, floor_link: str, own_links: str) -> None:
+def _judge(names: PathNames, report: PlanReport) -> None:
     """Raise for the first quantity of a report that breaks its limit."""
     limits = report.limits
     reach, speed, acceleration = report.joint_range, report.joint_speed, report.joint_acceleration
-    spline, floor, own = report.interpolation_error, report.floor_clearance, report.own_clearance
+    spline = report.interpolation_error
+    floor, own, cell = report.floor_clearance, report.own_clearance, report.cell_clearance
     for extreme, what in (
         (
             reach,
             f"{np.degrees(reach.value):.1f} deg from the end of its range, at least"
             f" {np.degrees(limits.position_margin):.1f} deg is asked; choose another branch or turn",
         ),
-        (
-            floor,
-            f"the {floor_link} comes to {floor.value * 1e3:.0f} mm above the base plane, at least"
-            f" {limits.floor_clearance_min * 1e3:.0f} mm is asked; raise the movement",
-        ),
-        (
-            own,
-            f"{own_links} come within {own.value * 1e3:.0f} mm, at least"
-            f" {limits.own_clearance_min * 1e3:.0f} mm is asked; move the movement away from the base",
-        ),
+        (floor.extreme, f"{floor.says}; raise the movement"),
+        (own.extreme, f"{own.says}; move the movement away from the base"),
+        (cell.extreme, f"{cell.says}; move the movement, or correct the cell file"),
         (
             speed,
             f"speed {speed.value:.2f} rad/s, at most {speed.limit:.2f} rad/s is allowed"
@@ -199,6 +188,15 @@ def _judge(names: PathNames, report: PlanReport, *, floor_link: str, own_links: 
     ):
         if extreme.share > 1.0:
             raise names.refuse(extreme.sample, what, joint=extreme.joint)
+
+
+def _least(distances: Distances, limit: float) -> LeastClearance:
+    """Return where bodies come nearest, relative to the distance that must be kept."""
+    extreme = _lowest(distances.least, limit)
+    if not distances.nearest:
+        return LeastClearance(extreme, None)
+    nearest = distances.nearest[extreme.sample]
+    return LeastClearance(extreme._replace(joint=nearest.joint), nearest)
 
 
 def _highest(values: Array, limit: Array | float) -> Extreme:

@@ -17,7 +17,7 @@ from pc_client.kinematics.forward import tcp_jacobian, tcp_pose
 from pc_client.kinematics.inverse import IkSolution, solve_ik_se3
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.kinematics.singularity import SINGULARITIES, SingularityMeasure, measure_singularity
-from pc_client.planning.limits import DEFAULT_LIMITS, PlanLimits
+from pc_client.planning.limits import PlanLimits
 from pc_client.planning.refusal import PathNames
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ def follow_path(
     R_base_tcp: Array,
     *,
     q_branch: ArrayLike | None = None,
-    limits: PlanLimits = DEFAULT_LIMITS,
+    limits: PlanLimits,
 ) -> JointPath:
     """Solve the inverse kinematics of a path with fixed orientation.
 

@@ -1,14 +1,14 @@
-"""What a plan may ask of the arm: limits and margins, stated once.
+"""What a plan may ask of an arm: limits and margins, stated once.
 
-The joint ranges and speeds themselves belong to the arm (kinematics.robot_model); here stands how much of
-them a plan uses, and what the arm's maker does not publish.
+What the arm itself can do belongs to the arm (kinematics.robot_model); here stands how much of it a plan
+uses, and which distances it keeps.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pc_client.kinematics.robot_model import Six
+from pc_client.kinematics.robot_model import RobotModel, Six
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +26,11 @@ class PlanLimits:
         position_error_max: error of the inverse kinematics at a sample [m].
         rotation_error_max: the same for the orientation [rad].
         interpolation_error_max: distance of the spline from the movement between samples [m].
-        floor_clearance_min: distance of forearm and wrists from the base plane [m].
-        own_clearance_min: distance between links of the arm that are not neighbours [m].
+        floor_clearance_min: distance of forearm, wrists and tool from the floor [m].
+        own_clearance_min: distance between links that are not neighbours, and of the tool from links [m].
+        cell_clearance_min: distance of moving links and tool from walls and solids of the cell [m].
+        approach_speed: speed of the leading joint on the way to the start [rad/s].
+        approach_acceleration: its acceleration [rad/s²].
     """
 
     speed_fraction: float
@@ -42,28 +45,40 @@ class PlanLimits:
     interpolation_error_max: float
     floor_clearance_min: float
     own_clearance_min: float
+    cell_clearance_min: float
+    approach_speed: float
+    approach_acceleration: float
 
 
-DEFAULT_LIMITS = PlanLimits(
-    speed_fraction=0.9,
-    position_margin=0.1,
-    # UR publishes none. UR's own driver streams speedj with a = 40 rad/s² (Universal_Robots_Client_Library,
-    # external_control.urscript); for base and shoulder less, from torque: (56 - 19 gravity - 10 friction) Nm
-    # over about .95 kg m² with rotor; the elbow has (28 - 7 - 4) Nm over about .4 kg m².
-    qdd_max=(28.0, 28.0, 40.0, 40.0, 40.0, 40.0),
-    # UR3 data sheet: "typical tool speed 1 m/s".
-    tcp_speed_max=1.0,
-    rest_speed_max=0.01,
-    # 25 rad/s at 4 ms: four times what any joint can do, and far less than the way between two branches.
-    joint_step_max=0.1,
-    # At .03 a TCP speed of .1 m/s in the worst direction needs about 3.3 rad/s, the limit of a big joint. The
-    # box recommended for movements keeps .08.
-    sigma_min=0.03,
-    position_error_max=1e-9,
-    rotation_error_max=1e-9,
-    interpolation_error_max=1e-4,
-    # Hulls are good to a few mm, calibration and tracking add as much.
-    floor_clearance_min=0.03,
-    own_clearance_min=0.01,
-)
-"""What `plan_movement` holds unless told otherwise. For a UR3 without a tool on a plane."""
+# Speed [m/s] and acceleration [m/s²] of the flange when the leading joint moves the stretched arm: UR's
+# recovery mode allows 250 mm/s.
+_APPROACH_SPEED = 0.25
+_APPROACH_ACCELERATION = 0.4
+
+
+def limits_of(arm: RobotModel) -> PlanLimits:
+    """Return what plans for an arm hold unless told otherwise."""
+    description = arm.description
+    return PlanLimits(
+        speed_fraction=0.9,
+        position_margin=0.1,
+        qdd_max=description.limits.qdd_max,
+        tcp_speed_max=description.tcp_speed_max,
+        rest_speed_max=0.01,
+        # 25 rad/s at 4 ms: four times what any joint can do, and far less than the way between two branches.
+        joint_step_max=0.1,
+        # At .03 a TCP speed of .1 m/s in the worst direction needs about 3.3 rad/s, the limit of a big joint.
+        # The box recommended for movements keeps .08 on a UR3; larger arms have larger values.
+        sigma_min=0.03,
+        position_error_max=1e-9,
+        rotation_error_max=1e-9,
+        interpolation_error_max=1e-4,
+        # Hulls are good to a few mm, calibration and tracking add as much, and the surface under the arm is
+        # seldom flat. From what stands around, 20 mm: the shoulder of a UR5 turns 24 mm above the plane that
+        # it is mounted on, and that plane may be the top of a box of the cell.
+        floor_clearance_min=0.03,
+        own_clearance_min=0.01,
+        cell_clearance_min=0.02,
+        approach_speed=_APPROACH_SPEED / description.reach,
+        approach_acceleration=_APPROACH_ACCELERATION / description.reach,
+    )

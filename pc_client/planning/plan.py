@@ -14,7 +14,7 @@ from pc_client.kinematics.robot_model import RobotModel, robot_model
 from pc_client.planning.checks import CartesianSamples, check_motion, check_samples, measure_joint_range
 from pc_client.planning.joint_path import follow_path
 from pc_client.planning.joint_spline import JointSpline
-from pc_client.planning.limits import DEFAULT_LIMITS, PlanLimits
+from pc_client.planning.limits import PlanLimits, limits_of
 from pc_client.planning.orientation import fixed_tcp_rotation
 from pc_client.planning.plan_report import PlanReport
 from pc_client.planning.refusal import PathNames
@@ -114,7 +114,7 @@ def plan_movement(
     *,
     model: RobotModel | None = None,
     dt: float = DEFAULT_DT,
-    limits: PlanLimits = DEFAULT_LIMITS,
+    limits: PlanLimits | None = None,
     q_branch: ArrayLike | None = None,
 ) -> JointPlan:
     """Plan a movement of the TCP with the fixed orientation of the experiment.
@@ -123,7 +123,7 @@ def plan_movement(
         movement: what the TCP shall do.
         model: nominal arm; a UR3 by default.
         dt: wanted time between samples [s]; shortened a little to make the duration a whole number of steps.
-        limits: what the plan must keep.
+        limits: what the plan must keep; by default what belongs to the arm.
         q_branch: (6,) posture whose IK branch is followed [rad]; the arm's preferred one by default.
 
     Returns:
@@ -133,6 +133,7 @@ def plan_movement(
         PlanningError: the movement cannot be done; names the sample, its time and point, and the joint.
     """
     arm = robot_model() if model is None else model
+    limits = limits_of(arm) if limits is None else limits
     samples = _sample(movement, dt)
     names = PathNames(movement.name, samples.t, samples.p)
     tcp_speed = check_samples(names, samples, limits)

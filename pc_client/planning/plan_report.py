@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pc_client.kinematics.cell import Cell
+from pc_client.kinematics.clearance import Nearest
 from pc_client.kinematics.robot_model import JointLimits
 from pc_client.planning.limits import PlanLimits
 from protocol.ur_types import JOINT_NAMES
@@ -33,6 +35,30 @@ class Extreme(NamedTuple):
     share: float
 
 
+class LeastClearance(NamedTuple):
+    """How near bodies come along a path.
+
+    Attributes:
+        extreme: the distance [m], held against the one that must be kept.
+        nearest: which bodies these are; None where there are none.
+    """
+
+    extreme: Extreme
+    nearest: Nearest | None
+
+    @property
+    def says(self) -> str:
+        """The refusal of what comes too near; empty where there is nothing."""
+        return "" if self.nearest is None else self.nearest.says(self.extreme.value, self.extreme.limit)
+
+    @property
+    def text(self) -> str:
+        """Distance and bodies, e.g. `31 mm, forearm from box 'press'`; empty where there is nothing."""
+        if self.nearest is None:
+            return ""
+        return f"{self.extreme.value * 1e3:.0f} mm, {self.nearest.first} from {self.nearest.second}"
+
+
 @dataclass(frozen=True, slots=True)
 class PlanReport:
     """Figures of a plan, all in SI.
@@ -41,6 +67,7 @@ class PlanReport:
         robot: name of the nominal arm.
         joint_limits: what the arm can do.
         limits: what the plan was held against.
+        cell: what stands around the arm and what it carries.
         duration: [s].
         samples: number of samples.
         path_length: length of the TCP path [m].
@@ -57,8 +84,9 @@ class PlanReport:
         sigma_min: least smallest singular value of the Jacobian.
         condition_max: largest condition number.
         manipulability_min: least |det J|.
-        floor_clearance: least distance from the base plane [m].
-        own_clearance: least distance of the arm from itself [m].
+        floor_clearance: how near forearm, wrists and tool come to the floor.
+        own_clearance: how near the arm and its tool come to themselves.
+        cell_clearance: how near they come to walls and solids of the cell.
         position_error: largest error of the inverse kinematics [m].
         rotation_error: the same for the orientation [rad].
         interpolation_error: largest distance of the spline from the movement half way between samples [m].
@@ -68,6 +96,7 @@ class PlanReport:
     robot: str
     joint_limits: JointLimits
     limits: PlanLimits
+    cell: Cell
     duration: float
     samples: int
     path_length: float
@@ -84,12 +113,17 @@ class PlanReport:
     sigma_min: Extreme
     condition_max: Extreme
     manipulability_min: Extreme
-    floor_clearance: Extreme
-    own_clearance: Extreme
+    floor_clearance: LeastClearance
+    own_clearance: LeastClearance
+    cell_clearance: LeastClearance
     position_error: Extreme
     rotation_error: Extreme
     interpolation_error: Extreme
     ik_iterations: float
+
+    @property
+    def _clearances(self) -> tuple[LeastClearance, ...]:
+        return self.floor_clearance, self.own_clearance, self.cell_clearance
 
     def lines(self) -> tuple[str, ...]:
         """Return the figures that matter to someone who stands beside the arm, one a line."""
@@ -108,8 +142,8 @@ class PlanReport:
             f"joint range     nearest to its end: {_joint(margin)}, {np.degrees(margin.value):.0f} deg away",
             f"singularity     smallest singular value {self.sigma_min.value:.3f}"
             f" (at least {self.limits.sigma_min:g}), condition number up to {self.condition_max.value:.0f}",
-            f"clearance       {self.floor_clearance.value * 1e3:.0f} mm above the base plane,"
-            f" {self.own_clearance.value * 1e3:.0f} mm of the arm from itself, no tool counted",
+            f"cell            {self.cell.summary}",
+            f"clearance       {'; '.join(least.text for least in self._clearances if least.text)}",
             f"accuracy        inverse kinematics {self.position_error.value:.1e} m,"
             f" spline {self.interpolation_error.value * 1e6:.2f} um",
         )

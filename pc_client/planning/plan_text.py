@@ -22,12 +22,19 @@ def approach_text(approach: Approach) -> str:
     names = ", ".join(JOINT_NAMES)
     title = (
         f"first, slowly (at most {np.degrees(approach.v):.0f} deg/s, about {approach.duration:.1f} s,"
-        f" {approach.floor_clearance * 1e3:.0f} mm clear of the base plane), joints {names}:"
+        f" {_clear(approach)}), joints {names}:"
     )
     lines = (f"  from            {_degrees(approach.q_from)}",)
     return "\n".join(
         (title, *lines, *(f"  to              {_degrees(waypoint)}" for waypoint in approach.waypoints))
     )
+
+
+def _clear(approach: Approach) -> str:
+    floor = f"{approach.floor_clearance * 1e3:.0f} mm clear of the floor"
+    if not np.isfinite(approach.cell_clearance):
+        return floor
+    return f"{floor}, {approach.cell_clearance * 1e3:.0f} mm of walls and solids of the cell"
 
 
 def _degrees(q: np.typing.NDArray[np.float64]) -> str:

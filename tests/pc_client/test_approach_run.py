@@ -9,16 +9,18 @@ from fake_robot import PERIOD, FakeRobot
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
 from pc_client.experiment.approach_run import run_approach
-from pc_client.planning.approach import APPROACH_ACCELERATION, APPROACH_SPEED, Approach
+from pc_client.planning.approach import Approach
 from protocol.velocity_stream import VelocityMode
 
 BETWEEN = np.array([0.05, -0.15, 0.0, 0.2, 0.0, 0.3])
 GOAL = np.array([0.1, -0.3, -0.2, 0.2, 0.1, 0.2])
 QD_MAX = (3.14, 3.14, 3.14, 6.28, 6.28, 6.28)
 
+SPEED = 0.5  # rad/s
+
 
 def approach_to(*waypoints):
-    return Approach(None, np.zeros(6), waypoints, APPROACH_SPEED, APPROACH_ACCELERATION, 1.0, 1.0)
+    return Approach(None, np.zeros(6), waypoints, SPEED, 0.8, 1.0, 1.0, 1.0)
 
 
 def move(robot, *waypoints):
@@ -41,7 +43,7 @@ def test_it_follows_the_checked_lines_slowly():
     robot.on_tick = lambda r: postures.append(list(r.q))
     move(robot)
     q = np.array(postures)
-    assert np.abs(np.diff(q, axis=0)).max() <= 1.1 * APPROACH_SPEED * PERIOD
+    assert np.abs(np.diff(q, axis=0)).max() <= 1.1 * SPEED * PERIOD
     lines = [np.linspace(a, b, 400) for a, b in ((np.zeros(6), BETWEEN), (BETWEEN, GOAL))]
     off = [min(np.abs(line - posture).max(axis=1).min() for line in lines) for posture in q]
     assert max(off) < 5e-3

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from importlib import metadata
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
@@ -9,8 +10,11 @@ import pytest
 from pc_client.errors import PlanningError
 from pc_client.kinematics import robot_data
 from pc_client.kinematics.clearance import clearance_model
-from pc_client.kinematics.forward import tcp_pose
+from pc_client.kinematics.forward import tcp_jacobian, tcp_pose
+from pc_client.kinematics.inverse import solve_ik
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
+from pc_client.movements.geometry import WORKING_BOXES
+from pc_client.planning.orientation import fixed_tcp_rotation
 
 UR3 = robot_model("ur3")
 HULLS = clearance_model(UR3)
@@ -20,6 +24,41 @@ def test_limits_are_the_manuals_and_not_the_urdfs():
     np.testing.assert_allclose(np.degrees(UR3.limits.qd_max), (180, 180, 180, 360, 360, 360))
     np.testing.assert_allclose(np.degrees(UR3.limits.q_max), 360)
     assert UR3.limits.qd_max[0] != pytest.approx(float(UR3.pin_model.velocityLimit[0]))
+
+
+@pytest.mark.parametrize("name", sorted(ROBOTS))
+def test_in_its_working_box_an_arm_does_350_mm_a_second_in_every_direction(name):
+    model, box = robot_model(name), WORKING_BOXES[name]
+    corners = list(product(*zip(box.low, box.high, strict=True)))
+    inside = np.random.default_rng(3).uniform(box.low, box.high, (60, 3))
+    hulls, T = clearance_model(model), np.eye(4)
+    T[:3, :3] = fixed_tcp_rotation()
+    q = np.array(model.description.q_branch)
+    for goal in (*corners, *inside):
+        # On a straight line from point to point, so that the branch is kept.
+        begin = tcp_pose(model, q)[:3, 3]
+        for share in np.linspace(0.0, 1.0, 12):
+            T[:3, 3] = begin + share * (goal - begin)
+            solution = solve_ik(model, T, q)
+            assert solution.converged
+            q = solution.q
+        qd_per_speed = np.linalg.norm(np.linalg.inv(tcp_jacobian(model, q))[:, :3], axis=1)
+        assert (np.array(model.limits.qd_max) / qd_per_speed).min() > 0.34
+        clearance = hulls.along(q)
+        assert clearance.own.least[0] > 0.01
+        assert clearance.floor.least[0] > 0.03
+
+
+def test_every_arm_has_a_working_box():
+    assert WORKING_BOXES.keys() == ROBOTS.keys()
+
+
+def test_the_large_joints_of_large_arms_accelerate_less():
+    shoulder = [ROBOTS[name].limits.qdd_max[1] for name in ("ur3", "ur5", "ur10")]
+    assert shoulder == sorted(shoulder, reverse=True)
+    for description in ROBOTS.values():
+        # No joint gets more than UR's own driver asks for.
+        assert max(description.limits.qdd_max) <= 40.0
 
 
 def test_an_unknown_arm_is_refused_with_the_known_ones():
@@ -73,8 +112,8 @@ def test_the_preferred_branch_is_elbow_up_clear_and_points_forward_and_down(name
     tool_z = tcp_pose(model, q)[:3, 2]
     np.testing.assert_allclose(tool_z, (np.sqrt(0.5), 0, -np.sqrt(0.5)), atol=2e-3)
     clearance = clearance_model(model).along(q)
-    assert clearance.floor[0] > 0.08
-    assert clearance.own[0] > 0.005
+    assert clearance.floor.least[0] > 0.08
+    assert clearance.own.least[0] > 0.005
 
 
 def test_the_flange_face_tells_the_floor_distance_of_a_tool_that_points_down():
@@ -83,28 +122,27 @@ def test_the_flange_face_tells_the_floor_distance_of_a_tool_that_points_down():
     T = tcp_pose(UR3, q)
     np.testing.assert_allclose(T[:3, 2], (0, 0, -1), atol=1e-9)
     clearance = HULLS.along(q)
-    assert clearance.floor_nearest[0] == ("wrist 3", 5)
-    assert clearance.floor[0] == pytest.approx(T[2, 3], abs=3e-3)
+    assert clearance.floor.nearest[0] == ("wrist 3", "the floor at z = 0 m", 5)
+    assert clearance.floor.least[0] == pytest.approx(T[2, 3], abs=3e-3)
 
 
 def test_an_arm_in_the_floor_has_negative_clearance():
     clearance = HULLS.along(np.radians((0, 40, 0, 0, 0, 0)))
-    assert clearance.floor[0] < -0.1
+    assert clearance.floor.least[0] < -0.1
 
 
 def test_turning_the_base_changes_no_clearance_from_the_floor():
     # Holds only if floor and arm are in the same frame.
     q = np.tile(UR3.description.q_branch, (8, 1))
     q[:, 0] = np.linspace(-3, 3, 8)
-    np.testing.assert_allclose(HULLS.along(q).floor, HULLS.along(q).floor[0], atol=1e-6)
+    np.testing.assert_allclose(HULLS.along(q).floor.least, HULLS.along(q).floor.least[0], atol=1e-6)
 
 
 def test_a_folded_arm_hits_itself_and_an_upright_one_does_not():
     clearance = HULLS.along(np.radians([(0, -90, 160, -90, -90, 0), (0, -90, 0, -90, 0, 0)]))
-    assert clearance.own[0] < 0.0
-    assert clearance.own_nearest[0].name == "upper arm and wrist 1"
-    assert clearance.own_nearest[0].joint == 3
-    assert clearance.own[1] > 0.02
+    assert clearance.own.least[0] < 0.0
+    assert clearance.own.nearest[0] == ("wrist 1", "upper arm", 3)
+    assert clearance.own.least[1] > 0.02
 
 
 @pytest.mark.parametrize(
@@ -128,8 +166,8 @@ def test_floor_distances_are_those_of_the_lowest_mesh_vertex(q_deg):
                 :, 2
             ].min()
     clearance = HULLS.along(q)
-    assert clearance.floor[0] == pytest.approx(min(heights.values()), abs=1e-6)
-    assert clearance.floor_nearest[0].joint == min(heights, key=heights.get)
+    assert clearance.floor.least[0] == pytest.approx(min(heights.values()), abs=1e-6)
+    assert clearance.floor.nearest[0].joint == min(heights, key=heights.get)
 
 
 def test_the_base_of_the_arm_stands_in_the_base_frame():
@@ -140,7 +178,7 @@ def test_the_base_of_the_arm_stands_in_the_base_frame():
     )
     root = frames[UR3.pin_model.getFrameId("base_link")].placement
     np.testing.assert_allclose(root.rotation, np.diag((-1.0, -1.0, 1.0)), atol=1e-9)
-    hull = next(h for h in HULLS._own_pairs.geometryObjects if h.parentJoint == 0)
+    hull = next(h for h in HULLS._own.geometry.geometryObjects if h.parentJoint == 0)
     points = np.array([hull.geometry.point(i) for i in range(hull.geometry.num_points)])
     y = (points @ hull.placement.rotation.T + hull.placement.translation)[:, 1]
     assert y.max() == pytest.approx(0.099, abs=1e-3)

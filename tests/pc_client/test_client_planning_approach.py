@@ -12,19 +12,14 @@ from planning_paths import INSIDE_THE_BOX, StraightStrokes
 from pc_client.errors import PlanningError
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.robot_model import robot_model
-from pc_client.planning.approach import (
-    APPROACH_ACCELERATION,
-    APPROACH_SPEED,
-    FLOOR_MARGIN,
-    OWN_MARGIN,
-    _raised,
-    plan_approach,
-)
+from pc_client.movements.geometry import WORKING_BOXES
+from pc_client.planning.approach import _raised, plan_approach
 from pc_client.planning.plan import plan_movement
 from pc_client.planning.plan_text import approach_text
 
 UR3 = robot_model("ur3")
 PLAN = plan_movement(StraightStrokes(INSIDE_THE_BOX, 1.5), model=UR3)
+FLOOR_MARGIN, OWN_MARGIN = PLAN.report.limits.floor_clearance_min, PLAN.report.limits.own_clearance_min
 HOME = np.radians((0, -90, 0, -90, 0, 0))
 
 
@@ -48,8 +43,6 @@ def test_from_home_the_direct_way_is_taken():
     assert approach.plan is PLAN
     assert len(approach.waypoints) == 1
     np.testing.assert_array_equal(approach.waypoints[-1], PLAN.start_q)
-    assert approach.v <= APPROACH_SPEED
-    assert approach.a <= APPROACH_ACCELERATION
     assert approach.floor_clearance >= FLOOR_MARGIN
     assert approach.own_clearance >= OWN_MARGIN
     assert_above_the_plane(approach)
@@ -98,13 +91,13 @@ def test_when_the_direct_line_is_not_clear_the_arm_is_raised_on_the_way():
     approach = plan_approach(PLAN, q_now, model=UR3)
     line = q_now + np.linspace(0, 1, 400)[:, None] * (approach.plan.start_q - q_now)
     hulls = clearance_model(UR3)
-    assert hulls.along(line).own.min() < OWN_MARGIN
+    assert hulls.along(line).own.least.min() < OWN_MARGIN
     assert len(approach.waypoints) == 2
     np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
     fine = hulls.along(np.array(list(way(approach))))
-    assert fine.own.min() >= OWN_MARGIN - 1e-3
-    assert approach.own_clearance == pytest.approx(fine.own.min(), abs=1e-3)
-    assert approach.floor_clearance == pytest.approx(fine.floor.min(), abs=2e-3)
+    assert fine.own.least.min() >= OWN_MARGIN - 1e-3
+    assert approach.own_clearance == pytest.approx(fine.own.least.min(), abs=1e-3)
+    assert approach.floor_clearance == pytest.approx(fine.floor.least.min(), abs=2e-3)
     assert_above_the_plane(approach)
     np.testing.assert_array_equal(approach.motion.at(approach.duration)[0], approach.plan.start_q)
 
@@ -169,10 +162,15 @@ def test_five_joints_are_not_an_arm():
         plan_approach(PLAN, np.zeros(5), model=UR3)
 
 
-@pytest.mark.parametrize(("v", "a"), [(0.6, 0.8), (0.5, 0.9), (0.0, 0.8), (0.5, -1.0), (np.nan, 0.8)])
-def test_a_fast_approach_is_refused(v, a):
-    with pytest.raises(PlanningError, match="allowed are"):
-        plan_approach(PLAN, HOME, model=UR3, v=v, a=a)
+@pytest.mark.parametrize(("name", "reach"), [("ur3", 0.5), ("ur5", 0.85), ("ur10", 1.3)])
+def test_on_the_way_the_flange_of_any_arm_is_slow(name, reach):
+    model = robot_model(name)
+    centre = WORKING_BOXES[name].centre
+    plan = plan_movement(StraightStrokes([centre, centre + np.array((0.0, 0.1, 0.0))], 2.0), model=model)
+    approach = plan_approach(plan, HOME, model=model)
+    assert approach.v * reach == pytest.approx(0.25)
+    assert approach.a * reach == pytest.approx(0.4)
+    np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
 
 
 def test_the_way_in_words_tells_from_where_to_where_and_how_slowly():

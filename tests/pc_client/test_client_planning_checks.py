@@ -9,16 +9,17 @@ from planning_paths import INSIDE_THE_BOX, Arc, Spoiled, StraightStrokes
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.robot_model import JointLimits, RobotModel, robot_model
-from pc_client.planning.limits import DEFAULT_LIMITS
+from pc_client.planning.limits import limits_of
 from pc_client.planning.plan import plan_movement
 from pc_client.planning.plan_text import plan_text
 
 UR3 = robot_model("ur3")
+LIMITS = limits_of(UR3)
 STROKES = StraightStrokes(INSIDE_THE_BOX, 1.5)
 PLAN = plan_movement(STROKES, model=UR3)
 
 
-def refused(movement=STROKES, limits=DEFAULT_LIMITS, model=UR3, **options):
+def refused(movement=STROKES, limits=LIMITS, model=UR3, **options):
     with pytest.raises(PlanningError) as caught:
         plan_movement(movement, model=model, limits=limits, **options)
     assert "\n" not in str(caught.value)
@@ -84,13 +85,13 @@ def test_the_joint_speed_limit_names_the_fast_joint_where_it_is_fastest():
 
 
 def test_a_movement_too_fast_for_its_joints_is_refused():
-    error = refused(StraightStrokes(INSIDE_THE_BOX, 0.3), replace(DEFAULT_LIMITS, tcp_speed_max=10.0))
+    error = refused(StraightStrokes(INSIDE_THE_BOX, 0.3), replace(LIMITS, tcp_speed_max=10.0))
     assert error.joint is not None
     assert "give the movement more time" in str(error)
 
 
 def test_the_tcp_speed_limit_names_the_first_sample_above():
-    error = refused(limits=replace(DEFAULT_LIMITS, tcp_speed_max=0.1))
+    error = refused(limits=replace(LIMITS, tcp_speed_max=0.1))
     speed = np.linalg.norm(STROKES.sample(PLAN.t)[1], axis=1)
     assert error.sample == pytest.approx(int(np.argmax(speed > 0.1)), abs=1)
     assert "at most 0.1 m/s" in str(error)
@@ -100,7 +101,7 @@ def test_the_acceleration_limit_names_joint_and_sample():
     joint = 3
     qdd_max = [1e3] * 6
     qdd_max[joint] = 0.5 * float(PLAN.report.qdd_peak[joint])
-    error = refused(limits=replace(DEFAULT_LIMITS, qdd_max=tuple(qdd_max)))
+    error = refused(limits=replace(LIMITS, qdd_max=tuple(qdd_max)))
     assert error.joint == joint
     peak = np.abs(PLAN.spline.qdd(PLAN.t[error.sample]))[0, joint]
     assert peak == pytest.approx(PLAN.report.qdd_peak[joint])
@@ -117,13 +118,13 @@ def test_the_end_of_a_joint_range_names_joint_and_sample(joint, side):
     assert error.joint == joint
     assert PLAN.q[error.sample, joint] == reached
     assert "end of its range" in str(error)
-    assert plan_movement(STROKES, model=arm_with(), limits=DEFAULT_LIMITS).report.joint_range.share < 1
+    assert plan_movement(STROKES, model=arm_with(), limits=LIMITS).report.joint_range.share < 1
 
 
 def test_too_near_the_base_plane_is_refused_with_the_link():
     low = StraightStrokes([(0.35, 0.0, 0.25), (0.35, 0.0, 0.03)], 4.0)
     error = refused(low)
-    assert "the wrist 1 comes to" in str(error)
+    assert "wrist 1 comes within" in str(error)
     assert error.joint == 3
     t = np.linspace(0, 4.0, 1001)
     # The lowest sample of the path is the offender.
@@ -131,9 +132,9 @@ def test_too_near_the_base_plane_is_refused_with_the_link():
 
 
 def test_too_near_itself_is_refused():
-    error = refused(limits=replace(DEFAULT_LIMITS, own_clearance_min=PLAN.report.own_clearance.value + 1e-3))
-    assert " and " in str(error)
-    assert error.joint == PLAN.report.own_clearance.joint
+    error = refused(limits=replace(LIMITS, own_clearance_min=PLAN.report.own_clearance.extreme.value + 1e-3))
+    assert " comes within " in str(error)
+    assert error.joint == PLAN.report.own_clearance.nearest.joint
 
 
 @pytest.mark.parametrize(("end", "word"), [(0, "begins"), (-1, "ends")])
@@ -148,7 +149,7 @@ def test_a_movement_must_begin_and_end_at_rest(end, word):
 
 def test_a_coarse_plan_that_would_leave_the_path_is_refused():
     error = refused(
-        Arc((0.35, 0, 0.25), 0.07, 4 * np.pi, 4.0), dt=0.5, limits=replace(DEFAULT_LIMITS, joint_step_max=3)
+        Arc((0.35, 0, 0.25), 0.07, 4 * np.pi, 4.0), dt=0.5, limits=replace(LIMITS, joint_step_max=3)
     )
     assert "the joint spline leaves the movement" in str(error)
 
@@ -221,4 +222,4 @@ def test_the_larger_arms_plan_the_same_kind_of_movement(name):
 
 def test_limits_are_those_given():
     assert isinstance(PLAN.report.joint_limits, JointLimits)
-    assert PLAN.report.limits is DEFAULT_LIMITS
+    assert PLAN.report.limits == LIMITS

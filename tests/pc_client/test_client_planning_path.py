@@ -9,6 +9,7 @@ from planning_paths import INSIDE_THE_BOX, Arc, Spoiled, StraightStrokes
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.robot_model import robot_model
+from pc_client.planning.limits import limits_of
 from pc_client.planning.orientation import fixed_tcp_rotation, rotation_from_rpy
 from pc_client.planning.plan import plan_movement
 
@@ -182,7 +183,7 @@ def test_the_joints_may_not_jump_to_another_branch():
     p = np.array([(0.35, -0.15, 0.25), (0.35, -0.15, 0.25), (0.35, 0.15, 0.25), (0.35, 0.15, 0.25)])
     names = PathNames("gap", np.arange(4.0), p)
     with pytest.raises(PlanningError, match="another branch") as caught:
-        follow_path(UR3, names, fixed_tcp_rotation())
+        follow_path(UR3, names, fixed_tcp_rotation(), limits=limits_of(UR3))
     assert caught.value.sample == 2
     assert caught.value.joint is not None
 
