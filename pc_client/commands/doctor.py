@@ -1,4 +1,4 @@
-"""`ur-client doctor`: what answers at an address, and whether it is safe to stream."""
+"""`ur-client doctor`: what answers at an address, and whether the robot is as it must be. Only reads."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ def doctor(
         float, typer.Option("--seconds", min=0.1, max=600.0, help="How long to listen.")
     ] = 2.0,
 ) -> None:
-    """Say what answers on which port, firmware, cycle time and jitter, and whether it is safe to stream."""
+    """Say what answers on which port, how even frames come, and whether the robot is as it must be."""
+    from pc_client.driver.condition import conditions_text
     from pc_client.driver.probe import probe
     from pc_client.driver.transport import TcpNetwork
+    from pc_client.experiment.preflight import model_of, preflight, refusal
 
     found = probe(TcpNetwork(), robot, ports_of(port_base), seconds)
     for name, number in found.open_ports.items():
@@ -32,10 +34,16 @@ def doctor(
         say(f"robot       {found.info}")
     if found.rhythm is not None:
         _show_rhythm(found.rhythm)
-    if found.obstacle:
-        say(f"streaming   NOT NOW: {found.obstacle}")
+    obstacle, untold = found.obstacle, []
+    if found.report is not None:
+        conditions = preflight(found.report, model_of(found.report))
+        say(conditions_text(conditions))
+        obstacle = refusal(conditions) or obstacle
+        untold = [condition.name for condition in conditions if condition.holds is None]
+    if obstacle:
+        say(f"streaming   NOT NOW: {obstacle}")
         raise typer.Exit(1)
-    say("streaming   ready: RUNNING, no safety stop, no program running")
+    say("streaming   ready" + (f"; not told by this software: {', '.join(untold)}" if untold else ""))
 
 
 def _show_rhythm(rhythm: FrameRhythm) -> None:

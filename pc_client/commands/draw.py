@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pc_client.commands.before_motion import ask_robot
 from pc_client.commands.experiment import execute
 from pc_client.commands.options import OutOption, RepeatOption, RobotOption, TimeUnitOption, console, say
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
@@ -162,17 +163,10 @@ def _make(
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from pc_client.drawing.drawing import make_drawing
-    from pc_client.driver.probe import read_info
-    from pc_client.driver.robot_info import UNKNOWN
-    from pc_client.driver.transport import TcpNetwork
     from pc_client.extraction.extract import extract
-    from pc_client.kinematics.robot_model import robot_model
     from pc_client.movements.geometry import WORKING_BOXES
 
-    arm = read_info(TcpNetwork(), robot, ports).model
-    if arm == UNKNOWN:
-        raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")
-    model = robot_model(arm.lower())
+    _, model = ask_robot(robot, ports)
     options = replace(options, box=WORKING_BOXES[model.name])
     bar = Progress(
         TextColumn("{task.description}"),

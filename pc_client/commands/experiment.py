@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pc_client.commands.before_motion import ask_before_motion, ask_robot
 from pc_client.commands.options import OutOption, RepeatOption, RobotOption, console, say, show_report
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import ClientError
 
 if TYPE_CHECKING:
-    from pc_client.experiment.prepare import Experiment
     from pc_client.movements.movement import Movement
-    from protocol.ur_types import Ports
 
 
 @takes_run_settings
@@ -69,23 +68,17 @@ def execute(movements: Sequence[Movement], robot: str, out: Path, repeat: int, s
     Raises:
         ClientError: a check failed, the robot stopped or the user interrupted; the arm rests.
     """
-    from pc_client.driver.probe import read_info
-    from pc_client.driver.robot_info import UNKNOWN
-    from pc_client.driver.transport import TcpNetwork
     from pc_client.driver.ur_driver import UrDriver
-    from pc_client.experiment.preflight import is_loopback
     from pc_client.experiment.prepare import prepare_experiment
     from pc_client.experiment.progress import Progress
     from pc_client.experiment.runner import ExperimentRunner
 
     ports = settings.ports
     with console.status("planning"):
-        arm = read_info(TcpNetwork(), robot, ports).model
-        if arm == UNKNOWN:
-            raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")
-        planned = prepare_experiment(movements, repeat=repeat, out=out, robot=arm.lower())
-    if not settings.yes and not is_loopback(robot):
-        ask_before_motion(planned, robot, ports)
+        reported, model = ask_robot(robot, ports)
+        planned = prepare_experiment(movements, repeat=repeat, out=out, robot=model.name)
+    if not settings.yes:
+        ask_before_motion(planned, robot, reported)
     try:
         with Progress(console, planned.n_runs) as progress, UrDriver(robot, ports) as driver:
             report = ExperimentRunner(driver, planned, settings.controller, progress).run()
@@ -103,26 +96,3 @@ def execute(movements: Sequence[Movement], robot: str, out: Path, repeat: int, s
     )
     for remark in report.remarks:
         say(remark)
-
-
-def ask_before_motion(planned: Experiment, robot: str, ports: Ports) -> None:
-    """Show what is going to happen and ask; nothing has moved and no connection stays open meanwhile.
-
-    Raises:
-        typer.Abort: the answer is no.
-    """
-    from pc_client.driver.ur_driver import UrDriver
-    from pc_client.experiment.preflight import experiment_text
-    from pc_client.planning.approach import plan_approach
-    from pc_client.planning.plan_text import approach_text
-
-    with UrDriver(robot, ports) as driver:
-        info, q_now = driver.info, driver.actual_q()
-        driver.check_ready()
-    approach = plan_approach(planned.planned[0].plan, q_now, model=planned.model)
-    say(f"robot at {robot}: {info}")
-    say(experiment_text(planned))
-    say(approach_text(approach))
-    typer.confirm(
-        "The arm is going to move. Is the space around it free, and the emergency stop at hand?", abort=True
-    )

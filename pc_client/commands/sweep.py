@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pc_client.commands.before_motion import ask_before_motion, ask_robot
 from pc_client.commands.options import (
     DaskOption,
     WorkersOption,
@@ -23,6 +24,7 @@ from pc_client.errors import ClientError, SweepError
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from pc_client.driver.robot_report import RobotReport
     from pc_client.sweep.case import Case, GivenRobot
     from pc_client.sweep.config import SweepConfig
     from pc_client.sweep.folder import SweepFolder
@@ -50,7 +52,7 @@ def sweep(
     yes: YesOption = False,
 ) -> None:
     """Run every combination of gains, arms and movements; a second call goes on where the first ended."""
-    from pc_client.sweep.case import all_cases
+    from pc_client.sweep.case import GivenRobot, all_cases
     from pc_client.sweep.config import read_config
     from pc_client.sweep.folder import SweepFolder
     from pc_client.sweep.ledger import Ledger
@@ -64,20 +66,25 @@ def sweep(
         raise typer.BadParameter(f"robot = {plan.host!r} is one robot: no --workers and no --dask")
     folder = SweepFolder(_folder_of(plan, out))
     written_as = table_format(format)
-    arms = plan.arms if plan.host is None else (_given_robot(plan, plan.host),)
-    cases = all_cases(plan.movements, arms, plan.controllers, plan.repeat)
+    given: tuple[GivenRobot, RobotReport] | None = None
+    if plan.host is not None:
+        report, model = ask_robot(plan.host, ports_of(plan.port_base))
+        given = GivenRobot(plan.host, plan.port_base, model.name, report.info.serial), report
+    cases = all_cases(
+        plan.movements, plan.arms if given is None else given[:1], plan.controllers, plan.repeat
+    )
     folder.prepare()
     ledger = Ledger(cases, folder, plan.keep_recordings)
     waiting = ledger.waiting()
     say(f"{len(ledger)} cases, {ledger.n_settled} of them done before; results in {folder.path}")
-    if plan.host is None:
+    if given is None:
         outcomes = run_side_by_side(waiting, plan.keep_recordings, run_case, workers=workers, dask=dask)
     else:
         if waiting and not yes:
-            _ask(plan.host, plan.port_base, waiting)
+            _ask(*given, waiting)
         outcomes = run_in_turn(waiting, plan.keep_recordings, run_case)
     try:
-        _work(ledger, outcomes, live=plan.host is None)
+        _work(ledger, outcomes, live=given is None)
     except KeyboardInterrupt as interrupt:
         doubts = "".join(f"; {note}" for note in getattr(interrupt, "__notes__", ()))
         raise ClientError(
@@ -118,41 +125,20 @@ def _folder_of(plan: SweepConfig, out: Path | None) -> Path:
     return folder
 
 
-def _given_robot(plan: SweepConfig, host: str) -> GivenRobot:
-    """Ask the robot who it is.
-
-    Raises:
-        ClientError: it does not answer, or does not tell.
-    """
-    from pc_client.driver.probe import read_info
-    from pc_client.driver.robot_info import UNKNOWN
-    from pc_client.driver.transport import TcpNetwork
-    from pc_client.sweep.case import GivenRobot
-
-    info = read_info(TcpNetwork(), host, ports_of(plan.port_base))
-    if info.model == UNKNOWN:
-        raise ClientError(f"{host} does not tell which arm it is: there is no plan for it")
-    return GivenRobot(host, plan.port_base, info.model.lower(), info.serial)
-
-
-def _ask(host: str, port_base: int, cases: Sequence[Case]) -> None:
-    """Before a real arm moves: show all that it is going to do, and ask.
+def _ask(robot: GivenRobot, report: RobotReport, cases: Sequence[Case]) -> None:
+    """Show all that an arm is going to do, and ask.
 
     Raises:
         typer.Abort: the answer is no.
     """
-    from pc_client.commands.experiment import ask_before_motion
-    from pc_client.experiment.preflight import is_loopback
     from pc_client.experiment.prepare import Experiment
     from pc_client.sweep.run_case import plan_case
 
-    if is_loopback(host):
-        return
     by_movement = {case.movement: case for case in cases}
     plans = [plan_case(case) for case in by_movement.values()]
     runs = sum(case.repeat for case in cases) // len(plans)
     planned = tuple(planned for plan in plans for planned in plan.planned)
-    ask_before_motion(Experiment(plans[0].model, planned, runs, Path()), host, ports_of(port_base))
+    ask_before_motion(Experiment(plans[0].model, planned, runs, Path()), robot.host, report)
 
 
 def _draw(folder: SweepFolder, name: str, table: Sequence[dict[str, object]]) -> None:

@@ -1,4 +1,4 @@
-"""What answers at an address: every port, firmware, the rhythm of the frames, and whether streaming is safe.
+"""What answers at an address: every port, the rhythm of the frames, and what the robot reports of itself.
 
 Looks only; sends nothing that could move an arm.
 """
@@ -12,8 +12,8 @@ import numpy as np
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
+from pc_client.driver.robot_report import RobotReport, make_report, read_payload
 from pc_client.driver.transport import Network
-from pc_client.driver.watchdog import check_idle, check_safety
 from pc_client.errors import DriverError
 from protocol.realtime_layout import RealtimeFrame
 from protocol.ur_types import Ports
@@ -53,13 +53,15 @@ class Diagnosis:
         closed_ports: the others.
         info: which robot; None when its primary port does not answer.
         rhythm: of the frames; None when none come.
-        obstacle: why velocities must not be streamed now, or "" when they may.
+        report: what `experiment.preflight` judges; None when the robot does not tell enough.
+        obstacle: which connection stands in the way of a session, or "".
     """
 
     open_ports: dict[str, int]
     closed_ports: dict[str, int]
     info: RobotInfo | None
     rhythm: FrameRhythm | None
+    report: RobotReport | None
     obstacle: str
 
 
@@ -81,35 +83,24 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
             found[item.name] = number
         except DriverError:
             absent[item.name] = number
-    obstacles: list[str] = []
     info: RobotInfo | None = None
     rhythm: FrameRhythm | None = None
+    report: RobotReport | None = None
+    obstacle = ""
     try:
-        info = read_info(network, host, ports)
+        primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
+        try:
+            info = read_robot_info(network, host, ports.dashboard, primary)
+            rhythm, frame = _listen(network, host, ports.realtime, seconds)
+            primary.poll()
+            report = make_report(info, frame, primary, read_payload(network, host, ports))
+        finally:
+            primary.close()
     except DriverError as error:
-        obstacles.append(str(error))
-    try:
-        rhythm, frame = _listen(network, host, ports.realtime, seconds)
-        check_safety(frame)
-        check_idle(frame)
-    except DriverError as error:
-        obstacles.append(str(error))
-    if "secondary" in absent:
-        obstacles.append(f"the secondary port {ports.secondary} takes no programs")
-    return Diagnosis(found, absent, info, rhythm, obstacles[0] if obstacles else "")
-
-
-def read_info(network: Network, host: str, ports: Ports) -> RobotInfo:
-    """Ask a robot who it is, on connections of its own.
-
-    Raises:
-        DriverError: nothing answers on the primary port.
-    """
-    primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
-    try:
-        return read_robot_info(network, host, ports.dashboard, primary)
-    finally:
-        primary.close()
+        obstacle = str(error)
+    if not obstacle and "secondary" in absent:
+        obstacle = f"the secondary port {ports.secondary} takes no programs"
+    return Diagnosis(found, absent, info, rhythm, report, obstacle)
 
 
 def _listen(network: Network, host: str, port: int, seconds: float) -> tuple[FrameRhythm, RealtimeFrame]:

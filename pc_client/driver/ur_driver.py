@@ -21,11 +21,12 @@ from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import receiver_script
 from pc_client.driver.reverse_server import ReverseServer
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
+from pc_client.driver.robot_report import RobotReport, make_report, read_payload, reported_slider
 from pc_client.driver.stop_script import STOP_WORD, stop_script
 from pc_client.driver.transport import Network, TcpNetwork, Transport
 from pc_client.driver.velocity_stream import RowSink, StreamReport, VelocityStream, collector_paused
 from pc_client.driver.waiting import REST_TIMEOUT, wait_for_rest, wait_until
-from pc_client.driver.watchdog import check_idle, check_safety, has_ended, is_stopped
+from pc_client.driver.watchdog import check_idle, check_safety, check_slider, has_ended, is_stopped
 from pc_client.errors import DriverError
 from protocol.realtime_layout import RealtimeFrame, RealtimeLayout
 from protocol.ur_types import Ports
@@ -111,16 +112,28 @@ class UrDriver:
         q: NDArray[np.float64] = self.read_frame().actual_q
         return q.copy()
 
+    def report(self) -> RobotReport:
+        """What the robot reports of itself now.
+
+        Raises:
+            DriverError: no frames come, or a connection broke.
+        """
+        self._primary.poll()
+        payload = read_payload(self._network, self._host, self._ports)
+        return make_report(self.info, self.read_frame(), self._primary, payload)
+
     def check_ready(self) -> RealtimeFrame:
         """Refuse a robot that may not move now; returns its state.
 
         Raises:
             RobotStoppedError: safety mode or robot mode forbids it.
-            DriverError: a program is running.
+            DriverError: a program is running, or the speed slider was moved.
         """
         frame = self.read_frame()
         check_safety(frame)
         check_idle(frame)
+        self._primary.poll()
+        check_slider(reported_slider(self._primary))
         return frame
 
     def stream(self, tracker: Tracker, on_row: RowSink, *, acceleration: float) -> StreamReport:
@@ -246,9 +259,10 @@ class UrDriver:
         )
 
     def _raise_robot_errors(self) -> None:
-        """Read both script ports; raise what the robot reports about our program."""
+        """Read both script ports; raise what the robot reports about our program, or a moved speed slider."""
         self._scripts.poll()
         raise_on_error(self._primary.poll(), self._program)
+        check_slider(reported_slider(self._primary))
 
     def _look_after(self) -> None:
         """Read everything that has come, while waiting for something else."""

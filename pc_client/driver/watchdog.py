@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pc_client.driver.condition import Condition
 from pc_client.errors import DriverError, RobotStoppedError
 from protocol.realtime_layout import RealtimeFrame
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
@@ -13,6 +14,9 @@ SAFE_MODES = (float(SafetyMode.NORMAL), float(SafetyMode.REDUCED))
 REST_SPEED = 0.01
 """Below this joint speed [rad/s] the arm rests: 0.6 deg/s, above the noise of a standing joint."""
 
+_FULL_SPEED = 0.999
+"""Speed slider and speed scaling count as 1 from here on; the pendant shows whole percents."""
+
 _HOW_TO_GO_ON = {
     SafetyMode.PROTECTIVE_STOP: "find the cause, then unlock the protective stop on the pendant",
     SafetyMode.SAFEGUARD_STOP: "leave the guarded area, then reset the safeguard",
@@ -22,24 +26,73 @@ _HOW_TO_GO_ON = {
 }
 
 
+def safety_mode(frame: RealtimeFrame) -> Condition:
+    """The safety system lets the arm move."""
+    value = frame.safety_mode
+    remedy = _HOW_TO_GO_ON.get(SafetyMode(int(value)), "") if value in list(SafetyMode) else ""
+    return Condition(
+        "safety mode",
+        _name(SafetyMode, value),
+        "NORMAL or REDUCED",
+        remedy or "look at the pendant",
+        value in SAFE_MODES,
+    )
+
+
+def robot_mode(frame: RealtimeFrame) -> Condition:
+    """The arm has power and its brakes are open."""
+    return Condition(
+        "mode",
+        _name(RobotMode, frame.robot_mode),
+        "RUNNING",
+        "power it on and release the brakes",
+        frame.robot_mode == RUNNING,
+    )
+
+
+def program_state(frame: RealtimeFrame) -> Condition:
+    """No program of somebody else runs, or stands paused."""
+    return Condition(
+        "program",
+        _name(ProgramState, frame.runtime_state),
+        "STOPPED",
+        "stop it before streaming",
+        is_stopped(frame),
+    )
+
+
+def speed_slider(fraction: float | None) -> Condition:
+    """The speed slider stands at its end; `fraction` of full speed, None when the robot does not tell."""
+    return Condition(
+        "speed slider",
+        "" if fraction is None else _percent(fraction),
+        "100 %",
+        "set it to 100 % on the pendant and leave it there",
+        None if fraction is None else fraction >= _FULL_SPEED,
+    )
+
+
+def speed_scaling(frame: RealtimeFrame) -> Condition:
+    """The controller does not slow the arm down; 0 without a program is no speed at all, and all right."""
+    scaling = frame.speed_scaling
+    return Condition(
+        "speed scaling",
+        _percent(scaling),
+        "100 %",
+        "end reduced mode on the robot, or give the movement more time",
+        scaling >= _FULL_SPEED or (scaling == 0.0 and is_stopped(frame)),
+    )
+
+
 def check_safety(frame: RealtimeFrame) -> None:
     """Refuse a robot that may not move.
 
     Raises:
         RobotStoppedError: safety mode or robot mode forbids motion; says which and what to do.
     """
-    if frame.safety_mode not in SAFE_MODES:
-        mode = _name(SafetyMode, frame.safety_mode)
-        what_next = _HOW_TO_GO_ON.get(SafetyMode(int(frame.safety_mode)), "") if mode.isidentifier() else ""
-        raise RobotStoppedError(
-            f"the robot's safety mode is {mode}, motion needs NORMAL or REDUCED; "
-            f"{what_next or 'look at the pendant'}"
-        )
-    if frame.robot_mode != RUNNING:
-        raise RobotStoppedError(
-            f"the robot is {_name(RobotMode, frame.robot_mode)}, motion needs RUNNING; "
-            "power it on and release the brakes"
-        )
+    for condition in (safety_mode(frame), robot_mode(frame)):
+        if not condition.holds:
+            raise RobotStoppedError(condition.complaint)
 
 
 def check_idle(frame: RealtimeFrame) -> None:
@@ -48,10 +101,21 @@ def check_idle(frame: RealtimeFrame) -> None:
     Raises:
         DriverError: a program is running or paused.
     """
-    if frame.runtime_state != ProgramState.STOPPED:
-        raise DriverError(
-            f"a program is {_name(ProgramState, frame.runtime_state)} on the robot; stop it before streaming"
-        )
+    if not (condition := program_state(frame)).holds:
+        raise DriverError(condition.complaint)
+
+
+def check_slider(fraction: float | None) -> None:
+    """Refuse a robot that is slowed down by its speed slider.
+
+    Args:
+        fraction: of full speed; None when the robot does not tell.
+
+    Raises:
+        DriverError: it does not stand at 100 %.
+    """
+    if fraction is not None and not fraction >= _FULL_SPEED:  # NaN fails too
+        raise DriverError(speed_slider(fraction).complaint)
 
 
 def check_streaming(frame: RealtimeFrame) -> None:
@@ -59,8 +123,11 @@ def check_streaming(frame: RealtimeFrame) -> None:
 
     Raises:
         RobotStoppedError: the robot may not move any more, or its program has ended.
+        DriverError: the robot slows the arm down.
     """
     if frame.safety_mode in SAFE_MODES and frame.robot_mode == RUNNING and frame.runtime_state == PLAYING:
+        if not frame.speed_scaling >= _FULL_SPEED:
+            raise DriverError(speed_scaling(frame).complaint)
         return
     check_safety(frame)
     raise RobotStoppedError(
@@ -88,3 +155,7 @@ def _name(kind: type[SafetyMode] | type[RobotMode] | type[ProgramState], value: 
         return kind(int(value)).name
     except ValueError:
         return f"{value:g} (unknown)"
+
+
+def _percent(fraction: float) -> str:
+    return f"{100.0 * fraction:.3g} %"

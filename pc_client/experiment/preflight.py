@@ -1,79 +1,199 @@
-"""What a bystander must know and agree to before a real arm moves. Text and a question; moves nothing."""
+"""The robot is compared with the model before anything moves: one table of conditions, all on one record.
+
+`CONDITIONS` is the table; each row is a pure function of what the robot reports and what the plan expects.
+The same rows are shown by `ur-client doctor`, before the question to the user, and asked by the runner.
+What a robot does not tell is shown as "not told": it never counts as passed, and it refuses nothing.
+"""
 
 from __future__ import annotations
 
-from ipaddress import ip_address
+from collections.abc import Callable, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
-from pc_client.driver.robot_info import RobotInfo
+from pc_client.driver.condition import Condition
+from pc_client.driver.robot_info import UNKNOWN
+from pc_client.driver.robot_report import RobotReport
+from pc_client.driver.watchdog import program_state, robot_mode, safety_mode, speed_scaling, speed_slider
 from pc_client.errors import DriverError
-from pc_client.experiment.prepare import Experiment
-from protocol.ur_types import JOINT_NAMES
+from pc_client.kinematics.forward import tcp_pose
+from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
+from protocol.pose import T_to_pose, pose_inv, pose_trans
+from protocol.ur_types import JOINT_NAMES, SoftwareVersion
+
+_OLDEST = SoftwareVersion(3, 2)
+"""The first software whose frames tell the program state."""
+
+_OFFSET_TOLERANCE = (1e-4, 1e-3)
+"""How far from the flange the TCP may be [m, rad]: what a pendant rounds."""
+
+_PAYLOAD = 0.0
+"""Mass that the arm carries [kg]."""
+
+_PAYLOAD_TOLERANCE = 0.05
+"""Of the mass [kg]. Its weight is 0.5 N, a sixth of the noise of the controller's own force estimate."""
+
+_POSITION_TOLERANCE = MappingProxyType({"ur3": 0.005, "ur5": 0.009, "ur10": 0.014})
+_ROTATION_TOLERANCE = 0.02
+"""Between the reported flange and the model's [m, rad]: twice what three real UR3e calibrations come to,
+2.7 mm and 8 mrad, the length in proportion to the reach of 0.5, 0.85, 1.3 m. A choice: docs/fidelity.md."""
+
+Check = Callable[[RobotReport, RobotModel | None], Condition]
+"""Holds one thing that a robot reports against what is needed."""
 
 
-def is_loopback(host: str) -> bool:
-    """Return True for this machine itself: nobody stands beside an arm there."""
-    if host.lower() == "localhost":
-        return True
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:  # a name; who knows what answers there
-        return False
-
-
-def check_model(experiment: Experiment, info: RobotInfo) -> None:
-    """Refuse to run a plan on another type of arm than it was made for.
-
-    A robot that does not tell its type passes: software before 3.12 cannot.
-
-    Raises:
-        DriverError: the robot says that it is another type.
-    """
-    wanted = experiment.model.name.upper()
-    if info.model not in ("unknown", wanted):
-        raise DriverError(
-            f"the robot is a {info.model}, the movements were planned for a {wanted}: not started"
-        )
-
-
-def experiment_text(experiment: Experiment) -> str:
-    """Describe what the arm is going to do: box of motion, top speeds, duration, margins.
+def preflight(report: RobotReport, model: RobotModel | None) -> tuple[Condition, ...]:
+    """Hold everything that a robot reports against what is needed.
 
     Args:
-        experiment: planned, not yet running.
+        report: what the robot reports.
+        model: nominal arm of the plan; None when there is no model of the arm that answers.
 
     Returns:
-        A few lines, the worst of all movements.
+        All conditions; only the first for software of another generation, whose reports mean something else.
     """
-    reports = {planned.movement.name: planned.plan.report for planned in experiment.planned}
-    low = np.min([report.box_min for report in reports.values()], axis=0)
-    high = np.max([report.box_max for report in reports.values()], axis=0)
-    fastest = max(reports, key=lambda name: reports[name].tcp_speed.value)
-    tightest = max(reports, key=lambda name: reports[name].joint_speed.share)
-    nearest = min(reports, key=lambda name: reports[name].joint_range.value)
-    joint_speed, joint_range = reports[tightest].joint_speed, reports[nearest].joint_range
-    moving = experiment.repeat * sum(report.duration for report in reports.values())
-    axes = "  ".join(f"{axis} {a:.3f}..{b:.3f}" for axis, a, b in zip("xyz", low, high, strict=True))
-    return "\n".join(
-        (
-            f"{_count(len(reports), 'movement')}, {_count(experiment.repeat, 'run')} of each, "
-            f"on a {experiment.model.name}, TCP at the flange",
-            f"  box of motion   {axes} m, robot base frame",
-            f"  duration        {moving:.0f} s of movement, plus a slow approach before each",
-            f"  top TCP speed   {reports[fastest].tcp_speed.value:.3f} m/s ({fastest})",
-            f"  top joint speed {np.degrees(joint_speed.value):.0f} deg/s, {_joint(joint_speed.joint)} "
-            f"({tightest}), {joint_speed.share:.0%} of what is allowed",
-            f"  joint range     nearest to its end: {_joint(joint_range.joint)} ({nearest}), "
-            f"{np.degrees(joint_range.value):.0f} deg away",
-            "  before the first movement all joints turn to and fro by 1 degree to find the loop's delay",
-        )
+    software = software_generation(report, model)
+    if not software.holds:
+        return (software,)
+    return software, *(row(report, model) for row in CONDITIONS[1:])
+
+
+def refusal(conditions: Sequence[Condition]) -> str:
+    """The line that refuses a robot: the first condition that fails; empty when none does."""
+    return next((condition.complaint for condition in conditions if condition.holds is False), "")
+
+
+def require(conditions: Sequence[Condition]) -> None:
+    """Refuse a robot that fails a condition.
+
+    Raises:
+        DriverError: one fails; the first is named.
+    """
+    if complaint := refusal(conditions):
+        raise DriverError(complaint)
+
+
+def model_of(report: RobotReport) -> RobotModel | None:
+    """The nominal model of the arm that answers; None when it does not tell, or there is no model of it."""
+    name = report.info.model.lower()
+    return robot_model(name) if name in ROBOTS else None
+
+
+def software_generation(report: RobotReport, model: RobotModel | None) -> Condition:
+    """The controller is of the generation that this client was made for."""
+    version = report.info.version
+    generation = "CB2" if version.major < 3 else "CB3" if version.major < 5 else "e-Series"
+    if version.major >= 10:
+        generation = "PolyScope X"
+    return Condition(
+        "software",
+        f"{version}, {generation}",
+        f"a CB3's, {_OLDEST.major}.{_OLDEST.minor} or later",
+        "this client was made for CB3 controllers only",
+        _OLDEST <= version < SoftwareVersion(4, 0),
     )
 
 
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}" if n == 1 else f"{n} {what}s"
+def arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
+    """Dashboard server and configuration data name the arm that the plan was made for."""
+    told, configured = report.info.model, report.configured
+    differ = configured is not None and told not in (UNKNOWN, configured)
+    return Condition(
+        "arm",
+        f"{told} (dashboard), {configured} (port 30001)" if differ else "" if told == UNKNOWN else told,
+        " or ".join(name.upper() for name in ROBOTS) if model is None else model.name.upper(),
+        "look which arm it is, and set it so in the installation"
+        if differ
+        else "plan for the arm that answers",
+        None if told == UNKNOWN else not differ and model is not None and told == model.name.upper(),
+    )
 
 
-def _joint(index: int | None) -> str:
-    return "" if index is None else JOINT_NAMES[index]
+def tcp_offset(report: RobotReport, model: RobotModel | None) -> Condition:
+    """The TCP is the flange: so plans take it."""
+    offset = report.tcp_offset
+    distance, angle = (0.0, 0.0) if offset is None else _size(offset)
+    most_distance, most_angle = _OFFSET_TOLERANCE
+    return Condition(
+        "TCP offset",
+        "" if offset is None else _pose_text(offset),
+        "0 (the flange)",
+        "set the TCP of the installation to zero in all six values",
+        None if offset is None else distance <= most_distance and angle <= most_angle,
+    )
+
+
+def forward_kinematics(report: RobotReport, model: RobotModel | None) -> Condition:
+    """The model puts the flange where the robot reports it: same arm, same generation, good calibration."""
+    frame = report.frame
+    if model is None:
+        return Condition("flange pose", "", "that of the model", "plan for the arm that answers", None)
+    offset = report.tcp_offset or (0.0,) * 6
+    flange = pose_trans(tuple(frame.actual_tcp_pose.tolist()), pose_inv(offset))
+    computed = T_to_pose(tcp_pose(model, frame.actual_q))
+    distance, angle = _size(pose_trans(pose_inv(computed), flange))
+    most = _POSITION_TOLERANCE[model.name]
+    return Condition(
+        "flange pose",
+        f"{distance * 1e3:.1f} mm, {angle * 1e3:.1f} mrad from the {model.name.upper()} model",
+        f"within {most * 1e3:g} mm, {_ROTATION_TOLERANCE * 1e3:g} mrad",
+        "this is another arm than the model's, or its calibration or TCP is wrong",
+        distance <= most and angle <= _ROTATION_TOLERANCE,
+    )
+
+
+def payload(report: RobotReport, model: RobotModel | None) -> Condition:
+    """The controller reckons with the mass that the arm carries."""
+    mass = report.payload
+    return Condition(
+        "payload",
+        "" if mass is None else f"{mass:.2f} kg",
+        f"{_PAYLOAD:.2f} kg within {_PAYLOAD_TOLERANCE:g} kg",
+        "set the payload on the pendant to what the arm carries",
+        None if mass is None else abs(mass - _PAYLOAD) <= _PAYLOAD_TOLERANCE,
+    )
+
+
+def joint_angles(report: RobotReport, model: RobotModel | None) -> Condition:
+    """Every joint stands within the range that plans use."""
+    if model is None:
+        return Condition("joint angles", "", "within the arm's range", "plan for the arm that answers", None)
+    q, limits = report.frame.actual_q, model.limits
+    beyond = np.maximum(q - np.array(limits.q_max), np.array(limits.q_min) - q)
+    joint = int(beyond.argmax())
+    low, high = np.degrees(limits.q_min[joint]), np.degrees(limits.q_max[joint])
+    return Condition(
+        "joint angles",
+        f"{JOINT_NAMES[joint]} at {np.degrees(q[joint]):.1f} deg",
+        f"within {low:.0f} to {high:.0f} deg",
+        "turn the joint back into its range on the pendant",
+        bool(beyond[joint] <= 0.0),
+    )
+
+
+CONDITIONS: tuple[Check, ...] = (
+    software_generation,
+    arm_type,
+    lambda report, model: safety_mode(report.frame),
+    lambda report, model: robot_mode(report.frame),
+    lambda report, model: program_state(report.frame),
+    lambda report, model: speed_slider(report.slider),
+    lambda report, model: speed_scaling(report.frame),
+    tcp_offset,
+    forward_kinematics,
+    payload,
+    joint_angles,
+)
+"""All conditions, in the order in which they are shown and asked: what explains the others comes first."""
+
+
+def _size(pose: Sequence[float]) -> tuple[float, float]:
+    """Length [m] and angle [rad] of a pose."""
+    return float(np.linalg.norm(pose[:3])), float(np.linalg.norm(pose[3:]))
+
+
+def _pose_text(pose: Sequence[float]) -> str:
+    position = ", ".join(f"{1e3 * value:.1f}" for value in pose[:3])
+    rotation = ", ".join(f"{1e3 * value:.0f}" for value in pose[3:])
+    return f"({position}) mm, ({rotation}) mrad"

@@ -20,7 +20,7 @@ from pc_client.driver.velocity_stream import StreamReport
 from pc_client.experiment.approach_run import run_approach
 from pc_client.experiment.identification import Identification, identify
 from pc_client.experiment.observer import Observer, Silent
-from pc_client.experiment.preflight import check_model
+from pc_client.experiment.preflight import preflight, require
 from pc_client.experiment.prepare import Experiment, PlannedMovement, clear_folder
 from pc_client.experiment.repetitions import Repetitions, RunLog
 from pc_client.planning.approach import plan_approach
@@ -84,8 +84,7 @@ class ExperimentRunner:
             ClientError: a check failed or the robot stopped; the arm rests, earlier recordings are complete.
         """
         experiment, driver = self._experiment, self._driver
-        check_model(experiment, driver.info)
-        driver.check_ready()
+        require(preflight(driver.report(), experiment.model))
         clear_folder(experiment)
         self._observer.connected(driver.info)
         # The loop is identified where the first run begins; that run needs no further approach.

@@ -241,7 +241,7 @@ REPLACED = r"program|closed the connection"
         ("sec p():\n  protective_stop()\nend\n", "PROTECTIVE_STOP"),
         ("stop program\n", "program"),
         ("def bad():\n  x = 1 / 0\nend\n", REPLACED),
-        ("power off\n", "motion needs RUNNING"),
+        ("power off\n", "must be RUNNING"),
     ],
     ids=["protective stop", "stop", "program error", "power off"],
 )
@@ -287,4 +287,4 @@ def test_a_robot_that_runs_a_program_is_refused(ur_client, standard_box, tmp_pat
         send(standard_box, "secondary", "stop program\n")
         reader.join()
     assert done.code == 1
-    assert "a program is PLAYING on the robot" in done.complaint()
+    assert "the robot's program is PLAYING" in done.complaint()

@@ -11,7 +11,11 @@ from collections import deque
 from types import SimpleNamespace
 
 from pc_client.errors import DriverError
-from protocol.primary_layout import ConfigurationData
+from pc_client.kinematics.forward import tcp_pose
+from pc_client.kinematics.robot_model import ROBOTS, robot_model
+from protocol.dashboard_connection import Role
+from protocol.pose import T_to_pose, pose_trans
+from protocol.primary_layout import CartesianInfo, ConfigurationData, RobotModeData
 from protocol.primary_messages import (
     ErrorCodeMessage,
     RuntimeExceptionMessage,
@@ -20,7 +24,8 @@ from protocol.primary_messages import (
 )
 from protocol.primary_state import encode_state
 from protocol.realtime_layout import SNAPSHOT_FIELDS, layout_for_version
-from protocol.ur_types import Ports, SoftwareVersion
+from protocol.rtde_connection import RtdeConnection
+from protocol.ur_types import Ports, RobotType, SoftwareVersion
 from protocol.velocity_stream import VelocityMode, decode_velocity, encode_hello
 
 VERSION = SoftwareVersion(3, 15, 8)
@@ -30,6 +35,7 @@ _ENCODE = LAYOUT.encoder()
 _COUNTS = {column.attribute: column.count for column in LAYOUT.columns}
 _ALL_ZERO = {name: 0.0 if _COUNTS.get(name, 1) == 1 else (0.0,) * _COUNTS[name] for name in SNAPSHOT_FIELDS}
 STOPPED, PLAYING, PAUSED = 1, 2, 4
+CYCLES_PER_STATE = 13
 
 
 class Pipe:
@@ -100,8 +106,11 @@ class FakeRobot:
         self.qd = [0.0] * 6
         self.robot_mode, self.safety_mode = 7, 1
         self.serial = "20993000007"  # None: software that does not know the question
-        # What the primary port sends behind its greeting.
-        self.state = encode_state([ConfigurationData()], VERSION)
+        self.version = VERSION
+        self.slider, self.scaling = 1.0, 1.0
+        self.tcp_offset = (0.0,) * 6
+        self.payload = 0.0  # None: no RTDE port
+        self.state = None  # instead of the state that script ports send: bytes
         self.program = None  # None, "receiver", "stop"
         self.programs = []
         self.listener = None
@@ -116,7 +125,7 @@ class FakeRobot:
         self.refuses = False
         self.deaf_to_stop = False
         self.error_in = None
-        self.tcp_of = None  # where the TCP is for joint angles; at the origin without
+        self.arm = robot_model(model.lower() if model.lower() in ROBOTS else "ur3")
         self.pauses = False  # a safety stop pauses the program, as on a real controller
 
     # ---- Network
@@ -129,11 +138,14 @@ class FakeRobot:
             raise DriverError(f"{host}:{port} refuses the connection")
         pipe = self.pipes[kind] = Pipe(self, kind)
         if kind in ("primary", "secondary"):
-            pipe.incoming.append(package(encode_message(version_message(VERSION), VERSION)))
-            if self.state is not None:
-                pipe.incoming.append(self.state)
+            pipe.incoming.append(package(encode_message(version_message(self.version), self.version)))
+            pipe.incoming.append(self.robot_state())
         elif kind == "realtime":
             pipe.incoming.append(self.frame())
+        elif kind == "rtde":
+            if self.payload is None:
+                raise DriverError(f"{host}:{port} refuses the connection")
+            pipe.rtde = RtdeConnection(Role.ROBOT, self.version)
         elif kind == "dashboard":
             pipe.incoming.append(b"Connected: Universal Robots Dashboard Server\n")
         return pipe
@@ -149,11 +161,29 @@ class FakeRobot:
         elif pipe.kind == "reverse":
             self.commands.append(decode_velocity(data))
             self.received.append(self.commands[-1])
+        elif pipe.kind == "rtde":
+            pipe.rtde.receive_data(data)
+            while pipe.rtde.next_event() is not None:
+                pipe.incoming.append(pipe.rtde.reply())
+            if pipe.rtde.encoder is not None:
+                pipe.incoming.append(pipe.rtde.encoder(self))
         elif pipe.kind == "dashboard":
             answers = {"get serial number": self.serial, "get robot model": self.model}
             answer = answers.get(data.decode().strip())
             if answer:
                 pipe.incoming.append(answer.encode() + b"\n")
+
+    def robot_state(self):
+        """What the script ports send ten times a second."""
+        robot_type = RobotType[self.model] if self.model in RobotType.__members__ else RobotType.UR3
+        return self.state or encode_state(
+            [
+                RobotModeData(target_speed_fraction=self.slider, speed_scaling=self.scaling),
+                CartesianInfo(tcp_offset=self.tcp_offset),
+                ConfigurationData(robot_type=robot_type),
+            ],
+            self.version,
+        )
 
     def load(self, text):
         if text == "stop program\n":
@@ -212,6 +242,9 @@ class FakeRobot:
         self.clock += PERIOD
         if self.on_tick is not None:
             self.on_tick(self)
+        if self.tick % CYCLES_PER_STATE == 0:
+            for pipe in (self.pipes["primary"], self.pipes["secondary"]):
+                pipe.incoming.append(self.robot_state())
         if self.safety_mode != 1:
             self.qd = [0.0] * 6
             if not self.pauses:
@@ -247,8 +280,8 @@ class FakeRobot:
             safety_mode=self.safety_mode,
             runtime_state=STOPPED if self.program is None else PAUSED if self.safety_mode != 1 else PLAYING,
         )
-        if self.tcp_of is not None:
-            values["actual_tcp_pose"] = (*self.tcp_of(self.q), 0.0, 0.0, 0.0)
+        values["speed_scaling"] = self.scaling
+        values["actual_tcp_pose"] = pose_trans(T_to_pose(tcp_pose(self.arm, self.q)), self.tcp_offset)
         return _ENCODE(SimpleNamespace(**values))
 
     # ---- what tests look at

@@ -146,12 +146,13 @@ def test_commands_that_move_an_arm_share_their_options(command, capsys):
 
 
 def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, monkeypatch):
+    robot.serial = "2017355123"
     asked = []
 
     def answer(question, abort):
         asked.append(question)
         assert robot.programs == []
-        assert {"primary", "secondary", "realtime"} <= set(robot.closed)
+        assert set(robot.closed) == set(robot.pipes)
         raise cli.typer.Abort
 
     monkeypatch.setattr(cli.typer, "confirm", answer)

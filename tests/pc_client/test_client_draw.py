@@ -14,8 +14,6 @@ from fake_robot import FakeRobot
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
-from pc_client.kinematics.forward import tcp_positions
-from pc_client.kinematics.robot_model import robot_model
 from pc_client.movements.files import load_movement
 from pc_client.recording.loader import load_recording
 
@@ -26,8 +24,6 @@ DATA = Path(__file__).parents[3] / "shared" / "data" / "pen_strokes" / "strokes_
 def robot(monkeypatch):
     """A robot in memory instead of the network."""
     fake = FakeRobot()
-    model = robot_model("ur3")
-    fake.tcp_of = lambda q: tcp_positions(model, [q])[0]
     fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
     for module in (transport, ur_driver_module):
         monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
@@ -165,6 +161,8 @@ def test_an_unknown_controller_is_refused_before_any_work(robot, file, capsys, t
 
 
 def test_a_real_arm_does_not_move_before_the_answer(robot, file, tmp_path, capsys, monkeypatch):
+    robot.serial = "2017355123"
+
     def answer(question, abort):
         assert robot.programs == []
         raise cli.typer.Abort

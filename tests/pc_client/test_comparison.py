@@ -21,8 +21,6 @@ from pc_client.comparison.movement_set import make_sets, save_sets
 from pc_client.comparison.signals import filtered_signal, planned_signal
 from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, build_comparison
 from pc_client.errors import ClientError
-from pc_client.kinematics.forward import tcp_positions
-from pc_client.kinematics.robot_model import robot_model
 from pc_client.movements import load_movement
 from pc_client.movements.twins import GENERATORS
 
@@ -175,8 +173,6 @@ def test_page_shows_every_generator(sets):
 @pytest.fixture
 def robot(monkeypatch):
     fake = FakeRobot(delay=4)
-    model = robot_model("ur3")
-    fake.tcp_of = lambda q: tcp_positions(model, [q])[0]
     fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
     for module in (transport, ur_driver_module):
         monkeypatch.setattr(module, "TcpNetwork", lambda: fake)

@@ -105,9 +105,9 @@ def test_software_that_does_not_tell_whether_a_program_runs_is_refused():
         ({"safety_mode": 3}, RobotStoppedError, "unlock the protective stop"),
         ({"safety_mode": 5}, RobotStoppedError, "SAFEGUARD_STOP"),
         ({"safety_mode": 99}, RobotStoppedError, "99"),
-        ({"robot_mode": 5}, RobotStoppedError, "IDLE, motion needs RUNNING"),
+        ({"robot_mode": 5}, RobotStoppedError, "IDLE, must be RUNNING"),
         ({"robot_mode": 3}, RobotStoppedError, "POWER_OFF"),
-        ({"program": "other"}, DriverError, "a program is PLAYING"),
+        ({"program": "other"}, DriverError, "program is PLAYING"),
     ],
 )
 def test_nothing_is_sent_to_a_robot_that_is_not_ready(spoil, error, words):

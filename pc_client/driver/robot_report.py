@@ -1,0 +1,104 @@
+"""What a robot reports of itself: the record that `experiment.preflight` judges. Only reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pc_client.driver.package_stream import PackageStream
+from pc_client.driver.realtime_client import RealtimeClient
+from pc_client.driver.robot_info import RobotInfo, read_robot_info
+from pc_client.driver.rtde_query import ask_rtde
+from pc_client.driver.transport import Network
+from protocol.primary_layout import CartesianInfo, ConfigurationData, RobotModeData
+from protocol.realtime_layout import RealtimeFrame
+from protocol.ur_types import Ports, RobotType
+
+_CONNECT_TIMEOUT = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class RobotReport:
+    """What a robot reports. None stands for what it does not tell.
+
+    Attributes:
+        info: which robot it is.
+        configured: the arm by the configuration data of port 30001, e.g. `UR3`.
+        frame: its state on port 30003.
+        slider: speed slider, 0 to 1, from port 30001.
+        tcp_offset: (6,) pose of the TCP in the flange frame [m, rad], from port 30001.
+        payload: mass [kg], by RTDE, since software 3.11.
+    """
+
+    info: RobotInfo
+    configured: str | None
+    frame: RealtimeFrame
+    slider: float | None
+    tcp_offset: tuple[float, ...] | None
+    payload: float | None
+
+
+def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
+    """Ask a robot, on connections of its own.
+
+    Raises:
+        DriverError: nothing answers on the primary or the realtime port, or something else than a robot.
+    """
+    primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
+    try:
+        info = read_robot_info(network, host, ports.dashboard, primary)
+        frames = RealtimeClient(network.connect(host, ports.realtime, _CONNECT_TIMEOUT), network)
+        try:
+            frame = frames.receive().latest
+        finally:
+            frames.close()
+        return make_report(info, frame, primary, read_payload(network, host, ports))
+    finally:
+        primary.close()
+
+
+def make_report(
+    info: RobotInfo, frame: RealtimeFrame, primary: PackageStream, payload: float | None
+) -> RobotReport:
+    """Put together what open connections have told.
+
+    Args:
+        info: which robot it is.
+        frame: its state.
+        primary: its primary port; what has come is to be polled by the caller.
+        payload: from `read_payload`.
+
+    Raises:
+        DriverError: a state on the primary port makes no sense.
+    """
+    configuration = primary.newest(ConfigurationData)
+    cartesian = primary.newest(CartesianInfo)
+    return RobotReport(
+        info=info,
+        configured=None if configuration is None else _name(configuration.robot_type),
+        frame=frame,
+        slider=reported_slider(primary),
+        tcp_offset=None if cartesian is None else cartesian.tcp_offset,
+        payload=payload,
+    )
+
+
+def reported_slider(primary: PackageStream) -> float | None:
+    """The speed slider, 0 to 1, as the port was last polled; None when it has not told."""
+    mode = primary.newest(RobotModeData)
+    return None if mode is None else mode.target_speed_fraction
+
+
+def read_payload(network: Network, host: str, ports: Ports) -> float | None:
+    """Ask for the mass of the payload [kg]; None when the robot does not tell.
+
+    Only RTDE tells it on a CB3: frames of port 30003 have it from 5.10 on.
+    """
+    value = ask_rtde(network, host, ports.rtde, "payload")
+    return value if isinstance(value, float) else None
+
+
+def _name(robot_type: int) -> str:
+    try:
+        return RobotType(robot_type).name
+    except ValueError:  # an arm that was built after this was written
+        return f"type {robot_type}"
