@@ -243,12 +243,14 @@ def test_a_robot_that_is_there_runs_one_case_after_the_other(robot, tmp_path, ca
 
 
 def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, monkeypatch):
+    robot.serial = "2017355123"
+
     def answer(question, abort):
         assert robot.programs == []
         raise cli.typer.Abort
 
     monkeypatch.setattr(cli.typer, "confirm", answer)
-    path = write(tmp_path, GIVEN.replace("HOST", "192.0.2.7"))
+    path = write(tmp_path, GIVEN.replace("HOST", "127.0.0.1"))
     assert run(path, tmp_path / "out") == 1
     assert robot.programs == []
     told = capsys.readouterr()
