@@ -1,5 +1,6 @@
 """Every example runs, and says what its docstring promises."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -42,11 +43,19 @@ def test_draw(tmp_path):
 
 @pytest.mark.slow
 def test_demo_and_plot(tmp_path):
-    said = run("demo.py", "--out", tmp_path, "--repeat", 1)
-    assert "Table I" in said
-    assert (tmp_path / "table1.json").exists()
+    said = run("demo.py", "--out", tmp_path, "--repeat", 1, "--movements", "lognorm_4_1,uniform_4_1")
+    assert f"report: {tmp_path / 'report.html'}" in said
+    for words in ("real UR3", "published controller, preview: SIMULATED UR3", "19.02", "29.90"):
+        assert words in said
+    found = {p.parent.name: json.loads(p.read_text()) for p in tmp_path.rglob("table1.json")}
+    assert (found["paper"]["controller"], found["preview"]["controller"]) == ("paper", "preview")
+    assert found["p10-i5-a3"]["controller"] == "paper with gain_p 10, gain_i 5"
+    assert all(table["simulated"] is True and len(table["rows"]) == 2 for table in found.values())
+    page = (tmp_path / "report.html").read_text()
+    for table in found.values():
+        assert f"{table['mean_snr_db']['lognormal']:.2f}" in page
     figure = tmp_path / "speed.png"
-    run("05_plot_a_recording.py", tmp_path / "lognorm_5_1_r1.mcap", "--out", figure)
+    run("05_plot_a_recording.py", tmp_path / "preview" / "lognorm_4_1_r1.mcap", "--out", figure)
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 

@@ -78,7 +78,7 @@ def draw_movement(row: Row) -> str:
 
 def draw_table(table: Table) -> str:
     """Draw Table I: our repetitions and mean beside the paper's figure, for each movement."""
-    with svg_figure(11.0, 3.4, table.origin.mark) as (figure, page):
+    with svg_figure(11.0, 3.4, table.provenance.origin.mark) as (figure, page):
         axes = figure.add_axes((0.06, 0.2, 0.925, 0.68))
         x = np.arange(len(table.rows))
         paper = [np.nan if row.paper_snr_db is None else row.paper_snr_db for row in table.rows]
@@ -115,7 +115,7 @@ def draw_definitions(table: Table) -> str:
         ("velocity vector", "s", RED, lambda run: run.snr.velocity_db),
         ("velocity vector, after best time shift", "D", ORANGE, lambda run: run.snr.velocity_shifted_db),
     )
-    with svg_figure(11.0, 3.1, table.origin.mark) as (figure, page):
+    with svg_figure(11.0, 3.1, table.provenance.origin.mark) as (figure, page):
         axes = figure.add_axes((0.06, 0.21, 0.925, 0.63))
         for i, (label, marker, colour, value) in enumerate(series):
             x = np.arange(len(table.rows)) + 0.16 * (i - 1.5)
@@ -132,7 +132,7 @@ def draw_definitions(table: Table) -> str:
 
 def draw_budget(table: Table) -> str:
     """Draw where the error power of each movement lies: bars of shares, and the level of the whole."""
-    with svg_figure(11.0, 0.34 * len(table.rows) + 1.25, table.origin.mark) as (figure, page):
+    with svg_figure(11.0, 0.34 * len(table.rows) + 1.25, table.provenance.origin.mark) as (figure, page):
         height = figure.get_figheight()
         axes = figure.add_axes((0.115, 0.55 / height, 0.755, 1.0 - 1.15 / height))
         y = np.arange(len(table.rows))

@@ -3,8 +3,29 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import resources
 from typing import Any
+
+from pc_client.errors import RecordingError
+
+
+@contextmanager
+def report_libraries() -> Iterator[None]:
+    """Say which library is missing before anything is drawn; modules that draw are imported in the block.
+
+    Raises:
+        RecordingError: matplotlib or jinja2 is not installed.
+    """
+    try:
+        import jinja2  # noqa: F401
+
+        yield
+    except ImportError as error:
+        raise RecordingError(
+            f"the report needs {error.name}; install it with: pip install 'ur-hil[report]'"
+        ) from error
 
 
 def render(template: str, **values: Any) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import track as progress
 
 from pc_client.analysis.budget import PARTS, SPLIT_HZ
-from pc_client.analysis.page import data_uri, render
+from pc_client.analysis.page import data_uri, render, report_libraries
 from pc_client.analysis.run import Run, analyse_run
 from pc_client.analysis.table import KINDS, Row, Table, build_table
 from pc_client.errors import RecordingError
@@ -30,21 +30,37 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What `build_report` made.
+    """What was made of a folder of recordings.
 
     Attributes:
         table: Table I of the runs.
-        paths: the files written: table1.json, table1.md, report.html.
+        paths: the files written: table1.json, table1.md and, with a page, report.html.
         left_out: one line for each recording that is not in the table, with the reason.
     """
 
     table: Table
-    paths: tuple[Path, Path, Path]
+    paths: tuple[Path, ...]
     left_out: tuple[str, ...]
 
 
 def build_report(run_dir: Path | str, console: Console | None = None) -> Report:
-    """Rebuild all tables and figures from the recordings `<movement>_r<k>.mcap` in a folder.
+    """Rebuild tables and page from the recordings `<movement>_r<k>.mcap` in a folder.
+
+    Args:
+        run_dir: the folder; the results are written into it.
+        console: where progress is shown; None shows none.
+
+    Raises:
+        RecordingError: as `build_tables`, or matplotlib or jinja2 is missing.
+    """
+    report = build_tables(run_dir, console)
+    page = Path(run_dir) / REPORT_HTML
+    write_text(page, render_page(report.table, report.left_out, console))
+    return replace(report, paths=(*report.paths, page))
+
+
+def build_tables(run_dir: Path | str, console: Console | None = None) -> Report:
+    """Rebuild the tables from the recordings in a folder, without a page.
 
     Recordings that were cut off, or of runs that were given up, are left out of the table and named on the
     page: half a movement has no SNR that could stand beside the others.
@@ -54,8 +70,8 @@ def build_report(run_dir: Path | str, console: Console | None = None) -> Report:
         console: where progress is shown; None shows none.
 
     Raises:
-        RecordingError: no usable recording, recordings of different experiments, matplotlib or jinja2
-            missing, or a file cannot be written.
+        RecordingError: no usable recording, recordings of different experiments, or a file cannot be
+            written.
     """
     run_dir = Path(run_dir)
     files = sorted(run_dir.glob("*.mcap"))
@@ -73,15 +89,22 @@ def build_report(run_dir: Path | str, console: Console | None = None) -> Report:
     if not runs:
         raise RecordingError(f"{run_dir} holds no usable recording; {left_out[0]}")
     table = build_table(runs)
-    html = render_page(table, left_out, console)
-    paths = (run_dir / TABLE_JSON, run_dir / TABLE_MARKDOWN, run_dir / REPORT_HTML)
-    texts = (json.dumps(table.to_json(), indent=2, allow_nan=False) + "\n", table.to_markdown(), html)
-    for path, text in zip(paths, texts, strict=True):
-        try:
-            path.write_text(text, encoding="utf-8", newline="\n")
-        except OSError as error:
-            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from error
+    paths = (run_dir / TABLE_JSON, run_dir / TABLE_MARKDOWN)
+    write_text(paths[0], json.dumps(table.to_json(), indent=2, allow_nan=False) + "\n")
+    write_text(paths[1], table.to_markdown())
     return Report(table, paths, tuple(left_out))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file of the report.
+
+    Raises:
+        RecordingError: it cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error.strerror or error}") from error
 
 
 def render_page(table: Table, left_out: Iterable[str] = (), console: Console | None = None) -> str:
@@ -90,14 +113,8 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
     Raises:
         RecordingError: matplotlib or jinja2 is not installed.
     """
-    try:
-        import jinja2  # noqa: F401 - what is missing is said before anything is drawn
-
+    with report_libraries():
         from pc_client.analysis import figures
-    except ImportError as error:
-        raise RecordingError(
-            f"the report needs {error.name}; install it with: pip install 'ur-hil[report]'"
-        ) from error
     movements = [
         {"row": row, "figure": data_uri(figures.draw_movement(row)), "parts": _parts(row)}
         for row in _shown(table.rows, "drawing", console)
@@ -114,7 +131,7 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         table_figure=data_uri(figures.draw_table(table)),
         definitions_figure=data_uri(figures.draw_definitions(table)),
         budget_figure=data_uri(figures.draw_budget(table)),
-        provenance=_provenance_facts(table),
+        provenance=provenance_facts(table),
         learned=_learned(table),
         left_out=list(left_out),
     )
@@ -152,7 +169,7 @@ def _parts(row: Row) -> list[tuple[str, float, float]]:
     ]
 
 
-def _provenance_facts(table: Table) -> Mapping[str, Any]:
+def provenance_facts(table: Table) -> Mapping[str, Any]:
     """Return what all runs have in common, and what differs, as texts by name."""
     runs = [run for row in table.rows for run in row.runs]
     first = runs[0].provenance
@@ -212,6 +229,8 @@ def _learned(table: Table) -> str:
 
 
 def _shown(items: Iterable[_T], what: str, console: Console | None) -> Iterable[_T]:
-    """Iterate with a progress bar when there is a console."""
+    """Iterate with a progress bar when there is a terminal to show it."""
     items = list(items)
-    return items if console is None else progress(items, description=what, console=console, transient=True)
+    if console is None or not console.is_terminal:
+        return items
+    return progress(items, description=what, console=console, transient=True)

@@ -19,7 +19,7 @@ from rich.text import Text
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
 from pc_client.analysis.run import Run
 from pc_client.errors import RecordingError
-from pc_client.recording.origin import Origin
+from pc_client.recording.provenance import Provenance
 
 # Source: A. Wolniakowski et al., "Towards human-like kinematics in industrial robotic arms: a case study on a
 # UR3 robot", Table I, in its order. One figure a movement, over three repetitions on a real UR3.
@@ -37,7 +37,7 @@ PAPER_SNR_DB = {
 }
 KINDS = ("uniform", "lognormal")
 
-SHARED = "paper: its points are not published; rows share name, kind and number of targets only"
+SHARED = "Paper: its points are not published; name, kind and number of targets agree"
 """Why no differences are given."""
 
 
@@ -180,19 +180,19 @@ class Table:
         return table
 
     @property
-    def origin(self) -> Origin:
-        """The words for simulated, real, or not known."""
-        return self.rows[0].runs[0].provenance.origin
+    def provenance(self) -> Provenance:
+        """Where the first run comes from; arm and controller are the same for all."""
+        return self.rows[0].runs[0].provenance
 
     @property
     def loop(self) -> Mapping[str, float | str]:
         """What the client identified of the loop and its margins; empty for old recordings."""
-        return self.rows[0].runs[0].provenance.loop
+        return self.provenance.loop
 
     @property
     def title(self) -> str:
         """One line that says what the table shows, and whether the arm was a real one."""
-        return f"Table I: {self.rows[0].runs[0].provenance.arm}, controller {self.controller}"
+        return f"Table I: {self.provenance.arm}, controller {self.controller}"
 
     def _cells(self) -> tuple[list[str], list[list[str]]]:
         """Return headings and texts; the mean of a kind follows its rows."""

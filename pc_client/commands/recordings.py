@@ -7,16 +7,28 @@ from typing import Annotated
 
 import typer
 
-from pc_client.commands.options import say, show_report
+from pc_client.commands.options import console, say, show_report
 
 
 def report(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Folder with the recordings of an experiment.")
+    folders: Annotated[
+        list[Path],
+        typer.Argument(metavar="DIR...", help="Folders with the recordings of one experiment each."),
     ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="Page that shows several experiments side by side.")
+    ] = Path("report.html"),
 ) -> None:
-    """Build tables and report again from the recordings of an experiment."""
-    show_report(folder)
+    """Build tables and report again from the recordings of an experiment; of several, one page more."""
+    if len(folders) == 1:
+        show_report(folders[0])
+        return
+    from pc_client.analysis.report import build_report
+    from pc_client.analysis.side_by_side import build_side_by_side
+
+    shown = build_side_by_side([build_report(folder, console) for folder in folders], out)
+    console.print(shown.to_rich())
+    say(f"report: {out}")
 
 
 def export(
