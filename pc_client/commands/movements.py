@@ -4,26 +4,50 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from pc_client.commands.options import console, say
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from pc_client.movements.movement import Movement
+    from pc_client.movements.own_points import Style
+    from pc_client.movements.robotic import Corners
 
 app = typer.Typer(help="The movement library.", rich_markup_mode=None)
 
 
+_CornersOption = Annotated[
+    str,
+    typer.Option(
+        "--corners",
+        metavar="stop|blend",
+        help="Robot-like: come to rest at inner target points, or round them, 30 mm before and after.",
+    ),
+]
+
+
 @app.command("list")
-def list_movements() -> None:
+def list_movements(
+    set_name: Annotated[
+        str | None, typer.Option("--set", metavar="NAME", help="Only this set: paper or arcs.")
+    ] = None,
+) -> None:
     """List the movements that come with the package."""
     from pc_client.movements.description import describe
-    from pc_client.movements.files import library_names, load_movement
+    from pc_client.movements.files import LIBRARY_SETS, library_names, load_movement
 
-    headings = ("name", "kind", "points", "duration [s]", "path [m]", "top speed [m/s]")
-    table = Table(*map(escape, headings))  # rich would take a unit in brackets for a style
-    for name in library_names():
+    headings = ("kind", "points", "duration [s]", "path [m]", "top speed [m/s]")
+    # rich would take a unit in brackets for a style
+    table = Table(Column("name", no_wrap=True), *map(escape, headings))
+    sets = [set_name] if set_name is not None else LIBRARY_SETS
+    for name in (name for chosen in sets for name in library_names(chosen)):
         figures = describe(load_movement(name))
         table.add_row(
             name,
@@ -63,9 +87,15 @@ def kinds() -> None:
     """List the generators of movements."""
     from pc_client.movements.twins import GENERATORS
 
-    table = Table("kind", "movement", "strokes last as long as lognormal's")
+    columns = ("kind", "movement", "target points", "stroke durations")
+    table = Table(*columns, title="beside the lognormal movement of the same seed")
     for name, generator in GENERATORS.items():
-        table.add_row(name, generator.says, "yes" if generator.same_strokes else "only the whole")
+        table.add_row(
+            name,
+            generator.says,
+            "the same" if generator.same_targets else "own, but the first",
+            "the same" if generator.same_strokes else "only their sum",
+        )
     console.print(table)
 
 
@@ -77,18 +107,51 @@ def generate(
     ] = "lognormal",
     targets: Annotated[int, typer.Option("--targets", min=2, max=50, help="Number of target points.")] = 4,
     seed: Annotated[int, typer.Option("--seed", min=0, help="The same seed gives the same movement.")] = 0,
+    corners: _CornersOption = "stop",
 ) -> None:
     """Make a random movement in the UR3's workspace, check that the arm can do it, and save it."""
-    from pc_client.movements.files import save_movement
     from pc_client.movements.generate import generate_movement
-    from pc_client.planning.plan import plan_movement
-    from pc_client.planning.plan_text import plan_text
 
-    movement = generate_movement(kind, targets, seed, name=out.stem)
-    plan = plan_movement(movement)
-    save_movement(movement, out)
-    say(plan_text(plan))
-    say(f"saved: {out}")
+    _check_and_save(generate_movement(kind, targets, seed, name=out.stem, corners=_corners(corners)), out)
+
+
+@app.command("new")
+def new(
+    targets: Annotated[
+        Path,
+        typer.Option(
+            "--targets",
+            metavar="FILE.csv",
+            help="Your target points: columns x, y, z in m, base frame; and t in s, if you wish.",
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Movement file to write, .toml.")],
+    style: Annotated[
+        str,
+        typer.Option("--style", metavar="human|robot", help="Lognormal strokes, or constant speeds."),
+    ] = "human",
+    durations: Annotated[
+        str | None,
+        typer.Option(
+            "--durations",
+            metavar="A,B,...",
+            help="Durations of the strokes in s, if the file has no t; by default for .25 m/s at most.",
+        ),
+    ] = None,
+    corners: _CornersOption = "stop",
+) -> None:
+    """Make a movement through your own target points, check that the arm can do it, and save it."""
+    from pc_client.movements.own_points import load_targets, through
+
+    if style not in ("human", "robot"):
+        raise typer.BadParameter(f'--style {style}: give "human" or "robot"')
+    points, times = load_targets(targets)
+    if durations is not None:
+        if times is not None:
+            raise typer.BadParameter(f"--durations, but {targets} has a column t: give only one of them")
+        times = _numbers(durations)
+    how: Style = "human" if style == "human" else "robot"
+    _check_and_save(through(points, how, times, name=out.stem, corners=_corners(corners)), out)
 
 
 @app.command("duplicate")
@@ -101,17 +164,43 @@ def duplicate(
         typer.Option("--share", min=0.0, max=1.0, help="Share of the published human variability."),
     ] = 1.0,
 ) -> None:
-    """Vary a movement as people vary when they repeat one, check that the arm can do it, and save it."""
-    from pc_client.movements.files import load_movement, save_movement
+    """Vary a movement as people vary when they repeat one, check that the arm can do it, and save it.
+
+    Only the first target point stays: strokes of other lengths and directions lead to others.
+    """
+    from pc_client.movements.files import load_movement
     from pc_client.movements.variability import duplicate as vary
+
+    _check_and_save(vary(load_movement(movement), seed, name=out.stem, share=share), out)
+
+
+def _check_and_save(movement: Movement, out: Path) -> None:
+    """Plan a movement for a UR3, save it and say what it would do; what cannot be planned is not saved."""
+    from pc_client.movements.files import save_movement
     from pc_client.planning.plan import plan_movement
     from pc_client.planning.plan_text import plan_text
 
-    varied = vary(load_movement(movement), seed, name=out.stem, share=share)
-    plan = plan_movement(varied)
-    save_movement(varied, out)
+    plan = plan_movement(movement)
+    save_movement(movement, out)
     say(plan_text(plan))
     say(f"saved: {out}")
+
+
+def _corners(word: str) -> Corners:
+    if word == "stop":
+        return "stop"
+    if word == "blend":
+        return "blend"
+    raise typer.BadParameter(f'--corners {word}: give "stop" or "blend"')
+
+
+def _numbers(words: str) -> NDArray[np.float64]:
+    import numpy as np
+
+    try:
+        return np.array([float(word) for word in words.split(",")])
+    except ValueError as error:
+        raise typer.BadParameter(f"--durations {words}: give times in s, separated by commas") from error
 
 
 def _text(value: object) -> str:

@@ -58,7 +58,7 @@ def fill_page(figure: Figure, one: MovementSet, runs: Mapping[str, Run] | None =
     figure.text(
         0.05,
         1.0 - 0.28 / height,
-        f"TCP speed and path, grey: as planned{executed}. The same target points (circles) and the same time",
+        f"TCP speed and path, grey: as planned{executed}. Same time, same target points (all but duplicate)",
         fontsize=10,
         weight="bold",
     )

@@ -1,4 +1,7 @@
-"""Which movements are compared: every generator on the same target points, for one or more seeds."""
+"""Which movements are compared: every generator in the same time, for one or more seeds.
+
+All but the duplicate, which moves its target points as people do, have the same target points.
+"""
 
 from __future__ import annotations
 

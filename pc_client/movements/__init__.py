@@ -7,9 +7,11 @@ no limits, no sockets.
     path, robotic                                the robot-like model: geometry, and the law of speed
     minimum_jerk; smooth_path, power_law         two other models of human movement
     durations, variability                       how long strokes last; the same movement another time
-    samples                                      (x, y, z, t) files
+    columns, samples                             tables of numbers as text; (x, y, z, t) files
     movement, files, law_tables, description     the `Movement`, its files and its figures
-    targets, generate, twins, fit, geometry      new movements by a seed, and movements into a workspace
+    targets, fit, geometry                       random target points; movements into a workspace
+    recipe, arcs, twins, generate                new movements by a seed, and the library's
+    own_points                                   new movements through one's own points
 
 Names are loaded when they are first asked for, so that importing the package costs nothing.
 """
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
     from pc_client.movements.movement import Movement as Movement
     from pc_client.movements.movement import MovementSample as MovementSample
     from pc_client.movements.movement import export_samples as export_samples
+    from pc_client.movements.own_points import load_targets as load_targets
+    from pc_client.movements.own_points import through as through
     from pc_client.movements.twins import robotic_twin as robotic_twin
     from pc_client.movements.variability import duplicate as duplicate
 
@@ -44,8 +48,10 @@ _HOMES = {
     "generate_movement": "generate",
     "library_names": "files",
     "load_movement": "files",
+    "load_targets": "own_points",
     "robotic_twin": "twins",
     "save_movement": "files",
+    "through": "own_points",
 }
 __all__ = sorted(_HOMES)
 

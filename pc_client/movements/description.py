@@ -95,6 +95,8 @@ def _describe_strokes(law: SigmaLognormal) -> list[dict[str, float]]:
                 "turn_rad": stroke.turn,
                 "tilt_rad": stroke.tilt,
                 "mode_s": bell.mode,
+                "skewness": bell.skewness,
+                "kurtosis": bell.kurtosis,
                 "peak_speed_m_s": length * bell.peak,
             }
         )

@@ -29,6 +29,7 @@ __all__ = [
     "library_path",
     "load_movement",
     "movement_text",
+    "read_text",
     "save_movement",
 ]
 
@@ -116,6 +117,24 @@ def save_movement(movement: Movement, path: str | Path) -> None:
         ) from error
 
 
+def read_text(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        MovementError: it cannot be read, or is not UTF-8.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise MovementError(
+            f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text"
+        ) from error
+    except OSError as error:
+        raise MovementError(
+            f"{path}: cannot be read ({error.strerror or error}); give a file that exists"
+        ) from error
+
+
 def movement_text(movement: Movement) -> str:
     """The TOML file of a movement with a law, complete and readable."""
     law = movement.law
@@ -148,16 +167,7 @@ def _read(path: Path) -> Movement:
     suffix = path.suffix.lower()
     if suffix not in (".toml", ".csv"):
         raise MovementError(f"{path}: movement files are .toml (parameters) or .csv (x, y, z, t samples)")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise MovementError(
-            f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text"
-        ) from error
-    except OSError as error:
-        raise MovementError(
-            f"{path}: cannot be read ({error.strerror or error}); give a file that exists"
-        ) from error
+    text = read_text(path)
     if suffix == ".csv":
         law = parse_samples(text, str(path))
         return Movement(path.stem, law, np.array([law.duration]), {"file": path.name})

@@ -23,7 +23,7 @@ __all__ = ["LAW_FIELDS", "LAW_WORDS", "law_lines", "parse_law"]
 
 #: What a file says of its kind of movement.
 LAW_WORDS = {
-    "lognormal": "human-like: overlapping lognormal strokes",
+    "lognormal": "human-like: lognormal strokes",
     "uniform": "robot-like: constant speed with ramps",
     "minimum_jerk": "human-like: least jerk",
     "power_law": "human-like: the two-thirds power law",

@@ -87,8 +87,9 @@ class Movement:
     Attributes:
         name: as in tables and file names.
         law: the closed form behind it.
-        stroke_durations: (n_strokes,), s: times between the least speeds of the movement, or, where a law
-            names them, between its passages at the target points; their sum is the duration.
+        stroke_durations: (n_strokes,), s, one after the other from time 0: the windows of strokes that do not
+            overlap, the times between the least speeds of those that do, or, where a law names them, between
+            its passages at the target points; their sum is the duration.
         provenance: how it was made, as short facts; written into its file.
     """
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from pc_client.errors import MovementError
+from pc_client.movements.columns import parse_rows
 from pc_client.movements.geometry import Similarity, read_only
 from pc_client.movements.stroke import Motion
 
@@ -26,7 +26,6 @@ __all__ = ["MIN_SAMPLES", "SampledLaw", "parse_samples", "write_samples"]
 MIN_SAMPLES = 4
 
 _COLUMNS = ("x", "y", "z", "t")
-_SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,8 +90,7 @@ class SampledLaw:
 def parse_samples(text: str, source: str) -> SampledLaw:
     """Samples from text: one a line, columns x, y, z (m) and t (s).
 
-    Columns are separated by commas, semicolons, tabs or blanks. A first line of the names x, y, z, t may give
-    another order; without it the order is x, y, z, t. Empty lines and lines that begin with # are skipped.
+    Without a first line of names the order is x, y, z, t; the form is that of `columns`.
 
     Args:
         text: the file's content.
@@ -101,40 +99,10 @@ def parse_samples(text: str, source: str) -> SampledLaw:
     Raises:
         MovementError: naming the line.
     """
-    order = list(range(4))
-    rows: list[list[float]] = []
-    lines: list[int] = []
-    header_allowed = True
-    for number, line in enumerate(text.splitlines(), start=1):
-        cells = line.strip().lstrip("\ufeff")
-        if not cells or cells.startswith("#"):
-            continue
-        fields = _SEPARATOR.split(cells)
-        names = [name.strip('"').lower() for name in fields]
-        if header_allowed and sorted(names) == sorted(_COLUMNS):
-            order = [names.index(name) for name in _COLUMNS]
-            header_allowed = False
-            continue
-        header_allowed = False
-        if len(fields) != len(_COLUMNS):
-            raise MovementError(
-                f"{source}, line {number}: {len(fields)} columns; give four: x, y, z in m and t in s"
-            )
-        row = [
-            _parse_number(fields[column], source, number, name)
-            for column, name in zip(order, _COLUMNS, strict=True)
-        ]
-        if rows and row[3] <= rows[-1][3]:
-            raise MovementError(
-                f"{source}, line {number}: t = {row[3]:g} s after t = {rows[-1][3]:g} s in line {lines[-1]}; "
-                "times must increase"
-            )
-        rows.append(row)
-        lines.append(number)
+    rows = parse_rows(text, source, [_COLUMNS], "four: x, y, z in m and t in s").values
     if len(rows) < MIN_SAMPLES:
         raise MovementError(f"{source}: {len(rows)} samples; a movement needs at least {MIN_SAMPLES}")
-    values = np.array(rows)
-    return SampledLaw(values[:, 3], values[:, :3])
+    return SampledLaw(rows[:, 3], rows[:, :3])
 
 
 def write_samples(path: Path, t: NDArray[np.float64], points: NDArray[np.float64]) -> None:
@@ -144,13 +112,3 @@ def write_samples(path: Path, t: NDArray[np.float64], points: NDArray[np.float64
     writer.writerow(_COLUMNS)
     writer.writerows([*point, time] for point, time in zip(points.tolist(), t.tolist(), strict=True))
     path.write_text(text.getvalue(), encoding="utf-8")
-
-
-def _parse_number(text: str, source: str, line: int, column: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise MovementError(f'{source}, line {line}: {column} is "{text}"; give a finite number')
-    return value

@@ -1,8 +1,8 @@
 """When a stroke happens: from a window in time to the lognormal that fills it.
 
-Two constructions, both exact. `LiteralTiming` is the paper's (Eq. 7-9); `TwoSidedTiming` asks both tails of
-the bell to lie inside the window and is what the movement library uses. Each knows its lognormal and how to
-slow itself down. This module knows no space.
+Two constructions, both exact. `LiteralTiming` is the paper's (Eq. 7-9) and what its recipe uses;
+`TwoSidedTiming` asks both tails of the bell to lie inside the window and is what strokes that overlap use.
+Each knows its lognormal and how to slow itself down. This module knows no space.
 """
 
 from __future__ import annotations

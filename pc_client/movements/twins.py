@@ -1,8 +1,8 @@
 """Twins: the same target points in the same time, by every other generator.
 
-A twin is made from a human-like movement and keeps its target points and its duration; whether it keeps the
-durations of its strokes, too, is up to the law: `GENERATORS` says it for each. So what is compared are the
-laws, not sizes or speeds.
+A twin is made from the movement of the paper's recipe and keeps its duration and, but for the duplicate, its
+target points; whether it keeps the durations of its strokes, too, is up to the law. `GENERATORS` says both
+for each. So what is compared are the laws, not sizes or speeds.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pc_client.errors import MovementError
+from pc_client.movements.arcs import arcs_twin
 from pc_client.movements.durations import DurationRule, Fitts, Isochrony, retimed
 from pc_client.movements.minimum_jerk import MinimumJerk, Passing
 from pc_client.movements.movement import Movement
@@ -24,14 +26,22 @@ from pc_client.movements.variability import duplicate
 
 __all__ = [
     "GENERATORS",
+    "RAMPS",
+    "SETBACK",
     "Generator",
-    "RobotRules",
     "minimum_jerk_twin",
     "power_law_twin",
     "retimed_twin",
+    "robotic_law",
     "robotic_twin",
 ]
 
+#: The two boxcars (s) that smooth the square wave of a robot-like movement: together they last as long as the
+#: ramp that a UR makes by itself, movel's default speed over its default acceleration, .25 m/s / 1.2 m/s^2 =
+#: .21 s (Source: URScript manual, movel). Most of it bounds the acceleration, the rest the jerk.
+RAMPS = (0.16, 0.05)
+#: How far (m) a blended corner keeps from its target point along the lines.
+SETBACK = 0.03
 #: Overlap of re-timed strokes and rest before and after them (s): the middle of what new movements draw.
 _OVERLAP, _REST = 0.425, 0.1
 #: Each of the two ramps of a power-law movement, as a share of its mean stroke: together they take as long as
@@ -41,33 +51,35 @@ _RAMP_SHARE = 0.2
 _LARGEST_RADIUS = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class RobotRules:
-    """The profile of robot-like movements: see `RoboticLaw`.
+def robotic_law(
+    target_points: ArrayLike, stroke_durations: ArrayLike, corners: Corners = "stop", setback: float = SETBACK
+) -> RoboticLaw:
+    """A constant speed a stroke, smoothed to ramps, on the straight lines between target points.
 
-    The ramps together last as long as those that a UR makes by itself: movel's default speed over its default
-    acceleration, .25 m/s / 1.2 m/s^2 = .21 s (Source: URScript manual, movel). Most of it bounds the
-    acceleration, the rest the jerk. To stop at the target points is what a UR does on movel without a blend
-    radius.
+    Args:
+        target_points: (n, 3), m.
+        stroke_durations: (n - 1,), s.
+        corners: come to rest at the inner target points, or blend them.
+        setback: of blended corners, m: how far before and after a target point the path leaves the lines.
+
+    Source: section II.C.
     """
-
-    ramps: tuple[float, ...] = (0.16, 0.05)
-    corners: Corners = "stop"
-    blend: float = 0.0
+    points, durations = (np.asarray(values, dtype=np.float64) for values in (target_points, stroke_durations))
+    return RoboticLaw(points, durations, RAMPS, corners, setback if corners == "blend" else 0.0)
 
 
-def robotic_twin(movement: Movement, name: str, rules: RobotRules | None = None) -> Movement:
+def robotic_twin(
+    movement: Movement, name: str, corners: Corners = "stop", setback: float = SETBACK
+) -> Movement:
     """The robot-like movement along the same target points with the same stroke durations.
 
     Args:
         movement: any movement with a stroke between each two target points.
         name: the twin's.
-        rules: its profile; defaults if None.
+        corners: as of `robotic_law`.
+        setback: as of `robotic_law`.
     """
-    rules = rules or RobotRules()
-    law = RoboticLaw(
-        movement.target_points, movement.stroke_durations, rules.ramps, rules.corners, rules.blend
-    )
+    law = robotic_law(movement.target_points, movement.stroke_durations, corners, setback)
     return Movement(name, law, movement.stroke_durations, _facts(movement))
 
 
@@ -125,15 +137,16 @@ class Generator:
     """One way to make a movement.
 
     Attributes:
-        make: from the human-like movement, a seed and the new movement's name.
+        make: from the movement of the paper's recipe, a seed and the new movement's name.
         says: what it is, for tables and help.
-        same_strokes: whether the strokes last as long as those of the human-like movement; the whole always
-            does.
+        same_strokes: whether the strokes last as long as those of the recipe; the whole always does.
+        same_targets: whether the target points are those of the recipe.
     """
 
     make: Callable[[Movement, int, str], Movement]
     says: str
-    same_strokes: bool
+    same_strokes: bool = False
+    same_targets: bool = True
 
 
 def _facts(movement: Movement) -> dict[str, str | int | float]:
@@ -145,23 +158,28 @@ def _duplicate(movement: Movement, seed: int, name: str) -> Movement:
     return varied.stretched(movement.duration / varied.duration)
 
 
+def _retimed_arcs(movement: Movement, seed: int, name: str, rule: DurationRule) -> Movement:
+    return retimed_twin(arcs_twin(movement, seed, movement.name), name, rule)
+
+
 #: Every generator by the name that `ur-client movements generate --kind` takes, human-like ones first.
 GENERATORS: Mapping[str, Generator] = MappingProxyType(
     {
         "lognormal": Generator(
-            lambda human, _, name: human.renamed(name), "overlapping lognormal strokes", True
+            lambda human, _, name: human.renamed(name), "the paper's recipe: straight lognormal strokes", True
+        ),
+        "arcs": Generator(
+            lambda human, seed, name: arcs_twin(human, seed, name), "arcs that overlap, lognormal strokes"
         ),
         "isochronous": Generator(
-            lambda human, _, name: retimed_twin(human, name, Isochrony()),
-            "lognormal strokes with one mu and sigma",
-            False,
+            lambda human, seed, name: _retimed_arcs(human, seed, name, Isochrony()),
+            "the arcs with one mu and sigma",
         ),
         "fitts": Generator(
-            lambda human, _, name: retimed_twin(human, name, Fitts()),
-            "lognormal strokes timed by Fitts' law",
-            False,
+            lambda human, seed, name: _retimed_arcs(human, seed, name, Fitts()),
+            "the arcs timed by Fitts' law",
         ),
-        "duplicate": Generator(_duplicate, "lognormal strokes, varied as between repetitions", False),
+        "duplicate": Generator(_duplicate, "lognormal, varied as between repetitions", same_targets=False),
         "minimum_jerk": Generator(
             lambda human, _, name: minimum_jerk_twin(human, name),
             "minimum jerk, at rest at every target point",
@@ -173,14 +191,11 @@ GENERATORS: Mapping[str, Generator] = MappingProxyType(
             True,
         ),
         "power_law": Generator(
-            lambda human, _, name: power_law_twin(human, name),
-            "two-thirds power law on a smooth path",
-            False,
+            lambda human, _, name: power_law_twin(human, name), "two-thirds power law on a smooth path"
         ),
         "power_law_3d": Generator(
             lambda human, _, name: power_law_twin(human, name, torsion=True),
             "power law with the factor of torsion",
-            False,
         ),
         "uniform": Generator(
             lambda human, _, name: robotic_twin(human, name),
@@ -188,7 +203,7 @@ GENERATORS: Mapping[str, Generator] = MappingProxyType(
             True,
         ),
         "uniform_blend": Generator(
-            lambda human, _, name: robotic_twin(human, name, RobotRules(corners="blend", blend=0.03)),
+            lambda human, _, name: robotic_twin(human, name, "blend"),
             "levels of speed, corners blended by 30 mm",
             True,
         ),

@@ -1,15 +1,17 @@
-"""`ur-client movements kinds | generate | duplicate`: every generator by its name, on one line when it cannot be."""
+"""`ur-client movements list | kinds | generate | duplicate`: every generator by its name, on one line when it cannot be."""
 
 from __future__ import annotations
 
 import pytest
 
 from pc_client import cli
-from pc_client.movements import load_movement
+from pc_client.movements import library_names, load_movement
 from pc_client.movements.twins import GENERATORS
 
 
-@pytest.mark.parametrize("command", [["movements", "kinds"], ["movements", "duplicate"], ["compare"]])
+@pytest.mark.parametrize(
+    "command", [["movements", "kinds"], ["movements", "new"], ["movements", "duplicate"], ["compare"]]
+)
 def test_every_command_has_help(command, capsys):
     assert cli.run([*command, "--help"]) == 0
     assert "Usage" in capsys.readouterr().out
@@ -20,6 +22,36 @@ def test_kinds_lists_every_generator(capsys):
     out = capsys.readouterr().out
     for kind in GENERATORS:
         assert kind in out
+
+
+def test_kinds_says_that_a_duplicate_has_its_own_target_points(capsys):
+    assert [kind for kind, generator in GENERATORS.items() if not generator.same_targets] == ["duplicate"]
+    assert cli.run(["movements", "kinds"]) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if "own" in line]
+    assert len(rows) == 1
+    assert "duplicate" in rows[0]
+    assert cli.run(["movements", "duplicate", "--help"]) == 0
+    assert "Only the first target point stays" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "sets"),
+    [([], ["paper", "arcs"]), (["--set", "paper"], ["paper"]), (["--set", "arcs"], ["arcs"])],
+)
+def test_list_shows_all_sets_or_one(options, sets, capsys):
+    assert cli.run(["movements", "list", *options]) == 0
+    rows = [
+        line.split()[1] for line in capsys.readouterr().out.splitlines() if "_5_" in line or "_4_" in line
+    ]
+    assert rows == [name for chosen in sets for name in library_names(chosen)]
+
+
+def test_corners_of_a_generated_robot_like_movement_can_be_blended(tmp_path):
+    file = tmp_path / "mine.toml"
+    assert (
+        cli.run(["movements", "generate", "--kind", "uniform", "--corners", "blend", "--out", str(file)]) == 0
+    )
+    assert (load_movement(file).law.corners, load_movement(file).law.blend) == ("blend", 0.03)
 
 
 @pytest.mark.parametrize("kind", GENERATORS)
@@ -47,6 +79,13 @@ def test_duplicate_varies_a_movement_of_the_library(tmp_path, capsys):
     ("arguments", "words", "code"),
     [
         (["movements", "generate", "--kind", "jerk", "--out", "x.toml"], "minimum_jerk_via", 1),
+        (
+            ["movements", "generate", "--kind", "fitts", "--corners", "blend", "--out", "x.toml"],
+            "kind uniform",
+            1,
+        ),
+        (["movements", "generate", "--corners", "cut", "--out", "x.toml"], 'give "stop" or "blend"', 2),
+        (["movements", "list", "--set", "all"], "give one of paper, arcs", 1),
         (["movements", "duplicate", "uniform_4_1", "--out", "x.toml"], "give a lognormal", 1),
         (["movements", "duplicate", "lognorm_4_1", "--out", "x.csv"], "saved as a .toml", 1),
         (["movements", "duplicate", "lognorm_4_1", "--share", "2", "--out", "x.toml"], "share", 2),

@@ -45,7 +45,7 @@ def test_sets_have_every_generator_on_the_same_points(sets):
         for kind, movement in one.movements.items():
             assert movement.name == f"{kind}_4_seed{one.seed}"
             assert movement.duration == pytest.approx(human.duration, abs=1e-9)
-            if kind != "duplicate":
+            if GENERATORS[kind].same_targets:
                 np.testing.assert_array_equal(movement.target_points, human.target_points)
     assert not np.allclose(
         sets[0].movements["uniform"].target_points, sets[1].movements["uniform"].target_points
@@ -133,12 +133,12 @@ def test_means_of_the_power_law_leave_out_those_without():
 def test_table_says_what_the_laws_promise(table):
     """One bell a stroke, exponents of a third where the law imposes it, none on straight lines."""
     means = {kind: table.means(kind)["planned"] for kind in table.kinds}
-    for kind in ("lognormal", "isochronous", "fitts", "minimum_jerk", "uniform"):
+    for kind in ("lognormal", "arcs", "isochronous", "fitts", "minimum_jerk", "uniform"):
         assert means[kind].peaks == 3.0
-    assert means["uniform_blend"].peaks == 1.0
-    assert means["power_law"].exponent == pytest.approx(1 / 3, abs=0.015)
+    assert means["uniform_blend"].peaks < 3.0
+    assert means["power_law"].exponent == pytest.approx(1 / 3, abs=0.02)  # R is 1 m
     assert means["power_law"].r_squared > 0.99
-    for kind in ("minimum_jerk", "uniform"):
+    for kind in ("lognormal", "minimum_jerk", "uniform"):
         assert math.isnan(means[kind].exponent)
     # the robot's profile is the least smooth by its jerk, the movement of least jerk through the points the smoothest
     jerk = {kind: figures.log_jerk for kind, figures in means.items()}

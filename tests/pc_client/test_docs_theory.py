@@ -14,11 +14,12 @@ from test_analysis_human_likeness import REFERENCE
 
 from pc_client.comparison.movement_set import make_sets
 from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, build_comparison
+from pc_client.movements.arcs import ARC_RULES
 from pc_client.movements.durations import Fitts, Isochrony
-from pc_client.movements.generate import HumanRules
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.minimum_jerk import stroke_shape
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS
+from pc_client.movements.recipe import HAND, LEAD
 from pc_client.movements.robotic import SmoothedSquareWave
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import PlanarStroke, Stroke
@@ -241,7 +242,16 @@ SAID: list[tuple[str, list[float]]] = [
     ("16 ms cost a stroke of 1 s {20.0} dB", [-20.0 * math.log10(0.016 * rms_frequency())]),
     ("top speed {1.875} A / T at T / 2", [float(stroke_shape(0.5).rate)]),
     ("-ln 204.8 = {-5.32203}", [-math.log(204.8)]),
-    ("b of .1 to .5; the library draws with {.3}", [HumanRules().isochrony]),
+    ("b of .1 to .5; both sets of the library draw with {.3}", [HAND.isochrony]),
+    ("both sets of the library draw with {.3}", [ARC_RULES.isochrony]),
+    (
+        "a stroke of .1 s have a mu, {-1.89}, within the -2.2 to -1.6 of hands",
+        [LiteralTiming(0.0, HAND.stroke, LEAD * HAND.stroke).lognormal.mu],
+    ),
+    (
+        "a lead of half a window gives {-2.29}, of two {-1.38}",
+        [LiteralTiming(0.0, 0.1, lead).lognormal.mu for lead in (0.05, 0.2)],
+    ),
     ("`fitts` takes a = {.1} s, b = {.15} s/bit", [Fitts().intercept, Fitts().slope]),
     ("W = {20} mm", [1e3 * Fitts().width]),
     ("whose strokes last {.15} s", [HUMAN_STROKE]),
@@ -307,16 +317,22 @@ def test_comparison_is_that_of_the_command() -> None:
     wanted = [[c.strip() for c in line[1:-1].split("|")] for line in lines if line.startswith("|")][2:]
     assert [row[:9] for row in cells if row[1] != "executed"] == wanted
     assert [row[1] for row in cells] == ["planned", "filtered", "executed"] * len(GENERATORS)
-    # the page says: SNR within 2 dB for all, and the number of peaks that was planned
+    # the page says: SNR within 3 dB for all, and the number of peaks that was planned
     executed = [row for row in cells if row[1] == "executed"]
     snr = [float(row[9]) for row in executed]
-    assert max(snr) - min(snr) < 2.0
+    assert max(snr) - min(snr) < 3.0
     for plan, done in zip(wanted[1::2], executed, strict=True):
         assert plan[4] == done[4]
-        assert float(plan[2]) == pytest.approx(float(done[2]), abs=0.02)
+        assert float(plan[2]) == pytest.approx(float(done[2]), abs=0.025)
     filtered = wanted[2 * list(GENERATORS).index("uniform") + 1]
-    assert "shows .33 with an R² of .85" in SENTENCES
-    assert_printed(float(filtered[5]), ".33")
-    assert_printed(float(filtered[6]), ".85")
+    assert "shows .32 with an R² of .86" in SENTENCES
+    assert_printed(float(filtered[5]), ".32")
+    assert_printed(float(filtered[6]), ".86")
     straight = executed[list(GENERATORS).index("minimum_jerk")]
     assert f"shows {straight[5]} as executed, with an R² of {straight[6]}" in SENTENCES
+    speeds = {row[0]: float(row[7]) for row in cells if row[1] == "planned"}
+    assert max((k for k in GENERATORS if GENERATORS[k].same_targets), key=speeds.__getitem__) == "lognormal"
+    assert "3.7 times that of its robot-like twin" in SENTENCES
+    assert_printed(speeds["lognormal"] / speeds["uniform"], "3.7")
+    assert "Arcs that overlap need .66 of it" in SENTENCES
+    assert_printed(speeds["arcs"] / speeds["lognormal"], ".66")

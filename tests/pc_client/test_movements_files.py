@@ -16,12 +16,12 @@ from pc_client.movements import (
     generate_movement,
     library_names,
     load_movement,
-    robotic_twin,
     save_movement,
 )
 from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_SETS, movement_text
-from pc_client.movements.generate import RobotRules, write_library
+from pc_client.movements.generate import write_library
 from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.robotic import RoboticLaw
 from pc_client.movements.samples import SampledLaw
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Stroke
@@ -58,18 +58,18 @@ def test_generation_reproduces_the_files_to_the_byte(tmp_path: Path) -> None:
 
 
 def test_another_seed_gives_other_movements() -> None:
-    other = generate_library(seed=100)
+    other = generate_library("paper", seed=100)
     assert list(other) == NAMES
     assert not np.allclose(other["lognorm_4_1"].target_points, load_movement("lognorm_4_1").target_points)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", library_names("paper") + library_names("arcs"))
 def test_library_movement_survives_saving(name: str, tmp_path: Path) -> None:
     movement = load_movement(name)
     save_movement(movement, tmp_path / "copy.toml")
     copy = load_movement(tmp_path / "copy.toml")
     assert_equal(copy, movement)
-    assert copy.name == name
+    assert copy.name == name.replace("/", "_")
     assert dict(copy.provenance) == dict(movement.provenance)
 
 
@@ -89,7 +89,8 @@ def test_every_timing_and_corner_survives_saving(tmp_path: Path) -> None:
     human = Movement(
         'odd "name" \\ ü\x7f', law, np.array([1.0, 1.0, 2.0]), {"a key": 'x "y"', "n": 3, "f": 0.1}
     )
-    blended = robotic_twin(human, "blended", RobotRules((0.15,), "blend", 0.02))
+    law = RoboticLaw(points, human.stroke_durations, (0.15,), "blend", 0.02)
+    blended = Movement("blended", law, human.stroke_durations)
     for movement in (human, blended):
         save_movement(movement, tmp_path / "copy.toml")
         copy = load_movement(tmp_path / "copy.toml")
@@ -147,8 +148,8 @@ def test_bad_samples_are_named_by_line(text: str, complaint: str, tmp_path: Path
     assert "\n" not in str(caught.value)
 
 
-HUMAN = movement_text(load_movement("lognorm_4_1"))
-ROBOT = movement_text(load_movement("uniform_4_1"))
+HUMAN = movement_text(load_movement("arcs/lognorm_4_1"))
+ROBOT = movement_text(load_movement("arcs/uniform_4_1"))
 
 
 @pytest.mark.parametrize(
@@ -156,7 +157,7 @@ ROBOT = movement_text(load_movement("uniform_4_1"))
     [
         (HUMAN, ("format = 1", "format = 2"), "format: 2"),
         (HUMAN, ("format = 1", ""), "format: missing"),
-        (HUMAN, ('name = "lognorm_4_1"', "name = 3"), "name: 3; give a text"),
+        (HUMAN, ('name = "arcs_lognorm_4_1"', "name = 3"), "name: 3; give a text"),
         (HUMAN, ('kind = "lognormal"', 'kind = "human"'), 'kind: "human"'),
         (HUMAN, ("duration = 5.901", 'duration = "long"'), "duration: 'long'; give a finite number"),
         (HUMAN, ("duration = 5.901", "duration = 4.0"), "add up to 5.901000 s"),
@@ -199,7 +200,7 @@ def test_without_stroke_durations_they_are_the_speed_minima(tmp_path: Path) -> N
     path = tmp_path / "short.toml"
     path.write_text("\n".join(line for line in HUMAN.splitlines() if not line.startswith("stroke_durations")))
     np.testing.assert_allclose(
-        load_movement(path).stroke_durations, load_movement("lognorm_4_1").stroke_durations, atol=1.1e-3
+        load_movement(path).stroke_durations, load_movement("arcs/lognorm_4_1").stroke_durations, atol=1.1e-3
     )
 
 
@@ -270,4 +271,5 @@ def test_description_is_plain_data() -> None:
     assert len(human["strokes"]) == 4
     assert "strokes" not in robot
     assert human["expected_snr_db"]["22 ms"] > human["expected_snr_db"]["35 ms"]
-    assert human["provenance"] == {"generator": "pc_client.movements.generate", "seed": 4}
+    assert human["provenance"] == dict(load_movement("lognorm_5_2").provenance)
+    assert human["provenance"]["seed"] == 4

@@ -1,4 +1,4 @@
-"""What the library's movements promise to those who run them: rest, twins, speeds, joints, expected SNR."""
+"""What both sets of the library promise to those who run them: rest, twins, speeds, joints, expected SNR."""
 
 from __future__ import annotations
 
@@ -19,28 +19,41 @@ from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Stroke
 from pc_client.movements.targets import TargetRules, random_targets
 from pc_client.movements.timing import TwoSidedTiming
+from pc_client.planning.plan import plan_movement
 
-NUMBERS = ("4_1", "4_2", "5_1", "5_2", "5_3")
+PAPER, ARCS = library_names("paper"), library_names("arcs")
 
 
-@pytest.mark.parametrize("number", NUMBERS)
-def test_twins(number: str) -> None:
-    human, robot = load_movement(f"lognorm_{number}"), load_movement(f"uniform_{number}")
+@pytest.mark.parametrize("name", PAPER[5:] + ARCS[5:])
+def test_twins(name: str) -> None:
+    human, robot = load_movement(name), load_movement(name.replace("lognorm", "uniform"))
     assert (human.kind, robot.kind) == ("lognormal", "uniform")
-    assert len(human.target_points) == len(robot.target_points) == int(number[0])
+    assert len(human.target_points) == len(robot.target_points) == int(name[-3])
     np.testing.assert_array_equal(human.target_points, robot.target_points)
     np.testing.assert_array_equal(human.stroke_durations, robot.stroke_durations)
     assert human.duration == pytest.approx(robot.duration, abs=1e-12)
-    # the strokes of the human-like one end where its speed is least
-    assert isinstance(human.law, SigmaLognormal)
-    np.testing.assert_allclose(np.cumsum(human.stroke_durations)[:-1], human.law.speed_minima(), atol=5.1e-4)
-    # bent but cut at the corners, the human path is as long as the straight one within a few percent
+    # the two paths are equally long: the same lines, or arcs that are bent but cut at the corners
     t = np.linspace(0.0, human.duration, 4001)
     lengths = [m.speed(t).mean() * m.duration for m in (human, robot)]
-    assert lengths[0] == pytest.approx(lengths[1], rel=0.03)
+    assert lengths[0] == pytest.approx(lengths[1], rel=0.03 if name in ARCS else 1e-3)
 
 
-@pytest.mark.parametrize("name", library_names())
+@pytest.mark.parametrize("name", ARCS[5:])
+def test_a_stroke_of_the_arcs_ends_where_the_speed_is_least(name: str) -> None:
+    human = load_movement(name)
+    assert isinstance(human.law, SigmaLognormal)
+    np.testing.assert_allclose(np.cumsum(human.stroke_durations)[:-1], human.law.speed_minima(), atol=5.1e-4)
+
+
+@pytest.mark.parametrize("name", PAPER + ARCS)
+def test_a_ur3_can_do_it(name: str) -> None:
+    """Every check of planning: reach, one branch, singularities, speeds, accelerations, clearances."""
+    report = plan_movement(load_movement(name)).report
+    assert report.joint_speed.value < 0.5 * report.joint_speed.limit
+    assert report.joint_acceleration.value < 0.5 * report.joint_acceleration.limit
+
+
+@pytest.mark.parametrize("name", PAPER + ARCS)
 def test_begins_and_ends_at_rest_in_the_box_within_the_speed(name: str) -> None:
     movement = load_movement(name)
     assert movement.speed([0.0, movement.duration]).max() < 1e-4
@@ -49,11 +62,11 @@ def test_begins_and_ends_at_rest_in_the_box_within_the_speed(name: str) -> None:
     )
     t = np.linspace(0.0, movement.duration, 4001)
     assert UR3_BOX.contains(movement.sample(t).p)
-    assert 0.1 < movement.speed(t).max() < 0.30
-    assert 5.0 < movement.duration < 10.0
+    assert 0.05 < movement.speed(t).max() < 0.30
+    assert 5.0 < movement.duration < 15.0
 
 
-@pytest.mark.parametrize("name", library_names())
+@pytest.mark.parametrize("name", PAPER + ARCS)
 def test_joints_stay_far_below_their_limits(name: str) -> None:
     """With the nominal UR3 of its data sheet, tool at RPY(0, 3/4 pi, 0), by Newton steps along the path."""
     movement = load_movement(name)
@@ -106,7 +119,7 @@ def solve_position(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np
     raise AssertionError(f"no joint angles for {p}")
 
 
-@pytest.mark.parametrize("name", library_names())
+@pytest.mark.parametrize("name", PAPER + ARCS)
 def test_expected_snr_follows_from_the_rms_frequency(name: str) -> None:
     movement = load_movement(name)
     w = speed_rms_frequency(movement)
@@ -129,7 +142,7 @@ def test_delay_costs_what_the_theory_says(window: float) -> None:
 
 
 def test_sums_of_strokes_reach_the_last_target() -> None:
-    for name in library_names()[5:]:
+    for name in PAPER[5:] + ARCS[5:]:
         movement = load_movement(name)
         assert np.linalg.norm(movement.law.evaluate(60.0).p[0] - movement.target_points[-1]) < 1e-14
 
@@ -173,6 +186,7 @@ def test_generated_twins_share_targets_and_times(seed: int, n: int) -> None:
         lambda: generate_movement("samples", 4, 1),
         lambda: generate_movement("lognormal", 1, 1),
         lambda: generate_movement("lognormal", 4, -1),
+        lambda: generate_movement("fitts", 4, 1, corners="blend"),
         lambda: random_targets(12, Box((0.0, 0.0, 0.0), (0.08, 0.08, 0.08)), random.Random(1)),
         lambda: Box((0.0, 0.0, 0.0), (0.1, -0.1, 0.1)),
         lambda: UR3_BOX.shrunk(0.2),
