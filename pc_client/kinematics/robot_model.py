@@ -33,7 +33,7 @@ class JointLimits:
     Attributes:
         q_min: lowest joint angles [rad].
         q_max: highest joint angles [rad].
-        qd_max: joint speed limits [rad/s].
+        qd_max: the fastest that a joint is asked to turn [rad/s].
         qdd_max: joint acceleration limits [rad/s²].
     """
 
@@ -95,6 +95,16 @@ class RobotModel:
         return self.description.limits
 
 
+_STOPPABLE_SPEED = 180.0
+"""No joint is asked for more than this [deg/s], which only a UR3's wrists could do: from it the arm is at
+rest within 0.3 s of the client's last command (the figures are those of `driver.receiver_script`)."""
+
+
+def _speeds(*rated: float) -> Six:
+    """The rated joint speeds of an arm [deg/s] as what the client asks for [rad/s]."""
+    return _six_degrees(*(min(speed, _STOPPABLE_SPEED) for speed in rated))
+
+
 def _six_degrees(*angles: float) -> Six:
     """Turn six angles [deg] into [rad]."""
     a, b, c, d, e, f = (radians(angle) for angle in angles)
@@ -129,7 +139,7 @@ ROBOTS = MappingProxyType(
             limits=JointLimits(
                 _ANY_TURN_MIN,
                 _ANY_TURN_MAX,
-                qd_max=_six_degrees(180, 180, 180, 360, 360, 360),
+                qd_max=_speeds(180, 180, 180, 360, 360, 360),
                 # (56 - 19 gravity - 10 friction) Nm over .95 kg m²; elbow (28 - 7 - 4) over .4.
                 qdd_max=(28.0, 28.0, 40.0, 40.0, 40.0, 40.0),
             ),
@@ -144,7 +154,7 @@ ROBOTS = MappingProxyType(
             limits=JointLimits(
                 _ANY_TURN_MIN,
                 _ANY_TURN_MAX,
-                qd_max=_six_degrees(180, 180, 180, 180, 180, 180),
+                qd_max=_speeds(180, 180, 180, 180, 180, 180),
                 # (150 - 55 - 14) Nm over 3.7 kg m²; elbow (150 - 17 - 17) over 2.6.
                 qdd_max=(22.0, 22.0, 40.0, 40.0, 40.0, 40.0),
             ),
@@ -159,7 +169,7 @@ ROBOTS = MappingProxyType(
             limits=JointLimits(
                 _ANY_TURN_MIN,
                 _ANY_TURN_MAX,
-                qd_max=_six_degrees(120, 120, 180, 180, 180, 180),
+                qd_max=_speeds(120, 120, 180, 180, 180, 180),
                 # (330 - 122 - 29) Nm over 11.8 kg m²; elbow (150 - 41 - 17) over 4.3.
                 qdd_max=(15.0, 15.0, 21.0, 40.0, 40.0, 40.0),
             ),

@@ -19,7 +19,7 @@ from integration_support import (
 from protocol.primary_messages import KeyMessage, TextMessage
 from protocol.ur_types import ProgramState, SafetyMode
 
-STOP_DECELERATION = 14.0  # rad/s^2; of the receiver's own ramp, at the speeds of these tests
+STOP_DECELERATION = 20.0  # rad/s^2; of the receiver's own ramp
 PROGRAM_END_DECELERATION = 20.0  # rad/s^2; of a program that is stopped from outside
 CLIENT_COMES_TO_REST = 0.5  # s of robot time: time-out, ramp and settling
 

@@ -20,8 +20,8 @@ UR3 = robot_model("ur3")
 HULLS = clearance_model(UR3)
 
 
-def test_limits_are_the_manuals_and_not_the_urdfs():
-    np.testing.assert_allclose(np.degrees(UR3.limits.qd_max), (180, 180, 180, 360, 360, 360))
+def test_speeds_can_be_stopped_in_time_and_limits_are_not_the_urdfs():
+    np.testing.assert_allclose(np.degrees(UR3.limits.qd_max), (180,) * 6)
     np.testing.assert_allclose(np.degrees(UR3.limits.q_max), 360)
     assert UR3.limits.qd_max[0] != pytest.approx(float(UR3.pin_model.velocityLimit[0]))
 

@@ -304,7 +304,7 @@ def test_when_the_stop_word_does_not_help_a_stop_program_is_sent():
     robot.deaf_to_stop = True
     with pytest.raises(RuntimeError, match="spoilt"):
         stream(robot, Spoilt(fail))
-    assert robot.programs[-1] == "def ur_client_stop():\n  stopj(14.0)\nend\n"
+    assert robot.programs[-1] == "def ur_client_stop():\n  stopj(20.0)\nend\n"
     assert robot.at_rest
 
 

@@ -95,10 +95,10 @@ class FakeNetwork:
 class Bench:
     """A controller on the bench: ticks when the test says so, remembers what was said."""
 
-    def __init__(self, *, seed=7, fidelity="typical", **kwargs):
+    def __init__(self, *, robot="ur3", seed=7, fidelity="typical", **kwargs):
         self.network = FakeNetwork()
         self.controller = Controller(
-            robot_by_name("ur3"), fidelity_by_name(fidelity), seed, self.network, **kwargs
+            robot_by_name(robot), fidelity_by_name(fidelity), seed, self.network, **kwargs
         )
         self.events = []
         self.snapshots = []

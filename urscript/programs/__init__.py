@@ -16,8 +16,7 @@ def velocity_receiver(
     port: int,
     *,
     acceleration: float = 20.0,
-    stop_deceleration: float = 14.0,
-    stop_time: float = 0.16,
+    stop_deceleration: float = 20.0,
     read_timeout: float = 1.0,
     missed_allowed: int = 1,
 ) -> str:
@@ -27,8 +26,7 @@ def velocity_receiver(
         host: Address of the PC as the robot reaches it.
         port: TCP port the PC listens on.
         acceleration: Of the leading axis towards a new set-point, rad/s^2.
-        stop_deceleration: Of the leading axis when ramping to rest, at least, rad/s^2.
-        stop_time: Longest duration of that ramp, s: a fast arm is stopped harder.
+        stop_deceleration: Of the leading axis when ramping to rest, rad/s^2.
         read_timeout: Silence of the PC after which the program ends, s.
         missed_allowed: Cycles without a message in which the last set-point is repeated.
 
@@ -42,7 +40,6 @@ def velocity_receiver(
     for name, value in (
         ("acceleration", acceleration),
         ("stop_deceleration", stop_deceleration),
-        ("stop_time", stop_time),
         ("read_timeout", read_timeout),
     ):
         if not 0 < value < 1000:
@@ -54,7 +51,6 @@ def velocity_receiver(
     text = _fill_in(text, "pc_port", str(port))
     text = _fill_in(text, "acceleration", repr(float(acceleration)))
     text = _fill_in(text, "stop_deceleration", repr(float(stop_deceleration)))
-    text = _fill_in(text, "stop_time", repr(float(stop_time)))
     text = _fill_in(text, "read_timeout", repr(float(read_timeout)))
     return _fill_in(text, "missed_allowed", str(int(missed_allowed)))
 
