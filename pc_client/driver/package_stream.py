@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 from pc_client.driver.transport import Network, Transport
+from pc_client.driver.watchdog import software
 from pc_client.errors import DriverError, RobotStoppedError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
@@ -24,6 +25,7 @@ from protocol.primary_messages import (
 )
 from protocol.primary_state import decode_sub_package, split_state
 from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import OLDEST
 
 S = TypeVar("S", bound=SubPackage)
 
@@ -65,7 +67,8 @@ class PackageStream:
         """Return the controller's software version from its greeting.
 
         Raises:
-            DriverError: no version message in time, or this is no Universal Robots port.
+            DriverError: no version message in time, this is no Universal Robots port, or the software is of
+                a CB2, whose packages have other forms.
         """
         deadline = self._network.now() + VERSION_TIMEOUT
         while self.version is None:
@@ -74,6 +77,8 @@ class PackageStream:
                     f"the {self._name} port says nothing about its version: is this a control box?"
                 )
             self._early += self._read(0.1) or []
+        if self.version < OLDEST:
+            raise DriverError(software(self.version).complaint)
         return self.version
 
     def wait_for_configuration(self) -> ConfigurationData | None:

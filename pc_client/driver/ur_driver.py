@@ -26,7 +26,7 @@ from pc_client.driver.stop_script import STOP_WORD, stop_script
 from pc_client.driver.transport import Network, TcpNetwork, Transport
 from pc_client.driver.velocity_stream import RowSink, StreamReport, VelocityStream, collector_paused
 from pc_client.driver.waiting import REST_TIMEOUT, wait_for_rest, wait_until
-from pc_client.driver.watchdog import check_idle, check_safety, check_slider, has_ended, is_stopped
+from pc_client.driver.watchdog import check_idle, check_safety, check_slider, has_ended, is_stopped, software
 from pc_client.errors import DriverError
 from protocol.realtime_layout import RealtimeFrame, RealtimeLayout
 from protocol.ur_types import Ports
@@ -35,15 +35,6 @@ from protocol.velocity_stream import VelocityMode, encode_velocity
 CONNECT_TIMEOUT = 5.0
 START_TIMEOUT = 5.0
 """A program that does not show as running within this [s] was not accepted."""
-
-_NEEDED_COLUMNS = (
-    "timestamp",
-    "actual_q",
-    "actual_qd",
-    "robot_mode",
-    "safety_mode",
-    "runtime_state",
-)
 
 
 class UrDriver:
@@ -237,13 +228,10 @@ class UrDriver:
         self._primary = self._open_packages(self._ports.primary, "primary")
         self._scripts = self._open_packages(self._ports.secondary, "secondary")
         self.info = read_robot_info(self._network, self._host, self._ports.dashboard, self._primary)
+        if not (condition := software(self.info.version)).holds:
+            raise DriverError(condition.complaint)
         self._frames = self._open_frames()
         self.layout = self._frames.layout
-        if missing := [name for name in _NEEDED_COLUMNS if name not in self.layout.slices]:
-            raise DriverError(
-                f"software {self.info.version} does not report {', '.join(missing)}: "
-                "streaming needs 3.2 or later"
-            )
 
     def _start(self, text: str) -> None:
         """Send a program and wait until it shows as running; what was reported before is of no interest."""

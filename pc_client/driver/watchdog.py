@@ -1,11 +1,11 @@
-"""What a frame must say for the arm to go on moving, and when the arm counts as at rest. Pure checks."""
+"""What a robot must report for the arm to go on moving, and when the arm counts as at rest. Pure checks."""
 
 from __future__ import annotations
 
 from pc_client.driver.condition import Condition
 from pc_client.errors import DriverError, RobotStoppedError
 from protocol.realtime_layout import RealtimeFrame
-from protocol.ur_types import ProgramState, RobotMode, SafetyMode
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 
 RUNNING = float(RobotMode.RUNNING)
 PLAYING = float(ProgramState.PLAYING)
@@ -13,6 +13,9 @@ SAFE_MODES = (float(SafetyMode.NORMAL), float(SafetyMode.REDUCED))
 
 REST_SPEED = 0.01
 """Below this joint speed [rad/s] the arm rests: 0.6 deg/s, above the noise of a standing joint."""
+
+_OLDEST = SoftwareVersion(3, 2)
+"""The first software whose frames tell the program state."""
 
 _FULL_SPEED = 0.999
 """Speed slider and speed scaling count as 1 from here on; the pendant shows whole percents."""
@@ -24,6 +27,19 @@ _HOW_TO_GO_ON = {
     SafetyMode.ROBOT_EMERGENCY_STOP: "release the emergency stop and start the robot again",
     SafetyMode.RECOVERY: "move the arm back within its limits by hand",
 }
+
+
+def software(version: SoftwareVersion) -> Condition:
+    """The controller is of the generation that this client was made for."""
+    major = version.major
+    generation = "CB2" if major < 3 else "CB3" if major < 5 else "e-Series" if major < 10 else "PolyScope X"
+    return Condition(
+        "software",
+        f"{version}, {generation}",
+        f"a CB3's, {_OLDEST.major}.{_OLDEST.minor} or later",
+        "this client was made for CB3 controllers only",
+        version >= _OLDEST and generation == "CB3",
+    )
 
 
 def safety_mode(frame: RealtimeFrame) -> Condition:

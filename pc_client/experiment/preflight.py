@@ -15,15 +15,19 @@ import numpy as np
 from pc_client.driver.condition import Condition
 from pc_client.driver.robot_info import UNKNOWN
 from pc_client.driver.robot_report import RobotReport
-from pc_client.driver.watchdog import program_state, robot_mode, safety_mode, speed_scaling, speed_slider
+from pc_client.driver.watchdog import (
+    program_state,
+    robot_mode,
+    safety_mode,
+    software,
+    speed_scaling,
+    speed_slider,
+)
 from pc_client.errors import DriverError
 from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
 from protocol.pose import T_to_pose, pose_inv, pose_trans
-from protocol.ur_types import JOINT_NAMES, SoftwareVersion
-
-_OLDEST = SoftwareVersion(3, 2)
-"""The first software whose frames tell the program state."""
+from protocol.ur_types import JOINT_NAMES
 
 _OFFSET_TOLERANCE = (1e-4, 1e-3)
 """How far from the flange the TCP may be [m, rad]: what a pendant rounds."""
@@ -53,10 +57,10 @@ def preflight(report: RobotReport, model: RobotModel | None) -> tuple[Condition,
     Returns:
         All conditions; only the first for software of another generation, whose reports mean something else.
     """
-    software = software_generation(report, model)
-    if not software.holds:
-        return (software,)
-    return software, *(row(report, model) for row in CONDITIONS[1:])
+    generation = software(report.info.version)
+    if not generation.holds:
+        return (generation,)
+    return generation, *(condition(report, model) for condition in CONDITIONS)
 
 
 def refusal(conditions: Sequence[Condition]) -> str:
@@ -78,21 +82,6 @@ def model_of(report: RobotReport) -> RobotModel | None:
     """The nominal model of the arm that answers; None when it does not tell, or there is no model of it."""
     name = report.info.model.lower()
     return robot_model(name) if name in ROBOTS else None
-
-
-def software_generation(report: RobotReport, model: RobotModel | None) -> Condition:
-    """The controller is of the generation that this client was made for."""
-    version = report.info.version
-    generation = "CB2" if version.major < 3 else "CB3" if version.major < 5 else "e-Series"
-    if version.major >= 10:
-        generation = "PolyScope X"
-    return Condition(
-        "software",
-        f"{version}, {generation}",
-        f"a CB3's, {_OLDEST.major}.{_OLDEST.minor} or later",
-        "this client was made for CB3 controllers only",
-        _OLDEST <= version < SoftwareVersion(4, 0),
-    )
 
 
 def arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
@@ -173,7 +162,6 @@ def joint_angles(report: RobotReport, model: RobotModel | None) -> Condition:
 
 
 CONDITIONS: tuple[Check, ...] = (
-    software_generation,
     arm_type,
     lambda report, model: safety_mode(report.frame),
     lambda report, model: robot_mode(report.frame),
@@ -185,7 +173,7 @@ CONDITIONS: tuple[Check, ...] = (
     payload,
     joint_angles,
 )
-"""All conditions, in the order in which they are shown and asked: what explains the others comes first."""
+"""What a CB3 must fulfil, in the order in which it is shown: what explains the others comes first."""
 
 
 def _size(pose: Sequence[float]) -> tuple[float, float]:

@@ -107,6 +107,7 @@ class FakeRobot:
         self.robot_mode, self.safety_mode = 7, 1
         self.serial = "20993000007"  # None: software that does not know the question
         self.version = VERSION
+        self.greeting = None  # instead of the version message: bytes
         self.slider, self.scaling = 1.0, 1.0
         self.tcp_offset = (0.0,) * 6
         self.payload = 0.0  # None: no RTDE port
@@ -138,7 +139,8 @@ class FakeRobot:
             raise DriverError(f"{host}:{port} refuses the connection")
         pipe = self.pipes[kind] = Pipe(self, kind)
         if kind in ("primary", "secondary"):
-            pipe.incoming.append(package(encode_message(version_message(self.version), self.version)))
+            greeting = package(encode_message(version_message(self.version), self.version))
+            pipe.incoming.append(self.greeting or greeting)
             pipe.incoming.append(self.robot_state())
         elif kind == "realtime":
             pipe.incoming.append(self.frame())

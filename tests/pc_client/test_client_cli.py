@@ -14,6 +14,7 @@ import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
 from pc_client.recording.loader import load_recording
+from protocol.ur_types import SoftwareVersion
 
 COMMANDS = (["experiment"], ["run"], ["movements"], ["movements", "list"], ["report"], ["doctor"], ["export"])
 RUN = ("run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o")
@@ -214,6 +215,61 @@ def test_doctor_names_the_obstacle(robot, capsys):
     out = capsys.readouterr().out
     assert "cycle       8.000 ms, 0 cycles lost" in out
     assert "NOT NOW: the robot's safety mode is PROTECTIVE_STOP" in out
+
+
+def test_doctor_shows_every_condition_and_only_reads(robot, capsys):
+    robot.slider, robot.payload = 0.5, None
+    assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    rows = {
+        name: row
+        for name in ("speed slider", "payload", "TCP offset")
+        for row in lines
+        if row.startswith(name)
+    }
+    assert rows["speed slider"].split()[2:] == ["50", "%", "must", "be", "100", "%", "NOT", "OK"]
+    assert rows["payload"].split()[1:] == ["-", "must", "be", "0.00", "kg", "within", "0.05", "kg", "not", "told"]
+    assert rows["TCP offset"].endswith("  ok")
+    assert lines[-1].startswith(
+        "streaming   NOT NOW: the robot's speed slider is 50 %, must be 100 %; set it"
+    )
+    assert robot.programs == []
+
+
+def test_doctor_says_what_was_not_told_beside_ready(robot, capsys):
+    robot.payload = None
+    assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"]) == 0
+    assert "streaming   ready; not told by this software: payload" in capsys.readouterr().out
+
+
+def test_doctor_refuses_another_generation_by_name(robot, capsys):
+    robot.state = robot.robot_state()
+    robot.version = SoftwareVersion(5, 12, 2)
+    assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"]) == 1
+    assert "NOT NOW: the robot's software is 5.12.2, e-Series" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "words"),
+    [
+        ({"slider": 0.95}, "the robot's speed slider is 95 %"),
+        ({"tcp_offset": (0.0, 0.0, 0.15, 0.0, 0.0, 0.0)}, "the robot's TCP offset is (0.0, 0.0, 150.0) mm"),
+        ({"payload": 0.5}, "the robot's payload is 0.50 kg"),
+        ({"model": "UR16"}, "the robot's arm is UR16, must be UR3 or UR5 or UR10"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_a_robot_that_is_not_as_it_must_be_is_refused_in_one_line(
+    command, robot, spoilt, words, tmp_path, capsys
+):
+    for name, value in spoilt.items():
+        setattr(robot, name, value)
+    out = tmp_path / "out"
+    movement = ["uniform_4_1"] if command == "run" else []
+    assert cli.run([command, *movement, "--robot", "127.0.0.1", "--yes", "--out", str(out)]) == 1
+    assert words in one_line(capsys)
+    assert robot.programs == []
+    assert not list(out.glob("*.mcap"))
 
 
 def test_doctor_where_nothing_answers(capsys):

@@ -93,10 +93,10 @@ def test_an_arm_that_was_built_later_is_unknown():
 
 def test_software_that_does_not_tell_whether_a_program_runs_is_refused():
     robot = FakeRobot()
-    robot.frame = lambda: (1044).to_bytes(4, "big") + bytes(1040)
-    with pytest.raises(DriverError, match=r"runtime_state.*3\.2 or later"):
+    robot.version = SoftwareVersion(3, 1)
+    with pytest.raises(DriverError, match=r"3\.1\.0, CB3, must be a CB3's, 3\.2 or later"):
         UrDriver("robot", network=robot)
-    assert set(robot.closed) == {"dashboard", "primary", "secondary", "realtime"}
+    assert set(robot.closed) == {"dashboard", "primary", "secondary"}
 
 
 @pytest.mark.parametrize(

@@ -240,6 +240,45 @@ def test_a_client_that_wakes_up_to_a_closed_connection_says_how_long_it_was_sile
     assert robot.at_rest
 
 
+LONGEST_UNSEEN = 40
+"""Cycles until a moved slider has ended a run: a state is due every 13, and looked at every 16."""
+
+
+@pytest.mark.parametrize("lockstep", [False, True])
+@pytest.mark.parametrize("slider", [0.3, 0.5, 0.95])
+def test_a_slider_that_is_moved_in_a_run_ends_it(lockstep, slider):
+    robot = FakeRobot(lockstep=lockstep, on_tick=spoil_at(1040, lambda r: setattr(r, "slider", slider)))
+    rows = Rows()
+    with pytest.raises(DriverError, match=f"speed slider is {slider:.0%}".replace("%", " %, must be 100 %;")):
+        stream(robot, rows=rows)
+    assert 0 < round(rows[-1][0] / PERIOD) - 1040 <= LONGEST_UNSEEN
+    assert robot.at_rest
+
+
+@pytest.mark.parametrize("lockstep", [False, True])
+def test_a_controller_that_slows_the_arm_down_ends_the_run_in_the_next_cycle(lockstep):
+    robot = FakeRobot(lockstep=lockstep, on_tick=spoil_at(1040, lambda r: setattr(r, "scaling", 0.8)))
+    rows = Rows()
+    with pytest.raises(DriverError, match="speed scaling is 80 %, must be 100 %; end reduced mode"):
+        stream(robot, rows=rows)
+    assert round(rows[-1][0] / PERIOD) == 1039
+    assert robot.at_rest
+
+
+@pytest.mark.parametrize("spoilt", [{"slider": 0.95}, {"robot_mode": 5}])
+def test_no_stream_begins_on_a_robot_that_has_changed_since_the_last_one(spoilt):
+    robot = FakeRobot(lockstep=False)
+    with UrDriver("robot", network=robot) as driver:
+        driver.stream(tracker(), Rows(), acceleration=40.0)
+        sent = len(robot.programs)
+        for name, value in spoilt.items():
+            setattr(robot, name, value)
+        robot.pipes["primary"].incoming.append(robot.robot_state())
+        with pytest.raises(DriverError, match="must be"):
+            driver.stream(tracker(), Rows(), acceleration=40.0)
+    assert len(robot.programs) == sent
+
+
 @pytest.mark.parametrize("lockstep", [False, True])
 def test_a_program_that_a_protective_stop_has_paused_is_not_left_behind(lockstep):
     robot = FakeRobot(lockstep=lockstep, on_tick=spoil_at(1040, protective_stop))

@@ -1,0 +1,112 @@
+"""The robot against the model, on the box: what `run` refuses and `doctor` says; the slider in the middle of a run."""
+
+import pytest
+from integration_support import (
+    PERIOD,
+    Frames,
+    Messages,
+    at,
+    finish,
+    free_port_base,
+    programs_since,
+    run_in_movement,
+    send,
+)
+
+from pc_client.recording.loader import load_recording
+from protocol.ur_types import ProgramState
+from ur_emulator import ControlBox
+
+TOOL = "def tool():\n  set_tcp(p[0, 0, 0.15, 0, 0, 0])\nend\n"
+LOAD = "def load():\n  set_payload(0.8)\nend\n"
+
+LONGEST_UNSEEN = 40
+"""Cycles that a run goes on with a moved slider: states are due every 13th, the client looks every 16th."""
+
+
+def slider(fraction):
+    return lambda box: box.set_speed(fraction)
+
+
+def program(script):
+    def run(box):
+        with Frames(box) as frames:
+            box.run_program(script)
+            frames.until(lambda f: f.runtime_state == ProgramState.STOPPED)
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("spoil", "line"),
+    [
+        (slider(0.3), "the robot's speed slider is 30 %, must be 100 %; set it to 100 % on the pendant"),
+        (slider(0.5), "the robot's speed slider is 50 %, must be 100 %"),
+        (slider(0.8), "the robot's speed slider is 80 %, must be 100 %"),
+        (slider(0.95), "the robot's speed slider is 95 %, must be 100 %"),
+        (program(TOOL), "the robot's TCP offset is (0.0, 0.0, 150.0) mm, (0, 0, 0) mrad, must be 0"),
+        (program(LOAD), "the robot's payload is 0.80 kg, must be 0.00 kg within 0.05 kg"),
+        (ControlBox.protective_stop, "the robot's safety mode is PROTECTIVE_STOP, must be NORMAL or REDUCED"),
+        (ControlBox.power_off, "the robot's mode is POWER_OFF, must be RUNNING; power it on"),
+    ],
+    ids=["30 %", "50 %", "80 %", "95 %", "TCP", "payload", "protective stop", "power off"],
+)
+def test_a_robot_that_is_not_as_it_must_be_is_refused_by_run_and_shown_by_doctor(
+    ur_client, standard_box, tmp_path, spoil, line
+):
+    spoil(standard_box)
+    with Messages(standard_box) as primary:
+        doctor = ur_client("doctor", *at(standard_box), "--seconds", 0.1)
+        run = ur_client("run", "uniform_4_1", *at(standard_box), "--out", tmp_path / "out")
+        if "POWER_OFF" not in line and "PROTECTIVE" not in line:  # there no program starts, ours neither
+            assert programs_since(primary, standard_box) == []
+    assert (doctor.code, run.code) == (1, 1)
+    assert line in run.complaint()
+    assert f"streaming   NOT NOW: {line}" in doctor.out
+    assert doctor.out.count("NOT OK") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("robot", "seed"), [("ur3", 1), ("ur5", 2), ("ur10", 3)])
+def test_an_arm_with_its_own_calibration_is_ready(ur_client, robot, seed):
+    with ControlBox(pace="lockstep", port_base=free_port_base(), robot=robot, seed=seed) as box:
+        doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
+    assert doctor.code == 0, doctor.out
+    assert "streaming   ready\n" in doctor.out
+    assert doctor.out.count("  ok\n") == 11
+
+
+@pytest.mark.parametrize(
+    ("version", "untold"), [("3.2.0", "; not told by this software: payload"), ("3.11.0", "")]
+)
+def test_software_that_does_not_tell_the_payload_is_not_refused(ur_client, version, untold):
+    with ControlBox(pace="lockstep", port_base=free_port_base(), version=version) as box:
+        doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
+    assert doctor.code == 0, doctor.out
+    assert f"streaming   ready{untold}\n" in doctor.out
+
+
+@pytest.mark.parametrize("fraction", [0.3, 0.5, 0.95])
+def test_a_slider_that_is_moved_in_a_run_ends_it_and_the_recording_is_kept(standard_box, tmp_path, fraction):
+    with Frames(standard_box) as frames, run_in_movement(standard_box, frames, tmp_path) as client:
+        moved = standard_box.set_speed(fraction)
+        frames.rest()
+        done = finish(client)
+    assert done.code == 1
+    assert f"the robot's speed slider is {100 * fraction:.0f} %, must be 100 %" in done.complaint()
+    recording = load_recording(tmp_path / "lognorm_4_1_r1.mcap")
+    assert recording.summary["aborted"] == "DriverError"
+    assert round(recording.column("timestamp")[-1] / PERIOD) - moved <= LONGEST_UNSEEN
+
+
+def test_a_program_that_runs_is_shown_by_doctor(ur_client, standard_box):
+    send(
+        standard_box,
+        "secondary",
+        'def busy():\n  socket_open("127.0.0.1", 9)\n  while True:\n    sync()\n  end\nend\n',
+    )
+    standard_box.wait_until(program_state="PLAYING")
+    doctor = ur_client("doctor", *at(standard_box), "--seconds", 0.1)
+    standard_box.stop_program()
+    assert doctor.code == 1
+    assert "NOT NOW: the robot's program is PLAYING, must be STOPPED" in doctor.out

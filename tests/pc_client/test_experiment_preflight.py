@@ -1,0 +1,220 @@
+"""The robot against the model before anything moves: each condition, told and not told, and what the commands say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_robot import FakeRobot, package
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pc_client.driver import robot_report
+from pc_client.driver.condition import conditions_text
+from pc_client.driver.rtde_query import ask_rtde
+from pc_client.driver.ur_driver import UrDriver
+from pc_client.errors import DriverError
+from pc_client.experiment.preflight import model_of, preflight, refusal, require
+from pc_client.kinematics.robot_model import robot_model
+from protocol.primary_layout import ConfigurationData
+from protocol.primary_messages import encode_message, version_message
+from protocol.primary_state import encode_state
+from protocol.ur_types import Ports, RobotType, SoftwareVersion
+
+POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
+UR3 = robot_model("ur3")
+NAMES = [
+    "software",
+    "arm",
+    "safety mode",
+    "mode",
+    "program",
+    "speed slider",
+    "speed scaling",
+    "TCP offset",
+    "flange pose",
+    "payload",
+    "joint angles",
+]
+
+
+def robot(*, model="UR3", **spoilt):
+    fake = FakeRobot(model=model)
+    fake.q = list(POSTURE)
+    for name, value in spoilt.items():
+        assert hasattr(fake, name)
+        setattr(fake, name, value)
+    return fake
+
+
+def report(fake):
+    return robot_report.read_report(fake, "robot", Ports.standard())
+
+
+def failing(fake, model=UR3):
+    return [c.name for c in preflight(report(fake), model) if c.holds is False]
+
+
+def test_a_robot_as_it_must_be_passes_every_condition():
+    conditions = preflight(report(robot()), UR3)
+    assert [condition.name for condition in conditions] == NAMES
+    assert all(condition.holds for condition in conditions)
+    assert refusal(conditions) == ""
+    require(conditions)
+
+
+def test_a_session_reports_what_a_fresh_connection_does():
+    fake = robot(payload=0.02, slider=0.5)
+    with UrDriver("robot", network=fake) as driver:
+        said = driver.report()
+    fresh = report(fake)
+    assert said.frame.values.tolist() == fresh.frame.values.tolist()
+    for name in ("info", "configured", "slider", "tcp_offset", "payload"):
+        assert getattr(said, name) == getattr(fresh, name)
+
+
+def test_asking_sends_no_program():
+    fake = robot()
+    report(fake)
+    assert fake.programs == []
+    assert set(fake.closed) == set(fake.pipes)
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "name", "line"),
+    [
+        ({"safety_mode": 3}, "safety mode", "PROTECTIVE_STOP, must be NORMAL or REDUCED; find the cause"),
+        ({"safety_mode": 99}, "safety mode", "99 (unknown), must be NORMAL or REDUCED; look at the pendant"),
+        ({"robot_mode": 5}, "mode", "the robot's mode is IDLE, must be RUNNING; power it on and release"),
+        ({"program": "other"}, "program", "the robot's program is PLAYING, must be STOPPED; stop it"),
+        ({"slider": 0.3}, "speed slider", "30 %, must be 100 %; set it to 100 % on the pendant"),
+        ({"slider": 0.5}, "speed slider", "50 %, must be 100 %; set it to 100 % on the pendant"),
+        ({"slider": 0.95}, "speed slider", "95 %, must be 100 %; set it to 100 % on the pendant"),
+        ({"slider": float("nan")}, "speed slider", "nan %, must be 100 %"),
+        ({"scaling": 0.5}, "speed scaling", "50 %, must be 100 %; end reduced mode"),
+        (
+            {"tcp_offset": (0.0, 0.0, 0.15, 0.0, 0.0, 0.0)},
+            "TCP offset",
+            "(0.0, 0.0, 150.0) mm, (0, 0, 0) mrad, must be 0 (the flange); set the TCP of the installation",
+        ),
+        ({"tcp_offset": (0.0,) * 5 + (0.01,)}, "TCP offset", "(0, 0, 10) mrad"),
+        ({"payload": 0.6}, "payload", "0.60 kg, must be 0.00 kg within 0.05 kg; set the payload"),
+        ({"q": [6.5, *POSTURE[1:]]}, "joint angles", "base at 372.4 deg, must be within -360 to 360 deg"),
+    ],
+)
+def test_what_is_not_as_it_must_be_is_one_line_that_says_so_and_what_to_do(spoilt, name, line):
+    fake = robot(**spoilt)
+    assert failing(fake) == [name]
+    with pytest.raises(DriverError) as refused:
+        require(preflight(report(fake), UR3))
+    assert f"the robot's {name} is " in str(refused.value)
+    assert line in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("version", "words"),
+    [
+        ((3, 1, 0), "3.1.0, CB3"),
+        ((5, 12, 2), "5.12.2, e-Series"),
+        ((10, 7, 0), "10.7.0, PolyScope X"),
+    ],
+)
+def test_software_of_another_generation_is_refused_by_name_and_nothing_else_is_judged(version, words):
+    fake = robot(slider=0.5)
+    fake.state = fake.robot_state()
+    fake.version = SoftwareVersion(*version)
+    (condition,) = preflight(report(fake), UR3)
+    assert condition.complaint == (
+        f"the robot's software is {words}, must be a CB3's, 3.2 or later; "
+        "this client was made for CB3 controllers only"
+    )
+
+
+@pytest.mark.parametrize(("major", "words"), [(1, "1.15.0, CB2"), (5, "5.15.0, e-Series")])
+def test_no_session_is_opened_with_another_generation(major, words):
+    fake = robot()
+    greeting = encode_message(replace(version_message(SoftwareVersion(3, 15, 0)), major=major), fake.version)
+    fake.greeting = package(greeting)
+    with pytest.raises(DriverError, match=words):
+        UrDriver("robot", network=fake)
+    assert set(fake.closed) == set(fake.pipes)
+
+
+def test_an_arm_that_dashboard_and_configuration_data_name_differently_is_refused():
+    fake = robot()
+    fake.state = encode_state([ConfigurationData(robot_type=RobotType.UR5)], fake.version)
+    (arm,) = (c for c in preflight(report(fake), UR3) if c.holds is False)
+    assert arm.complaint.startswith("the robot's arm is UR3 (dashboard), UR5 (port 30001), must be UR3;")
+
+
+def test_an_arm_without_a_model_is_refused():
+    fake = robot(model="UR16")
+    assert model_of(report(fake)) is None
+    assert failing(fake, None) == ["arm"]
+
+
+@pytest.mark.parametrize("other", ["ur5", "ur10"])
+def test_an_arm_that_stands_elsewhere_than_its_model_is_refused(other):
+    assert failing(robot(arm=robot_model(other))) == ["flange pose"]
+
+
+def test_an_arm_as_the_e_series_has_it_is_refused_by_its_flange_pose():
+    e_series = robot_model("ur3")
+    placement = e_series.pin_model.copy()
+    placement.jointPlacements[4].translation += np.array([0.0, 0.01870, 0.0])  # d4 of a UR3e: 131.05 mm
+    moved = replace(e_series, pin_model=placement, pin_data=placement.createData())
+    (condition,) = (c for c in preflight(report(robot(arm=moved)), UR3) if c.holds is False)
+    assert condition.reported.startswith("18.7 mm")
+
+
+offsets = st.tuples(*[st.floats(-0.3, 0.3)] * 3, *[st.floats(-1.5, 1.5)] * 3)
+
+
+@given(offset=offsets, q=st.lists(st.floats(-6.0, 6.0), min_size=6, max_size=6))
+def test_the_flange_pose_is_judged_without_the_tcp_offset(offset, q):
+    fake = robot(tcp_offset=offset, q=q)
+    flange = next(c for c in preflight(report(fake), UR3) if c.name == "flange pose")
+    assert flange.holds
+    assert flange.reported.startswith("0.0 mm, 0.0 mrad")
+
+
+def test_what_a_robot_does_not_tell_is_neither_passed_nor_refused():
+    fake = robot(payload=None)
+    fake.state = encode_state([ConfigurationData(robot_type=RobotType.UR3)], fake.version)
+    conditions = preflight(report(fake), UR3)
+    untold = {condition.name for condition in conditions if condition.holds is None}
+    assert untold == {"speed slider", "TCP offset", "payload"}
+    assert refusal(conditions) == ""
+    assert conditions_text(conditions).count("not told") == 3
+
+
+def test_an_arm_that_is_not_told_cannot_be_compared():
+    fake = robot(has_dashboard=False)
+    fake.state = encode_state([ConfigurationData(robot_type=99)], fake.version)
+    conditions = {condition.name: condition.verdict for condition in preflight(report(fake), None)}
+    assert [conditions[name] for name in ("arm", "flange pose", "joint angles")] == ["not told"] * 3
+
+
+def test_speed_scaling_of_0_without_a_program_is_no_speed():
+    assert failing(robot(scaling=0.0)) == []
+    assert failing(robot(scaling=0.0, program="other")) == ["program", "speed scaling"]
+
+
+@pytest.mark.parametrize(
+    ("version", "told"), [((3, 10, 0), None), ((3, 11, 0), 1.5)], ids=["before 3.11", "since 3.11"]
+)
+def test_the_payload_is_asked_for_by_rtde(version, told):
+    fake = robot(payload=1.5, version=SoftwareVersion(*version))
+    assert ask_rtde(fake, "robot", Ports.standard().rtde, "payload") == told
+
+
+def test_an_rtde_port_that_says_nothing_or_nonsense_tells_nothing():
+    fake = robot()
+    answers = fake.took
+    for nonsense in (b"", b"SSH-2.0-OpenSSH_9.2\r\n"):
+        fake.took = lambda pipe, data, say=nonsense: say and pipe.incoming.append(say)
+        assert ask_rtde(fake, "robot", Ports.standard().rtde, "payload") is None
+    fake.took = answers
+    assert ask_rtde(fake, "robot", Ports.standard().rtde, "payload") == 0.0
