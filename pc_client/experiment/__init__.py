@@ -1,7 +1,8 @@
 """The experiment as a whole: which movements, how often, on which robot, into which folder.
 
     prepare         plan all movements and look at the folder, before anything moves
-    preflight       what a bystander must know and agree to, before a real arm moves
+    preflight       the robot compared with the model, before anything moves
+    experiment_text what a bystander must know and agree to, before a real arm moves
     approach_run    the slow way to a start, streamed like everything that moves the arm
     identification  the loop of this session, and the margins on it
     repetitions     what runs of one movement hand on, and when it may be used

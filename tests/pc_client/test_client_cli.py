@@ -228,7 +228,18 @@ def test_doctor_shows_every_condition_and_only_reads(robot, capsys):
         if row.startswith(name)
     }
     assert rows["speed slider"].split()[2:] == ["50", "%", "must", "be", "100", "%", "NOT", "OK"]
-    assert rows["payload"].split()[1:] == ["-", "must", "be", "0.00", "kg", "within", "0.05", "kg", "not", "told"]
+    assert rows["payload"].split()[1:] == [
+        "-",
+        "must",
+        "be",
+        "0.00",
+        "kg",
+        "within",
+        "0.05",
+        "kg",
+        "not",
+        "told",
+    ]
     assert rows["TCP offset"].endswith("  ok")
     assert lines[-1].startswith(
         "streaming   NOT NOW: the robot's speed slider is 50 %, must be 100 %; set it"
