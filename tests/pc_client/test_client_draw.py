@@ -175,14 +175,27 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, file, tmp_path, capsy
     assert "box of motion" in capsys.readouterr().out
 
 
+def test_a_robot_that_is_not_as_it_must_be_is_refused_before_the_work_is_done(robot, file, tmp_path, capsys):
+    robot.slider = 0.5
+    out = tmp_path / "out"
+    assert cli.run(["draw", str(file), "--robot", "127.0.0.1", "--yes", "--out", str(out)]) == 1
+    assert "the robot's speed slider is 50 %, must be 100 %" in one_line(capsys)
+    assert robot.programs == []
+    assert not out.exists()
+
+
 def test_ctrl_c_leaves_the_arm_at_rest_and_what_is_recorded(robot, file, tmp_path, capsys):
+    out = tmp_path / "out"
+    ticks = []
+
     def interrupt(r):
-        if r.program == "receiver" and len(r.received) == 300:
+        if (out / "letter_a_r1.mcap").exists():
+            ticks.append(r.tick)
+        if len(ticks) == 150:
             robot.on_tick = None
             raise KeyboardInterrupt
 
     robot.on_tick = interrupt
-    out = tmp_path / "out"
     assert cli.run(["draw", str(file), "--robot", "127.0.0.1", "--out", str(out), "--size", "50"]) == 1
     assert [line for line in capsys.readouterr().err.splitlines() if line][-1].startswith(
         "ur-client: interrupted"

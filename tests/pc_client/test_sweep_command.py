@@ -258,6 +258,16 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, mon
     assert told.err == "ur-client: aborted\n"
 
 
+def test_a_robot_that_is_not_as_it_must_be_is_refused(robot, tmp_path, capsys):
+    robot.tcp_offset = (0.0, 0.0, 0.15, 0.0, 0.0, 0.0)
+    path = write(tmp_path, GIVEN.replace("HOST", "127.0.0.1"))
+    assert run(path, tmp_path / "out", "--yes") == 1
+    told = capsys.readouterr().err
+    assert told.startswith("ur-client: the robot's TCP offset is (0.0, 0.0, 150.0) mm")
+    assert told.count("\n") == 1
+    assert robot.programs == []
+
+
 def test_a_robot_that_stops_ends_the_sweep(robot, tmp_path, capsys):
     def stop(r):
         if len(r.received) == 300:
