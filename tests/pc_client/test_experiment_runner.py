@@ -254,6 +254,6 @@ def test_plan_for_bystanders_names_what_matters(two):
         "top TCP speed",
         "top joint speed",
         "joint range",
-        "2 runs of each",
+        "2 runs of each, on a UR3",
     ):
         assert words in text
