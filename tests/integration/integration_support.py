@@ -6,6 +6,7 @@ Everything goes over real sockets. Time-outs are limits for hangs: no test waits
 import json
 import os
 import random
+import select
 import socket
 import struct
 import subprocess
@@ -87,6 +88,10 @@ class Frames:
     def until_stamp(self, stamp):
         """Read on, cheaply, until a stamp."""
         self.until(lambda frame: self.stamps[-1] >= stamp - PERIOD / 2, self.raw)
+
+    def has_come(self):
+        """True when the next frame, or a part of it, is there already."""
+        return bool(self._rest) or bool(select.select([self.sock], [], [], 0)[0])
 
     def new(self):
         """Return the next frame with a stamp of its own."""
@@ -276,17 +281,24 @@ def at(box):
 
 
 @contextmanager
-def run_in_movement(box, frames, out):
-    """A `ur-client run` on a box of this process; the block begins when the arm is well inside the movement."""
+def client_run(box, out):
+    """A `ur-client run` on a box of this process; no longer than the block."""
     client = start("pc_client", "run", "lognorm_4_1", *at(box), "--out", out)
     try:
-        frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(out.glob("*.mcap")))
-        assert client.poll() is None
         yield client
     finally:
         if not client.stdout.closed:
             client.kill()
             finish(client)
+
+
+@contextmanager
+def run_in_movement(box, frames, out):
+    """The same; the block begins when the arm is well inside the movement."""
+    with client_run(box, out) as client:
+        frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(out.glob("*.mcap")))
+        assert client.poll() is None
+        yield client
 
 
 def port_base_of(box):

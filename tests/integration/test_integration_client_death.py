@@ -1,27 +1,40 @@
 """A client that dies in motion: the arm ramps to rest, the program ends, the next client works."""
 
+import os
 import signal
 import struct
 
 import pytest
+from dying_client import Bystander
 from integration_support import (
     PERIOD,
     Frames,
     Messages,
     VelocitySession,
     at,
+    client_run,
     finish,
+    free_port_base,
     is_closed,
     run_in_movement,
     send,
 )
 
+from pc_client.recording.loader import load_recording
 from protocol.primary_messages import KeyMessage, TextMessage
 from protocol.ur_types import ProgramState, SafetyMode
+from ur_emulator import ControlBox
 
 STOP_DECELERATION = 20.0  # rad/s^2; of the receiver's own ramp
 PROGRAM_END_DECELERATION = 20.0  # rad/s^2; of a program that is stopped from outside
-CLIENT_COMES_TO_REST = 0.5  # s of robot time: time-out, ramp and settling
+AT_REST_IN_TIME = 0.3  # s of robot time, from the last command
+
+
+@pytest.fixture
+def nameable_box():
+    """A box in real time on ports that `--port-base` can name."""
+    with ControlBox(pace="realtime", port_base=free_port_base(), seed=7) as box:
+        yield box
 
 
 def ramp(frames, deceleration):
@@ -57,15 +70,6 @@ def test_a_reset_reverse_socket_does_the_same(lockstep_box):
         )  # SOL_SOCKET, SO_LINGER 0: RST instead of FIN
         session.reverse.close()
         assert not ramp(session.frames, STOP_DECELERATION).target_qd.any()
-
-
-def test_in_realtime_the_arm_stops_within_a_few_cycles_of_the_last_command(realtime_box):
-    with VelocitySession(realtime_box, missed_allowed=6) as session:
-        session.spin_up()
-        moving = session.frames.stamps[-1]
-        session.reverse.close()
-        rest = ramp(session.frames, STOP_DECELERATION)
-        assert rest.timestamp - moving < CLIENT_COMES_TO_REST
 
 
 def test_a_silent_client_is_not_waited_for_in_motion(realtime_box):
@@ -119,3 +123,37 @@ def cut_off(box, frames, out, signal_number):
     with run_in_movement(box, frames, out) as client:
         client.send_signal(signal_number)
         return finish(client)
+
+
+def test_a_client_killed_on_the_way_to_the_start_leaves_the_arm_at_rest_in_time(nameable_box, tmp_path):
+    with Frames(nameable_box) as frames, client_run(nameable_box, tmp_path) as client:
+        bystander = Bystander(frames)
+        bystander.until(lambda: abs(bystander.latest.actual_qd).max() > 0.3)
+        client.send_signal(signal.SIGKILL)
+        client.wait()
+        assert time_to_rest(bystander) <= AT_REST_IN_TIME
+        assert list(tmp_path.iterdir()) == []  # it was still on the way
+
+
+def test_a_client_that_was_stopped_in_a_movement_ends_with_one_line_when_it_goes_on(nameable_box, tmp_path):
+    with Frames(nameable_box) as frames, client_run(nameable_box, tmp_path) as client:
+        bystander = Bystander(frames)
+        bystander.until(lambda: abs(bystander.latest.actual_qd).max() > 0.1 and any(tmp_path.iterdir()))
+        client.send_signal(signal.SIGSTOP)
+        os.waitpid(client.pid, os.WUNTRACED)
+        assert time_to_rest(bystander) <= AT_REST_IN_TIME
+        client.send_signal(signal.SIGCONT)
+        ended = finish(client)
+        assert ended.code == 1
+        assert "ur-client: the robot had no command for" in ended.complaint()
+        bystander.until_rest()
+    (recording,) = tmp_path.iterdir()
+    assert load_recording(recording).summary == {"aborted": "DriverError"}
+
+
+def time_to_rest(bystander):
+    """From now, when the client is known to be lost, until the arm rests [s]: no more than from its last command."""
+    bystander.read_what_has_come()
+    now = bystander.latest.timestamp
+    bystander.until_rest()
+    return bystander.time_to_rest(now)
