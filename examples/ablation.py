@@ -51,8 +51,9 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/ablation"))
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--quick", action="store_true", help="two movements, two compositions, one box")
+    parser.add_argument("--set", default="arcs", help="of the library; arcs is what docs/tracking.md shows")
     options = parser.parse_args()
-    movements = ["lognorm_4_1", "uniform_4_1"] if options.quick else library_names()
+    movements = ["lognorm_4_1", "uniform_4_1"] if options.quick else library_names(options.set)
     cases = [
         *((name, fidelity, options.seed, "lockstep") for fidelity in FIDELITIES for name in COMPOSITIONS),
         *(("best", "typical", seed, "lockstep") for seed in SEEDS if seed != options.seed),

@@ -1,6 +1,7 @@
-"""A picture of the library: speed over time and path of every pair, human-like beside robot-like.
+"""A picture of a set of the library: speed over time and path of every pair, human-like beside robot-like.
 
-`python -m pc_client.movements.figure docs/img/movements.png` writes it. Needs matplotlib (extra `report`).
+`python -m pc_client.movements.figure docs/img/movements.png` writes that of the set `paper`; a second word
+names another set. Needs matplotlib (extra `report`).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pc_client.movements.files import library_names, load_movement
+from pc_client.movements.files import DEFAULT_SET, library_names, load_movement
 from pc_client.movements.geometry import UR3_BOX
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal
@@ -21,37 +22,43 @@ __all__ = ["draw_library"]
 _HUMAN, _ROBOT, _FAINT = "#c2410c", "#1d4ed8", "#a8a29e"
 
 
-def draw_library(path: Path) -> None:
-    """Draw the five pairs into a picture file (the suffix names the format)."""
+def draw_library(path: Path, set_name: str = DEFAULT_SET) -> None:
+    """Draw the five pairs of a set into a picture file (the suffix names the format)."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    numbers = [name.removeprefix("lognorm_") for name in library_names() if name.startswith("lognorm_")]
-    figure = plt.figure(figsize=(13.0, 3.0 * len(numbers)), layout="constrained")
+    names = library_names(set_name)
+    pairs = [
+        (load_movement(human), load_movement(robot))
+        for human, robot in zip(names[5:], names[:5], strict=True)
+    ]
+    end = 1.02 * max(human.duration for human, _ in pairs)
+    figure = plt.figure(figsize=(13.0, 3.0 * len(pairs)), layout="constrained")
     figure.suptitle(
-        "The ten movements: human-like and robot-like twins, same target points, same stroke durations"
+        f"The ten movements of the set {set_name}: human-like and robot-like twins, same target points, "
+        "same stroke durations"
     )
-    grid = figure.add_gridspec(len(numbers), 2, width_ratios=(1.9, 1.0))
-    for row, number in enumerate(numbers):
-        human, robot = load_movement(f"lognorm_{number}"), load_movement(f"uniform_{number}")
-        _draw_speeds(figure.add_subplot(grid[row, 0]), human, robot, number, last=row + 1 == len(numbers))
+    grid = figure.add_gridspec(len(pairs), 2, width_ratios=(1.9, 1.0))
+    for row, (human, robot) in enumerate(pairs):
+        axes = figure.add_subplot(grid[row, 0])
+        axes.set(xlim=(0.0, end), ylim=(0.0, 0.30), ylabel="TCP speed (m/s)")
+        _draw_speeds(axes, human, robot)
         _draw_paths(figure.add_subplot(grid[row, 1], projection="3d"), human, robot, first=row == 0)
+    axes.set_xlabel("time (s); grey: single strokes; dotted: boundaries of strokes")
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
 
-def _draw_speeds(axes: Any, human: Movement, robot: Movement, number: str, *, last: bool) -> None:
+def _draw_speeds(axes: Any, human: Movement, robot: Movement) -> None:
     t = np.linspace(0.0, human.duration, 1200)
     if isinstance(human.law, SigmaLognormal):
         axes.plot(t, human.law.stroke_speeds(t), color=_FAINT, linewidth=1.0, zorder=1)
-    axes.plot(t, robot.speed(t), color=_ROBOT, linewidth=1.8, label=f"uniform_{number}")
-    axes.plot(t, human.speed(t), color=_HUMAN, linewidth=1.8, label=f"lognorm_{number}")
+    axes.plot(t, robot.speed(t), color=_ROBOT, linewidth=1.8, label=robot.name)
+    axes.plot(t, human.speed(t), color=_HUMAN, linewidth=1.8, label=human.name)
     for boundary in np.cumsum(human.stroke_durations)[:-1]:
         axes.axvline(boundary, color=_FAINT, linewidth=0.8, linestyle=":")
-    axes.set(xlim=(0.0, 8.0), ylim=(0.0, 0.30), ylabel="TCP speed (m/s)")
-    axes.set_xlabel("time (s); grey: single strokes; dotted: boundaries of strokes" if last else "")
     axes.legend(loc="upper right", frameon=False, ncols=2)
     axes.spines[["top", "right"]].set_visible(False)
 
@@ -74,4 +81,4 @@ def _draw_paths(axes: Any, human: Movement, robot: Movement, *, first: bool) -> 
 
 
 if __name__ == "__main__":
-    draw_library(Path(sys.argv[1] if len(sys.argv) > 1 else "movements.png"))
+    draw_library(Path(sys.argv[1] if len(sys.argv) > 1 else "movements.png"), *sys.argv[2:3])
