@@ -18,7 +18,7 @@ $(STAMP): pyproject.toml
 
 setup: $(STAMP) ## install everything that the other targets use
 
-demo: $(STAMP) ## the paper's experiment: box and client, ten movements, three times each, into out/demo
+demo: $(STAMP) ## the paper's experiment: published controller and ours side by side, into out/demo
 	$(BIN)/python examples/demo.py
 
 ablation: $(STAMP) ## what each piece of the controller brings, into out/ablation (half an hour)

@@ -43,10 +43,11 @@ def plot(axis, path):
     run = analyse_run(recording)
     provenance = recording.provenance
     mark = provenance.origin.mark and f", {provenance.origin.mark}"
-    axis.set_title(f"{provenance.movement}: SNR {run.snr.speed_db:.1f} dB{mark}", loc="left", fontsize=10)
+    title = f"{provenance.movement}, {provenance.controller}: SNR {run.snr.speed_db:.1f} dB{mark}"
+    axis.set_title(title, loc="left", fontsize=10)
     axis.set_ylabel("TCP speed [mm/s]")
     axis.grid(alpha=0.3)
-    axis.legend(loc="upper right", frameon=False, ncols=2)
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), frameon=False, ncols=2)
 
 
 if __name__ == "__main__":

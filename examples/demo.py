@@ -72,9 +72,9 @@ def run(experiment: Experiment, config: ControllerConfig, box: Box, console: Con
     """Run an experiment on a box, and say how fast that was."""
     with UrDriver(box.host, box.ports) as driver:
         streams = ExperimentRunner(driver, experiment, config).run().streams
-    robot_time, wall_time = sum(s.robot_time for s in streams), sum(s.wall_time for s in streams)
+    moved, wall_time = sum(s.robot_time for s in streams), sum(s.wall_time for s in streams)
     console.print(
-        f"{config.title}: {experiment.n_runs} runs, {robot_time:.0f} s of robot time in {wall_time:.1f} s",
+        f"{config.title}: {experiment.n_runs} runs, {moved:.0f} s of movement in {wall_time:.1f} s",
         soft_wrap=True,
     )
 
