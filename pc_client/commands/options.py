@@ -61,6 +61,24 @@ DaskOption = Annotated[
     str | None,
     typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler to work on, tcp://HOST:8786."),
 ]
+CellOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--cell",
+        metavar="FILE",
+        help="What stands around the arm and what it carries, .toml; without: the bare arm on a plane z = 0.",
+    ),
+]
+ReversePortOption = Annotated[
+    int | None,
+    typer.Option(
+        "--reverse-port",
+        metavar="N",
+        min=0,
+        max=65535,
+        help="TCP port of this computer that the robot's program calls; 0: any free one.  [default: 31000]",
+    ),
+]
 YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a real arm moves.")]
 
 

@@ -17,10 +17,12 @@ import typer
 
 from pc_client.commands.options import (
     AccelerationOption,
+    CellOption,
     ControllerOption,
     GainIOption,
     GainPOption,
     PortBaseOption,
+    ReversePortOption,
     YesOption,
     ports_of,
 )
@@ -28,6 +30,8 @@ from pc_client.control.controller_config import ControllerConfig
 from pc_client.control.controller_fields import changed
 from pc_client.control.controller_file import DEFAULT, load_controller
 from pc_client.errors import ControllerError
+from pc_client.kinematics.cell import NO_CELL, Cell
+from pc_client.kinematics.cell_file import load_cell
 from protocol.ur_types import Ports
 
 _OPTIONS = {"gain_p": "--gain-p", "gain_i": "--gain-i", "speedj_acceleration": "--acceleration"}
@@ -39,12 +43,16 @@ class RunSettings:
 
     Attributes:
         controller: the same for all runs.
+        cell: what stands around the arm and what it carries.
         ports: where the control box listens.
+        reverse_port: where its programs dial back; see `ReverseServer`.
         yes: do not ask before a real arm moves.
     """
 
     controller: ControllerConfig
+    cell: Cell
     ports: Ports
+    reverse_port: int | None
     yes: bool
 
 
@@ -53,13 +61,16 @@ def read_settings(
     gain_p: GainPOption = None,
     gain_i: GainIOption = None,
     acceleration: AccelerationOption = None,
+    cell: CellOption = None,
     port_base: PortBaseOption = 0,
+    reverse_port: ReversePortOption = None,
     yes: YesOption = False,
 ) -> RunSettings:
     """Make the record from what was given on the command line.
 
     Raises:
         ControllerError: there is no such controller, or its file makes no sense.
+        CellError: the cell's file makes no sense.
         typer.BadParameter: an option makes no sense.
     """
     given = {"gain_p": gain_p, "gain_i": gain_i, "speedj_acceleration": acceleration}
@@ -69,7 +80,8 @@ def read_settings(
         config = changed(base, numbers, _OPTIONS.__getitem__)
     except ControllerError as error:
         raise typer.BadParameter(str(error)) from error
-    return RunSettings(config, ports_of(port_base), yes)
+    surroundings = NO_CELL if cell is None else load_cell(cell)
+    return RunSettings(config, surroundings, ports_of(port_base), reverse_port, yes)
 
 
 def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:

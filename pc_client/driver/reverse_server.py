@@ -1,13 +1,20 @@
-"""Where the robot's program dials back: one caller, and only the robot."""
+"""Where the robot's programs dial back: one caller at a time, and only the robot."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from pc_client.driver.transport import Network, Transport
+from pc_client.driver.transport import Listener, Network, PortTakenError, Transport
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
 from protocol.velocity_stream import HELLO_SIZE, decode_hello
+
+REVERSE_PORT = 31000
+"""The port unless told otherwise: always the same, so that a firewall can be told.
+
+No port of a control box (502, 29999 to 30020), and below those that systems give to clients, where another
+program could hold it by chance (Linux from 32768 on, Windows and macOS from 49152 on).
+"""
 
 DIAL_TIMEOUT = 5.0
 """A program that has not dialled back after this [s] cannot reach us."""
@@ -17,22 +24,27 @@ _POLL = 0.02
 
 
 class ReverseServer:
-    """A listening port for one call of the robot's program.
+    """A listening port for the calls of the robot's programs, open for a whole session.
 
     Args:
         network: opens the port.
         address: our own address as the robot sees it; the port opens on no other.
         robot_address: the only address that may call. An emulated robot on this machine may call from any
             of this machine's loopback addresses.
+        port: which one; 0: any free one; None: REVERSE_PORT, or any free one if it is taken and the robot is
+            on this machine, where no firewall lies between and many emulated robots may be used at once.
+
+    Raises:
+        DriverError: the port is taken, or may not be used.
     """
 
     __slots__ = ("_address", "_listener", "_network", "_robot_address")
 
-    def __init__(self, network: Network, address: str, robot_address: str) -> None:
+    def __init__(self, network: Network, address: str, robot_address: str, port: int | None) -> None:
         self._network = network
         self._address = address
         self._robot_address = robot_address
-        self._listener = network.listen(address)
+        self._listener = _listen(network, address, port)
 
     @property
     def address(self) -> str:
@@ -43,6 +55,11 @@ class ReverseServer:
     def port(self) -> int:
         """The port to dial."""
         return self._listener.port
+
+    def forget_callers(self) -> None:
+        """Close calls that nobody waits for any more; to be called before a program is started."""
+        while (caller := self._listener.accept(0.0)) is not None:
+            caller.close()
 
     def accept_program(self, meanwhile: Callable[[], None], timeout: float = DIAL_TIMEOUT) -> Transport:
         """Wait for the program's call and its hello.
@@ -69,7 +86,7 @@ class ReverseServer:
             if self._network.now() > deadline:
                 raise DriverError(
                     f"the robot's program did not dial back to {self._address}:{self.port} within "
-                    f"{timeout:g} s: is a firewall between the robot and this computer?"
+                    f"{timeout:g} s: does a firewall keep it from this TCP port?"
                 )
         try:
             _read_hello(caller, timeout)
@@ -84,7 +101,20 @@ class ReverseServer:
 
 
 def _is_from(caller: str, robot: str) -> bool:
-    return caller == robot or (caller.startswith("127.") and robot.startswith("127."))
+    return caller == robot or (_is_loopback(caller) and _is_loopback(robot))
+
+
+def _is_loopback(address: str) -> bool:
+    return address.startswith("127.")
+
+
+def _listen(network: Network, address: str, port: int | None) -> Listener:
+    try:
+        return network.listen(address, REVERSE_PORT if port is None else port)
+    except PortTakenError:
+        if port is not None or not _is_loopback(address):
+            raise
+        return network.listen(address, 0)
 
 
 def _read_hello(caller: Transport, timeout: float) -> None:

@@ -5,6 +5,8 @@ No protocol here: bytes in, bytes out, and every failure is a DriverError that n
 
 from __future__ import annotations
 
+import errno
+import os
 import select
 import socket
 import time
@@ -76,13 +78,17 @@ class Network(Protocol):
         """Connect. Raises DriverError."""
         ...
 
-    def listen(self, address: str) -> Listener:
-        """Listen on a free port of one of our own addresses. Raises DriverError."""
+    def listen(self, address: str, port: int) -> Listener:
+        """Listen on a port of one of our own addresses; 0: any free one. Raises DriverError."""
         ...
 
     def now(self) -> float:
         """Seconds of a monotonic clock."""
         ...
+
+
+class PortTakenError(DriverError):
+    """Another program listens on the port."""
 
 
 class TcpTransport:
@@ -194,7 +200,7 @@ class EagerWait:
 
 
 class TcpListener:
-    """A listening TCP socket on a free port."""
+    """A listening TCP socket."""
 
     __slots__ = ("_socket",)
 
@@ -237,20 +243,26 @@ class TcpNetwork:
             raise DriverError(f"{host}:{port} {_reason(error)}") from error
         return TcpTransport(connected, f"{host}:{port}")
 
-    def listen(self, address: str) -> TcpListener:
-        """Listen on a free port of one of our own addresses.
+    def listen(self, address: str, port: int) -> TcpListener:
+        """Listen on a port of one of our own addresses; 0: any free one.
 
         Raises:
-            DriverError: not an address of this machine.
+            PortTakenError: another program listens there.
+            DriverError: not an address of this machine, or a port that we may not use.
         """
         family = socket.AF_INET6 if ":" in address else socket.AF_INET
         listening = socket.socket(family, socket.SOCK_STREAM)
+        if os.name == "posix":
+            # Connections of a session that has just ended keep the port for a minute otherwise. Two listeners
+            # are never let in; on Windows the option would do that, and it is not needed there.
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listening.bind((address, 0))
+            listening.bind((address, port))
             listening.listen(4)
         except OSError as error:
             listening.close()
-            raise DriverError(f"cannot listen on {address}: {_reason(error)}") from error
+            kind = PortTakenError if error.errno == errno.EADDRINUSE else DriverError
+            raise kind(f"cannot listen on {address}:{port}: {_reason(error)}") from error
         return TcpListener(listening)
 
     def now(self) -> float:
@@ -266,6 +278,8 @@ def _reason(error: OSError) -> str:
         return "does not answer: check the address, the cable and that the robot is switched on"
     if isinstance(error, ConnectionRefusedError):
         return "refuses the connection: is the control box up, and is --port-base right?"
+    if error.errno == errno.EADDRINUSE:
+        return "another program uses the port: end it, or give another --reverse-port (0: any free one)"
     if isinstance(error, (ConnectionResetError, BrokenPipeError, ConnectionAbortedError)):
         return "the other end closed the connection"
     return error.strerror or str(error) or type(error).__name__

@@ -45,6 +45,7 @@ class UrDriver:
     Args:
         host: the robot's name or address.
         ports: its ports.
+        reverse_port: where its programs dial back; see ReverseServer.
         network: tests hand in a network in memory.
 
     Attributes:
@@ -57,10 +58,19 @@ class UrDriver:
     _primary: PackageStream
     _scripts: PackageStream
     _frames: RealtimeClient
+    _server: ReverseServer
 
-    def __init__(self, host: str, ports: Ports | None = None, *, network: Network | None = None) -> None:
+    def __init__(
+        self,
+        host: str,
+        ports: Ports | None = None,
+        *,
+        reverse_port: int | None = None,
+        network: Network | None = None,
+    ) -> None:
         self._host = host
         self._ports = ports or Ports.standard()
+        self._reverse_port = reverse_port
         self._network: Network = network or TcpNetwork()
         self._open: list[RealtimeClient | PackageStream | ReverseServer] = []
         self._in_motion = False
@@ -143,7 +153,8 @@ class UrDriver:
             DriverError: anything else that ended the run; the arm has been stopped.
         """
         self.check_ready()
-        server = ReverseServer(self._network, self._frames.local_address, self._frames.robot_address)
+        server = self._server
+        server.forget_callers()
         reverse: Transport | None = None
         try:
             with _AlwaysStopped(self) as guard:
@@ -158,7 +169,6 @@ class UrDriver:
                 self._wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
                 wait_for_rest(self._frames, self._network)
         finally:
-            server.close()
             if reverse is not None:
                 reverse.close()
         return report
@@ -232,6 +242,10 @@ class UrDriver:
             raise DriverError(condition.complaint)
         self._frames = self._open_frames()
         self.layout = self._frames.layout
+        self._server = ReverseServer(
+            self._network, self._frames.local_address, self._frames.robot_address, self._reverse_port
+        )
+        self._open.append(self._server)
 
     def _start(self, text: str) -> None:
         """Send a program and wait until it shows as running; what was reported before is of no interest."""

@@ -207,6 +207,7 @@ class ExperimentRunner:
             controller_config=asdict(self._config),
             movement_text=planned.text,
             target_points=points,
+            cell_text=self._experiment.model.cell.text,
         )
 
 

@@ -38,6 +38,7 @@ class Provenance:
         client_version: version of this package.
         movement_text: the movement file, as it was read.
         target_points: the movement's target points in the base frame, (x, y, z) in m.
+        cell_text: the file of the surroundings and the tool, as it was read; empty where none was given.
     """
 
     movement: str
@@ -57,6 +58,7 @@ class Provenance:
     loop: Mapping[str, float | str] = field(default_factory=dict)
     movement_text: str = ""
     target_points: tuple[tuple[float, float, float], ...] = ()
+    cell_text: str = ""
 
     @property
     def robot(self) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from types import SimpleNamespace
 
+from pc_client.driver.transport import PortTakenError
 from pc_client.errors import DriverError
 from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
@@ -75,10 +76,9 @@ class Pipe:
 
 
 class Listener:
-    port = 50123
-
-    def __init__(self, robot):
+    def __init__(self, robot, port):
         self.robot = robot
+        self.port = port or 50123
         self.callers = deque()
         self.closed = False
 
@@ -115,6 +115,7 @@ class FakeRobot:
         self.program = None  # None, "receiver", "stop"
         self.programs = []
         self.listener = None
+        self.taken_ports = ()
         self.reverse = None
         self.commands = deque()
         self.received = []  # every velocity message
@@ -152,8 +153,10 @@ class FakeRobot:
             pipe.incoming.append(b"Connected: Universal Robots Dashboard Server\n")
         return pipe
 
-    def listen(self, address):
-        self.listener = Listener(self)
+    def listen(self, address, port):
+        if port in self.taken_ports:
+            raise PortTakenError(f"cannot listen on {address}:{port}: taken")
+        self.listener = Listener(self, port)
         return self.listener
 
     # ---- what the driver sends

@@ -12,7 +12,7 @@ from fake_robot import LAYOUT, FakeRobot, Pipe
 from pc_client.driver.dashboard_query import ask_dashboard
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.receiver_script import fill_template, receiver_script
-from pc_client.driver.reverse_server import ReverseServer
+from pc_client.driver.reverse_server import REVERSE_PORT, ReverseServer
 from pc_client.driver.stop_script import stop_script
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
@@ -164,7 +164,7 @@ def test_only_our_program_may_dial_back(hello):
 
 def test_callers_from_elsewhere_are_turned_away():
     robot = FakeRobot()
-    server = ReverseServer(robot, "10.0.0.1", "10.0.0.2")
+    server = ReverseServer(robot, "10.0.0.1", "10.0.0.2", None)
     stranger = Pipe(robot, "stranger", peer="10.0.0.66")
     program = Pipe(robot, "reverse")
     program.incoming.append(robot.hello[:1])
@@ -172,6 +172,47 @@ def test_callers_from_elsewhere_are_turned_away():
     robot.listener.callers.extend([stranger, program])
     assert server.accept_program(lambda: None) is program
     assert stranger.closed
+
+
+def test_the_reverse_port_is_always_the_same_unless_told_otherwise():
+    robot = FakeRobot()
+    for given, expected in ((None, REVERSE_PORT), (4321, 4321), (0, 50123)):
+        with UrDriver("robot", reverse_port=given, network=robot):
+            assert robot.listener.port == expected
+        assert robot.listener.closed
+    # No port of a box, and none that Linux, Windows or macOS give to clients.
+    assert REVERSE_PORT not in range(29999, 30021)
+    assert 1024 <= REVERSE_PORT < 32768
+
+
+@pytest.mark.parametrize("given", [None, 4321])
+def test_a_taken_reverse_port_is_an_error_before_anything_moves(given):
+    robot = FakeRobot()
+    robot.taken_ports = (REVERSE_PORT, 4321)
+    with pytest.raises(DriverError, match=f"cannot listen on 10.0.0.1:{given or REVERSE_PORT}"):
+        UrDriver("robot", reverse_port=given, network=robot)
+    assert not robot.programs
+    assert all(pipe.closed for pipe in robot.pipes.values())
+
+
+def test_on_this_machine_a_taken_default_port_gives_way_to_a_free_one_and_a_given_one_does_not():
+    robot = FakeRobot()
+    robot.taken_ports = (REVERSE_PORT, 4321)
+    assert ReverseServer(robot, "127.0.0.1", "127.0.0.1", None).port == 50123
+    with pytest.raises(DriverError, match="cannot listen"):
+        ReverseServer(robot, "127.0.0.1", "127.0.0.1", 4321)
+
+
+def test_a_call_of_an_earlier_program_is_not_taken_for_the_next():
+    robot = FakeRobot()
+    server = ReverseServer(robot, "10.0.0.1", "10.0.0.2", None)
+    earlier, program = Pipe(robot, "reverse"), Pipe(robot, "reverse")
+    robot.listener.callers.append(earlier)
+    server.forget_callers()
+    assert earlier.closed
+    program.incoming.append(robot.hello)
+    robot.listener.callers.append(program)
+    assert server.accept_program(lambda: None) is program
 
 
 def test_a_port_that_is_no_control_box():

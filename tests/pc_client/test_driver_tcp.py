@@ -9,7 +9,7 @@ import pytest
 from fake_robot import LAYOUT, FakeRobot
 
 from pc_client.driver.realtime_client import RealtimeClient
-from pc_client.driver.transport import TcpNetwork, TcpTransport
+from pc_client.driver.transport import PortTakenError, TcpNetwork, TcpTransport
 from pc_client.errors import DriverError
 
 
@@ -67,11 +67,26 @@ def test_unknown_name():
 
 def test_listening_on_a_foreign_address_is_refused():
     with pytest.raises(DriverError, match=r"cannot listen on 192\.0\.2\.1"):
-        TcpNetwork().listen("192.0.2.1")
+        TcpNetwork().listen("192.0.2.1", 0)
+
+
+def test_a_port_is_listened_on_once_and_again_right_after_a_session():
+    first = TcpNetwork().listen("127.0.0.1", 0)
+    port = first.port
+    with pytest.raises(PortTakenError, match=rf"127\.0\.0\.1:{port}: another program.*--reverse-port"):
+        TcpNetwork().listen("127.0.0.1", port)
+    # The end that closes first keeps the port in the system for a while.
+    with socket.create_connection(("127.0.0.1", port)) as caller:
+        first.accept(1.0).close()
+        assert caller.recv(1) == b""
+    first.close()
+    again = TcpNetwork().listen("127.0.0.1", port)
+    assert again.port == port
+    again.close()
 
 
 def test_listener_accepts_and_times_out():
-    listener = TcpNetwork().listen("127.0.0.1")
+    listener = TcpNetwork().listen("127.0.0.1", 0)
     assert listener.accept(0.0) is None
     with socket.create_connection(("127.0.0.1", listener.port)) as caller:
         accepted = listener.accept(1.0)
