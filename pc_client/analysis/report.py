@@ -20,6 +20,8 @@ from pc_client.analysis.page import data_uri, render, report_libraries
 from pc_client.analysis.run import Run, analyse_run
 from pc_client.analysis.table import KINDS, Row, Table, build_table
 from pc_client.errors import RecordingError
+from pc_client.kinematics.cell import NO_CELL
+from pc_client.kinematics.cell_file import parse_cell
 from pc_client.recording.loader import Recording, load_recording
 from protocol.ur_types import JOINT_NAMES
 
@@ -192,6 +194,7 @@ def provenance_facts(table: Table) -> Mapping[str, Any]:
         "controller settings": ", ".join(f"{k} = {v}" for k, v in sorted(first.controller_config.items())),
         "loop delay identified by the client": delay,
         **_loop_facts(table.loop),
+        "cell": (parse_cell(first.cell_text, "recording") if first.cell_text else NO_CELL).summary,
         "client version": ", ".join(sorted({run.provenance.client_version for run in runs})),
         "runs": f"{len(runs)}, of {len(table.rows)} movements",
     }

@@ -13,19 +13,21 @@ from pc_client.errors import ClientError
 if TYPE_CHECKING:
     from pc_client.driver.robot_report import RobotReport
     from pc_client.experiment.prepare import Experiment
+    from pc_client.kinematics.cell import Cell
     from pc_client.kinematics.robot_model import RobotModel
     from protocol.ur_types import Ports
 
 
-def ask_robot(robot: str, ports: Ports) -> tuple[RobotReport, RobotModel]:
+def ask_robot(robot: str, ports: Ports, cell: Cell) -> tuple[RobotReport, RobotModel]:
     """Ask a robot what it reports, and refuse it before anything is planned; it stays as it is.
 
     Args:
         robot: name or address of the control box.
         ports: its ports.
+        cell: what stands around it and what it carries.
 
     Returns:
-        What it reports, and the nominal model of its arm.
+        What it reports, and the nominal model of its arm in the cell.
 
     Raises:
         ClientError: it does not answer, does not tell which arm it is, or is not as it must be.
@@ -35,7 +37,7 @@ def ask_robot(robot: str, ports: Ports) -> tuple[RobotReport, RobotModel]:
     from pc_client.experiment.preflight import model_of, preflight, require
 
     report = read_report(TcpNetwork(), robot, ports)
-    model = model_of(report)
+    model = model_of(report, cell)
     require(preflight(report, model))
     if model is None:
         raise ClientError(f"{robot} does not tell which arm it is: there is no plan for it")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.options import PortBaseOption, RobotOption, ports_of, say
+from pc_client.commands.options import CellOption, PortBaseOption, RobotOption, cell_of, ports_of, say
 
 if TYPE_CHECKING:
     from pc_client.driver.probe import FrameRhythm
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 def doctor(
     robot: RobotOption,
+    cell: CellOption = None,
     port_base: PortBaseOption = 0,
     seconds: Annotated[
         float, typer.Option("--seconds", min=0.1, max=600.0, help="How long to listen.")
@@ -25,6 +26,7 @@ def doctor(
     from pc_client.driver.transport import TcpNetwork
     from pc_client.experiment.preflight import model_of, preflight, refusal
 
+    surroundings = cell_of(cell)
     found = probe(TcpNetwork(), robot, ports_of(port_base), seconds)
     for name, number in found.open_ports.items():
         say(f"port {number:5}  {name:13} open")
@@ -36,7 +38,7 @@ def doctor(
         _show_rhythm(found.rhythm)
     obstacle, untold = found.obstacle, []
     if found.report is not None:
-        conditions = preflight(found.report, model_of(found.report))
+        conditions = preflight(found.report, model_of(found.report, surroundings))
         say(conditions_text(conditions))
         obstacle = refusal(conditions) or obstacle
         untold = [condition.name for condition in conditions if condition.holds is None]

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from pc_client.drawing.placement import PlacementOptions
     from pc_client.drawing.table import Entry
     from pc_client.extraction.recording import PenRecording
-    from protocol.ur_types import Ports
 
 
 @takes_run_settings
@@ -97,7 +96,7 @@ def draw(
     import matplotlib  # noqa: F401  # complains before the work is done
 
     recordings = [_read(file, None if time_unit == "auto" else time_unit) for file in files]
-    drawings = _make(recordings, options, slower, robot, settings.ports)
+    drawings = _make(recordings, options, slower, robot, settings)
     if save is not None:
         from pc_client.movements.files import save_movement
 
@@ -157,7 +156,11 @@ def _read(given: str, time_unit: str | None) -> PenRecording:
 
 
 def _make(
-    recordings: Sequence[PenRecording], options: PlacementOptions, slower: float, robot: str, ports: Ports
+    recordings: Sequence[PenRecording],
+    options: PlacementOptions,
+    slower: float,
+    robot: str,
+    settings: RunSettings,
 ) -> list[Drawing]:
     """Extract the strokes of recordings and make them ready for the arm that answers."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -166,7 +169,7 @@ def _make(
     from pc_client.extraction.extract import extract
     from pc_client.movements.geometry import WORKING_BOXES
 
-    _, model = ask_robot(robot, ports)
+    _, model = ask_robot(robot, settings.ports, settings.cell)
     options = replace(options, box=WORKING_BOXES[model.name])
     bar = Progress(
         TextColumn("{task.description}"),

@@ -75,12 +75,15 @@ def execute(movements: Sequence[Movement], robot: str, out: Path, repeat: int, s
 
     ports = settings.ports
     with console.status("planning"):
-        reported, model = ask_robot(robot, ports)
-        planned = prepare_experiment(movements, repeat=repeat, out=out, robot=model.name)
+        reported, model = ask_robot(robot, ports, settings.cell)
+        planned = prepare_experiment(movements, repeat=repeat, out=out, robot=model.name, cell=settings.cell)
     if not settings.yes:
         ask_before_motion(planned, robot, reported)
     try:
-        with Progress(console, planned.n_runs) as progress, UrDriver(robot, ports) as driver:
+        with (
+            Progress(console, planned.n_runs) as progress,
+            UrDriver(robot, ports, reverse_port=settings.reverse_port) as driver,
+        ):
             report = ExperimentRunner(driver, planned, settings.controller, progress).run()
     except KeyboardInterrupt as interrupt:
         doubts = "; ".join(getattr(interrupt, "__notes__", ())) or "the arm rests"

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from pc_client.kinematics.cell import NO_CELL, Cell
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
 
@@ -106,6 +107,17 @@ def check_workers(workers: int | None, dask: str | None) -> None:
     """
     if workers is not None and dask is not None:
         raise typer.BadParameter("--workers is for this machine, --dask for a cluster: give only one")
+
+
+def cell_of(path: Path | None) -> Cell:
+    """What stands around the arm and what it carries; nothing is known without a file.
+
+    Raises:
+        CellError: the file makes no sense.
+    """
+    from pc_client.kinematics.cell_file import load_cell
+
+    return NO_CELL if path is None else load_cell(path)
 
 
 def ports_of(port_base: int) -> Ports:

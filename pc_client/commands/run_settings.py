@@ -24,14 +24,14 @@ from pc_client.commands.options import (
     PortBaseOption,
     ReversePortOption,
     YesOption,
+    cell_of,
     ports_of,
 )
 from pc_client.control.controller_config import ControllerConfig
 from pc_client.control.controller_fields import changed
 from pc_client.control.controller_file import DEFAULT, load_controller
 from pc_client.errors import ControllerError
-from pc_client.kinematics.cell import NO_CELL, Cell
-from pc_client.kinematics.cell_file import load_cell
+from pc_client.kinematics.cell import Cell
 from protocol.ur_types import Ports
 
 _OPTIONS = {"gain_p": "--gain-p", "gain_i": "--gain-i", "speedj_acceleration": "--acceleration"}
@@ -80,8 +80,7 @@ def read_settings(
         config = changed(base, numbers, _OPTIONS.__getitem__)
     except ControllerError as error:
         raise typer.BadParameter(str(error)) from error
-    surroundings = NO_CELL if cell is None else load_cell(cell)
-    return RunSettings(config, surroundings, ports_of(port_base), reverse_port, yes)
+    return RunSettings(config, cell_of(cell), ports_of(port_base), reverse_port, yes)
 
 
 def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:

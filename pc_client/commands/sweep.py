@@ -68,8 +68,11 @@ def sweep(
     written_as = table_format(format)
     given: tuple[GivenRobot, RobotReport] | None = None
     if plan.host is not None:
-        report, model = ask_robot(plan.host, ports_of(plan.port_base))
-        given = GivenRobot(plan.host, plan.port_base, model.name, report.info.serial), report
+        report, model = ask_robot(plan.host, ports_of(plan.port_base), plan.cell)
+        arm = GivenRobot(
+            plan.host, plan.port_base, model.name, report.info.serial, plan.cell, plan.reverse_port
+        )
+        given = arm, report
     cases = all_cases(
         plan.movements, plan.arms if given is None else given[:1], plan.controllers, plan.repeat
     )

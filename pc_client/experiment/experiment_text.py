@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 
 from pc_client.experiment.prepare import Experiment
+from pc_client.planning.plan_report import PlanReport
 from protocol.ur_types import JOINT_NAMES
 
 
@@ -37,9 +40,19 @@ def experiment_text(experiment: Experiment) -> str:
             f"({tightest}), {joint_speed.share:.0%} of what is allowed",
             f"  joint range     nearest to its end: {_joint(joint_range.joint)} ({nearest}), "
             f"{np.degrees(joint_range.value):.0f} deg away",
+            f"  cell            {experiment.model.cell.summary}",
+            *_clearances(reports.values()),
             "  before the first movement all joints turn to and fro by 1 degree to find the loop's delay",
         )
     )
+
+
+def _clearances(reports: Iterable[PlanReport]) -> Iterator[str]:
+    """Yield what comes nearest in all movements: to the floor, to itself, to the cell."""
+    for same_kind in zip(*(report.clearances for report in reports), strict=True):
+        least = min(same_kind, key=lambda clearance: clearance.extreme.value)
+        if least.text:
+            yield f"  nearest         {least.text}"
 
 
 def _count(n: int, what: str) -> str:

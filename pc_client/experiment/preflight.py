@@ -24,6 +24,7 @@ from pc_client.driver.watchdog import (
     speed_slider,
 )
 from pc_client.errors import DriverError
+from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
 from protocol.pose import T_to_pose, pose_inv, pose_trans
@@ -31,9 +32,6 @@ from protocol.ur_types import JOINT_NAMES
 
 _OFFSET_TOLERANCE = (1e-4, 1e-3)
 """How far from the flange the TCP may be [m, rad]: what a pendant rounds."""
-
-_PAYLOAD = 0.0
-"""Mass that the arm carries [kg]."""
 
 _PAYLOAD_TOLERANCE = 0.05
 """Of the mass [kg]. Its weight is 0.5 N, a sixth of the noise of the controller's own force estimate."""
@@ -78,10 +76,10 @@ def require(conditions: Sequence[Condition]) -> None:
         raise DriverError(complaint)
 
 
-def model_of(report: RobotReport) -> RobotModel | None:
+def model_of(report: RobotReport, cell: Cell) -> RobotModel | None:
     """The nominal model of the arm that answers; None when it does not tell, or there is no model of it."""
     name = report.info.model.lower()
-    return robot_model(name) if name in ROBOTS else None
+    return robot_model(name, cell) if name in ROBOTS else None
 
 
 def arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
@@ -134,13 +132,13 @@ def forward_kinematics(report: RobotReport, model: RobotModel | None) -> Conditi
 
 def payload(report: RobotReport, model: RobotModel | None) -> Condition:
     """The controller reckons with the mass that the arm carries."""
-    mass = report.payload
+    mass, carried = report.payload, (NO_CELL if model is None else model.cell).tool.mass
     return Condition(
         "payload",
         "" if mass is None else f"{mass:.2f} kg",
-        f"{_PAYLOAD:.2f} kg within {_PAYLOAD_TOLERANCE:g} kg",
-        "set the payload on the pendant to what the arm carries",
-        None if mass is None else abs(mass - _PAYLOAD) <= _PAYLOAD_TOLERANCE,
+        f"{carried:.2f} kg within {_PAYLOAD_TOLERANCE:g} kg",
+        "set the payload on the pendant to the tool's mass, or the mass in the cell file to the tool's",
+        None if mass is None else abs(mass - carried) <= _PAYLOAD_TOLERANCE,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pc_client.errors import ClientError, RecordingError
+from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.robot_model import RobotModel, robot_model
 from pc_client.movements.files import load_movement, movement_text
 from pc_client.movements.movement import Movement
@@ -78,7 +79,7 @@ def load_movements(sources: Sequence[str | Path]) -> list[Movement]:
 
 
 def prepare_experiment(
-    movements: Sequence[Movement], *, repeat: int, out: Path, robot: str = "ur3"
+    movements: Sequence[Movement], *, repeat: int, out: Path, robot: str = "ur3", cell: Cell = NO_CELL
 ) -> Experiment:
     """Plan all movements for an arm.
 
@@ -87,6 +88,7 @@ def prepare_experiment(
         repeat: runs of each, at least 1.
         out: folder of the recordings; need not exist.
         robot: nominal arm.
+        cell: what stands around it and what it carries.
 
     Raises:
         PlanningError: a movement cannot be done by the arm, or there is no model of it.
@@ -94,7 +96,7 @@ def prepare_experiment(
     """
     if repeat < 1:
         raise ClientError(f"{repeat} runs of each movement is nothing to do; give at least one")
-    model = robot_model(robot)
+    model = robot_model(robot, cell)
     planned = tuple(
         PlannedMovement(movement, plan_movement(movement, model=model), _text_of(movement))
         for movement in movements

@@ -122,7 +122,8 @@ class PlanReport:
     ik_iterations: float
 
     @property
-    def _clearances(self) -> tuple[LeastClearance, ...]:
+    def clearances(self) -> tuple[LeastClearance, ...]:
+        """From the floor, of the arm from itself, from the cell."""
         return self.floor_clearance, self.own_clearance, self.cell_clearance
 
     def lines(self) -> tuple[str, ...]:
@@ -143,7 +144,7 @@ class PlanReport:
             f"singularity     smallest singular value {self.sigma_min.value:.3f}"
             f" (at least {self.limits.sigma_min:g}), condition number up to {self.condition_max.value:.0f}",
             f"cell            {self.cell.summary}",
-            f"clearance       {'; '.join(least.text for least in self._clearances if least.text)}",
+            f"clearance       {'; '.join(least.text for least in self.clearances if least.text)}",
             f"accuracy        inverse kinematics {self.position_error.value:.1e} m,"
             f" spline {self.interpolation_error.value * 1e6:.2f} um",
         )

@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from pc_client.control.controller_config import ControllerConfig
+from pc_client.kinematics.cell import NO_CELL, Cell
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +52,16 @@ class GivenRobot:
         port_base: offset of its ports.
         robot: "ur3", "ur5" or "ur10", as it told.
         serial: its serial number: this is who it is, wherever it answers.
+        cell: what stands around it and what it carries.
+        reverse_port: where its programs dial back; see `ReverseServer`.
     """
 
     host: str
     port_base: int
     robot: str
     serial: str
+    cell: Cell = NO_CELL
+    reverse_port: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +83,7 @@ class Case:
     def content(self) -> dict[str, Any]:
         """Everything that may change its figures, as JSON knows it."""
         arm = asdict(self.arm)
-        for address in ("host", "port_base"):
+        for address in ("host", "port_base", "reverse_port"):
             arm.pop(address, None)
         return {
             "client_version": _client_version(),

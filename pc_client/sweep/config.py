@@ -15,6 +15,8 @@ from typing import Any
 from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
 from pc_client.control.controller_fields import FIELDS
 from pc_client.errors import MovementError, SweepError
+from pc_client.kinematics.cell import NO_CELL, Cell
+from pc_client.kinematics.cell_file import load_cell
 from pc_client.kinematics.robot_model import ROBOTS
 from pc_client.movements.files import library_names, library_path, load_movement
 from pc_client.spelling import check_keys, nearest
@@ -35,6 +37,8 @@ KEYS = {
     "seeds": "which arms of their kind, whole numbers; [0] by default",
     "robot": "host of a control box that is there already, instead of robots, fidelities and seeds",
     "port_base": "offset of the ports of `robot`; 0 by default",
+    "reverse_port": "port of this computer that `robot` calls; 0: any free one; 31000 by default",
+    "cell": "cell file of `robot`, beside the configuration: what stands around it and what it carries",
     "repeat": "runs of each case in one session, 1 to 99; 1 by default",
     "random": "draw this many settings from [controller] instead of taking every combination",
     "random_seed": "the same seed draws the same settings; 0 by default",
@@ -44,6 +48,7 @@ KEYS = {
 }
 
 _OF_SIMULATED_ARMS = ("robots", "fidelities", "seeds")
+_OF_GIVEN_ROBOTS = ("port_base", "reverse_port", "cell")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +61,8 @@ class SweepConfig:
         arms: simulated arms; empty when `host` names a robot.
         host: a robot that is there already, or None.
         port_base: offset of its ports.
+        reverse_port: where its programs dial back; None: as always.
+        cell: what stands around it and what it carries.
         controllers: all settings.
         repeat: runs of each case.
         keep_recordings: whether recordings stay.
@@ -67,6 +74,8 @@ class SweepConfig:
     arms: tuple[SimulatedArm, ...]
     host: str | None
     port_base: int
+    reverse_port: int | None
+    cell: Cell
     controllers: tuple[ControllerConfig, ...]
     repeat: int
     keep_recordings: bool
@@ -98,8 +107,12 @@ def _parse(reader: _Reader, path: Path) -> SweepConfig:
     arms: tuple[SimulatedArm, ...] = ()
     host = reader.text("robot")
     if host is None:
-        if "port_base" in reader:
-            raise reader.error("port_base", "goes with robot = HOST; simulated arms have ports of their own")
+        for key in _OF_GIVEN_ROBOTS:
+            if key in reader:
+                raise reader.error(
+                    key,
+                    "goes with robot = HOST; simulated arms have ports of their own, and nothing around them",
+                )
         arms = tuple(
             SimulatedArm(robot, fidelity, seed)
             for robot in reader.words("robots", ("ur3",), tuple(ROBOTS))
@@ -116,6 +129,10 @@ def _parse(reader: _Reader, path: Path) -> SweepConfig:
         arms=arms,
         host=host,
         port_base=reader.integer("port_base", 0, least=-65535, most=65535),
+        reverse_port=reader.integer("reverse_port", 0, least=0, most=65535)
+        if "reverse_port" in reader
+        else None,
+        cell=NO_CELL if (cell := reader.text("cell")) is None else load_cell(path.parent / cell),
         controllers=_controllers(reader),
         repeat=repeat,
         keep_recordings=reader.truth("keep_recordings", False),

@@ -13,6 +13,7 @@ from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import ClientError, GainMarginError, full_message
 from pc_client.experiment.prepare import Experiment, PlannedMovement, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
+from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.movements.files import load_movement
 from pc_client.sweep.box import simulated_box
@@ -36,10 +37,10 @@ def run_case(case: Case, keep_recordings: bool) -> Outcome:
     try:
         if isinstance(case.arm, SimulatedArm):
             with simulated_box(case.arm) as box:
-                return _run(case, box.host, box.ports, box.folder, keep_recordings)
+                return _run(case, box.host, box.ports, 0, box.folder, keep_recordings)
         with TemporaryDirectory(prefix="ur-sweep-") as folder:
-            ports = Ports.standard(case.arm.port_base)
-            return _run(case, case.arm.host, ports, Path(folder), keep_recordings)
+            arm, ports = case.arm, Ports.standard(case.arm.port_base)
+            return _run(case, arm.host, ports, arm.reverse_port, Path(folder), keep_recordings)
     except GainMarginError as error:
         return Outcome(
             "refused", full_message(error), ({"delay_ms": 1e3 * error.delay, "gain_margin": error.margin},)
@@ -55,15 +56,18 @@ def plan_case(case: Case) -> Experiment:
         PlanningError: the arm cannot do the movement.
         MovementError: the movement makes no sense.
     """
-    planned = _planned(case.movement, case.arm.robot)
+    cell = NO_CELL if isinstance(case.arm, SimulatedArm) else case.arm.cell
+    planned = _planned(case.movement, case.arm.robot, cell)
     # A model of its own: it carries scratch data, and workers of a cluster may be threads.
-    return Experiment(robot_model(case.arm.robot), (planned,), case.repeat, Path())
+    return Experiment(robot_model(case.arm.robot, cell), (planned,), case.repeat, Path())
 
 
-def _run(case: Case, host: str, ports: Ports, folder: Path, keep_recordings: bool) -> Outcome:
+def _run(
+    case: Case, host: str, ports: Ports, reverse_port: int | None, folder: Path, keep_recordings: bool
+) -> Outcome:
     planned = plan_case(case)
     experiment = Experiment(planned.model, planned.planned, planned.repeat, folder / "recordings")
-    with UrDriver(host, ports) as driver:
+    with UrDriver(host, ports, reverse_port=reverse_port) as driver:
         report = ExperimentRunner(driver, experiment, case.controller).run()
     loop = loop_figures(report.delay)
     rows = tuple(
@@ -75,10 +79,10 @@ def _run(case: Case, host: str, ports: Ports, folder: Path, keep_recordings: boo
 
 
 @lru_cache(maxsize=64)
-def _planned(movement: MovementFile, robot: str) -> PlannedMovement:
+def _planned(movement: MovementFile, robot: str, cell: Cell) -> PlannedMovement:
     """Plan a movement, once for all cases of this worker; a plan is never changed."""
     with TemporaryDirectory(prefix="ur-sweep-") as folder:
         path = Path(folder) / movement.file_name
         path.write_text(movement.text, encoding="utf-8")
         loaded = load_movement(path)
-    return prepare_experiment([loaded], repeat=1, out=Path(), robot=robot).planned[0]
+    return prepare_experiment([loaded], repeat=1, out=Path(), robot=robot, cell=cell).planned[0]

@@ -6,6 +6,7 @@ import json
 import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from fake_robot import FakeRobot
@@ -17,6 +18,7 @@ from pc_client.recording.loader import load_recording
 from protocol.ur_types import SoftwareVersion
 
 COMMANDS = (["experiment"], ["run"], ["movements"], ["movements", "list"], ["report"], ["doctor"], ["export"])
+CELL = Path(__file__).parents[2] / "examples" / "cell.toml"
 RUN = ("run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o")
 
 
@@ -63,6 +65,8 @@ def test_every_command_has_help(command, capsys):
         ([*RUN, "--gain-i", "nan"], "--gain-i: nan; give a number"),
         ([*RUN, "--acceleration", "0"], "--acceleration: 0.0; give a number from 0.1 to 100 rad/s2"),
         ([*RUN, "--gain-p", "much"], "--gain-p"),
+        ([*RUN, "--reverse-port", "65536"], "--reverse-port"),
+        ([*RUN, "--reverse-port", "-1"], "--reverse-port"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(arguments, words, capsys):
@@ -83,6 +87,8 @@ def free_offset():
         (["run", "nowhere.toml", "--robot", "127.0.0.1", "--out", "o"], "nowhere.toml"),
         (["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o", "--controller", "pid"], "preview"),
         ([*RUN, "--controller", "mine.toml"], "mine.toml: cannot be read"),
+        ([*RUN, "--cell", "mine.toml"], "mine.toml: cannot be read"),
+        (["doctor", "--robot", "127.0.0.1", "--cell", "mine.toml"], "mine.toml: cannot be read"),
         (["report", "empty"], "no recordings"),
         (["export", "missing.mcap"], "missing.mcap"),
         (["movements", "show", "lognorm_9_9"], "no movement"),
@@ -96,6 +102,54 @@ def test_what_does_not_work_is_one_line_and_exit_1(arguments, words, capsys, tmp
     assert cli.run(arguments) == 1
     assert words in one_line(capsys)
     assert not (tmp_path / "o").exists()
+
+
+def test_a_run_in_a_cell_is_planned_recorded_and_reported_in_it(robot, tmp_path, capsys):
+    out, words = tmp_path / "out", ("run", "uniform_4_1", "--robot", "127.0.0.1")
+    given = [*words, "--out", str(out), "--cell", str(CELL)]
+    # The file says that the arm carries 0.4 kg, the pendant that it carries nothing.
+    assert cli.run(given) == 1
+    assert "payload is 0.00 kg, must be 0.40 kg" in one_line(capsys)
+    robot.payload = 0.4
+    assert cli.run(given) == 0
+    assert load_recording(out / "uniform_4_1_r1.mcap").provenance.cell_text == CELL.read_text()
+    page = (out / "report.html").read_text()
+    assert "bench by the window" in page
+    assert "no cell file" not in page
+    robot.payload = 0.0
+    bare = tmp_path / "bare"
+    assert cli.run([*words, "--out", str(bare)]) == 0
+    assert load_recording(bare / "uniform_4_1_r1.mcap").provenance.cell_text == ""
+    assert "no cell file: bare arm on a plane z = 0" in (bare / "report.html").read_text()
+
+
+def test_a_box_in_the_way_refuses_the_run_before_anything_moves(robot, tmp_path, capsys):
+    cell = tmp_path / "cell.toml"
+    cell.write_text(
+        'format = 1\nname = "c"\n[[spheres]]\nname = "ball"\ncentre = [0.35, 0, 0.25]\nradius = 0.1\n'
+    )
+    given = [
+        "run",
+        "uniform_4_1",
+        "--robot",
+        "127.0.0.1",
+        "--out",
+        str(tmp_path / "out"),
+        "--cell",
+        str(cell),
+    ]
+    assert cli.run(given) == 1
+    assert "of sphere 'ball', at least 20 mm is asked" in one_line(capsys)
+    assert not robot.programs
+
+
+@pytest.mark.parametrize(("given", "port"), [((), 31000), (("--reverse-port", "4321"), 4321)])
+def test_the_robot_is_told_the_reverse_port(robot, given, port, tmp_path):
+    assert cli.run([*RUN[:-1], str(tmp_path / "o"), *given]) == 0
+    assert robot.listener.port == port
+    receivers = [program for program in robot.programs if "socket_open" in program]
+    assert receivers
+    assert all(f"pc_port = {port} " in program for program in receivers)
 
 
 def test_run_records_and_reports(robot, tmp_path, capsys):

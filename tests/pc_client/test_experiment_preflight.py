@@ -16,6 +16,7 @@ from pc_client.driver.rtde_query import ask_rtde
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError
 from pc_client.experiment.preflight import model_of, preflight, refusal, require
+from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.robot_model import robot_model
 from protocol.primary_layout import ConfigurationData
 from protocol.primary_messages import encode_message, version_message
@@ -151,7 +152,7 @@ def test_an_arm_that_dashboard_and_configuration_data_name_differently_is_refuse
 
 def test_an_arm_without_a_model_is_refused():
     fake = robot(model="UR16")
-    assert model_of(report(fake)) is None
+    assert model_of(report(fake), NO_CELL) is None
     assert failing(fake, None) == ["arm"]
 
 

@@ -12,9 +12,10 @@ from sweep_samples import PREVIEW, write
 
 from pc_client.errors import ClientError
 from pc_client.movements.files import library_path
-from pc_client.sweep.case import SimulatedArm, all_cases
+from pc_client.sweep.case import Case, GivenRobot, SimulatedArm, all_cases
 from pc_client.sweep.config import FIDELITIES, KEYS, read_config
 from pc_client.sweep.controller_axes import Range, grid, samples
+from pc_client.sweep.run_case import plan_case
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "sweeps").glob("*.toml"))
@@ -96,6 +97,9 @@ def test_examples_make_sense(path):
         ("MOVES\nkeep_recordings = 1", "true or false"),
         ("MOVES\noutput = 7", "give a text"),
         ("MOVES\nport_base = 3", "goes with robot"),
+        ("MOVES\nreverse_port = 3", "goes with robot"),
+        ('MOVES\ncell = "cell.toml"', "goes with robot"),
+        ('MOVES\nrobot = "10.0.0.2"\nreverse_port = 70000', "0 to 65535"),
         ('MOVES\nrobot = "10.0.0.2"\nseeds = [1]', "is for simulated arms"),
         ("MOVES\nrandom_seed = 1", "goes with random"),
         ("MOVES\nrandom = 5", "nothing to draw"),
@@ -130,6 +134,24 @@ def test_what_makes_no_sense_is_one_line_with_file_and_key(text, words, tmp_path
     assert words in message
     assert message.startswith(str(path))
     assert "\n" not in message
+
+
+def test_a_given_robot_stands_in_its_cell(tmp_path):
+    (tmp_path / "cell.toml").write_text('format = 1\nname = "bench"\n[tool]\nmass = 0.5\n')
+    text = 'movements = ["uniform_4_1"]\nrobot = "10.0.0.2"\n'
+    bare = read_config(write(tmp_path, text))
+    config = read_config(write(tmp_path, text + 'cell = "cell.toml"\nreverse_port = 0\n'))
+    assert (bare.cell.name, bare.reverse_port) == ("", None)
+    assert (config.cell.name, config.cell.tool.mass, config.reverse_port) == ("bench", 0.5, 0)
+    robots = [
+        GivenRobot("10.0.0.2", 0, "ur3", "1", cell, port)
+        for cell, port in ((bare.cell, None), (config.cell, None), (config.cell, 0))
+    ]
+    cases = [Case(config.movements[0], robot, config.controllers[0], 1) for robot in robots]
+    # The cell belongs to what a case is; the port does not.
+    assert cases[0].identity != cases[1].identity == cases[2].identity
+    assert plan_case(cases[1]).model.cell is config.cell
+    assert plan_case(cases[1]).planned[0].plan.report.cell == config.cell
 
 
 def test_a_file_that_is_not_there(tmp_path):
