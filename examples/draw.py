@@ -10,7 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from demo import open_box
+from ur_emulator import ControlBox
+from ur_emulator.errors import PortError
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "pen_strokes" / "strokes_background_small1.zip"
 CHARACTERS = (
@@ -33,6 +34,18 @@ def made_up_letter(folder: Path) -> Path:
     path = folder / "letter.txt"
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+def open_box(**settings) -> ControlBox:
+    """Return a listening box: on the standard ports, or moved up if they are taken."""
+    for base in range(0, 20_000, 1000):
+        box = ControlBox(port_base=base, **settings)
+        try:
+            box.listen()
+        except PortError:
+            continue
+        return box
+    sys.exit("draw: no free ports found; stop what listens on 29999 to 30013")
 
 
 def main() -> int:

@@ -25,3 +25,8 @@ def test_a_box_that_tells_no_serial_number_is_simulated_and_may_be_run_again(ur_
     page = (out / "report.html").read_text()
     assert "SIMULATED: an emulated arm, no real robot moved" in page
     assert "measured on a real arm" not in page
+    # `preview` identifies one delay: what it does not identify must not look measured.
+    assert not {"dead_time_s", "lag_s", "joint_spread_s"} & set(provenance.loop)
+    assert "joints within" not in done.out
+    assert "loop delay identified by the client" in page
+    assert "identified loop" not in page

@@ -175,6 +175,23 @@ def test_report_of_an_arm_that_may_be_a_real_one_says_so(tmp_path: Path) -> None
     assert report.table.title == f"Table I: {mark}: UR3 3.15.8, controller preview"
 
 
+MARGINS = {"gain_margin": 8.6, "phase_margin_deg": 73.0, "delay_margin_s": 0.25, "sensitivity_peak": 1.2}
+APART = {"dead_time_s": 0.024, "lag_s": 0.008, "joint_spread_s": 0.002}
+
+
+@pytest.mark.parametrize(("loop", "told"), [(MARGINS, False), ({**MARGINS, **APART}, True)])
+def test_only_what_was_identified_is_told_of_the_loop(
+    tmp_path: Path, loop: dict[str, float], told: bool
+) -> None:
+    record(tmp_path, "lognorm_4_1", 1, loop=loop)
+    report = build_report(tmp_path)
+    html = report.paths[2].read_text()
+    assert ("dead time 24.0 ms, lag 8.0 ms, single joints within 2.0 ms" in html) == told
+    assert ("single joints" in html) == told
+    assert "gain 8.6, phase 73°" in html
+    assert report.table.to_json()["loop"] == loop
+
+
 def test_report_of_a_real_arm_does_not_say_simulated(tmp_path: Path) -> None:
     record(tmp_path, "lognorm_4_1", 1, simulated=False, seed=None, serial="2016330001")
     html = build_report(tmp_path).paths[2].read_text()
