@@ -16,19 +16,25 @@ def report(
         typer.Argument(metavar="DIR...", help="Folders with the recordings of one experiment each."),
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="FILE", help="Page that shows several experiments side by side.")
-    ] = Path("report.html"),
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Page of several experiments; report.html by default."),
+    ] = None,
 ) -> None:
     """Build tables and report again from the recordings of an experiment; of several, one page more."""
     if len(folders) == 1:
+        if out is not None:
+            raise typer.BadParameter(
+                f"--out is for several folders: the page of one is {folders[0]}/report.html"
+            )
         show_report(folders[0])
         return
     from pc_client.analysis.report import build_report
     from pc_client.analysis.side_by_side import build_side_by_side
 
-    shown = build_side_by_side([build_report(folder, console) for folder in folders], out)
+    page = out or Path("report.html")
+    shown = build_side_by_side([build_report(folder, console) for folder in folders], page)
     console.print(shown.to_rich())
-    say(f"report: {out}")
+    say(f"report: {page}")
 
 
 def export(

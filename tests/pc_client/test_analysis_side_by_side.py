@@ -137,3 +137,5 @@ def test_the_command_takes_several_folders(
     assert page.exists()
     assert cli.run(["report", *folders, "--out", str(tmp_path / "nowhere" / "page.html")]) == 1
     assert "cannot write" in capsys.readouterr().err
+    assert cli.run(["report", folders[0], "--out", str(page)]) == 2
+    assert "--out is for several folders" in capsys.readouterr().err
