@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pc_client.commands.before_motion import ask_before_motion, ask_robot
-from pc_client.commands.options import OutOption, RepeatOption, RobotOption, console, say, show_report
+from pc_client.commands.options import (
+    OutOption,
+    RepeatOption,
+    RobotOption,
+    SetOption,
+    console,
+    say,
+    show_report,
+)
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import ClientError
 
@@ -22,17 +30,23 @@ def experiment(
     robot: RobotOption,
     out: OutOption,
     movements: Annotated[
-        str | None, typer.Option("--movements", metavar="A,B,...", help="Names or files; all ten by default.")
+        str | None, typer.Option("--movements", metavar="A,B,...", help="Names or files instead of a set.")
     ] = None,
+    set_name: SetOption = None,
     repeat: RepeatOption = 3,
     *,
     settings: RunSettings,
 ) -> None:
     """Run the paper's experiment: ten movements, three times each, Table I and a report."""
-    from pc_client.movements.files import library_names
+    from pc_client.movements.files import DEFAULT_SET, library_names
 
-    chosen = [name.strip() for name in movements.split(",")] if movements else library_names()
-    _run([name for name in chosen if name], robot, out, repeat, settings)
+    if movements and set_name is not None:
+        raise typer.BadParameter("--movements and --set each say what to run: give only one")
+    if movements:
+        chosen = [name.strip() for name in movements.split(",") if name.strip()]
+    else:
+        chosen = library_names(set_name if set_name is not None else DEFAULT_SET)
+    _run(chosen, robot, out, repeat, settings)
 
 
 @takes_run_settings

@@ -10,7 +10,7 @@ import typer
 from rich.markup import escape
 from rich.table import Column, Table
 
-from pc_client.commands.options import console, say
+from pc_client.commands.options import SetOption, console, say
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,11 +34,7 @@ _CornersOption = Annotated[
 
 
 @app.command("list")
-def list_movements(
-    set_name: Annotated[
-        str | None, typer.Option("--set", metavar="NAME", help="Only this set: paper or arcs.")
-    ] = None,
-) -> None:
+def list_movements(set_name: SetOption = None) -> None:
     """List the movements that come with the package."""
     from pc_client.movements.description import describe
     from pc_client.movements.files import LIBRARY_SETS, library_names, load_movement

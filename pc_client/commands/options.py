@@ -46,6 +46,9 @@ AccelerationOption = Annotated[
     ),
 ]
 RepeatOption = Annotated[int, typer.Option("--repeat", min=1, max=99, help="Runs of each movement.")]
+SetOption = Annotated[
+    str | None, typer.Option("--set", metavar="NAME", help="Ten movements of the library: paper or arcs.")
+]
 TimeUnitOption = Annotated[
     str,
     typer.Option(
