@@ -31,7 +31,10 @@ LAG = replace(BEST, compensates_gear=False, learns=False)
 
 COMPOSITIONS: dict[str, tuple[ControllerConfig, str]] = {
     "paper": (PAPER, "PI and feed-forward, as published"),
-    "short ramp": (replace(PREVIEW, looks_ahead=False), "the robot's own ramp 40 rad/s2, other gains"),
+    "short ramp": (
+        replace(PREVIEW, looks_ahead=False, path_tolerance=PAPER.path_tolerance),
+        "the robot's own ramp 40 rad/s2, other gains",
+    ),
     "preview": (PREVIEW, "+ feed-forward ahead by the identified delay"),
     "lag": (LAG, "+ dead time and lag apart: qd + lag qdd, ahead by the dead time"),
     "lag, kalman": (replace(LAG, estimates=True), "lag + feedback of estimated positions"),

@@ -7,6 +7,7 @@ reference          what the arm should do at any time, prepared for the loop
 pi_feedforward     PI + velocity feed-forward for six joints (the paper's Fig. 3)
 state_estimate     Kalman estimate of positions and velocities for the feedback
 tracker            one frame in, one command out
+tool_guard         ends a run when the tool leaves its path
 excitation         the small movement that reveals the loop
 delay              the loop delay from a logged stream
 loop_model         dead time, lag, integrator: what the client knows of the loop, and its exact response

@@ -9,9 +9,9 @@ from pc_client.control.controller_config import ControllerConfig
 from pc_client.control.pi_feedforward import PiState, step_pi
 from pc_client.control.reference import ReferencePoint, ReferenceTable
 from pc_client.control.state_estimate import StateEstimator
-from pc_client.errors import DriverError
+from pc_client.control.tool_guard import ToolGuard
+from pc_client.kinematics.robot_model import RobotModel
 from pc_client.recording.layout import Phase
-from protocol.ur_types import JOINT_NAMES
 
 # After a gap in the frames the integral must not jump: no more than this many cycles count.
 _MOST_CYCLES_PER_STEP = 3
@@ -43,23 +43,35 @@ class Tracker:
     Args:
         reference: what to follow.
         config: the controller.
-        qd_max: (6,) joint speed limits of the arm [rad/s]; the controller uses its share of them.
+        model: the nominal arm: what its tool does is guarded, and the controller uses its share of the joint
+            speed limits.
         estimator: fresh, gives the positions that are fed back; None feeds back those that are reported.
     """
 
-    __slots__ = ("_config", "_end", "_estimator", "_last_stamp", "_qd_max", "_reference", "_start", "_state")
+    __slots__ = (
+        "_config",
+        "_end",
+        "_estimator",
+        "_guard",
+        "_last_stamp",
+        "_qd_max",
+        "_reference",
+        "_start",
+        "_state",
+    )
 
     def __init__(
         self,
         reference: ReferenceTable,
         config: ControllerConfig,
-        qd_max: Sequence[float],
+        model: RobotModel,
         estimator: StateEstimator | None = None,
     ) -> None:
         self._reference = reference
         self._estimator = estimator
         self._config = config
-        self._qd_max = tuple(limit * config.speed_share for limit in qd_max)
+        self._guard = ToolGuard(reference, model, config.path_tolerance, config.angle_tolerance)
+        self._qd_max = tuple(limit * config.speed_share for limit in model.limits.qd_max)
         self._state = PiState()
         self._start: float | None = None
         self._last_stamp = 0.0
@@ -79,7 +91,7 @@ class Tracker:
             q: (6,) reported joint positions [rad].
 
         Raises:
-            DriverError: a joint is further from its reference than the controller's `abort_error`.
+            DriverError: the tool is further from its path than the controller's tolerances.
         """
         reference = self._reference
         if self._start is None:
@@ -92,11 +104,7 @@ class Tracker:
         self._last_stamp = stamp
         t = stamp - self._start
         point = reference.at(t)
-        abort = self._config.abort_error
-        for wanted, actual in zip(point.q, q, strict=True):
-            # Written so that NaN aborts too.
-            if not -abort < wanted - actual < abort:
-                raise DriverError(_describe_error(point.q, q, t, abort))
+        self._guard.check(t, q)
         if self._estimator is not None:
             q = self._estimator.update(q, cycles)
         command = step_pi(self._config, self._qd_max, self._state, point.q, point.qd_feedforward, q, dt)
@@ -116,12 +124,3 @@ class Tracker:
         if t < -0.5e-6:
             return Phase.SETTLE_BEFORE
         return Phase.MOVEMENT if t <= self._reference.duration + 0.5e-6 else Phase.SETTLE_AFTER
-
-
-def _describe_error(q_ref: Sequence[float], q: Sequence[float], t: float, abort: float) -> str:
-    errors = [wanted - actual for wanted, actual in zip(q_ref, q, strict=True)]
-    joint = next(j for j, error in enumerate(errors) if not -abort < error < abort)
-    return (
-        f"the {JOINT_NAMES[joint]} joint is {errors[joint]:+.3f} rad from its reference at t = {t:.3f} s; "
-        f"allowed is {abort} rad: the run was ended"
-    )

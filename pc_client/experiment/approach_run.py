@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from pc_client.control.controller_config import APPROACH
@@ -11,6 +9,7 @@ from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError
+from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.approach import Approach
 from protocol.realtime_layout import RealtimeFrame
 
@@ -24,13 +23,13 @@ _NO_MOVE = 1e-4
 """A way shorter than this [rad] is no way."""
 
 
-def run_approach(driver: UrDriver, approach: Approach, qd_max: Sequence[float]) -> None:
+def run_approach(driver: UrDriver, approach: Approach, model: RobotModel) -> None:
     """Move the arm along a checked way and wait until it rests at its end.
 
     Args:
         driver: a session; the arm rests where the way begins.
         approach: the way.
-        qd_max: (6,) joint speed limits [rad/s]; an approach uses a small share of them.
+        model: the nominal arm.
 
     Raises:
         RobotStoppedError: the robot stopped.
@@ -40,7 +39,7 @@ def run_approach(driver: UrDriver, approach: Approach, qd_max: Sequence[float]) 
     if np.abs(approach.waypoints - approach.q_from).max() < _NO_MOVE:
         return
     table = ReferenceTable(approach.motion, period=driver.info.period, lead=0.0, settle=_SETTLE)
-    tracker = Tracker(table, APPROACH, qd_max)
+    tracker = Tracker(table, APPROACH, model)
     driver.stream(tracker, _ignore, acceleration=APPROACH.speedj_acceleration)
     error = float(np.abs(driver.actual_q() - goal).max())
     if not error <= _ARRIVAL_TOLERANCE:

@@ -18,8 +18,8 @@ from pc_client.planning.plan import JointPlan
 
 Array = NDArray[np.float64]
 
-_LEARNED_WAY = 0.25
-"""What was learned may lead a joint this share of the way to where the run would be aborted."""
+_LEARNED_WAY = 0.05
+"""What was learned may lead a joint this far [rad]."""
 
 _CLEARANCE_STEP = 4
 """Every so many cycles the arm's clearance is measured: 32 ms, in which it moves by less than a margin."""
@@ -53,7 +53,7 @@ def broken_limit(
     motion = {
         "joint speed": np.abs(commands) / (config.speed_share * np.array(model.limits.qd_max)),
         "joint acceleration": acceleration / np.minimum(limits.qdd_max, config.slew_limit),
-        "learned way": learned_way / (_LEARNED_WAY * config.abort_error),
+        "learned way": learned_way / _LEARNED_WAY,
         "joint range": np.array(measure_joint_range(way, model.limits, limits).share),
     }
     if complaint := _first_beyond(motion):

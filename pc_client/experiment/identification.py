@@ -6,7 +6,7 @@ movements of the experiment.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError, GainMarginError
+from pc_client.kinematics.robot_model import RobotModel
 from protocol.realtime_layout import RealtimeFrame
 
 _LEAD, _SETTLE = 0.1, 0.3
@@ -89,14 +90,14 @@ class Identification:
 
 
 def identify(
-    driver: UrDriver, config: ControllerConfig, qd_max: Sequence[float]
+    driver: UrDriver, config: ControllerConfig, model: RobotModel
 ) -> tuple[Identification, StreamReport]:
     """Identify the loop where the arm stands; it moves less than one degree and comes back.
 
     Args:
         driver: a session; the arm rests.
         config: the controller that will be used: its acceleration is part of the loop, its gains are checked.
-        qd_max: (6,) joint speed limits [rad/s].
+        model: the nominal arm.
 
     Returns:
         What was found, and what happened on the wire.
@@ -121,9 +122,7 @@ def identify(
         commands.append(step.qd_cmd)
         positions.append(frame.actual_q.tolist())
 
-    report = driver.stream(
-        Tracker(table, open_loop, qd_max), collect, acceleration=config.speedj_acceleration
-    )
+    report = driver.stream(Tracker(table, open_loop, model), collect, acceleration=config.speedj_acceleration)
     t, qd_cmd, q = np.array(stamps), np.array(commands), np.array(positions)
     estimate = estimate_delay(t, qd_cmd, q, period)
     drift = float(np.abs(driver.actual_q() - q_start).max())

@@ -74,7 +74,6 @@ class ExperimentRunner:
         self._experiment = experiment
         self._config = config
         self._observer = Silent() if observer is None else observer
-        self._qd_max = experiment.model.limits.qd_max
         self._signals = [(column.name, column.count, column.unit) for column in driver.layout.columns]
 
     def run(self) -> ExperimentReport:
@@ -89,7 +88,7 @@ class ExperimentRunner:
         self._observer.connected(driver.info)
         # The loop is identified where the first run begins; that run needs no further approach.
         there: JointPlan | None = self._approach(experiment.planned[0].plan)
-        found, stream = identify(driver, self._config, self._qd_max)
+        found, stream = identify(driver, self._config, experiment.model)
         self._observer.identified(found)
         report = ExperimentReport(found)
         # Only a robot whose time waits for its client repeats a frame.
@@ -117,7 +116,7 @@ class ExperimentRunner:
         """Move slowly to the begin of the plan; returns it in the turns where the arm is."""
         approach = plan_approach(plan, self._driver.actual_q(), model=self._experiment.model)
         self._observer.approaching(approach)
-        run_approach(self._driver, approach, self._qd_max)
+        run_approach(self._driver, approach, self._experiment.model)
         return approach.plan
 
     def _repetitions(self, found: Identification) -> Repetitions:
@@ -164,7 +163,7 @@ class ExperimentRunner:
         log = RunLog() if config.learns or config.compensates_gear else None
         with Recorder(path, provenance, self._signals) as recorder:
             stream = self._driver.stream(
-                Tracker(table, config, self._qd_max, estimator),
+                Tracker(table, config, self._experiment.model, estimator),
                 _row_sink(recorder, log),
                 acceleration=config.speedj_acceleration,
             )

@@ -9,6 +9,7 @@ from pc_client.control.controller_config import APPROACH
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker
 from pc_client.driver.ur_driver import UrDriver
+from pc_client.kinematics.robot_model import robot_model
 from pc_client.planning.joint_lines import JointLines
 from ur_emulator import ControlBox
 
@@ -51,5 +52,7 @@ def test_the_client_moves_an_arm_at_any_loopback_address(box):
         goal = q + np.array([0.05, 0, 0, 0, 0, 0])
         lines = JointLines([q, goal], v=0.5, a=1.0)
         table = ReferenceTable(lines, period=driver.info.period, lead=0.0, settle=0.8)
-        driver.stream(Tracker(table, APPROACH, (3.0,) * 6), lambda frame, step: None, acceleration=5.0)
+        driver.stream(
+            Tracker(table, APPROACH, robot_model("ur3")), lambda frame, step: None, acceleration=5.0
+        )
         assert driver.actual_q()[0] == pytest.approx(goal[0], abs=1e-3)

@@ -9,12 +9,13 @@ from fake_robot import PERIOD, FakeRobot
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
 from pc_client.experiment.approach_run import run_approach
+from pc_client.kinematics.robot_model import robot_model
 from pc_client.planning.approach import Approach
 from protocol.velocity_stream import VelocityMode
 
 BETWEEN = np.array([0.05, -0.15, 0.0, 0.2, 0.0, 0.3])
 GOAL = np.array([0.1, -0.3, -0.2, 0.2, 0.1, 0.2])
-QD_MAX = (3.14, 3.14, 3.14, 6.28, 6.28, 6.28)
+UR3 = robot_model("ur3")
 
 SPEED = 0.5  # rad/s
 
@@ -25,7 +26,7 @@ def approach_to(*waypoints):
 
 def move(robot, *waypoints):
     with UrDriver("robot", network=robot) as driver:
-        run_approach(driver, approach_to(*(waypoints or (BETWEEN, GOAL))), QD_MAX)
+        run_approach(driver, approach_to(*(waypoints or (BETWEEN, GOAL))), UR3)
 
 
 @pytest.mark.parametrize("delay", [0, 3, 12])
@@ -73,7 +74,7 @@ def test_a_protective_stop_on_the_way_is_reported_and_nothing_left_moving():
 def test_an_arm_that_does_not_follow_is_stopped_soon():
     robot = FakeRobot()
     robot.follow = lambda: robot.commands and robot.commands.popleft()
-    with pytest.raises(DriverError, match=r"wrist 3 joint is \+0\.05\d rad from its reference"):
+    with pytest.raises(DriverError, match=r"the tool is 1\d\.\d mm .* off its path"):
         move(robot)
     assert "stopj" in robot.programs[-1]
 

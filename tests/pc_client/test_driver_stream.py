@@ -15,9 +15,11 @@ from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import check_command
 from pc_client.errors import ClientError, DriverError, RobotStoppedError
+from pc_client.kinematics.robot_model import robot_model
 from pc_client.recording.layout import Phase
 from protocol.velocity_stream import VelocityMode
 
+UR3 = robot_model("ur3")
 QD_MAX = (3.14, 3.14, 3.14, 6.28, 6.28, 6.28)
 CONFIG = CONTROLLERS["preview"]
 
@@ -26,7 +28,7 @@ def tracker(duration=0.4, qd=0.1):
     reference = ReferenceTable(
         Ramp([qd] * 6, duration), period=PERIOD, lead=0.2, settle=0.3, lookahead=3 * PERIOD
     )
-    return Tracker(reference, CONFIG, QD_MAX)
+    return Tracker(reference, CONFIG, UR3)
 
 
 class Rows(list):

@@ -177,6 +177,30 @@ def test_what_is_recorded_before_a_protective_stop_stays(two, tmp_path):
     assert not (tmp_path / "lognorm_4_1_r1.mcap").exists()
 
 
+@pytest.mark.parametrize(("phase", "receiver"), [("approach", 1), ("identification", 2), ("run", 3)])
+@pytest.mark.parametrize("joint", [2, 5])
+def test_in_every_phase_a_tool_off_its_path_ends_the_motion(phase, receiver, joint, two, tmp_path):
+    robot, begun = FakeRobot(), []
+
+    def push(r):
+        begun.append(
+            len(r.received) if sum("velocity_receiver" in text for text in r.programs) == receiver else 0
+        )
+        if r.program == "receiver" and begun[-1] > min(filter(None, begun), default=0) + 40:
+            r.q[joint] += 0.15
+
+    robot.on_tick = push
+    with pytest.raises(DriverError, match=r"mm and .* deg off its path at t = .* s, near .* m; allowed is"):
+        run(robot, with_folder(two, tmp_path))
+    robot.on_tick = None
+    assert sum("velocity_receiver" in text for text in robot.programs) == receiver
+    assert robot.at_rest
+    recordings = sorted(tmp_path.glob("*.mcap"))
+    assert len(recordings) == (phase == "run")
+    for path in recordings:
+        assert load_recording(path).summary == {"aborted": "DriverError"}
+
+
 def test_an_arm_that_does_not_follow_is_found_before_the_first_movement(two, tmp_path):
     robot = FakeRobot()
     robot.follow = lambda: (robot.commands and robot.commands.popleft().mode) or None

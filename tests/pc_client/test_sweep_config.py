@@ -45,13 +45,13 @@ def test_every_combination(tmp_path):
         [controller]
         gain_p = [1, 2.5]
         looks_ahead = [true, false]
-        abort_error = 0.1
+        path_tolerance = 0.02
     """
     config = read_config(write(tmp_path, text))
     cases = cases_of(config)
     assert len(cases) == len({case.identity for case in cases}) == 2 * 2 * 2 * 2 * 3 * 4
     assert {case.controller.gain_p for case in cases} == {1.0, 2.5}
-    assert {case.controller.abort_error for case in cases} == {0.1}
+    assert {case.controller.path_tolerance for case in cases} == {0.02}
     assert {case.controller.name for case in cases} == {"paper", "preview"}
     assert config.output == Path("out/here")
 
