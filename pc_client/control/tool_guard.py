@@ -107,7 +107,7 @@ class ToolGuard:
         if not (distance <= self._distance and angle <= self._angle):  # NaN is not
             x, y, z = point[3::4]
             raise DriverError(
-                f"the tool is {1e3 * distance:.1f} mm and {degrees(angle):.1f} deg off its path at "
+                f"the tool is {1e3 * distance:.2f} mm and {degrees(angle):.2f} deg off its path at "
                 f"t = {t:.3f} s, near ({x:.3f}, {y:.3f}, {z:.3f}) m; allowed is "
                 f"{1e3 * self._distance:g} mm (path_tolerance) and {degrees(self._angle):.1f} deg "
                 "(angle_tolerance): the run was ended"

@@ -74,7 +74,7 @@ def test_a_protective_stop_on_the_way_is_reported_and_nothing_left_moving():
 def test_an_arm_that_does_not_follow_is_stopped_soon():
     robot = FakeRobot()
     robot.follow = lambda: robot.commands and robot.commands.popleft()
-    with pytest.raises(DriverError, match=r"the tool is 1\d\.\d mm .* off its path"):
+    with pytest.raises(DriverError, match=r"the tool is 1\d\.\d\d mm .* off its path"):
         move(robot)
     assert "stopj" in robot.programs[-1]
 
