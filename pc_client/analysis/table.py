@@ -37,7 +37,7 @@ PAPER_SNR_DB = {
 }
 KINDS = ("uniform", "lognormal")
 
-SHARED = "Paper: its points are not published; name, kind and number of targets agree"
+SHARED = "Paper: own points, not published; name, kind, number of targets agree"
 """Why no differences are given."""
 
 
