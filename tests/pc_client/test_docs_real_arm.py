@@ -1,0 +1,142 @@
+"""docs/real-arm.md says what the code says: messages, port, margins, and the plan that it shows."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pc_client.control.controller_config import APPROACH, CONTROLLERS
+from pc_client.driver.receiver_script import MISSED_ALLOWED
+from pc_client.driver.reverse_server import REVERSE_PORT
+from pc_client.driver.watchdog import (
+    program_state,
+    robot_mode,
+    safety_mode,
+    software,
+    speed_scaling,
+    speed_slider,
+)
+from pc_client.errors import CellError
+from pc_client.experiment.experiment_text import experiment_text
+from pc_client.experiment.preflight import payload, tcp_offset
+from pc_client.experiment.prepare import load_movements, prepare_experiment
+from pc_client.kinematics.cell_file import load_cell, parse_cell
+from pc_client.kinematics.robot_model import robot_model
+from pc_client.planning.approach import plan_approach
+from pc_client.planning.limits import limits_of
+from pc_client.planning.plan_text import approach_text
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "real-arm.md").read_text(encoding="utf-8")
+CELL = load_cell(ROOT / "examples" / "cell.toml")
+MESSAGES = [
+    message
+    for row in PAGE.partition("## What can go wrong")[2].partition("## When the client dies")[0].splitlines()
+    if row.startswith("| ")
+    for message in re.findall(r"`([^`]+)`", row.split(" | ")[1])
+]
+
+
+def templates():
+    """All texts of the client: its literals, with … for values."""
+    for path in (ROOT / "pc_client").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                yield node.value
+            elif isinstance(node, ast.JoinedStr):
+                yield "".join(
+                    str(part.value) if isinstance(part, ast.Constant) else "…" for part in node.values
+                )
+
+
+PATTERNS = [
+    re.compile(".+".join(map(re.escape, text.split("…"))))
+    for text in templates()
+    if len(text.replace("…", "")) >= 25 and "\n" not in text
+]
+
+
+def conditions():
+    """The page's refusals of a robot that is not as it must be."""
+    frame = SimpleNamespace(
+        safety_mode=float(SafetyMode.ROBOT_EMERGENCY_STOP),
+        robot_mode=float(RobotMode.IDLE),
+        runtime_state=float(ProgramState.PLAYING),
+        speed_scaling=0.6,
+    )
+    protective = SimpleNamespace(safety_mode=float(SafetyMode.PROTECTIVE_STOP))
+    report = SimpleNamespace(tcp_offset=(0.0, 0.0, 0.15, 0.0, 0.0, 0.0), payload=0.0)
+    model = robot_model("ur3", CELL)
+    return [
+        software(SoftwareVersion(5, 11, 0)),
+        safety_mode(frame),
+        safety_mode(protective),
+        robot_mode(frame),
+        program_state(frame),
+        speed_slider(0.5),
+        speed_scaling(frame),
+        tcp_offset(report, model),
+        payload(report, model),
+    ]
+
+
+def cell_error():
+    with pytest.raises(CellError) as caught:
+        parse_cell(CELL.text.replace("size = [0.2, 0.45, 0.4]", "size = [0.2, 0, 0.4]"), "cell.toml")
+    return str(caught.value)
+
+
+COMPLAINTS = [condition.complaint for condition in conditions()] + [cell_error()]
+
+
+@pytest.mark.parametrize("message", COMPLAINTS)
+def test_every_condition_is_on_the_page_in_its_own_words(message):
+    assert f"`{message}`" in PAGE
+
+
+@pytest.mark.parametrize("message", MESSAGES)
+def test_every_message_of_the_page_is_one_of_the_client(message):
+    if message in COMPLAINTS or message in ("…", "the robot's safety mode is …"):
+        return
+    assert any(pattern.search(message) for pattern in PATTERNS), message
+
+
+def test_the_page_has_the_messages_that_this_test_looks_for():
+    assert len(MESSAGES) > 30
+
+
+def test_port_margins_and_tolerances_are_those_of_the_code():
+    limits = limits_of(robot_model("ur3"))
+    assert f"TCP **{REVERSE_PORT}**" in PAGE
+    assert PAGE.count(str(REVERSE_PORT)) >= 5
+    floor, own, around = (
+        round(1e3 * margin)
+        for margin in (limits.floor_clearance_min, limits.own_clearance_min, limits.cell_clearance_min)
+    )
+    assert f"{floor} mm from the floor, {around} mm from walls and solids, {own} mm of links and tool" in PAGE
+    preview, paper = CONTROLLERS["preview"].path_tolerance, CONTROLLERS["paper"].path_tolerance
+    off = f"{1e3 * preview:g} mm off it before a run ends ({1e3 * paper:g} mm with the published controller"
+    assert f"{off}, {1e3 * APPROACH.path_tolerance:g} mm on the way to a start)" in PAGE.replace("\n", " ")
+    assert MISSED_ALLOWED == 2
+    assert "the last velocity for two cycles at\nmost" in PAGE
+
+
+def test_the_cell_of_the_page_is_one():
+    text = PAGE.partition("```toml\n")[2].partition("```")[0]
+    cell = parse_cell(text, "docs/real-arm.md")
+    assert cell.tool.mass == CELL.tool.mass
+    assert cell.solids == CELL.solids[:1]
+
+
+def test_the_plan_of_the_page_is_the_clients(tmp_path):
+    experiment = prepare_experiment(load_movements(["lognorm_4_1"]), repeat=1, out=tmp_path, cell=CELL)
+    assert experiment_text(experiment) in PAGE
+    q_now = np.radians((22.6, -101.1, -120.3, -5.9, 74.2, 106.4))
+    way = plan_approach(experiment.planned[0].plan, q_now, model=experiment.model)
+    assert approach_text(way) in PAGE
