@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pc_client.errors import CellError
 from pc_client.kinematics.cell import SHAPES, Cell, Solid, Three, Tool, Wall
-from pc_client.movements.tables import TableReader
+from pc_client.toml_tables import TableReader
 
 _FORMAT = 1
 

@@ -19,7 +19,7 @@ from pc_client.errors import MovementError
 from pc_client.movements.law_tables import LAW_FIELDS, LAW_WORDS, law_lines, parse_law
 from pc_client.movements.movement import Movement
 from pc_client.movements.samples import SampledLaw, parse_samples, write_samples
-from pc_client.movements.tables import TableReader, toml_value
+from pc_client.toml_tables import TableReader, toml_value
 
 __all__ = [
     "DEFAULT_SET",

@@ -16,8 +16,8 @@ from pc_client.movements.power_law import TWO_THIRDS, PowerLaw
 from pc_client.movements.robotic import RoboticLaw
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Stroke
-from pc_client.movements.tables import TableReader, toml_value
 from pc_client.movements.timing import FULL_COVERAGE, LiteralTiming, Timing, TwoSidedTiming, lead_from_k
+from pc_client.toml_tables import TableReader, toml_value
 
 __all__ = ["LAW_FIELDS", "LAW_WORDS", "law_lines", "parse_law"]
 

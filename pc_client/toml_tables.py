@@ -1,6 +1,6 @@
 """Typed reading of TOML tables, with messages that name file and field, and writing of TOML values.
 
-Generic: this module knows nothing of movements.
+Generic: this module knows nothing of movements or cells.
 """
 
 from __future__ import annotations
