@@ -11,10 +11,14 @@ import pytest
 from drawing_samples import one_part, recording_text, two_parts_and_a_dot
 from fake_robot import FakeRobot
 
+import pc_client.commands.draw as draw_module
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
+from pc_client.errors import ClientError
+from pc_client.kinematics.robot_model import robot_model
 from pc_client.movements.files import load_movement
+from pc_client.movements.geometry import WORKING_BOXES
 from pc_client.recording.loader import load_recording
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "pen_strokes" / "strokes_background_small1.zip"
@@ -217,3 +221,20 @@ def test_a_drawing_of_the_data_set(robot, tmp_path):
     assert one["y_up"] is True  # rows of the screen as 0, -1, -2 ...
     assert one["reconstruction"]["snr_v_db"] > 15.0
     assert one["runs"][0]["human"]["snr_v_db"] > 10.0
+
+
+def test_a_drawing_is_placed_in_the_box_of_the_arm_that_answers(robot, file, tmp_path, monkeypatch):
+    drawings = []
+
+    def stop(movements, *_):
+        drawings.extend(movements)
+        raise ClientError("far enough")
+
+    monkeypatch.setattr(draw_module, "execute", stop)
+    monkeypatch.setattr(draw_module, "ask_robot", lambda *_: (None, robot_model("ur10")))
+    assert cli.run(["draw", str(file), "--robot", "x", "--out", str(tmp_path / "o"), "--size", "max"]) == 1
+    (movement,) = drawings
+    p = movement.sample(np.linspace(0.0, movement.duration, 500)).p
+    box = WORKING_BOXES["ur10"]
+    assert box.contains(p, 1e-3)
+    assert np.isclose(np.ptp(p, axis=0) / box.size, 1.0, atol=0.02).any()
