@@ -151,6 +151,7 @@ class Table:
     def to_markdown(self) -> str:
         """Return the content of `table1.md`."""
         columns, rows = self._cells()
+        shared = ["", SHARED] if self.has_paper_rows else []
         lines = [
             f"# {self.title}",
             "",
@@ -161,15 +162,15 @@ class Table:
             *["| " + " | ".join(row) + " |" for row in rows],
             "",
             "floor: SNR that the noise of the arm's encoders at rest alone would leave a perfect arm.",
-            "",
-            SHARED,
+            *shared,
         ]
         return "\n".join(lines) + "\n"
 
     def to_rich(self) -> RichTable:
         """Return the table for the terminal."""
         columns, rows = self._cells()
-        caption = f"SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed\n{SHARED}"
+        caption = "SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed"
+        caption += f"\n{SHARED}" if self.has_paper_rows else ""
         table = RichTable(title=self.title, caption=caption, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for i, column in enumerate(columns):
             heading = Text(column.replace(" [", "\n["))
@@ -185,6 +186,11 @@ class Table:
         return self.rows[0].runs[0].provenance
 
     @property
+    def has_paper_rows(self) -> bool:
+        """Whether a movement has the name of one in the paper's Table I."""
+        return any(row.paper_snr_db is not None for row in self.rows)
+
+    @property
     def loop(self) -> Mapping[str, float | str]:
         """What the client identified of the loop and its margins; empty for old recordings."""
         return self.provenance.loop
@@ -198,16 +204,17 @@ class Table:
         """Return headings and texts; the mean of a kind follows its rows."""
         n_runs = max((len(row.runs) for row in self.rows), default=0)
         repetitions = [f"r{k}" for k in range(1, n_runs + 1)]
-        columns = ["movement", *repetitions, "mean", "paper", "floor", "error [mm]", "lag [ms]"]
+        paper = ["paper"] if self.has_paper_rows else []
+        columns = ["movement", *repetitions, "mean", *paper, "floor", "error [mm]", "lag [ms]"]
         rows = []
         for kind, group in groupby(self.rows, key=lambda row: row.kind):
             for row in group:
                 figures = [f"{v:.2f}" for v in row.snr_db] + [""] * (n_runs - len(row.runs))
-                levels = map(_decibels, (row.mean_snr_db, row.paper_snr_db, row.noise_floor_db))
+                levels = (row.mean_snr_db, *[row.paper_snr_db for _ in paper], row.noise_floor_db)
                 errors = [f"{row.max_position_error_mm:.2f}", f"{row.lag_ms:.1f}"]
-                rows.append([row.name, *figures, *levels, *errors])
-            means = map(_decibels, (self.mean_of(kind), self.paper_mean_of(kind)))
-            rows.append([f"mean {kind}", *[""] * n_runs, *means, "", "", ""])
+                rows.append([row.name, *figures, *map(_decibels, levels), *errors])
+            means = (self.mean_of(kind), *[self.paper_mean_of(kind) for _ in paper])
+            rows.append([f"mean {kind}", *[""] * n_runs, *map(_decibels, means), "", "", ""])
         return columns, rows
 
 

@@ -5,13 +5,11 @@ The limits are those that the plan itself was held against, and the controller's
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.control.controller_config import ControllerConfig
-from pc_client.kinematics.clearance import Distances, clearance_model
+from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.checks import measure_joint_range
 from pc_client.planning.plan import JointPlan
@@ -56,27 +54,16 @@ def broken_limit(
         "learned way": learned_way / _LEARNED_WAY,
         "joint range": np.array(measure_joint_range(way, model.limits, limits).share),
     }
-    if complaint := _first_beyond(motion):
-        return complaint  # what is no number must not come to the clearance
+    for what, share in motion.items():
+        # What is no number must not come to the clearance.
+        if not (most := float(np.max(share))) <= 1.0:
+            return f"{what} would be {most:.0%} of what is allowed"
     clearance = clearance_model(model).along(way)
-    return _first_beyond(
-        {
-            "clearance to itself": _share(clearance.own, limits.own_clearance_min),
-            "clearance to the floor": _share(clearance.floor, limits.floor_clearance_min),
-            "clearance to the cell": _share(clearance.cell, limits.cell_clearance_min),
-        }
-    )
-
-
-def _share(distances: Distances, limit: float) -> Array:
-    """Return (n,) limit over distance: above 1 is too near."""
-    share: Array = limit / np.maximum(distances.least, 1e-6)
-    return share
-
-
-def _first_beyond(shares: Mapping[str, Array]) -> str:
-    """Name the first quantity whose share of what is allowed is above 1, or no number; else empty."""
-    for what, share in shares.items():
-        if not float(np.max(share)) <= 1.0:
-            return f"{what} would be {float(np.max(share)):.0%} of what is allowed"
+    for what, distances, needed in (
+        ("itself", clearance.own, limits.own_clearance_min),
+        ("the floor", clearance.floor, limits.floor_clearance_min),
+        ("the cell", clearance.cell, limits.cell_clearance_min),
+    ):
+        if not (least := float(np.min(distances.least))) >= needed:
+            return f"the arm would come within {1e3 * least:.0f} mm of {what}, asked: {1e3 * needed:.0f} mm"
     return ""

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pc_client.control.controller_config import ControllerConfig
 from pc_client.control.delay import DelayEstimate, estimate_delay
@@ -124,13 +125,13 @@ def identify(
 
     report = driver.stream(Tracker(table, open_loop, model), collect, acceleration=config.speedj_acceleration)
     t, qd_cmd, q = np.array(stamps), np.array(commands), np.array(positions)
-    estimate = estimate_delay(t, qd_cmd, q, period)
-    drift = float(np.abs(driver.actual_q() - q_start).max())
-    if not drift <= _RETURN_TOLERANCE:
-        raise DriverError(
-            f"the excitation left a joint {drift:.4f} rad from where it began, "
-            f"allowed is {_RETURN_TOLERANCE} rad"
-        )
+    try:
+        estimate = estimate_delay(t, qd_cmd, q, period)
+        _check_return(driver.actual_q() - q_start)
+    except DriverError as error:
+        if late := report.late_frames + report.lost_frames:
+            error.add_note(f"{late} of {len(t)} commands came late: is the computer or network too busy?")
+        raise
     if knows_lag:
         loop = identify_loop(t, qd_cmd, q, period)
     else:
@@ -150,6 +151,16 @@ def identify(
         learning=learning_filter(config, loop, period),
         estimator=identify_estimator(qd_cmd, q, loop, period, _AT_REST) if config.estimates else None,
     ), report
+
+
+def _check_return(drift: NDArray[np.float64]) -> None:
+    """Refuse an excitation that left a joint away from where it began, (6,) [rad]."""
+    most = float(np.abs(drift).max())
+    if not most <= _RETURN_TOLERANCE:
+        raise DriverError(
+            f"the excitation left a joint {most:.4f} rad from where it began, "
+            f"allowed is {_RETURN_TOLERANCE} rad"
+        )
 
 
 def learning_filter(config: ControllerConfig, loop: LoopModel, period: float) -> LearningFilter | None:

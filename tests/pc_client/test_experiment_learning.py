@@ -156,7 +156,7 @@ def test_a_plan_itself_keeps_the_limits(two, plan):
         (lambda c: c + 0.3 * (-1.0) ** np.arange(len(c))[:, None], "joint acceleration"),
         (lambda c: c + np.nan, "joint speed"),
         (lambda c: c + np.eye(6)[0], "joint range"),
-        (lambda c: c - 0.14 * np.eye(6)[1], "clearance to the floor"),
+        (lambda c: c - 0.14 * np.eye(6)[1], "mm of the floor, asked: 30 mm"),
     ],
 )
 def test_commands_that_break_a_limit_are_named(two, plan, spoil, words):

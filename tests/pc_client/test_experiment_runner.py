@@ -19,8 +19,10 @@ from pc_client.errors import (
     MovementError,
     RecordingError,
     RobotStoppedError,
+    full_message,
 )
 from pc_client.experiment.experiment_text import experiment_text
+from pc_client.experiment.identification import identify
 from pc_client.experiment.prepare import clear_folder, load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.layout import Phase
@@ -63,6 +65,29 @@ def run(robot, experiment, controller="preview", notes=None, posture=POSTURE):
     robot.q = list(posture)
     with UrDriver("robot", network=robot) as driver:
         return ExperimentRunner(driver, experiment, CONTROLLERS[controller], notes).run()
+
+
+@pytest.mark.parametrize("held_up", [0, 4])
+def test_an_identification_that_fails_says_how_many_commands_came_late(two, held_up):
+    n_ticks = 0
+
+    def slip(robot):
+        nonlocal n_ticks
+        n_ticks += robot.program == "receiver"
+        if n_ticks == 20:
+            robot.hold = held_up
+        if n_ticks == 60:
+            robot.q[0] += 0.003
+
+    robot = FakeRobot(lockstep=False, on_tick=slip)
+    robot.q = list(POSTURE)
+    with UrDriver("robot", network=robot) as driver, pytest.raises(DriverError) as refused:
+        identify(driver, CONTROLLERS["preview"], two.model)
+    assert (
+        ("4 of" in full_message(refused.value))
+        is ("commands came late" in full_message(refused.value))
+        is bool(held_up)
+    )
 
 
 def test_two_movements_twice(two, tmp_path):
