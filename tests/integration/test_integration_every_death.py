@@ -13,7 +13,6 @@ from integration_support import PERIOD, Frames
 import ur_emulator.realtime.pacing as pacing
 from pc_client.control.controller_config import CONTROLLERS
 from pc_client.driver.ur_driver import UrDriver
-from pc_client.errors import DriverError
 from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.loader import load_recording
@@ -49,7 +48,7 @@ class Client(threading.Thread):
         try:
             with UrDriver(self.box.host, self.box.ports, network=self.network) as driver:
                 ExperimentRunner(driver, self.experiment, CONTROLLERS["preview"]).run()
-        except (DriverError, Killed) as error:
+        except BaseException as error:
             self.error = error
 
 
@@ -65,7 +64,8 @@ def lose_client(box, experiment, death, phase, monkeypatch):
         bystander = Bystander(frames)
         client.start()
         try:
-            bystander.until(network.dead.is_set)
+            bystander.until(lambda: network.dead.is_set() or not client.is_alive())
+            assert network.dead.is_set(), client.error
             monkeypatch.setattr(
                 pacing, "HANG_LIMIT", 0.05
             )  # s, instead of ten: time goes on without a command
