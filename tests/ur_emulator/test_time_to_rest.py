@@ -112,6 +112,13 @@ def test_an_arm_that_still_speeds_up_does_not_go_on_speeding_up():
     assert not any(speeds[10:])
 
 
+def test_a_speed_slider_that_was_moved_does_not_make_the_stop_longer():
+    arm = Turning("ur3", 0)
+    arm.tick(1, cmd.SetSpeedSlider(0.3))
+    arm.send(VelocityMode.VELOCITY, [ROBOTS["ur3"].limits.qd_max[0], 0, 0, 0, 0, 0])
+    assert (arm.ticks_to_rest() + WAITS_FOR_THE_READ) * PERIOD <= ALLOWED
+
+
 def test_what_is_resumed_on_the_pendant_while_the_client_is_frozen_comes_to_rest_in_time_too():
     arm = Turning("ur3", 0)
     arm.tick(1, cmd.TriggerProtectiveStop())
