@@ -17,7 +17,7 @@ from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import READ_TIMEOUT
 from pc_client.driver.transport import Network, Transport
-from pc_client.driver.watchdog import check_streaming
+from pc_client.driver.watchdog import check_streaming, is_at_full_speed
 from pc_client.errors import DriverError
 from protocol.realtime_layout import RealtimeFrame
 from protocol.velocity_stream import VelocityMode, encode_velocity
@@ -30,6 +30,9 @@ LONGEST_STANDSTILL = 5.0
 
 _FRAMES_BEFORE_START = 3
 """New frames after which a robot counts as one whose time runs by itself."""
+
+_LONGEST_RISE = 125
+"""New frames in which the speed scaling must have reached 1 after the start of a program: a second of a CB3."""
 
 _HOUSEKEEPING = 16
 """New frames between two looks at the other connections: an eighth of a second, as robot states come."""
@@ -152,7 +155,8 @@ class VelocityStream:
 
         After its hello the program waits for a command. A robot whose time waits too repeats its last frame:
         that one is the trigger, whenever the hello came between the frames. A robot whose time
-        runs on sends new frames: the third is the trigger.
+        runs on sends new frames: the third is the trigger, or a later one if the controller raises the speed
+        scaling when a program starts; it gets the word to rest until then.
         """
         self._frames.drain()
         n_new = 0
@@ -162,7 +166,9 @@ class VelocityStream:
             n_new += len(arrival.new)
             stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
             if stands_still or n_new >= _FRAMES_BEFORE_START:
-                return arrival.latest
+                if stands_still or is_at_full_speed(arrival.latest) or n_new >= _LONGEST_RISE:
+                    return arrival.latest
+                self._reverse.send(encode_velocity(VelocityMode.HOLD))
 
     def _wait_for_new(self, report: StreamReport) -> list[RealtimeFrame]:
         """Sit out heartbeats until time goes on."""

@@ -96,7 +96,7 @@ def speed_scaling(frame: RealtimeFrame) -> Condition:
         _percent(scaling),
         "100 %",
         "end reduced mode on the robot, or give the movement more time",
-        scaling >= _FULL_SPEED or (scaling == 0.0 and is_stopped(frame)),
+        is_at_full_speed(frame) or (scaling == 0.0 and is_stopped(frame)),
     )
 
 
@@ -142,13 +142,18 @@ def check_streaming(frame: RealtimeFrame) -> None:
         DriverError: the robot slows the arm down.
     """
     if frame.safety_mode in SAFE_MODES and frame.robot_mode == RUNNING and frame.runtime_state == PLAYING:
-        if not frame.speed_scaling >= _FULL_SPEED:
+        if not is_at_full_speed(frame):
             raise DriverError(speed_scaling(frame).complaint)
         return
     check_safety(frame)
     raise RobotStoppedError(
         f"the robot's program is {_name(ProgramState, frame.runtime_state)}: it ended before the movement did"
     )
+
+
+def is_at_full_speed(frame: RealtimeFrame) -> bool:
+    """Return True when the controller does not slow the arm down."""
+    return bool(frame.speed_scaling >= _FULL_SPEED)
 
 
 def is_stopped(frame: RealtimeFrame) -> bool:

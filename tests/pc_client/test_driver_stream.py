@@ -379,3 +379,32 @@ def test_check_command_accepts_the_limits_themselves():
     check_command([3.14, -3.14, 0.0, 6.28, -6.28, 0.0], QD_MAX)
     with pytest.raises(DriverError, match="allowed is"):
         check_command([3.141, 0, 0, 0, 0, 0], QD_MAX)
+
+
+def rising(robot, n_cycles):
+    """The speed scaling reaches 1 so many cycles after a program has started."""
+    if robot.program is None:
+        robot.scaling, robot.n_slow = 0.0, 0
+    elif robot.n_slow < n_cycles:
+        robot.n_slow += 1
+        robot.scaling = robot.n_slow / n_cycles
+
+
+def test_a_controller_that_raises_its_speed_at_the_start_gets_no_velocity_before_it_is_at_full_speed():
+    robot = FakeRobot(lockstep=False, on_tick=lambda r: rising(r, 40))
+    robot.scaling, robot.n_slow = 0.0, 0
+    report, rows = stream(robot)
+    modes = [command.mode for command in robot.received]
+    n_held = modes.count(VelocityMode.HOLD)
+    assert 30 <= n_held <= 40
+    assert modes[:n_held] == [VelocityMode.HOLD] * n_held
+    assert len(velocities(robot)) == len(rows) == report.n_commands
+
+
+def test_a_controller_that_stays_slow_is_refused_before_the_arm_moves():
+    robot = FakeRobot(lockstep=False, on_tick=lambda r: rising(r, 400))
+    robot.scaling, robot.n_slow = 0.0, 0
+    with pytest.raises(DriverError, match=r"speed scaling is 3\S+ %, must be 100 %"):
+        stream(robot)
+    assert not velocities(robot)
+    assert robot.at_rest
