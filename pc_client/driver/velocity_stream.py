@@ -32,7 +32,7 @@ _FRAMES_BEFORE_START = 3
 """New frames after which a robot counts as one whose time runs by itself."""
 
 _LONGEST_RISE = 125
-"""New frames in which the speed scaling must have reached 1 after the start of a program: a second of a CB3."""
+"""New frames in which the speed scaling must have reached 1 after the program started: a second of a CB3."""
 
 _HOUSEKEEPING = 16
 """New frames between two looks at the other connections: an eighth of a second, as robot states come."""
