@@ -21,7 +21,7 @@ from chunk_bench import ChunkRun  # noqa: E402
 from chunk_marks import load_box_chunks  # noqa: E402
 from wire_story import MODBUS, Story  # noqa: E402
 
-from pc_client.control.controller_config import controller_config  # noqa: E402
+from pc_client.control.controller_config import CONTROLLERS  # noqa: E402
 from pc_client.driver.ur_driver import UrDriver  # noqa: E402
 from pc_client.experiment.prepare import load_movements, prepare_experiment  # noqa: E402
 from pc_client.experiment.runner import ExperimentRunner  # noqa: E402
@@ -105,7 +105,7 @@ def demo():
         ):
             experiment = prepare_experiment(load_movements(DEMO), repeat=2, out=Path(folder))
             with UrDriver(box.host, box.ports) as driver:
-                ExperimentRunner(driver, experiment, controller_config(controller)).run()
+                ExperimentRunner(driver, experiment, CONTROLLERS[controller]).run()
             for path in sorted(Path(folder).glob("*.mcap")):
                 yield f"demo {controller} {path.name}", hashlib.sha256(path.read_bytes()).hexdigest()
 
