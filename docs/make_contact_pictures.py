@@ -11,6 +11,9 @@ import os
 from itertools import pairwise
 from pathlib import Path
 
+from ur_emulator.commands.programs import StartProgram
+from ur_emulator.commands.push import Push
+
 os.environ.setdefault("MUJOCO_GL", "egl")
 
 import matplotlib as mpl
@@ -18,10 +21,8 @@ import mujoco
 import numpy as np
 
 from protocol.ur_types import ControlMode, SafetyMode
-from ur_emulator.controller.commands import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported
-from ur_emulator.controller.hands import Push
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.fidelity import TYPICAL
 from ur_emulator.models.mjcf import LINKS, arm_spec, to_body

@@ -79,7 +79,7 @@ def test_effects_stay_at_the_rim(package):
                 "pymodbus",
                 "asyncio",
                 "h11",
-                "ur_emulator.control.operations",
+                "ur_emulator.control.http_port",
             },
         ),
         ("pc_client.experiment.runner", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),

@@ -22,9 +22,10 @@ from protocol.errors import LocalProtocolError
 from protocol.primary_messages import ReportLevel
 from protocol.ur_types import Ports, RobotMode, SoftwareVersion, simulated_serial
 from ur_emulator.box_log import LogEntry
-from ur_emulator.control.box_operations import BoxOperations
-from ur_emulator.control.desk import ControlDesk, Surroundings
-from ur_emulator.controller.commands import Command
+from ur_emulator.control.operations import BoxOperations
+from ur_emulator.control.runner import OperationRunner
+from ur_emulator.control.step_operation import Context
+from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.fidelity import fidelity_by_name
@@ -42,8 +43,8 @@ from ur_emulator.servers.modbus_loading import CodecLoader
 from ur_emulator.servers.modbus_server import ModbusPort
 from ur_emulator.servers.port_set import CONTROL, MODBUS, PortSet, ServedPort
 from ur_emulator.servers.primary_port import PrimaryPort
-from ur_emulator.servers.program_desk import ProgramDesk
 from ur_emulator.servers.program_intake import ProgramIntake
+from ur_emulator.servers.program_player import ProgramPlayer
 from ur_emulator.servers.realtime_port import RealtimePort
 from ur_emulator.servers.robot_state import StateEncoder
 from ur_emulator.servers.rtde_port import RtdePort
@@ -141,8 +142,8 @@ class ControlBox(BoxOperations):
         self._intake = ProgramIntake(self._loop, software, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
-        desk = ProgramDesk(self._access, ProgramFolder(None if programs is None else Path(programs)))
-        self._reports = BoxReports(desk.folder)
+        player = ProgramPlayer(self._access, ProgramFolder(None if programs is None else Path(programs)))
+        self._reports = BoxReports(player.folder)
         states = StateEncoder(software, controller.state.arm)
         # In the order in which they hear of a cycle: first those whose clients act on it.
         ports: dict[str, ServedPort] = {
@@ -154,7 +155,7 @@ class ControlBox(BoxOperations):
             "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
             "dashboard": DashboardPort(
                 self._access,
-                DashboardAnswers(self._access, desk, self._reports, self._shut_down),
+                DashboardAnswers(self._access, player, self._reports, self._shut_down),
             ),
             "modbus": ModbusPort(controller, self._box.submit, modbus),
             "realtime_ro": RealtimePort(software, None),
@@ -171,13 +172,13 @@ class ControlBox(BoxOperations):
             "seed": seed,
             "fidelity": fidelity,
         }
-        around = Surroundings(self._access, desk, time.monotonic, self._identity_now)
-        self._desk = ControlDesk(self._loop, around)
+        context = Context(self._access, player, time.monotonic, self._identity_now)
+        self._operations = OperationRunner(self._loop, context)
         self._wanted_control_port = control_port
         if control_port is not None:
-            from ur_emulator.servers.control_port import ControlPort
+            from ur_emulator.control.http_port import HttpPort
 
-            ports[CONTROL] = ControlPort(self._desk, host)
+            ports[CONTROL] = HttpPort(self._operations, host)
         self._port_set = PortSet(self._loop, host, self._box, ports)
         self.is_shut_down = False
         self.failure: Exception | None = None
@@ -206,9 +207,7 @@ class ControlBox(BoxOperations):
         """What a user should know although the box runs, one line each."""
         return self._port_set.notices
 
-    @property
-    def log(self) -> tuple[LogEntry, ...]:
-        """The last entries of the log, the oldest first; may be asked from any thread."""
+    def _log_entries(self) -> tuple[LogEntry, ...]:
         return self._box.log.entries
 
     def follow_log(self, follower: Callable[[LogEntry], None]) -> None:
@@ -218,16 +217,18 @@ class ControlBox(BoxOperations):
         """
         self._box.log.follow(follower)
 
-    def submit(self, command: Command) -> None:
+    def submit(self, command: Command, done: Done | None = None) -> None:
         """Ask for something as a client of the box would, from any thread; it acts in the next cycle.
 
         Args:
-            command: one of `ur_emulator.controller.commands`, such as `ClosePopup()` or `AnswerRequest(5)`.
+            command: one of `ur_emulator.commands`, such as `operator.ClosePopup()` or `power.PowerOff()`.
+            done: told in that cycle, in the thread of the box, what has come of it: its result and None, or
+                None and the `RefusedError`.
         """
-        self._loop.call_soon_threadsafe(lambda: self._box.submit(command))
+        self._loop.call_soon_threadsafe(lambda: self._box.submit(command, done))
 
     def _perform(self, name: str, arguments: Mapping[str, Any]) -> Any:
-        return self._desk.perform(name, arguments)
+        return self._operations.perform(name, arguments)
 
     def _identity_now(self) -> dict[str, Any]:
         ports = {**dataclasses.asdict(self.ports), "control": self.control_port}
@@ -250,7 +251,7 @@ class ControlBox(BoxOperations):
             raise
         self.control_port = numbers.pop(CONTROL, 0)
         self.ports = dataclasses.replace(self.ports, **{MODBUS: 0, **numbers})
-        self._box.attach(self._desk)
+        self._box.attach(self._operations)
         self._loop.add(self._box)
 
     def _wanted_numbers(self) -> dict[str, int]:
@@ -311,7 +312,7 @@ class ControlBox(BoxOperations):
     def close(self) -> None:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
         self._loop.remove(self._box)
-        self._desk.close()
+        self._operations.close()
         self._intake.close()
         self._access.close()
         self._reports.close()

@@ -13,9 +13,12 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from protocol.primary_messages import RequestedType
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.operator import AnswerRequest, ClosePopup
+from ur_emulator.commands.programs import StartProgram, StopProgram
 from ur_emulator.controller import events as ev
+from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
+from ur_emulator.errors import ArgumentError
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
@@ -23,7 +26,6 @@ from ur_emulator.servers.script_sockets import LoopNetwork
 from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 
 if TYPE_CHECKING:
-    from ur_emulator.controller.operator import Answer
     from urscript import CompiledProgram
 
 # After the program the arm gets this many cycles to come to rest (2 s): the longest ramp and its echo.
@@ -79,7 +81,7 @@ class ScriptBox:
     def run(self, program: CompiledProgram, limit: float, report: Callable[[Report], None]) -> RunEnd:
         """Run a program to its end and the arm to rest; see urscript.robot.ScriptRobot."""
         run = _Run(self._controller, self._loop, self._answers, limit, report)
-        run.submit(cmd.StartProgram(program))
+        run.submit(StartProgram(program))
         self._loop.add(run)
         try:
             self._loop.run()
@@ -115,7 +117,7 @@ class _Run:
         self._answers = answers
         self._limit_cycles = round(min(limit / controller.period_s, 1e15))
         self._send = report
-        self._commands: list[cmd.Command] = []
+        self._commands: list[Command] = []
         self._first_tick = controller.snapshot.tick
         self._began = math.nan
         self._due = -math.inf
@@ -123,7 +125,7 @@ class _Run:
         self._is_over = False
         self._rest = REST_CYCLES
 
-    def submit(self, command: cmd.Command) -> None:
+    def submit(self, command: Command) -> None:
         """Take a command for the next cycle."""
         self._commands.append(command)
 
@@ -131,7 +133,7 @@ class _Run:
         """End the program at once, because somebody pressed Ctrl-C."""
         if not self._is_over:
             self._end(RunStatus.INTERRUPTED)
-        self._controller.tick((*self._commands, cmd.StopProgram()))
+        self._controller.tick((*self._commands, StopProgram()))
 
     # --- the loop
 
@@ -189,7 +191,7 @@ class _Run:
         # Up to the beginning of its last cycle, as for all that is reported; a program cut off had all of it.
         cycles = self._cycles - (status is not RunStatus.RUNNING)
         self.robot_time = max(0, cycles) * self._controller.period_s
-        self._commands.append(cmd.StopProgram())
+        self._commands.append(StopProgram())
 
     # --- what is said
 
@@ -206,23 +208,23 @@ class _Run:
                 closed = " (closed)" if blocking else ""
                 self._report(ReportKind.POPUP, f"{title}: {text}{closed}")
                 if blocking:
-                    self._commands.append(cmd.ClosePopup())
+                    self._commands.append(ClosePopup())
             case ev.ValueRequested(request_id, kind, text):
                 self._answer(request_id, kind, text)
 
     def _answer(self, request_id: int, kind: RequestedType, question: str) -> None:
         """Answer for the operator; a program whose question nobody answers has failed."""
         text = self._answers.popleft() if self._answers else None
-        answer = None if text is None else _parsed(text, kind)
+        answer = None if text is None else _parsed(text, kind, request_id)
         if answer is not None:
             self._report(ReportKind.QUESTION, f"{question} {text}", *self._place())
-            self._commands.append(cmd.AnswerRequest(answer, request_id))
+            self._commands.append(answer)
             return
         given = "and nobody answers" if text is None else f"'{text}' is none"
         self.status = RunStatus.FAILED
         message = f"the program asks for {_KINDS[kind]}: '{question}', {given} (--answer)"
         self._report(ReportKind.FAILURE, message, *self._place())
-        self._commands.append(cmd.StopProgram())
+        self._commands.append(StopProgram())
 
     def _place(self) -> tuple[int, int]:
         """Return line and column of the thread that has the arm, or of the main one; 0, 0 if none is left."""
@@ -237,16 +239,16 @@ class _Run:
         self._send(Report(time, kind, text, line, column))
 
 
-def _parsed(text: str, kind: RequestedType) -> Answer | None:
+def _parsed(text: str, kind: RequestedType, request_id: int) -> AnswerRequest | None:
     """Return an answer as the type asked for; None if it is none."""
     try:
         if kind is RequestedType.INTEGER:
-            return int(text)
+            return AnswerRequest(int(text), request_id)
         if kind is RequestedType.FLOAT:
-            return float(text)
-    except ValueError:
+            return AnswerRequest(float(text), request_id)
+        if kind is RequestedType.BOOLEAN:
+            word = text.lower()
+            return AnswerRequest(word in _TRUE, request_id) if word in _TRUE | _FALSE else None
+        return AnswerRequest(text, request_id)
+    except (ValueError, ArgumentError):
         return None
-    if kind is RequestedType.BOOLEAN:
-        word = text.lower()
-        return True if word in _TRUE else False if word in _FALSE else None
-    return text

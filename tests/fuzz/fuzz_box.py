@@ -24,9 +24,15 @@ from protocol.rtde_messages import RequestProtocolVersion, SetupOutputs, Start
 from protocol.script_channel import MAX_LINE, MAX_PROGRAM
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.controller import commands as cmd
-from ur_emulator.controller import safety_commands as safe
-from ur_emulator.controller.hands import HangLoad, Push
+from ur_emulator.commands.power import PowerOn, ReleaseBrakes
+from ur_emulator.commands.programs import StartProgram, StopProgram
+from ur_emulator.commands.push import AttachPayload, Push
+from ur_emulator.commands.safety import (
+    ReleaseEmergencyStop,
+    RestartSafety,
+    SafeguardStop,
+    UnlockProtectiveStop,
+)
 from ur_emulator.servers.connection import OUTBOX_LIMIT
 from ur_emulator.servers.modbus_codec import ModbusCodec
 from ur_emulator.servers.modbus_server import MAX_INBOX
@@ -133,8 +139,8 @@ class FuzzBox:
         self.ports["modbus"]._loader.codec = ModbusCodec()
         for port in self.ports.values():
             self.served.attach(port)
-        self.served.attach(box._desk)
-        object.__setattr__(box._desk._around, "clock", lambda: self.now)
+        self.served.attach(box._operations)
+        box._operations._context.clock = lambda: self.now
         self.loop = FakeLoop()
         self.numbers = itertools.count(50_000)
         self.hostile = {name: {} for name in self.ports}
@@ -254,27 +260,27 @@ class FuzzBox:
                 wire.reset()
         self.turn()
         commands = [
-            safe.ReleaseEmergencyStop(),
-            safe.SafeguardStop(False),
-            cmd.StopProgram(),
+            ReleaseEmergencyStop(),
+            SafeguardStop(False),
+            StopProgram(),
             Push((0.0, 0.0, 0.0)),
-            HangLoad(0.0, (0.0, 0.0, 0.0)),
+            AttachPayload(0.0, (0.0, 0.0, 0.0)),
         ]
         self._order(20, *commands)
         if self.controller.snapshot.safety_mode == SafetyMode.PROTECTIVE_STOP:
             self._order(640)
-            self._order(20, cmd.UnlockProtectiveStop())
+            self._order(20, UnlockProtectiveStop())
         if self.controller.snapshot.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
-            self._order(200, cmd.RestartSafety())
-        self._order(300, cmd.PowerOn())
-        self._order(100, cmd.ReleaseBrakes())
+            self._order(200, RestartSafety())
+        self._order(300, PowerOn())
+        self._order(100, ReleaseBrakes())
         if not self.lively:  # a moved arm may stand where it cannot work
             now = self.controller.snapshot
             assert now.robot_mode == RobotMode.RUNNING, (
                 f"it cannot be repaired: {RobotMode(now.robot_mode).name}, {SafetyMode(now.safety_mode).name}, "
                 f"{[entry.text for entry in self.served.log.entries[-8:]]}"
             )
-            self._order(1, cmd.StartProgram(SIGN_OF_LIFE))
+            self._order(1, StartProgram(SIGN_OF_LIFE))
             assert self.controller.programs.latest.program is SIGN_OF_LIFE, "no program starts any more"
 
     def _order(self, n_cycles, *commands):

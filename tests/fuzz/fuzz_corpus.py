@@ -18,8 +18,8 @@ from protocol.rtde_messages import (
     TextMessage,
 )
 from protocol.ur_types import SoftwareVersion
+from ur_emulator.commands.parameters import Kind
 from ur_emulator.control.operations import OPERATIONS
-from ur_emulator.control.parameters import Kind
 
 VERSION = SoftwareVersion(3, 15, 8)
 # Words and operations by which something else than a program may move the arm.
@@ -148,8 +148,8 @@ def _argument(rng, parameter):
 
 
 def control_message(rng, lively):
-    usable = [o for o in OPERATIONS if lively or o.name not in MOVING_OPERATIONS]
-    operation = rng.choice(usable)
+    name = rng.choice([name for name in OPERATIONS if lively or name not in MOVING_OPERATIONS])
+    operation = OPERATIONS[name]
     arguments = {
         p.name: _argument(rng, p) for p in operation.parameters if p.is_required or rng.random() < 0.5
     }
@@ -157,13 +157,13 @@ def control_message(rng, lively):
     if operation.only_reads and rng.random() < 0.8:
         query = "&".join(f"{k}={v}" for k, v in arguments.items() if v is not None)
         query = "".join(c if 32 < ord(c) < 127 else "%20" for c in query)
-        return f"GET /v1/{operation.name}?{query} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode()
+        return f"GET /v1/{name}?{query} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode()
     body = json.dumps(arguments).encode()
     extra = rng.choice(("", "", "", "Expect: 100-continue\r\n", "Connection: close\r\n"))
     if rng.random() < 0.2:
-        head = f"POST /v1/{operation.name} HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\n{extra}Transfer-Encoding: chunked\r\n\r\n"
+        head = f"POST /v1/{name} HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\n{extra}Transfer-Encoding: chunked\r\n\r\n"
         return head.encode() + b"%x\r\n%s\r\n0\r\n\r\n" % (len(body), body)
-    head = f"POST /v1/{operation.name} HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\n{extra}Content-Length: {len(body)}\r\n\r\n"
+    head = f"POST /v1/{name} HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\n{extra}Content-Length: {len(body)}\r\n\r\n"
     return head.encode() + body
 
 

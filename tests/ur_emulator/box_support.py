@@ -8,7 +8,7 @@ from protocol.frame_buffer import FrameBuffer
 from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
 from protocol.realtime_layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.controller.commands import StartProgram
+from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name

@@ -16,19 +16,29 @@ push 0 0 -20          push the flange, base axes, N; zeros end it
 
 from ast import literal_eval
 
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.commands.operator import AnswerRequest, ClosePopup
+from ur_emulator.commands.power import PowerOff
+from ur_emulator.commands.programs import (
+    PauseProgram,
+    ResumeProgram,
+    SetSpeedSlider,
+    StartProgram,
+    StopProgram,
+)
+from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.controller.io import CONFIGURABLE_SHIFT, TOOL_SHIFT
 from urscript import compile_program
 
 _SHIFTS = {"c": CONFIGURABLE_SHIFT, "t": TOOL_SHIFT}
 _PLAIN = {
-    "stop": "StopProgram",
-    "unlock": "UnlockProtectiveStop",
-    "power_off": "PowerOff",
-    "close_popup": "ClosePopup",
-    "protective_stop": "TriggerProtectiveStop",
-    "pause": "PauseProgram",
-    "resume": "ResumeProgram",
+    "stop": StopProgram,
+    "unlock": UnlockProtectiveStop,
+    "power_off": PowerOff,
+    "close_popup": ClosePopup,
+    "protective_stop": TriggerProtectiveStop,
+    "pause": PauseProgram,
+    "resume": ResumeProgram,
 }
 
 
@@ -50,7 +60,7 @@ def act(bench, catalogue, action):
             state.io.euromap.inputs = state.io.euromap.inputs & ~mask | mask * (level == "high")
         case "write":
             name, value = rest.split(" ", 1)
-            return [cmd.WriteInputs(((name, literal_eval(value)),))]
+            return [WriteInputs(((name, literal_eval(value)),))]
         case "send":
             index, text = rest.split(" ", 1) if rest[0].isdigit() else ("-1", rest)
             bench.network.sockets[int(index)].receive(literal_eval(text).encode("latin-1"))
@@ -66,16 +76,16 @@ def act(bench, catalogue, action):
             kind, address, value = map(int, rest.split())
             bench.network.modbus_memory[kind, address] = value
         case "run":
-            return [cmd.StartProgram(compile_program(rest, catalogue=catalogue))]
+            return [StartProgram(compile_program(rest, catalogue=catalogue))]
         case "answer":
-            return [cmd.AnswerRequest(literal_eval(rest))]
+            return [AnswerRequest(literal_eval(rest))]
         case "slider":
-            return [cmd.SetSpeedSlider(float(rest))]
+            return [SetSpeedSlider(float(rest))]
         case "push":
             bench.controller.plant.push([float(x) for x in rest.split()])
         case _:
             assert action in _PLAIN, f"there is no action {action!r}"
-            return [getattr(cmd, _PLAIN[action])()]
+            return [_PLAIN[action]()]
     return []
 
 

@@ -7,7 +7,7 @@ Nothing comes within the cycle in which it is asked for.
 from box_support import Bench, FakeNetwork
 
 from protocol.script_channel import ControlLine, ProgramText, ScriptChannel
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.programs import StartProgram, StopProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
@@ -130,11 +130,11 @@ class Box(Bench):
             match item:
                 case ProgramText(text):
                     try:
-                        self.tick(1, cmd.StartProgram(compile_program(text, catalogue=self._catalogue)))
+                        self.tick(1, StartProgram(compile_program(text, catalogue=self._catalogue)))
                     except ScriptError as error:
                         self.compile_errors.append(error)
                 case ControlLine(word="stop program"):
-                    self.tick(1, cmd.StopProgram())
+                    self.tick(1, StopProgram())
 
     def run_until(self, condition, limit=30_000):
         """Tick until `condition(box)` holds."""

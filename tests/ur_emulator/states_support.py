@@ -7,8 +7,18 @@ from protocol.primary_packages import decode_package, encode_state
 from protocol.realtime_layout import layout_for_version
 from protocol.rtde_types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.controller import commands as cmd
-from ur_emulator.controller import safety_commands as safe
+from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.commands.safety import (
+    PressEmergencyStop,
+    ReducedMode,
+    ReleaseEmergencyStop,
+    RestartSafety,
+    SafeguardStop,
+    TriggerFault,
+    TriggerProtectiveStop,
+    TriggerViolation,
+    UnlockProtectiveStop,
+)
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.controller.port_map import read_coil, read_register
 from ur_emulator.controller.safety_modes import SafetyEvent
@@ -24,20 +34,20 @@ BRAKING = 150  # cycles, more than any arm needs to come to rest and lose its po
 
 # How each event is made to happen from outside, where it can be.
 COMMANDS = {
-    SafetyEvent.PROTECTIVE_STOP: cmd.TriggerProtectiveStop(),
-    SafetyEvent.UNLOCK: cmd.UnlockProtectiveStop(),
-    SafetyEvent.SAFEGUARD_OPENED: safe.SafeguardStop(True),
-    SafetyEvent.SAFEGUARD_RESTORED: safe.SafeguardStop(False),
-    SafetyEvent.ROBOT_EMERGENCY_PRESSED: safe.PressEmergencyStop("robot"),
-    SafetyEvent.SYSTEM_EMERGENCY_PRESSED: safe.PressEmergencyStop("system"),
-    SafetyEvent.ROBOT_EMERGENCY_RELEASED: safe.ReleaseEmergencyStop(),
-    SafetyEvent.SYSTEM_EMERGENCY_RELEASED: safe.ReleaseEmergencyStop(),
-    SafetyEvent.REDUCED_ON: safe.ReducedMode(True),
-    SafetyEvent.REDUCED_OFF: safe.ReducedMode(False),
-    SafetyEvent.VIOLATION: safe.TriggerViolation(),
-    SafetyEvent.FAULT: safe.TriggerFault(),
-    SafetyEvent.RESTART: cmd.RestartSafety(),
-    SafetyEvent.POWERED_OFF: cmd.PowerOff(),
+    SafetyEvent.PROTECTIVE_STOP: TriggerProtectiveStop(),
+    SafetyEvent.UNLOCK: UnlockProtectiveStop(),
+    SafetyEvent.SAFEGUARD_OPENED: SafeguardStop(True),
+    SafetyEvent.SAFEGUARD_RESTORED: SafeguardStop(False),
+    SafetyEvent.ROBOT_EMERGENCY_PRESSED: PressEmergencyStop("robot"),
+    SafetyEvent.SYSTEM_EMERGENCY_PRESSED: PressEmergencyStop("system"),
+    SafetyEvent.ROBOT_EMERGENCY_RELEASED: ReleaseEmergencyStop(),
+    SafetyEvent.SYSTEM_EMERGENCY_RELEASED: ReleaseEmergencyStop(),
+    SafetyEvent.REDUCED_ON: ReducedMode(True),
+    SafetyEvent.REDUCED_OFF: ReducedMode(False),
+    SafetyEvent.VIOLATION: TriggerViolation(),
+    SafetyEvent.FAULT: TriggerFault(),
+    SafetyEvent.RESTART: RestartSafety(),
+    SafetyEvent.POWERED_OFF: PowerOff(),
 }
 # The event that leads from NORMAL into a mode.
 WAY_IN = {
@@ -72,10 +82,10 @@ def failures(bench):
 
 def power_up(bench):
     """What a client does after an emergency stop."""
-    bench.tick(1, cmd.PowerOn())
+    bench.tick(1, PowerOn())
     bench.tick(200)
     assert bench.now.robot_mode == RobotMode.IDLE
-    bench.tick(1, cmd.ReleaseBrakes())
+    bench.tick(1, ReleaseBrakes())
     bench.tick(60)
     return bench.now
 

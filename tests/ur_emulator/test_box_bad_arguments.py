@@ -6,7 +6,9 @@ import pytest
 from chunk_bench import ChunkBench
 from chunk_marks import BoxChunk
 
-from ur_emulator.controller.commands import ReleaseBrakes, StartProgram, StopProgram, UnlockProtectiveStop
+from ur_emulator.commands.power import ReleaseBrakes
+from ur_emulator.commands.programs import StartProgram, StopProgram
+from ur_emulator.commands.safety import UnlockProtectiveStop
 from urscript import compile_program
 from urscript.builtins import PURE
 from urscript.catalogue import CB3_3_15

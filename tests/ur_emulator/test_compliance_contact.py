@@ -6,7 +6,9 @@ from compliance_support import DOWN, TABLE, above_table, failures, place, push, 
 from plant_support import HOME, hold, target
 
 from protocol.ur_types import ControlMode, SafetyMode
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.commands.programs import StopProgram
+from ur_emulator.commands.safety import UnlockProtectiveStop
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
 from ur_emulator.models.ur3 import UR3
 from ur_emulator.plant.plant import Plant
@@ -34,7 +36,7 @@ def test_after_a_protective_stop_on_the_table_the_arm_can_be_moved_away():
     bench = above_table(f"  movel({DEEP}, v=0.25)", z=0.1)
     bench.tick(300)
     bench.tick(650)
-    bench.tick(1, cmd.StopProgram(), cmd.UnlockProtectiveStop())
+    bench.tick(1, StopProgram(), UnlockProtectiveStop())
     bench.events.clear()
     bench.start("def up():\n  movel(pose_add(get_target_tcp_pose(), p[0,0,0.1,0,0,0]), v=0.1)\nend\n")
     bench.tick(300)
@@ -212,7 +214,7 @@ def test_another_sensor_begins_without_zero_and_past():
     )
     bench.tick(100)
     for _ in range(60):
-        bench.tick(1, cmd.WriteInputs((("external_force_torque", (0.0, 0.0, 40.0, 0.0, 0.0, 0.0)),)))
+        bench.tick(1, WriteInputs((("external_force_torque", (0.0, 0.0, 40.0, 0.0, 0.0, 0.0)),)))
     assert np.hypot.reduce(bench.now.actual_tcp_force[:3]) == pytest.approx(40.0)
     # The first reading was there before the first cycle with the sensor was over: no contact came.
     assert set(said(bench)) == {"0"}

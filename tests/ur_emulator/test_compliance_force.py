@@ -5,7 +5,9 @@ import pytest
 from compliance_support import TABLE, above_table, failures, place, push, reported, said, truth
 
 from protocol.ur_types import ControlMode
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.power import PowerOff
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
+from ur_emulator.commands.safety import TriggerProtectiveStop
 
 BASE = "p[0,0,0,0,0,0]"
 LIMITS = "[0.05,0.05,0.05,0.2,0.2,0.2]"
@@ -276,13 +278,13 @@ def test_it_ends_with_the_program_and_with_every_stop(end):
     assert bench.now.control_mode == ControlMode.FORCE
     match end:
         case "stop":
-            bench.tick(1, cmd.StopProgram())
+            bench.tick(1, StopProgram())
         case "by itself":
             bench.tick(120)
         case "protective stop":
-            bench.tick(1, cmd.TriggerProtectiveStop())
+            bench.tick(1, TriggerProtectiveStop())
         case "power off":
-            bench.tick(1, cmd.PowerOff())
+            bench.tick(1, PowerOff())
         case "replaced":
             bench.start("def g():\n  sleep(100)\nend\n")
     bench.tick(60)
@@ -327,12 +329,12 @@ def test_is_steady_is_false_meanwhile():
 def test_a_pause_holds_the_arm_and_the_force():
     bench = above_table(pressing(20) + "  sleep(100)")
     bench.tick(600)
-    bench.tick(1, cmd.PauseProgram())
+    bench.tick(1, PauseProgram())
     bench.tick(50)
     forces, places = truth(bench, 100)
     assert np.ptp(places[:, 2]) < 1e-5
     assert np.ptp(forces[:, 2]) < 1.0
-    bench.tick(1, cmd.ResumeProgram())
+    bench.tick(1, ResumeProgram())
     forces, _ = truth(bench, 300)
     assert forces[-100:, 2].mean() == pytest.approx(20.0, rel=0.1)
 

@@ -6,9 +6,12 @@ from box_support import Bench
 from compliance_support import above_table, failures, place, push, reported, said, truth
 
 from protocol.ur_types import ControlMode, ProgramState, SafetyMode
-from ur_emulator.controller import commands as cmd
-from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
-from ur_emulator.errors import PlantError
+from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.commands.power import PowerOff, ReleaseBrakes, StartFreedrive
+from ur_emulator.commands.programs import StartProgram, StopProgram
+from ur_emulator.commands.push import AttachPayload, Push
+from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.errors import ArgumentError
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 
@@ -145,7 +148,7 @@ def test_it_ends_with_the_program(end):
     bench.tick(50)
     assert bench.now.control_mode == ControlMode.TEACH
     if end == "stop":
-        bench.tick(1, cmd.StopProgram())
+        bench.tick(1, StopProgram())
     else:
         bench.tick(80)
     bench.tick(2)
@@ -204,24 +207,24 @@ def test_an_input_register_guides_too_and_also_without_a_program():
     bench = above_table('  set_gp_boolean_input_action(70, "freedrive")', z=0.2)
     bench.tick(5)
     assert bench.now.runtime_state == ProgramState.STOPPED
-    bench.tick(1, cmd.WriteInputs((("input_bit_register_70", True),)))
+    bench.tick(1, WriteInputs((("input_bit_register_70", True),)))
     bench.tick(1)
     assert bench.now.control_mode == ControlMode.TEACH
-    bench.tick(1, cmd.WriteInputs((("input_bit_register_70", False),)))
+    bench.tick(1, WriteInputs((("input_bit_register_70", False),)))
     bench.tick(1)
     assert bench.now.control_mode == ControlMode.POSITION
 
 
 def test_the_words_of_a_client_guide_and_hold():
     bench = Bench()
-    bench.tick(1, GuideByHand())
+    bench.tick(1, StartFreedrive())
     assert bench.now.control_mode == ControlMode.TEACH
     bench.start("def f():\n  sleep(0.1)\nend\n")
     bench.tick(30)
     assert bench.now.control_mode == ControlMode.TEACH  # it does not end with a program
-    bench.tick(1, cmd.ReleaseBrakes())
+    bench.tick(1, ReleaseBrakes())
     assert bench.now.control_mode == ControlMode.POSITION
-    bench.tick(1, GuideByHand(), cmd.PowerOff())
+    bench.tick(1, StartFreedrive(), PowerOff())
     bench.tick(2)
     assert bench.now.control_mode == ControlMode.POSITION
 
@@ -243,7 +246,7 @@ def test_near_the_end_of_its_range_a_joint_pushes_back_and_beyond_it_the_arm_sto
     bench.tick(100)
     assert np.all(np.array(bench.now.actual_qd) == 0.0)
     # Outside, it may be guided back.
-    bench.tick(700, cmd.UnlockProtectiveStop())
+    bench.tick(700, UnlockProtectiveStop())
     bench.events.clear()
     bench.start("def f():\n  freedrive_mode()\n  sleep(100)\nend\n")
     push(bench, *(-20.0 * turn))
@@ -270,7 +273,7 @@ def test_a_protective_stop_takes_the_arm_from_the_hand():
     bench = above_table(FREE, z=0.2)
     push(bench, 0.0, 15.0, 0.0)
     bench.tick(60)
-    bench.tick(1, cmd.TriggerProtectiveStop())
+    bench.tick(1, TriggerProtectiveStop())
     bench.tick(60)
     assert np.abs(bench.controller.plant.qd_true).max() < 1e-3
     assert bench.now.control_mode == ControlMode.POSITION
@@ -288,7 +291,7 @@ def test_the_table_stops_a_guided_arm():
 
 def test_time_passes_in_lockstep_as_long_as_a_hand_moves_the_arm():
     bench = Bench()
-    bench.tick(1, GuideByHand())
+    bench.tick(1, StartFreedrive())
     bench.tick(100)
     assert not bench.controller.is_active
     bench.tick(1, Push((0.0, 15.0, 0.0)))
@@ -310,19 +313,22 @@ def test_two_equal_guidings_are_equal_to_the_last_bit():
     "force", [(0.0, 0.0, float("nan")), (1e9, 0.0, 0.0), (200.0, 200.0, 0.0), (1.0, 2.0)]
 )
 def test_no_hand_pushes_like_that(force):
-    with pytest.raises(PlantError, match="together at most 250 N"):
+    with pytest.raises(ArgumentError, match="together at most 250 N"):
         Push(force)
 
 
-@pytest.mark.parametrize(("mass", "cog"), [(-1.0, (0, 0, 0)), (float("nan"), (0, 0, 0)), (1.0, (9, 0, 0))])
-def test_no_load_is_like_that(mass, cog):
-    with pytest.raises(PlantError, match="load"):
-        HangLoad(mass, cog)
+@pytest.mark.parametrize(
+    ("mass", "cog", "what"),
+    [(-1.0, (0, 0, 0), "mass"), (float("nan"), (0, 0, 0), "mass"), (1.0, (9, 0, 0), "cog")],
+)
+def test_no_load_is_like_that(mass, cog, what):
+    with pytest.raises(ArgumentError, match=f"^{what} .* given: allowed is"):
+        AttachPayload(mass, cog)
 
 
 def test_a_load_can_be_hung_by_command():
     bench = above_table("  sleep(100)", z=0.25, fidelity="ideal")
-    bench.tick(1, HangLoad(1.0))
+    bench.tick(1, AttachPayload(1.0))
     bench.tick(100)
     assert bench.now.actual_tcp_force[2] == pytest.approx(-9.81, abs=0.5)
     assert failures(bench) == []
@@ -342,7 +348,7 @@ def test_the_form_of_the_e_series_frees_all_axes_or_says_that_it_cannot_block_an
     ):
         bench = Bench()
         program = compile_program(f"def f():\n  {call}\n  sleep(1)\nend\n", catalogue=catalogue_for("5.11"))
-        bench.tick(1, cmd.StartProgram(program))
+        bench.tick(1, StartProgram(program))
         bench.tick(5)
         assert bench.now.control_mode == mode
         assert failures(bench) == text

@@ -9,8 +9,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from protocol.ur_types import ControlMode, RobotMode
-from ur_emulator.controller import commands as cmd
-from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
+from ur_emulator.commands.power import PowerOff, ReleaseBrakes, StartFreedrive
+from ur_emulator.commands.programs import (
+    PauseProgram,
+    ResumeProgram,
+    SetSpeedSlider,
+    StartProgram,
+    StopProgram,
+)
+from ur_emulator.commands.push import AttachPayload, Push
+from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.motion.overlay import Frozen
 from urscript import compile_program
 
@@ -56,18 +64,18 @@ event = st.one_of(
     st.builds(
         lambda x, y, z: Push((80 * x, 80 * y, 80 * z), (0.1 * x, 0.1 * z, 0.1 * y)), number, number, number
     ),
-    st.builds(HangLoad, st.floats(0.0, 3.0)),
+    st.builds(AttachPayload, st.floats(0.0, 3.0)),
     st.sampled_from(
         [
-            GuideByHand(),
-            cmd.StopProgram(),
-            cmd.PauseProgram(),
-            cmd.ResumeProgram(),
-            cmd.TriggerProtectiveStop(),
-            cmd.UnlockProtectiveStop(),
-            cmd.ReleaseBrakes(),
-            cmd.PowerOff(),
-            cmd.SetSpeedSlider(0.3),
+            StartFreedrive(),
+            StopProgram(),
+            PauseProgram(),
+            ResumeProgram(),
+            TriggerProtectiveStop(),
+            UnlockProtectiveStop(),
+            ReleaseBrakes(),
+            PowerOff(),
+            SetSpeedSlider(0.3),
             "input",
         ]
     ),
@@ -84,14 +92,14 @@ def test_nothing_breaks_a_compliant_arm(events, seed):
         if what == "input":
             state.io.digital_in ^= 1
         else:
-            command = cmd.StartProgram(compile_program(what)) if isinstance(what, str) else what
+            command = StartProgram(compile_program(what)) if isinstance(what, str) else what
             bench.tick(1, command)
         bench.tick(cycles)
         assert all(
             map(math.isfinite, (*bench.now.actual_q, *bench.now.target_q, *bench.now.actual_tcp_force))
         )
     state.io.digital_in = 0
-    bench.tick(1, cmd.StopProgram(), cmd.ReleaseBrakes(), Push((0.0, 0.0, 0.0)))
+    bench.tick(1, StopProgram(), ReleaseBrakes(), Push((0.0, 0.0, 0.0)))
     bench.tick(400)
     assert bench.now.control_mode == ControlMode.POSITION
     assert state.mode.mode is RobotMode.RUNNING

@@ -8,14 +8,14 @@ from box_support import Bench, connect
 from control_support import control_box
 
 from ur_emulator import ControlBox
-from ur_emulator.controller.commands import Push, StopProgram
-from ur_emulator.controller.wires import SetAnalogInput, SetDigitalInput
+from ur_emulator.commands.inputs import SetAnalogInput, SetDigitalInput
+from ur_emulator.commands.programs import StopProgram
+from ur_emulator.commands.push import Push
 from ur_emulator.errors import (
     ArgumentError,
     ControlError,
     EmulatorError,
     NotRunningError,
-    PlantError,
     RefusedError,
     WaitTimeoutError,
 )
@@ -182,7 +182,7 @@ def test_the_last_push_counts():
 
 @pytest.mark.parametrize("duration", [-1.0, float("nan"), float("inf"), 1e9])
 def test_an_absurd_duration_is_refused(duration):
-    with pytest.raises(PlantError):
+    with pytest.raises(ArgumentError, match=r"duration .* given: allowed is 0 to 600 s"):
         Push((1.0, 0.0, 0.0), duration=duration)
 
 
@@ -230,6 +230,17 @@ def test_an_obstacle_cannot_be_put_into_the_arm_nor_be_absurd(box):
     with pytest.raises(ArgumentError, match="six numbers"):
         box.add_obstacle("ball", "sphere", (0.1,), (1, 0, 0))
     assert box.state.obstacles == ()
+
+
+def test_what_a_program_prints_refuses_nothing(box):
+    lines = ["obstacle box: hello", "play failed: hello", "program loop not started: hello"]
+    printed = "".join(f'    textmsg("{line}")\n' for line in lines)
+    box.run_program(f"def loop():\n  while True:\n{printed}    sync()\n  end\nend\n")
+    box.add_obstacle("box", "box", (0.1, 0.1, 0.1), (1, 0, 0, 0, 0, 0))
+    assert box.state.obstacles == ("box",)
+    with pytest.raises(RefusedError, match=r"^obstacle box: the arm is where it should stand"):
+        box.add_obstacle("box", "sphere", (0.2,), (*box.state.tcp_pose[:3], 0, 0, 0))
+    assert "obstacle box: the arm is where it should stand, move one of them" in [e.text for e in box.log]
 
 
 # --- safety and power

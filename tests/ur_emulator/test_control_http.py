@@ -8,8 +8,8 @@ import struct
 import pytest
 from control_support import Http, control_box
 
+from ur_emulator.control.http_port import MAX_BODY, MAX_CLIENTS, MAX_HEADER
 from ur_emulator.control.operations import OPERATIONS
-from ur_emulator.servers.control_port import MAX_BODY, MAX_CLIENTS, MAX_HEADER
 
 JSON = "Content-Type: application/json"
 
@@ -51,7 +51,7 @@ def test_the_state_is_that_of_the_box(box, http):
 def test_operations_describe_themselves(http):
     status, table = http.ask("GET", "/v1/operations")
     assert status == 200
-    assert [row["name"] for row in table["operations"]] == [operation.name for operation in OPERATIONS]
+    assert [row["name"] for row in table["operations"]] == list(OPERATIONS)
 
 
 def test_an_operation_is_done_when_it_is_answered(box, http):
@@ -185,7 +185,7 @@ def test_a_body_must_say_that_it_is_json(http):
         "[::1]",
     ],
 )
-def test_a_name_that_was_bent_to_this_machine_is_refused(http, host):
+def test_a_foreign_name_that_resolves_to_this_machine_is_refused(http, host):
     status, answer = http.ask("POST", "/v1/power_off", {}, host=host)
     assert status == 403
     assert "host" in answer["error"]
@@ -345,7 +345,7 @@ def test_who_goes_while_it_waits_is_forgotten(box):
     with Http(box) as http:
         for _ in range(1000):
             assert http.ask("GET", "/v1/state")[0] == 200
-            if not box._desk._jobs:
+            if not box._operations._jobs:
                 return
     raise AssertionError("they are waited for still")
 

@@ -1,56 +1,59 @@
-"""The table of operations, and everything that must follow it: methods, actions, page, JSON."""
+"""The operations, and everything that follows from their dataclasses: methods, checks, page, JSON."""
 
 import inspect
 import json
 import math
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ur_emulator.control.box_operations import BoxOperations
-from ur_emulator.control.conditions import CONDITIONS
-from ur_emulator.control.operations import BY_NAME, OPERATIONS, describe
+from ur_emulator.commands.obstacles import SIZES
+from ur_emulator.commands.parameters import Kind
+from ur_emulator.control.operations import OPERATIONS, BoxOperations, Reading, describe, make
 from ur_emulator.control.page import render
-from ur_emulator.control.parameters import Kind
+from ur_emulator.control.waiting import CONDITIONS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ArgumentError
+from ur_emulator.plant.obstacles import SHAPES
 
 ROOT = Path(__file__).parents[2]
-EVERY = pytest.mark.parametrize("operation", OPERATIONS, ids=lambda operation: operation.name)
+EVERY = pytest.mark.parametrize("name", OPERATIONS)
 # A value of each kind that must fit, beside ranges.
 FITTING = {Kind.BOOLEAN: True, Kind.TEXT: "text", Kind.SCRIPT: "text", Kind.ANSWER: 7}
 
 
 def fitting(parameter):
     if parameter.kind is Kind.CHOICE:
-        return parameter.choices[-1]
+        return parameter.choices[0]
     if parameter.kind is Kind.VECTOR:
         return (0.1,) * parameter.lengths[1]
     return FITTING.get(parameter.kind, 1 if parameter.high is None else parameter.high)
 
 
 @EVERY
-def test_an_operation_that_acts_is_a_method_with_the_same_parameters_and_meaning(operation):
-    method = getattr(ControlBox, operation.name)
+def test_an_operation_that_acts_is_a_method_with_its_parameters_and_its_sentence(name):
+    operation, method = OPERATIONS[name], getattr(ControlBox, name)
+    assert inspect.getdoc(method).splitlines()[0] == operation.meaning
     if operation.only_reads:
-        assert isinstance(method, property)
+        assert isinstance(method, Reading)
         return
+    assert method.__name__ == name
     parameters = list(inspect.signature(method).parameters.values())[1:]
     assert [p.name for p in parameters] == [p.name for p in operation.parameters]
     for mine, row in zip(parameters, operation.parameters, strict=True):
-        # Left out in both, or the same default; run_program decides between its two by leaving one out.
         assert (mine.default is inspect.Parameter.empty) == row.is_required
         if not row.is_required:
             assert mine.default == row.default
-    assert inspect.getdoc(method).splitlines()[0] == operation.meaning
+        assert f"\n    {row.name}: {row.meaning} ({row.allowed})." in method.__doc__
 
 
 @EVERY
-def test_a_method_hands_all_its_arguments_on(operation):
+def test_a_method_hands_all_its_arguments_on(name):
     asked = {}
 
     class Recorder(BoxOperations):
@@ -58,41 +61,46 @@ def test_a_method_hands_all_its_arguments_on(operation):
             asked[name] = arguments
             return {"tick": 3}
 
+    operation = OPERATIONS[name]
     values = {p.name: fitting(p) for p in operation.parameters}
     if operation.only_reads:
         return
-    getattr(Recorder(), operation.name)(**values)
-    assert asked == {operation.name: values}
+    assert getattr(Recorder(), name)(**values) == 3
+    assert asked == {name: values}
 
 
 def test_no_method_is_without_an_operation():
-    public = {name for name in vars(BoxOperations) if not name.startswith("_")}
-    assert public == set(BY_NAME) - {"log"}  # the log is read without the loop
+    assert {name for name in vars(BoxOperations) if not name.startswith("_")} == set(OPERATIONS)
 
 
 def test_conditions_are_those_of_wait_until():
-    names = {p.name for p in BY_NAME["wait_until"].parameters}
+    names = {p.name for p in OPERATIONS["wait_until"].parameters}
     assert names == set(CONDITIONS) | {"log", "after", "timeout"}
 
 
+def test_the_shapes_of_obstacles_are_those_of_the_plant():
+    assert list(SIZES) == list(SHAPES)
+
+
 @EVERY
-def test_what_fits_is_taken_and_defaults_are_filled_in(operation):
+def test_what_fits_is_taken_and_defaults_are_filled_in(name):
+    operation = OPERATIONS[name]
     required = {p.name: fitting(p) for p in operation.parameters if p.is_required}
-    checked = operation.check(required)
-    assert list(checked) == [p.name for p in operation.parameters]
+    assert list(asdict(make(name, required))) == [p.name for p in operation.parameters]
     everything = {p.name: fitting(p) for p in operation.parameters}
-    assert operation.check(everything) == everything
+    assert asdict(make(name, everything)) == everything
 
 
 @EVERY
-def test_what_is_missing_or_unknown_is_named(operation):
+def test_what_is_missing_or_unknown_is_named(name):
+    rows = OPERATIONS[name].parameters
     with pytest.raises(ArgumentError, match="no parameter 'colour'"):
-        operation.check({p.name: fitting(p) for p in operation.parameters} | {"colour": 1})
-    for parameter in operation.parameters:
+        make(name, {p.name: fitting(p) for p in rows} | {"colour": 1})
+    for parameter in rows:
         if parameter.is_required:
-            others = {p.name: fitting(p) for p in operation.parameters if p is not parameter}
-            with pytest.raises(ArgumentError, match=f"{operation.name} needs {parameter.name}"):
-                operation.check(others)
+            others = {p.name: fitting(p) for p in rows if p is not parameter}
+            with pytest.raises(ArgumentError, match=f"{name} needs {parameter.name}"):
+                make(name, others)
 
 
 ODD = st.recursive(
@@ -103,8 +111,8 @@ ODD = st.recursive(
 
 @EVERY
 @given(data=st.data())
-def test_whatever_comes_fits_or_is_refused_in_one_line(operation, data):
-    for parameter in operation.parameters:
+def test_whatever_comes_fits_or_is_refused_in_one_line(name, data):
+    for parameter in OPERATIONS[name].parameters:
         value = data.draw(ODD)
         try:
             checked = parameter.check(value)
@@ -146,14 +154,14 @@ def test_whatever_comes_fits_or_is_refused_in_one_line(operation, data):
     ],
 )
 def test_words_of_a_command_line_become_values(operation, name, text, value):
-    parameter = {p.name: p for p in BY_NAME[operation].parameters}[name]
+    parameter = {p.name: p for p in OPERATIONS[operation].parameters}[name]
     parsed = parameter.parse(text)
     assert (parsed, type(parsed)) == (value, type(value))
 
 
 def test_the_table_is_json():
     rows = json.loads(json.dumps(describe(), allow_nan=False))
-    assert [row["name"] for row in rows] == [operation.name for operation in OPERATIONS]
+    assert [row["name"] for row in rows] == list(OPERATIONS)
     assert all(row["meaning"].endswith(".") for row in rows)
 
 

@@ -7,7 +7,9 @@ import pytest
 from box_support import Bench
 
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.power import PowerOff, ReleaseBrakes
+from ur_emulator.commands.programs import SetSpeedSlider, StartProgram, StopProgram
+from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
@@ -77,7 +79,7 @@ def test_when_a_program_is_stopped_the_arm_ramps_to_rest(bench):
     assert bench.now.target_qd[0] == pytest.approx(0.2)
     before = bench.now.target_qd[0]
     states = []
-    bench.tick(1, cmd.StopProgram())
+    bench.tick(1, StopProgram())
     while bench.now.target_qd[0] > 0:
         assert before - bench.now.target_qd[0] <= bench.controller.state.robot.stop_deceleration * 0.008 * (
             1 + 1e-9
@@ -98,7 +100,7 @@ def test_stopping_a_program_also_stops_a_move_that_it_has_left_behind(bench):
     while not [e for e in bench.events if type(e).__name__ == "TextPrinted"]:
         bench.tick()
     assert bench.now.target_qd[0] > 0.1
-    bench.tick(1, cmd.StopProgram())
+    bench.tick(1, StopProgram())
     bench.tick(20)
     assert bench.now.target_qd == (0.0,) * 6
     assert bench.now.target_q[0] < 1.39
@@ -158,13 +160,13 @@ def test_a_velocity_beyond_the_joint_limit_is_a_protective_stop(bench):
 
 
 def test_nothing_runs_in_a_protective_stop_until_it_is_unlocked(bench):
-    bench.tick(1, cmd.TriggerProtectiveStop())
+    bench.tick(1, TriggerProtectiveStop())
     bench.tick(2)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
     bench.start(SPIN)
     bench.tick(20)
     assert bench.now.target_qd == (0.0,) * 6
-    bench.tick(1, cmd.UnlockProtectiveStop())
+    bench.tick(1, UnlockProtectiveStop())
     bench.start(SPIN)
     bench.tick(20)
     assert bench.now.target_qd[0] > 0
@@ -179,12 +181,12 @@ def test_a_blocked_arm_stops_itself_and_drops_its_target(bench):
 
 def test_power_cycle_passes_through_the_modes():
     bench = Bench(mode=RobotMode.POWER_OFF)
-    bench.tick(1, cmd.ReleaseBrakes())
+    bench.tick(1, ReleaseBrakes())
     modes = [bench.tick().robot_mode for _ in range(300)]
     order = list(dict.fromkeys(modes))
     assert order[-3:] == [RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING]
     q = bench.now.actual_q
-    bench.tick(1, cmd.PowerOff())
+    bench.tick(1, PowerOff())
     bench.tick(50)
     assert bench.now.robot_mode == RobotMode.POWER_OFF
     assert np.abs(np.subtract(bench.now.actual_q, q)).max() < 1e-3
@@ -253,7 +255,7 @@ def test_registers_outlive_programs(bench):
 
 
 def test_speed_slider_slows_a_move(bench):
-    bench.tick(1, cmd.SetSpeedSlider(0.5))
+    bench.tick(1, SetSpeedSlider(0.5))
     bench.run("def m():\n  movej([0.5,-1.5,-1.8,0,1.2,1.5], a=1.4, v=0.4)\nend\n")
     assert max(abs(x) for s in bench.snapshots for x in s.target_qd) == pytest.approx(0.2)
     assert bench.now.target_speed_fraction == 0.5
@@ -261,9 +263,7 @@ def test_speed_slider_slows_a_move(bench):
 
 
 def test_a_name_that_is_only_declared_says_so_when_it_is_called(bench):
-    bench.tick(
-        1, cmd.StartProgram(compile_program("screw_driving(10, 0.1)", catalogue=catalogue_for("5.11")))
-    )
+    bench.tick(1, StartProgram(compile_program("screw_driving(10, 0.1)", catalogue=catalogue_for("5.11"))))
     bench.tick(2)
     assert "declared only" in texts(bench.events)[0]
 

@@ -9,7 +9,7 @@ from dashboard_support import Dashboard, write_programs
 from protocol.dashboard_commands import COMMANDS, match_command
 from protocol.primary_messages import PopupMessage
 from protocol.ur_types import RobotMode, SoftwareVersion
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.emulator import ControlBox
 
 
@@ -32,7 +32,7 @@ def dashboard(box):
 
 
 def protective_stop(box, dashboard, folder):
-    box.submit(cmd.TriggerProtectiveStop())
+    box.submit(TriggerProtectiveStop())
     dashboard.until("safetymode", "Safetymode: PROTECTIVE_STOP")
 
 

@@ -8,8 +8,8 @@ from box_support import Bench
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.controller import port_map, port_map_page
-from ur_emulator.controller.commands import TriggerProtectiveStop
 from ur_emulator.controller.port_map import COILS, REGISTERS, PortAddressError
 
 BENCH = Bench()

@@ -10,7 +10,7 @@ from box_support import FakeNetwork, connect
 from pc_client.kinematics.robot_model import robot_model
 from protocol.ur_types import parse_serial
 from ur_emulator import ControlBox
-from ur_emulator.controller.commands import StartProgram
+from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.fidelity import FIDELITIES

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from motion_support import DT, HOME, START, TOOL, at, line
 
 from protocol.pose import pose_inv, pose_trans
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.programs import StopProgram
 from ur_emulator.controller.encoders import RANGES, Encoder
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.motion.arm_motion import ArmMotion
@@ -181,7 +181,7 @@ def test_tracking_ends_with_the_program(bench, how):
     )
     bench.tick(120)
     if how == "stop":
-        bench.tick(1, cmd.StopProgram())
+        bench.tick(1, StopProgram())
     bench.tick(30)
     assert bench.now.target_qd == (0.0,) * 6
     assert bench.now.target_tcp_pose[1] > -0.2

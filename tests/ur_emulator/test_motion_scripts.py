@@ -6,7 +6,7 @@ from box_support import Bench
 
 from protocol.pose import pose_trans
 from protocol.ur_types import ProgramState, SafetyMode
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.programs import SetSpeedSlider, StopProgram
 from ur_emulator.controller.events import ErrorReported, ReportLevel, ScriptFailed
 
 PLACE = "p[0.25,-0.25,0.25,2.2,-2.2,0]"
@@ -127,7 +127,7 @@ def test_the_target_waypoint_stays_the_same_during_a_move(bench):
 def test_a_stopped_program_stops_a_move_abruptly(bench):
     bench.start(f"movel({shifted(0.1)})\n")
     bench.tick(30)
-    bench.tick(1, cmd.StopProgram())
+    bench.tick(1, StopProgram())
     bench.tick(20)
     assert bench.now.target_qd == (0.0,) * 6
     assert 0.005 < distances(bench)[-1] < 0.08
@@ -195,7 +195,7 @@ def test_senseless_limits_are_runtime_errors(bench, call):
 def test_the_speed_slider_is_taken_on_without_a_jump(bench):
     bench.start(f"movel({shifted(0.1)}, v=0.1)\n")
     bench.tick(40)
-    bench.tick(1, cmd.SetSpeedSlider(0.1))
+    bench.tick(1, SetSpeedSlider(0.1))
     bench.tick(60)
     speed = np.array([s.target_tcp_speed[0] for s in bench.snapshots])
     assert speed[-1] == pytest.approx(0.01, abs=1e-6)

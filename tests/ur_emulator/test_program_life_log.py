@@ -16,7 +16,9 @@ from protocol.primary_messages import (
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
 from ur_emulator.box_log import MAX_ENTRIES, MAX_TEXT, BoxLog, LogEntry
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.operator import AnswerRequest, ClosePopup
+from ur_emulator.commands.programs import ResumeProgram
+from ur_emulator.commands.safety import UnlockProtectiveStop
 from ur_emulator.controller import events
 
 
@@ -82,9 +84,9 @@ def test_a_protective_stop_and_what_follows(box):
     with connect(box, "realtime") as frames:
         reader = FrameReader(frames)
         run(box, "def f():\n  protective_stop()\n  sleep(1)\nend\n", "PROGRAM_XXX_PAUSED")
-        box.submit(cmd.UnlockProtectiveStop())
+        box.submit(UnlockProtectiveStop())
         reader.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
-        box.submit(cmd.ResumeProgram())
+        box.submit(ResumeProgram())
         reader.until(lambda f: f.runtime_state == ProgramState.STOPPED)
     found = [(e.source, e.code, e.text) for e in box.log if e.source != "Client"]
     assert found == [
@@ -145,11 +147,11 @@ def test_a_client_of_ones_own_can_close_popups_and_answer(box):
             b'  n = request_integer_from_primary_client("how many?")\n  textmsg("got ", n)\nend\n'
         )
         assert reader.message(PopupMessage).text == "go?"
-        box.submit(cmd.ClosePopup())
-        box.submit(cmd.AnswerRequest("not a number"))
+        box.submit(ClosePopup())
+        box.submit(AnswerRequest("not a number"))
         while "Waiting for a value (integer): how many?" not in texts(box.log):
             reader.state()
-        box.submit(cmd.AnswerRequest(7))
+        box.submit(AnswerRequest(7))
         assert reader.message(TextMessage).text == "got 7"
     assert "Popup: Wait: go?" in texts(box.log, "Program")
 

@@ -7,7 +7,8 @@ import pytest
 from box_support import Bench
 
 from protocol.ur_types import ProgramState
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.operator import ClosePopup
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
 from ur_emulator.controller.events import (
     ErrorReported,
     ProgramPaused,
@@ -20,7 +21,7 @@ from ur_emulator.controller.events import (
 COUNT = "def count():\n  n = 0\n  while True:\n    n = n + 1\n    write_output_integer_register(0, n)\n    sync()\n  end\nend\n"
 GOAL = [0.9, -1.6, -1.9, -0.2, 1.2, 1.6]
 MOVE = f'def m():\n  movej({GOAL}, a=1.4, v=1.0)\n  textmsg("there")\nend\n'
-PAUSE, RESUME, STOP = cmd.PauseProgram(), cmd.ResumeProgram(), cmd.StopProgram()
+PAUSE, RESUME, STOP = PauseProgram(), ResumeProgram(), StopProgram()
 
 
 @pytest.fixture
@@ -175,7 +176,7 @@ def test_a_secondary_program_runs_beside_a_paused_one(bench):
 def test_a_popup_that_is_closed_in_a_pause_lets_the_program_go_on_after_it(bench):
     bench.start('def p():\n  popup("stop", blocking=True)\n  textmsg("closed")\nend\n')
     bench.tick(5, PAUSE)
-    bench.tick(5, cmd.ClosePopup())
+    bench.tick(5, ClosePopup())
     assert printed(bench) == []
     bench.tick(1, RESUME)
     assert printed(bench) == ["closed"]

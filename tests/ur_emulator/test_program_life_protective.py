@@ -6,7 +6,9 @@ from box_support import Bench
 
 from protocol.primary_messages import ReportLevel
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.power import PowerOff
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
+from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.controller.events import (
     ErrorReported,
     ProgramPaused,
@@ -19,8 +21,8 @@ from ur_emulator.controller.events import (
 
 GOAL = [0.9, -1.6, -1.9, -0.2, 1.2, 1.6]
 MOVE = f'def m():\n  movej({GOAL}, a=1.4, v=1.0)\n  textmsg("there")\nend\n'
-TRIGGER, UNLOCK = cmd.TriggerProtectiveStop(), cmd.UnlockProtectiveStop()
-RESUME, STOP = cmd.ResumeProgram(), cmd.StopProgram()
+TRIGGER, UNLOCK = TriggerProtectiveStop(), UnlockProtectiveStop()
+RESUME, STOP = ResumeProgram(), StopProgram()
 
 
 @pytest.fixture
@@ -134,7 +136,7 @@ def test_after_the_unlocking_another_program_takes_its_place(stopped):
     ]
 
 
-@pytest.mark.parametrize("end", [STOP, cmd.PowerOff()])
+@pytest.mark.parametrize("end", [STOP, PowerOff()])
 def test_it_can_be_ended_during_the_stop(stopped, end):
     stopped.tick(1, end)
     stopped.tick(5)
@@ -152,7 +154,7 @@ def test_a_pause_before_the_stop_changes_nothing():
     bench = Bench(fidelity="ideal")
     bench.start(MOVE)
     bench.tick(60)
-    bench.tick(60, cmd.PauseProgram())
+    bench.tick(60, PauseProgram())
     bench.tick(10, TRIGGER)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
     bench.tick(5, UNLOCK)
@@ -166,7 +168,7 @@ def test_a_stop_on_the_way_into_a_pause_or_out_of_it(cycles):
     bench = Bench(fidelity="ideal")
     bench.start(MOVE)
     bench.tick(60)
-    bench.tick(cycles, cmd.PauseProgram())
+    bench.tick(cycles, PauseProgram())
     bench.tick(80, TRIGGER)
     assert bench.now.runtime_state == ProgramState.PAUSED
     bench.tick(1, UNLOCK)

@@ -6,7 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.operator import ClosePopup
+from ur_emulator.commands.power import PowerOff, ReleaseBrakes
+from ur_emulator.commands.programs import (
+    PauseProgram,
+    ResumeProgram,
+    SetSpeedSlider,
+    StartProgram,
+    StopProgram,
+)
+from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.controller.events import ProgramPaused, ProgramResumed, ProgramStarted, ProgramStopped
 from ur_emulator.models.robots import robot_by_name
 from urscript import compile_program
@@ -28,17 +37,17 @@ PROGRAMS = [
     )
 ]  # fmt: skip
 COMMANDS = [
-    cmd.PauseProgram(),
-    cmd.ResumeProgram(),
-    cmd.StopProgram(),
-    cmd.TriggerProtectiveStop(),
-    cmd.UnlockProtectiveStop(),
-    cmd.ClosePopup(),
-    cmd.PowerOff(),
-    cmd.ReleaseBrakes(),
-    cmd.SetSpeedSlider(0.3),
-    cmd.SetSpeedSlider(1.0),
-    *(cmd.StartProgram(program) for program in PROGRAMS),
+    PauseProgram(),
+    ResumeProgram(),
+    StopProgram(),
+    TriggerProtectiveStop(),
+    UnlockProtectiveStop(),
+    ClosePopup(),
+    PowerOff(),
+    ReleaseBrakes(),
+    SetSpeedSlider(0.3),
+    SetSpeedSlider(1.0),
+    *(StartProgram(program) for program in PROGRAMS),
 ]
 STEPS = st.lists(
     st.tuples(st.lists(st.sampled_from(COMMANDS), max_size=3), st.integers(1, 25)), min_size=4, max_size=20
@@ -81,7 +90,7 @@ def test_commands_in_any_order(steps):
             allowed = NEXT[last] | ({ProgramResumed} if last in (ProgramStarted, ProgramResumed) else set())
             assert type(event) in allowed
             last = type(event)
-    bench.tick(1, cmd.StopProgram(), cmd.UnlockProtectiveStop(), cmd.ReleaseBrakes(), cmd.SetSpeedSlider(1.0))
+    bench.tick(1, StopProgram(), UnlockProtectiveStop(), ReleaseBrakes(), SetSpeedSlider(1.0))
     bench.tick(400)
     assert bench.now.robot_mode == RobotMode.RUNNING
     assert bench.run('def last():\n  movej([0.4,-1.7,-1.9,-0.2,1.2,1.6])\n  textmsg("works")\nend\n')[

@@ -16,7 +16,7 @@ from protocol.primary_program import GlobalVariablesSetup, GlobalVariablesUpdate
 from protocol.primary_values import TypedValue, ValueType
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
-from ur_emulator.controller.commands import StopProgram
+from ur_emulator.commands.programs import StopProgram
 from ur_emulator.servers.label_reporter import LabelReporter, parse_label
 from ur_emulator.servers.primary_port import PrimaryPort
 from ur_emulator.servers.robot_state import StateEncoder

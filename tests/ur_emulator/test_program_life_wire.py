@@ -8,7 +8,8 @@ from protocol.primary_messages import ErrorCodeMessage, KeyMessage, ReportLevel,
 from protocol.rtde_types import RobotStatusBits
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
+from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.servers.robot_state import state_records
 
 MOVE = 'def m():\n  movej([0.9,-1.6,-1.9,-0.2,1.2,1.6], a=1.4, v=0.5)\n  textmsg("there")\nend\n'
@@ -132,8 +133,8 @@ def test_flags_of_the_states():
     bench = Bench(fidelity="ideal")
     bench.start(MOVE)
     bench.tick(40)
-    bench.tick(60, cmd.PauseProgram())
-    bench.tick(300, cmd.ResumeProgram())
+    bench.tick(60, PauseProgram())
+    bench.tick(300, ResumeProgram())
     seen = {ProgramState(s.runtime_state): flags(s) for s in bench.snapshots}
     running, paused, stopped = (True, False, True), (False, True, False), (False, False, False)
     assert seen == {
@@ -150,8 +151,8 @@ def test_after_a_stop_neither_flag_is_set():
     bench = Bench(fidelity="ideal")
     bench.start(MOVE)
     bench.tick(40)
-    bench.tick(5, cmd.PauseProgram())
-    bench.tick(1, cmd.StopProgram())
+    bench.tick(5, PauseProgram())
+    bench.tick(1, StopProgram())
     assert flags(bench.now) == (False, False, False)
 
 
@@ -178,7 +179,7 @@ def test_a_client_that_reuploads_after_a_protective_stop(box):
         reader = FrameReader(frames)
         sock.sendall(COUNT.encode())
         reader.until(lambda f: f.runtime_state == ProgramState.PLAYING)
-        box.submit(cmd.TriggerProtectiveStop())
+        box.submit(TriggerProtectiveStop())
         reader.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
         sock.sendall(b"set unlock protective stop\n")
         frame = reader.until(lambda f: f.safety_mode == SafetyMode.NORMAL)

@@ -16,7 +16,8 @@ from driver_program import (
 )
 from program_support import Box, frames
 
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from urscript.program import check_program
 
 ABOVE = [-0.462, -1.757, -1.667, -1.289, 1.57, -0.462]
@@ -69,9 +70,9 @@ class Operator:
     def work(self):
         for event in self.box.events[self.seen :]:
             if type(event).__name__ == "ValueRequested":
-                self.box.tick(1, cmd.AnswerRequest(self.answer))
+                self.box.tick(1, AnswerRequest(self.answer))
             elif type(event).__name__ == "PopupShown" and event.blocking:
-                self.box.tick(1, cmd.ClosePopup())
+                self.box.tick(1, ClosePopup())
         self.seen = len(self.box.events)
 
 
@@ -148,7 +149,7 @@ class Driver:
 
     def write(self, **values):
         inputs = tuple((f"input_{name}", value) for name, value in values.items())
-        self.box.tick(1, cmd.WriteInputs(inputs))
+        self.box.tick(1, WriteInputs(inputs))
 
     def command(self, name, *floats, kind=0, kind2=0):
         number = COMMANDS.get(name, name)
@@ -285,7 +286,7 @@ def test_a_gripper_preamble_says_when_nobody_answers():
     assert (popup.text, popup.title) == ("the gripper does not answer", "No connection")
     assert (popup.warning, popup.error, popup.blocking) == (False, True, True)
     assert box.controller.waits_outside
-    box.tick(1, cmd.ClosePopup())
+    box.tick(1, ClosePopup())
     box.finish()
     assert_clean(box)
 

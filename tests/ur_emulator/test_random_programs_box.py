@@ -15,7 +15,8 @@ from program_support import Box, frames
 from random_arguments import HOME, ROWS, calls, text_of, values
 
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.programs import StopProgram
+from ur_emulator.commands.safety import UnlockProtectiveStop
 from urscript.catalogue.types import Support
 
 EXAMPLES = int(os.environ.get("RANDOM_PROGRAMS", "25"))
@@ -79,7 +80,7 @@ class WatchedBox(Box):
     def leave(self):
         """Stop what runs; nothing of it may stay."""
         state = self.controller.state
-        self.tick(1, cmd.StopProgram())
+        self.tick(1, StopProgram())
         self.finish(limit=3000)
         assert not self.controller.programs.is_running
         assert state.motion.owner is None
@@ -99,7 +100,7 @@ def run_and_leave(text, cycles=60):
     box.send_text(text)
     box.tick(cycles)
     if box.now.safety_mode != SafetyMode.NORMAL:
-        box.tick(1, cmd.UnlockProtectiveStop())
+        box.tick(1, UnlockProtectiveStop())
     box.leave()
     assert threading.active_count() == system_threads
     return box

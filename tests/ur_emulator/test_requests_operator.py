@@ -1,5 +1,7 @@
 """What programs ask of the operator: values and popups, answered by a client."""
 
+import math
+
 import pytest
 from box_support import VERSION, Bench, MessageReader, connect
 
@@ -11,8 +13,10 @@ from protocol.primary_messages import (
     decode_message,
     encode_message,
 )
-from ur_emulator.controller.commands import AnswerRequest, ClosePopup, StopProgram
+from ur_emulator.commands.operator import AnswerRequest, ClosePopup
+from ur_emulator.commands.programs import StopProgram
 from ur_emulator.emulator import ControlBox
+from ur_emulator.errors import ArgumentError
 
 
 def asking(kind):
@@ -47,12 +51,18 @@ def test_a_program_waits_for_its_answer(kind, requested, answer, text):
     assert not bench.controller.state.operator.requests
 
 
-@pytest.mark.parametrize(("answer", "text"), [("\u20acuro", "6"), ("\ud800", "1"), ("", "0")])
+@pytest.mark.parametrize(("answer", "text"), [("\u20acuro", "6"), ("", "0")])
 def test_a_text_has_one_character_for_each_byte_of_utf_8(answer, text):
     bench = Bench()
     bench.start('def p():\n  textmsg(str_len(request_string_from_primary_client("?")))\nend\n')
     bench.tick(2, AnswerRequest(answer))
     assert printed(bench) == [text]
+
+
+@pytest.mark.parametrize("answer", ["\ud800", "x" * 1001, math.nan, None])
+def test_what_is_no_answer_at_all_cannot_be_given(answer):
+    with pytest.raises(ArgumentError, match=r"^value .* given: allowed is true, false, number or text$"):
+        AnswerRequest(answer)
 
 
 @pytest.mark.parametrize(

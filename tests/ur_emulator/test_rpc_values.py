@@ -3,7 +3,7 @@
 import pytest
 from box_support import Bench
 
-from ur_emulator.controller.commands import StopProgram
+from ur_emulator.commands.programs import StopProgram
 from ur_emulator.scripting.network import RemoteCallError
 
 

@@ -10,7 +10,8 @@ from protocol.rtde_fields import INPUTS, OUTPUTS, output_fields
 from protocol.rtde_recipe import Recipe, snapshot_encoder
 from protocol.rtde_types import RtdeType
 from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
-from ur_emulator.controller.commands import TriggerProtectiveStop, WriteInputs
+from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.controller.status_bits import safety_status_bits
 
 V3_15 = SoftwareVersion(3, 15, 8)

@@ -7,8 +7,15 @@ import pytest
 from states_support import ENDLESS, moving
 
 from protocol.ur_types import ProgramState, SafetyMode
-from ur_emulator.controller import commands as cmd
-from ur_emulator.controller import safety_commands as safe
+from ur_emulator.commands.power import PowerOff
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
+from ur_emulator.commands.safety import (
+    PressEmergencyStop,
+    SafeguardStop,
+    TriggerFault,
+    TriggerProtectiveStop,
+    TriggerViolation,
+)
 from ur_emulator.controller import states_page
 from ur_emulator.controller.robot_mode import TRANSITIONS
 from ur_emulator.controller.safety_modes import EVENTS, MODES
@@ -32,14 +39,14 @@ def test_the_page_shows_every_mode_event_and_way():
         assert f"| {mode.name} | {command.value} |" in text
 
 
-PAUSES = [cmd.PauseProgram(), cmd.TriggerProtectiveStop(), safe.SafeguardStop(True)]
+PAUSES = [PauseProgram(), TriggerProtectiveStop(), SafeguardStop(True)]
 ENDS = [
-    cmd.StopProgram(),
-    safe.PressEmergencyStop(),
-    safe.TriggerViolation(),
-    safe.TriggerFault(),
+    StopProgram(),
+    PressEmergencyStop(),
+    TriggerViolation(),
+    TriggerFault(),
 ]
-START = cmd.StartProgram(compile_program(ENDLESS))
+START = StartProgram(compile_program(ENDLESS))
 
 
 def ways_of(*commands):
@@ -59,14 +66,14 @@ def test_every_way_of_the_page_is_taken_and_no_other():
     taken = set()
     for pause in PAUSES:
         taken.update(ways_of(pause))
-    for end in [*ENDS, cmd.PowerOff()]:
-        for before in ([], [cmd.PauseProgram()], [(3, cmd.PauseProgram())]):
+    for end in [*ENDS, PowerOff()]:
+        for before in ([], [PauseProgram()], [(3, PauseProgram())]):
             taken.update(ways_of(*before, end))
-    taken.update(ways_of(cmd.PauseProgram(), cmd.ResumeProgram()))
-    taken.update(ways_of((3, cmd.PauseProgram()), cmd.ResumeProgram()))
-    taken.update(ways_of(safe.SafeguardStop(True), safe.SafeguardStop(False)))
-    taken.update(ways_of(cmd.StopProgram(), START))
-    taken.update(ways_of((3, cmd.StopProgram()), START))
+    taken.update(ways_of(PauseProgram(), ResumeProgram()))
+    taken.update(ways_of((3, PauseProgram()), ResumeProgram()))
+    taken.update(ways_of(SafeguardStop(True), SafeguardStop(False)))
+    taken.update(ways_of(StopProgram(), START))
+    taken.update(ways_of((3, StopProgram()), START))
     assert taken == {(way.state, way.then) for way in states_page.PROGRAM_WAYS}
 
 

@@ -8,9 +8,29 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from states_support import BRAKING, COMMANDS, ENDLESS, WAY_IN, check_wires, failures
 
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.controller import commands as cmd
-from ur_emulator.controller import safety_commands as safe
-from ur_emulator.controller.hands import GuideByHand
+from ur_emulator.commands.power import PowerOn, ReleaseBrakes, StartFreedrive
+from ur_emulator.commands.programs import (
+    PauseProgram,
+    ResumeProgram,
+    SetSpeedSlider,
+    StartProgram,
+    StopProgram,
+)
+from ur_emulator.commands.safety import (
+    AssignSafetyInput,
+    Button,
+    ChangeSafetySettings,
+    ConfirmSafety,
+    PressButton,
+    ReducedMode,
+    ReleaseEmergencyStop,
+    RequireSafeguardReset,
+    ResetSafeguard,
+    RestartSafety,
+    SafeguardStop,
+    UnlockProtectiveStop,
+)
+from ur_emulator.controller.safety_inputs import SafetyInput
 from ur_emulator.controller.safety_modes import MOVING_MODES, ROW
 from urscript import compile_program
 
@@ -24,29 +44,29 @@ SECONDARY = "sec p():\n  set_digital_out(0, True)\nend\n"
 PROGRAMS = tuple(compile_program(text) for text in (ENDLESS, STREAM, FORCE, SHORT, SECONDARY))
 ANYTHING = (
     *COMMANDS.values(),
-    *(cmd.StartProgram(program) for program in PROGRAMS),
-    cmd.StopProgram(),
-    cmd.PauseProgram(),
-    cmd.ResumeProgram(),
-    cmd.PowerOn(),
-    cmd.ReleaseBrakes(),
-    GuideByHand(),
-    cmd.SetSpeedSlider(0.3),
-    cmd.SetSpeedSlider(1.0),
-    safe.RequireSafeguardReset(True),
-    safe.RequireSafeguardReset(False),
-    safe.ResetSafeguard(),
-    safe.ChangeSafetySettings(),
-    safe.ConfirmSafety(),
-    safe.PressButton(safe.Button.TEACH, True),
-    safe.PressButton(safe.Button.TEACH, False),
-    safe.AssignSafetyInput(0, safe.SafetyInput.EMERGENCY_STOP),
-    safe.AssignSafetyInput(0, safe.SafetyInput.REDUCED),
-    safe.AssignSafetyInput(0, None),
+    *(StartProgram(program) for program in PROGRAMS),
+    StopProgram(),
+    PauseProgram(),
+    ResumeProgram(),
+    PowerOn(),
+    ReleaseBrakes(),
+    StartFreedrive(),
+    SetSpeedSlider(0.3),
+    SetSpeedSlider(1.0),
+    RequireSafeguardReset(True),
+    RequireSafeguardReset(False),
+    ResetSafeguard(),
+    ChangeSafetySettings(),
+    ConfirmSafety(),
+    PressButton(Button.TEACH, True),
+    PressButton(Button.TEACH, False),
+    AssignSafetyInput(0, SafetyInput.EMERGENCY_STOP),
+    AssignSafetyInput(0, SafetyInput.REDUCED),
+    AssignSafetyInput(0, None),
 )
 # What wakes an arm up, three times as likely: else most boxes would sleep.
-LIKELY = (*ANYTHING, *3 * (safe.ReleaseEmergencyStop(), cmd.RestartSafety(), safe.SafeguardStop(False)))
-LIKELY += 3 * (cmd.UnlockProtectiveStop(), cmd.ReleaseBrakes(), cmd.StartProgram(PROGRAMS[0]))
+LIKELY = (*ANYTHING, *3 * (ReleaseEmergencyStop(), RestartSafety(), SafeguardStop(False)))
+LIKELY += 3 * (UnlockProtectiveStop(), ReleaseBrakes(), StartProgram(PROGRAMS[0]))
 STOPS = tuple(COMMANDS[event] for mode, event in WAY_IN.items() if mode not in MOVING_MODES)
 RESTING = 0.03  # rad/s, what sensors may say of an arm at rest
 
@@ -95,7 +115,7 @@ class AnyBox(RuleBasedStateMachine):
     def stop_at_work(self, program, ticks, stop):
         """A program is at work, and something stops it."""
         self.the_way_back_is_always_open()
-        self.tick(cmd.StartProgram(program))
+        self.tick(StartProgram(program))
         for _ in range(ticks):
             self.tick()
         self.tick(stop)
@@ -121,7 +141,7 @@ class AnyBox(RuleBasedStateMachine):
         if self.bench.controller.state.mode.is_changing:
             return
         known = len(failures(self.bench))
-        self.tick(cmd.StartProgram(PROGRAMS[3]))
+        self.tick(StartProgram(PROGRAMS[3]))
         (text,) = failures(self.bench)[known:]
         assert text.startswith("program t not started: the robot is in ")
         assert text.count("\n") == 0
@@ -130,15 +150,15 @@ class AnyBox(RuleBasedStateMachine):
     def the_way_back_is_always_open(self):
         """Whatever has happened: release, close, restart, confirm, release the brakes; then programs run."""
         for command in (
-            safe.AssignSafetyInput(0, None),
-            safe.PressButton(safe.Button.TEACH, False),
-            safe.ReleaseEmergencyStop(),
-            safe.RequireSafeguardReset(False),
-            safe.SafeguardStop(False),
-            safe.ReducedMode(False),
-            cmd.RestartSafety(),
-            safe.ConfirmSafety(),
-            cmd.ReleaseBrakes(),
+            AssignSafetyInput(0, None),
+            PressButton(Button.TEACH, False),
+            ReleaseEmergencyStop(),
+            RequireSafeguardReset(False),
+            SafeguardStop(False),
+            ReducedMode(False),
+            RestartSafety(),
+            ConfirmSafety(),
+            ReleaseBrakes(),
         ):
             self.tick(command)
         for _ in range(200):
@@ -147,7 +167,7 @@ class AnyBox(RuleBasedStateMachine):
             RobotMode.RUNNING,
             SafetyMode.NORMAL,
         )
-        self.tick(cmd.SetSpeedSlider(1.0), cmd.StartProgram(PROGRAMS[0]))
+        self.tick(SetSpeedSlider(1.0), StartProgram(PROGRAMS[0]))
         for _ in range(20):
             self.tick()
         assert any(self.bench.now.target_qd)

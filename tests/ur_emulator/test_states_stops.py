@@ -8,11 +8,29 @@ from box_support import Bench, FakeNetwork
 from states_support import BRAKING, ENDLESS, failures, infos, moving, power_up
 
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.controller import commands as cmd
-from ur_emulator.controller import safety_commands as safe
+from ur_emulator.commands.power import PowerOn, ReleaseBrakes, StartFreedrive
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram
+from ur_emulator.commands.safety import (
+    AssignSafetyInput,
+    Button,
+    ChangeSafetySettings,
+    ConfirmSafety,
+    PressButton,
+    PressEmergencyStop,
+    ReducedMode,
+    ReleaseEmergencyStop,
+    RequireSafeguardReset,
+    ResetSafeguard,
+    RestartSafety,
+    SafeguardStop,
+    TriggerFault,
+    TriggerProtectiveStop,
+    TriggerViolation,
+    UnlockProtectiveStop,
+)
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
-from ur_emulator.controller.hands import GuideByHand
+from ur_emulator.controller.safety_inputs import SafetyInput
 from ur_emulator.controller.speed_limiter import RECOVERY_SPEED, REDUCED_SHARE, TOLERANCE, joint_limits
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.fidelity import fidelity_by_name
@@ -20,9 +38,9 @@ from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import SpeedJ
 
-PRESS, RELEASE = safe.PressEmergencyStop("robot"), safe.ReleaseEmergencyStop()
-OPEN, CLOSE = safe.SafeguardStop(True), safe.SafeguardStop(False)
-REDUCE, NO_REDUCE = safe.ReducedMode(True), safe.ReducedMode(False)
+PRESS, RELEASE = PressEmergencyStop("robot"), ReleaseEmergencyStop()
+OPEN, CLOSE = SafeguardStop(True), SafeguardStop(False)
+REDUCE, NO_REDUCE = ReducedMode(True), ReducedMode(False)
 LONG_MOVE = "def m():\n  q = get_actual_joint_positions()\n  movej([q[0] + 2, q[1], q[2], q[3], q[4], q[5]], a=3, v=3)\nend\n"
 
 
@@ -37,9 +55,7 @@ def modes(bench):
 # --- emergency stops
 
 
-@pytest.mark.parametrize(
-    "command", [PRESS, safe.PressEmergencyStop("system"), safe.TriggerViolation(), safe.TriggerFault()]
-)
+@pytest.mark.parametrize("command", [PRESS, PressEmergencyStop("system"), TriggerViolation(), TriggerFault()])
 def test_the_arm_brakes_as_it_can_then_loses_its_power(command):
     bench = moving()
     first = len(bench.snapshots)
@@ -60,14 +76,14 @@ def test_joint_modes_tell_of_the_stop_while_the_arm_brakes():
     bench = moving()
     assert bench.tick(1, PRESS).joint_mode == (JointMode.READY_FOR_POWER_OFF,) * 6
     assert bench.tick(BRAKING).joint_mode == (JointMode.POWER_OFF,) * 6
-    bench.tick(1, safe.TriggerFault())
+    bench.tick(1, TriggerFault())
     assert bench.now.joint_mode == (JointMode.FAULT,) * 6
 
 
 def test_a_client_gets_the_arm_going_after_an_emergency_stop():
     bench = moving()
     bench.tick(BRAKING, PRESS)
-    bench.tick(300, cmd.PowerOn())
+    bench.tick(300, PowerOn())
     assert bench.now.robot_mode == RobotMode.POWER_OFF
     bench.tick(1, RELEASE)
     assert (bench.now.safety_mode, bench.now.robot_mode) == (SafetyMode.NORMAL, RobotMode.POWER_OFF)
@@ -93,7 +109,7 @@ def test_a_stop_that_is_released_at_once_still_ends_without_power():
 @pytest.mark.parametrize("ticks", [1, 80, 140, 160])
 def test_a_stop_on_the_way_up_cuts_the_power(ticks):
     bench = Bench(mode=RobotMode.POWER_OFF)
-    bench.tick(ticks, cmd.ReleaseBrakes())
+    bench.tick(ticks, ReleaseBrakes())
     assert bench.now.robot_mode not in (RobotMode.POWER_OFF, RobotMode.RUNNING)
     assert bench.tick(1, PRESS).robot_mode == RobotMode.POWER_OFF
     bench.tick(300)
@@ -102,7 +118,7 @@ def test_a_stop_on_the_way_up_cuts_the_power(ticks):
 
 def test_two_buttons_must_both_be_released():
     bench = moving()
-    bench.tick(1, safe.AssignSafetyInput(0, safe.SafetyInput.EMERGENCY_STOP))
+    bench.tick(1, AssignSafetyInput(0, SafetyInput.EMERGENCY_STOP))
     assert bench.now.safety_mode == SafetyMode.SYSTEM_EMERGENCY_STOP
     bench.tick(BRAKING, PRESS)
     assert bench.now.safety_mode == SafetyMode.ROBOT_EMERGENCY_STOP
@@ -115,7 +131,7 @@ def test_two_buttons_must_both_be_released():
 
 def test_an_emergency_stop_in_freedrive_ends_it():
     bench = Bench()
-    bench.tick(5, GuideByHand())
+    bench.tick(5, StartFreedrive())
     bench.controller.plant.push((30.0, 0.0, 0.0))
     bench.tick(30)
     assert max(map(abs, bench.now.actual_qd)) > 0.01
@@ -125,10 +141,10 @@ def test_an_emergency_stop_in_freedrive_ends_it():
 
 
 def test_unknown_kinds_and_pairs_are_refused():
-    with pytest.raises(EmulatorError, match="choose robot or system"):
-        safe.PressEmergencyStop("red")
+    with pytest.raises(EmulatorError, match="allowed is robot or system"):
+        PressEmergencyStop("red")
     with pytest.raises(EmulatorError, match="allowed are 0 to 3"):
-        safe.AssignSafetyInput(4, None)
+        AssignSafetyInput(4, None)
 
 
 # --- safeguard
@@ -169,22 +185,20 @@ def test_the_hardness_of_the_stop_is_the_programs(hardness, least, most):
 
 def test_with_a_reset_button_closing_is_not_enough():
     bench = moving()
-    bench.tick(1, safe.RequireSafeguardReset(True))
+    bench.tick(1, RequireSafeguardReset(True))
     bench.tick(100, OPEN)
-    bench.tick(1, safe.ResetSafeguard())
+    bench.tick(1, ResetSafeguard())
     assert bench.now.safety_mode == SafetyMode.SAFEGUARD_STOP
     bench.tick(50, CLOSE)
     assert bench.now.safety_mode == SafetyMode.SAFEGUARD_STOP
-    bench.tick(10, safe.ResetSafeguard())
+    bench.tick(10, ResetSafeguard())
     assert bench.now.safety_mode == SafetyMode.NORMAL
     assert bench.now.runtime_state == ProgramState.PLAYING
 
 
 def test_a_reset_input_resets_on_its_rising_edge():
     bench = moving()
-    bench.tick(
-        1, safe.RequireSafeguardReset(True), safe.AssignSafetyInput(1, safe.SafetyInput.SAFEGUARD_RESET)
-    )
+    bench.tick(1, RequireSafeguardReset(True), AssignSafetyInput(1, SafetyInput.SAFEGUARD_RESET))
     bench.tick(50, OPEN)
     bench.tick(5, CLOSE)
     assert bench.now.safety_mode == SafetyMode.SAFEGUARD_STOP
@@ -194,11 +208,11 @@ def test_a_reset_input_resets_on_its_rising_edge():
 
 def test_what_was_paused_before_stays_paused():
     bench = moving()
-    bench.tick(60, cmd.PauseProgram())
+    bench.tick(60, PauseProgram())
     bench.tick(60, OPEN)
     bench.tick(60, CLOSE)
     assert bench.now.runtime_state == ProgramState.PAUSED
-    bench.tick(10, cmd.ResumeProgram())
+    bench.tick(10, ResumeProgram())
     assert bench.now.runtime_state == ProgramState.PLAYING
 
 
@@ -206,7 +220,7 @@ def test_programs_and_resuming_are_refused_while_the_safeguard_is_open():
     bench = moving()
     bench.tick(60, OPEN)
     bench.start(ENDLESS)
-    bench.tick(10, cmd.ResumeProgram())
+    bench.tick(10, ResumeProgram())
     assert "SAFEGUARD_STOP" in failures(bench)[-1]
     assert "close the safeguard" in failures(bench)[-1]
     assert "stays paused: the robot is in SAFEGUARD_STOP" in infos(bench)[-1]
@@ -216,10 +230,10 @@ def test_programs_and_resuming_are_refused_while_the_safeguard_is_open():
 def test_a_push_in_a_safeguard_stop_is_a_protective_stop():
     bench = moving()
     bench.tick(60, OPEN)
-    bench.tick(1, cmd.TriggerProtectiveStop())
+    bench.tick(1, TriggerProtectiveStop())
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
     bench.tick(20, CLOSE)
-    bench.tick(20, cmd.UnlockProtectiveStop())
+    bench.tick(20, UnlockProtectiveStop())
     assert bench.now.safety_mode == SafetyMode.NORMAL
     assert bench.now.runtime_state == ProgramState.PAUSED
     assert modes(bench) == ["SAFEGUARD_STOP", "PROTECTIVE_STOP", "NORMAL"]
@@ -242,26 +256,26 @@ def test_a_stream_of_speeds_stops_and_goes_on():
 
 def test_unlocking_waits_five_seconds_for_the_dashboard_only():
     bench = moving()
-    bench.tick(1, cmd.TriggerProtectiveStop())
+    bench.tick(1, TriggerProtectiveStop())
     stopped_at, safety = bench.now.timestamp, bench.controller.state.safety
     while not safety.may_unlock(bench.now.timestamp):
         assert bench.controller.is_active
         bench.tick()
     assert bench.now.timestamp - stopped_at == pytest.approx(5.0, abs=0.01)
-    bench.tick(1, cmd.UnlockProtectiveStop())
+    bench.tick(1, UnlockProtectiveStop())
     assert bench.now.safety_mode == SafetyMode.NORMAL
-    bench.tick(1, cmd.TriggerProtectiveStop())
+    bench.tick(1, TriggerProtectiveStop())
     assert not safety.may_unlock(bench.now.timestamp)
 
 
 def test_an_emergency_stop_over_a_protective_stop_leads_back_to_it():
     bench = moving()
-    bench.tick(50, cmd.TriggerProtectiveStop())
+    bench.tick(50, TriggerProtectiveStop())
     bench.tick(BRAKING, PRESS)
     assert bench.now.runtime_state == ProgramState.STOPPED
     bench.tick(1, RELEASE)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
-    bench.tick(1, cmd.UnlockProtectiveStop())
+    bench.tick(1, UnlockProtectiveStop())
     assert power_up(bench).robot_mode == RobotMode.RUNNING
 
 
@@ -274,7 +288,7 @@ def test_every_arm_brakes_with_its_own_deceleration(name):
     bench.start(LONG_MOVE)
     bench.tick(55)
     first = len(bench.snapshots)
-    bench.tick(2, cmd.TriggerProtectiveStop())
+    bench.tick(2, TriggerProtectiveStop())
     bench.tick(60)
     drops = -np.diff(speeds(bench, first)[:, 0]) / 0.008
     assert drops.max() == pytest.approx(robot.stop_deceleration)
@@ -346,7 +360,7 @@ def test_an_arm_that_wakes_up_out_of_range_is_in_recovery_until_it_is_back():
     bench.controller.plant.reset(q)
     bench.controller.state.motion.place(q)
     bench.tick(5)
-    bench.tick(220, cmd.ReleaseBrakes())
+    bench.tick(220, ReleaseBrakes())
     assert (bench.now.robot_mode, bench.now.safety_mode) == (RobotMode.RUNNING, SafetyMode.RECOVERY)
     bench.start(
         "def back():\n  q = get_actual_joint_positions()\n  movej([q[0] - 1, q[1], q[2], q[3], q[4], q[5]], a=2, v=2)\nend\n"
@@ -376,21 +390,21 @@ def test_the_scale_of_an_arm_at_rest_is_that_of_the_slider():
 
 def test_the_teach_button_guides_by_hand_and_is_told():
     bench = Bench()
-    bench.tick(5, safe.PressButton(safe.Button.TEACH, True), safe.PressButton(safe.Button.POWER, True))
+    bench.tick(5, PressButton(Button.TEACH, True), PressButton(Button.POWER, True))
     assert bench.now.robot_status_bits & 0b1100 == 0b1100
     assert bench.now.control_mode == 1
-    bench.tick(5, safe.PressButton(safe.Button.TEACH, False))
+    bench.tick(5, PressButton(Button.TEACH, False))
     assert bench.now.robot_status_bits & 0b1100 == 0b1000
     assert bench.now.control_mode == 0
 
 
 def test_changed_safety_settings_want_to_be_confirmed():
     bench = moving()
-    bench.tick(1, safe.ChangeSafetySettings())
+    bench.tick(1, ChangeSafetySettings())
     assert bench.now.robot_mode == RobotMode.CONFIRM_SAFETY
-    bench.tick(300, cmd.ReleaseBrakes())
+    bench.tick(300, ReleaseBrakes())
     assert bench.now.robot_mode == RobotMode.CONFIRM_SAFETY
-    bench.tick(1, safe.ConfirmSafety())
+    bench.tick(1, ConfirmSafety())
     assert bench.now.robot_mode == RobotMode.POWER_OFF
     assert power_up(bench).robot_mode == RobotMode.RUNNING
 
@@ -406,11 +420,11 @@ def test_a_controller_that_starts_from_nothing_boots():
 
 def test_faults_and_violations_are_reported_and_end_with_a_restart():
     bench = moving()
-    bench.tick(BRAKING, safe.TriggerViolation("too fast"))
+    bench.tick(BRAKING, TriggerViolation("too fast"))
     reports = [e for e in bench.events if isinstance(e, ErrorReported)]
     assert [(e.text, e.level.name) for e in reports] == [("too fast", "VIOLATION")]
-    bench.tick(1, safe.TriggerFault("broken"))
+    bench.tick(1, TriggerFault("broken"))
     assert bench.now.safety_mode == SafetyMode.FAULT
-    bench.tick(1, cmd.RestartSafety())
+    bench.tick(1, RestartSafety())
     assert (bench.now.safety_mode, bench.now.robot_mode) == (SafetyMode.NORMAL, RobotMode.POWER_OFF)
     assert power_up(bench).robot_mode == RobotMode.RUNNING

@@ -4,7 +4,7 @@ import pytest
 from states_support import BRAKING, COMMANDS, WAY_IN, infos, moving
 
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.power import PowerOn, ReleaseBrakes
 from ur_emulator.controller.robot_mode import JOINT_MODES, POWERED, TRANSITIONS, ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety_modes import (
     EVENTS,
@@ -97,7 +97,7 @@ def enter(mode):
     bench = moving(fidelity="ideal")
     way_in = WAY_IN[mode]
     if mode is M.RECOVERY:
-        bench.controller._safety.happen(E.RANGE_LEFT)
+        bench.controller.safety.happen(E.RANGE_LEFT)
         bench.controller.state.snapshot = bench.now._replace(actual_q=(7.0, *bench.now.actual_q[1:]))
     elif way_in is not None:
         bench.tick(1, COMMANDS[way_in])
@@ -141,7 +141,7 @@ def test_what_a_mode_does_to_arm_program_and_power(mode):
 def test_power_is_refused_with_a_word_about_the_way_out(mode):
     bench = enter(mode)
     bench.tick(BRAKING)
-    bench.tick(1, cmd.PowerOn(), cmd.ReleaseBrakes())
+    bench.tick(1, PowerOn(), ReleaseBrakes())
     bench.tick(300)
     assert bench.now.robot_mode == RobotMode.POWER_OFF
     first, second = infos(bench)[-2:]

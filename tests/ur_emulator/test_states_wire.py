@@ -9,8 +9,14 @@ from protocol.primary_layout import MasterboardData, RobotModeData
 from protocol.primary_messages import ErrorCodeMessage, SafetyModeMessage
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.controller import safety_commands as safe
-from ur_emulator.controller.commands import ReleaseBrakes
+from ur_emulator.commands.power import ReleaseBrakes
+from ur_emulator.commands.safety import (
+    ChangeSafetySettings,
+    PressEmergencyStop,
+    ReleaseEmergencyStop,
+    TriggerFault,
+    TriggerViolation,
+)
 from ur_emulator.controller.safety_modes import SafetyEvent
 
 MODES = [mode for mode in WAY_IN if mode is not SafetyMode.RECOVERY]
@@ -36,7 +42,7 @@ def test_ports_agree_in_recovery_and_on_the_way_up():
         check_wires(bench)
         bench.tick()
     assert bench.now.robot_mode == RobotMode.RUNNING
-    bench.controller._safety.happen(SafetyEvent.RANGE_LEFT)
+    bench.controller.safety.happen(SafetyEvent.RANGE_LEFT)
     bench.controller.state.snapshot = bench.now._replace(
         safety_mode=int(SafetyMode.RECOVERY), safety_status=4
     )
@@ -83,7 +89,7 @@ def test_an_emergency_stop_and_the_way_back_by_the_dashboard(box):
         client.subscribe(
             "robot_mode", "safety_mode", "safety_status", "safety_status_bits", "robot_status_bits"
         )
-        box.submit(safe.PressEmergencyStop("system"))
+        box.submit(PressEmergencyStop("system"))
         values = client.until(lambda v: v["safety_mode"] == SafetyMode.SYSTEM_EMERGENCY_STOP)
         assert values["safety_status"] == SafetyMode.SYSTEM_EMERGENCY_STOP
         assert values["safety_status_bits"] == 1 << 5 | 1 << 7 | 1 << 10
@@ -100,7 +106,7 @@ def test_an_emergency_stop_and_the_way_back_by_the_dashboard(box):
         dashboard.ask("power on")
         client.until(lambda v: True)
         assert dashboard.ask("robotmode") == "Robotmode: POWER_OFF"
-        box.submit(safe.ReleaseEmergencyStop())
+        box.submit(ReleaseEmergencyStop())
         client.until(lambda v: v["safety_mode"] == SafetyMode.NORMAL)
         assert dashboard.ask("power on") == "Powering on"
         client.until(lambda v: v["robot_mode"] == RobotMode.IDLE)
@@ -128,11 +134,11 @@ def test_a_protective_stop_by_script_and_the_five_seconds_of_the_dashboard(box):
         assert messages.message(SafetyModeMessage).safety_mode == SafetyMode.NORMAL
 
 
-@pytest.mark.parametrize("command", [safe.TriggerViolation(), safe.TriggerFault()])
+@pytest.mark.parametrize("command", [TriggerViolation(), TriggerFault()])
 def test_safety_is_restarted_by_the_dashboard(box, command):
     with Dashboard(box) as dashboard:
         box.submit(command)
-        name = "VIOLATION" if isinstance(command, safe.TriggerViolation) else "FAULT"
+        name = "VIOLATION" if isinstance(command, TriggerViolation) else "FAULT"
         dashboard.until("safetystatus", f"Safetystatus: {name}")
         assert dashboard.ask("restart safety") == "Restarting safety"
         assert dashboard.ask("robotmode") == "Robotmode: POWER_OFF"
@@ -143,7 +149,7 @@ def test_safety_is_restarted_by_the_dashboard(box, command):
 
 def test_confirming_over_a_script_port(box):
     with Dashboard(box) as dashboard, connect(box, "secondary") as secondary:
-        box.submit(safe.ChangeSafetySettings())
+        box.submit(ChangeSafetySettings())
         dashboard.until("robotmode", "Robotmode: CONFIRM_SAFETY")
         secondary.sendall(b"confirm user safety parameters\n")
         dashboard.until("robotmode", "Robotmode: POWER_OFF")

@@ -7,7 +7,7 @@ import pytest
 from box_support import Bench
 
 from protocol.pose import rotvec_to_matrix
-from ur_emulator.controller.commands import WriteInputs
+from ur_emulator.commands.client_writes import WriteInputs
 
 READING = (1.0, -2.0, 3.0, 0.1, 0.2, -0.3)
 

@@ -4,7 +4,8 @@ import pytest
 from box_support import Bench
 
 from protocol.ur_types import ProgramState
-from ur_emulator.controller.commands import ResumeProgram, StopProgram, WriteInputs
+from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.commands.programs import ResumeProgram, StopProgram
 
 REGISTER = "input_int_register_24"
 WRITE = WriteInputs(((REGISTER, 5),))

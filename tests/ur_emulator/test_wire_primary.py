@@ -20,9 +20,16 @@ from protocol.primary_packages import (
 )
 from protocol.primary_program import ProgramStateMessage
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotMode, SafetyMode, SoftwareVersion
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.power import ReleaseBrakes
+from ur_emulator.commands.safety import (
+    PressEmergencyStop,
+    ReducedMode,
+    SafeguardStop,
+    TriggerFault,
+    TriggerProtectiveStop,
+    TriggerViolation,
+)
 from ur_emulator.controller import events
-from ur_emulator.controller import safety_commands as safe
 from ur_emulator.controller.safety import hardest_joint
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.robots import robot_by_name
@@ -143,7 +150,7 @@ def test_setup_comes_again_when_the_brakes_open():
     bench = PortBench(mode=RobotMode.POWER_OFF)
     client = Client(bench.secondary)
     client.take(V3_15)
-    bench.tick(1, cmd.ReleaseBrakes())
+    bench.tick(1, ReleaseBrakes())
     bench.tick(600)
     states = [state for state, _ in client.take(V3_15)]
     running = [state.find(L.RobotModeData).robot_mode == RobotMode.RUNNING for state in states]
@@ -175,13 +182,13 @@ def test_read_only_ports_take_no_script():
 @pytest.mark.parametrize(
     ("command", "mode", "level"),
     [
-        (safe.PressEmergencyStop("robot"), SafetyMode.ROBOT_EMERGENCY_STOP, None),
-        (safe.PressEmergencyStop("system"), SafetyMode.SYSTEM_EMERGENCY_STOP, None),
-        (safe.SafeguardStop(True), SafetyMode.SAFEGUARD_STOP, None),
-        (safe.ReducedMode(True), SafetyMode.REDUCED, None),
-        (cmd.TriggerProtectiveStop(), SafetyMode.PROTECTIVE_STOP, M.ReportLevel.WARNING),
-        (safe.TriggerViolation(), SafetyMode.VIOLATION, M.ReportLevel.VIOLATION),
-        (safe.TriggerFault(), SafetyMode.FAULT, M.ReportLevel.FAULT),
+        (PressEmergencyStop("robot"), SafetyMode.ROBOT_EMERGENCY_STOP, None),
+        (PressEmergencyStop("system"), SafetyMode.SYSTEM_EMERGENCY_STOP, None),
+        (SafeguardStop(True), SafetyMode.SAFEGUARD_STOP, None),
+        (ReducedMode(True), SafetyMode.REDUCED, None),
+        (TriggerProtectiveStop(), SafetyMode.PROTECTIVE_STOP, M.ReportLevel.WARNING),
+        (TriggerViolation(), SafetyMode.VIOLATION, M.ReportLevel.VIOLATION),
+        (TriggerFault(), SafetyMode.FAULT, M.ReportLevel.FAULT),
     ],
 )
 def test_every_safety_mode_has_its_message_and_level(command, mode, level):

@@ -6,9 +6,28 @@
 from box_support import Bench
 
 from protocol.ur_types import RobotMode
-from ur_emulator.controller import commands as cmd
-from ur_emulator.controller import safety_commands as safe
-from ur_emulator.controller.hands import Push
+from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.commands.power import ReleaseBrakes
+from ur_emulator.commands.programs import (
+    PauseProgram,
+    ResumeProgram,
+    SetSpeedSlider,
+    StartProgram,
+    StopProgram,
+)
+from ur_emulator.commands.push import Push
+from ur_emulator.commands.safety import (
+    Button,
+    PressButton,
+    PressEmergencyStop,
+    ReducedMode,
+    ReleaseEmergencyStop,
+    RestartSafety,
+    SafeguardStop,
+    TriggerProtectiveStop,
+    TriggerViolation,
+    UnlockProtectiveStop,
+)
 from ur_emulator.controller.port_map import read_register
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
@@ -100,7 +119,7 @@ class Story(Bench):
 
     def power_up(self):
         self.until(lambda now: now.robot_mode == RobotMode.POWER_OFF)
-        self.tick(5, cmd.ReleaseBrakes())
+        self.tick(5, ReleaseBrakes())
         self.until(lambda now: now.robot_mode == RobotMode.RUNNING)
 
     def work(self):
@@ -127,20 +146,20 @@ class Story(Bench):
         )
         self.run(MOVES)
         e_series = compile_program(INERTIA, catalogue=catalogue_for((5, 12)))
-        self.tick(5, cmd.StartProgram(e_series))
+        self.tick(5, StartProgram(e_series))
         self.start(ENDLESS)
         self.tick(300)
-        self.tick(100, cmd.PauseProgram())
-        self.tick(50, cmd.ResumeProgram())
-        self.tick(200, cmd.StopProgram())
+        self.tick(100, PauseProgram())
+        self.tick(50, ResumeProgram())
+        self.tick(200, StopProgram())
 
     def write(self, values):
-        self.tick(3, cmd.WriteInputs(tuple(values.items())))
+        self.tick(3, WriteInputs(tuple(values.items())))
 
     def be_guided(self):
-        for button in safe.Button:
-            self.tick(3, safe.PressButton(button, True))
-            self.tick(3, safe.PressButton(button, False))
+        for button in Button:
+            self.tick(3, PressButton(button, True))
+            self.tick(3, PressButton(button, False))
         self.run(INPUT_ACTION)
         self.controller.state.io.digital_in = 1
         self.tick(10)
@@ -151,17 +170,17 @@ class Story(Bench):
         self.tick(20, Push((0.0, 0.0, 0.0)))
 
     def be_stopped(self):
-        self.tick(50, safe.ReducedMode(True), cmd.SetSpeedSlider(1.0))
+        self.tick(50, ReducedMode(True), SetSpeedSlider(1.0))
         self.start(ENDLESS.replace("a=3, v=1.5", "a=8, v=3"))  # more than reduced mode allows
         self.tick(60)
-        self.tick(50, safe.SafeguardStop(True))
-        self.tick(20, safe.SafeguardStop(False))
-        self.tick(20, safe.ReducedMode(False))
-        self.tick(100, cmd.TriggerProtectiveStop())
-        self.tick(20, cmd.UnlockProtectiveStop())
-        self.tick(200, safe.PressEmergencyStop("robot"))
-        self.tick(5, safe.ReleaseEmergencyStop())
-        self.tick(5, cmd.ReleaseBrakes())
+        self.tick(50, SafeguardStop(True))
+        self.tick(20, SafeguardStop(False))
+        self.tick(20, ReducedMode(False))
+        self.tick(100, TriggerProtectiveStop())
+        self.tick(20, UnlockProtectiveStop())
+        self.tick(200, PressEmergencyStop("robot"))
+        self.tick(5, ReleaseEmergencyStop())
+        self.tick(5, ReleaseBrakes())
         self.until(lambda now: now.robot_mode == RobotMode.RUNNING)
-        self.tick(20, safe.TriggerViolation())
-        self.tick(5, cmd.RestartSafety())
+        self.tick(20, TriggerViolation())
+        self.tick(5, RestartSafety())

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from protocol.primary_messages import RequestedType
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.controller.controller import Controller
+from ur_emulator.commands.inputs import DIGITAL_GROUPS
 from ur_emulator.controller.cycle import controller_time
-from ur_emulator.controller.wires import DIGITAL_GROUPS
 from ur_emulator.models.robot_model import Vector3, Vector6
+
+if TYPE_CHECKING:
+    from ur_emulator.controller.controller import Controller
 
 # Slower than this counts as standing still [rad/s]: more than what the sensors make of an arm at rest.
 STANDING_SPEED = 0.01
@@ -121,7 +124,7 @@ def take_state(controller: Controller) -> BoxState:
         analog_outputs=now.analog_values[2:4],
         tool_analog_inputs=now.analog_values[4:],
         tool_voltage=now.tool_output_voltage,
-        obstacles=controller.plant.obstacles,
+        obstacles=controller.plant.obstacles.names,
         popups=(*operator.shown, *popups),
         questions=tuple(
             Question(r.request_id, r.kind.name, r.text)

@@ -13,9 +13,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from ur_emulator.commands.parameters import Kind, Parameter
 from ur_emulator.control.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
-from ur_emulator.control.operations import BY_NAME, OPERATIONS, Operation
-from ur_emulator.control.parameters import Kind, Parameter
+from ur_emulator.control.operations import OPERATIONS, make
 from ur_emulator.errors import ArgumentError, ControlError
 
 PROGRAM = "ur-emulator ctl"
@@ -33,17 +33,17 @@ class _Parser(argparse.ArgumentParser):
 def main(words: Sequence[str]) -> int:
     """Do what the command line says; return the exit code."""
     given = vars(make_parser().parse_args(words))
-    operation = BY_NAME[given.pop("operation")]
+    name = given.pop("operation")
     client = ControlClient(given.pop("host", DEFAULT_HOST), given.pop("control_port", DEFAULT_PORT))
     as_json, follow = given.pop("json", False), given.pop("follow", False)
     try:
-        arguments = _arguments(operation, given)
+        arguments = _arguments(name, given)
     except (ArgumentError, OSError, UnicodeError) as error:
         return _complain(error, 2)
     try:
         if follow:
             _follow(client, arguments, as_json)
-        result = client.perform(operation.name, arguments)
+        result = client.perform(name, arguments)
     except KeyboardInterrupt:
         return 0
     except ControlError as error:
@@ -60,9 +60,9 @@ def make_parser() -> argparse.ArgumentParser:
     common.add_argument("--json", action="store_true", help="print the result as JSON")
     parser = _Parser(prog=PROGRAM, description="Do something to a box that runs.", parents=[common])
     commands = parser.add_subparsers(dest="operation", required=True, metavar="OPERATION")
-    for operation in OPERATIONS:
+    for name, operation in OPERATIONS.items():
         command = commands.add_parser(
-            operation.name,
+            name,
             help=operation.meaning,
             description=operation.meaning,
             parents=[common],
@@ -71,7 +71,7 @@ def make_parser() -> argparse.ArgumentParser:
         )
         for parameter in operation.parameters:
             _add_option(command, parameter)
-        if operation.name == "log":
+        if name == "log":
             command.add_argument("--follow", action="store_true", help="go on with what comes, until Ctrl-C")
     return parser
 
@@ -104,20 +104,20 @@ def _add_option(command: argparse.ArgumentParser, parameter: Parameter) -> None:
         )
 
 
-def _arguments(operation: Operation, given: Mapping[str, Any]) -> dict[str, Any]:
+def _arguments(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return what was given as JSON has it.
 
     Raises:
         ArgumentError: it does not fit.
     """
     arguments: dict[str, Any] = {}
-    for parameter in operation.parameters:
+    for parameter in OPERATIONS[name].parameters:
         if (path := given.get(f"{parameter.name}_file")) is not None:
             arguments[parameter.name] = Path(path).read_text(encoding="utf-8")
         elif parameter.name in given:
             value = given[parameter.name]
             arguments[parameter.name] = parameter.parse(value if isinstance(value, str) else " ".join(value))
-    operation.check(arguments)
+    make(name, arguments)
     return arguments
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlencode
 
-from ur_emulator.control.operations import BY_NAME
+from ur_emulator.control.operations import OPERATIONS, make
 from ur_emulator.errors import ArgumentError, ControlError, RefusedError
 
 DEFAULT_HOST = "127.0.0.1"
@@ -32,13 +32,12 @@ class ControlClient:
             RefusedError: the state of the box stands against it.
             ControlError: it was not done for another reason, such as that no box answers.
         """
-        operation = BY_NAME[name]
-        operation.check(arguments)
+        make(name, arguments)
         given = {key: value for key, value in arguments.items() if value is not None}
         patience = PATIENCE + float(given.get("timeout", 0.0))
         connection = http.client.HTTPConnection(self.host, self.port, timeout=patience)
         try:
-            if operation.only_reads:
+            if OPERATIONS[name].only_reads:
                 query = f"?{urlencode(given)}" if given else ""
                 connection.request("GET", f"/v1/{name}{query}")
             else:

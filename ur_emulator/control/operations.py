@@ -1,306 +1,192 @@
-"""The operations of the control API, as one table: names, parameters, ranges, defaults, results.
+"""All operations: each a method of `ControlBox`, a path below /v1/, a sub-command of `ur-emulator ctl`.
 
-The methods of `ControlBox`, the HTTP endpoint, `ur-emulator ctl` and docs/control.md all follow it; how an
-operation is done stands in `actions`. Nothing heavy is imported here: the command line needs the table only.
+A row of `BoxOperations` gives an operation its name; all else is declared by its dataclass. Methods may be
+called from any thread but that of the loop. They return after the cycle in which what they ask was applied,
+and raise `ArgumentError` for what they do not take, `RefusedError` when the state of the box stands against
+it, and `NotRunningError` when the box does not run; all of them are `EmulatorError`s.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, overload
 
-from protocol.primary_messages import ReportLevel
-from protocol.ur_types import ProgramState, RobotMode, SafetyMode
-from ur_emulator.control.parameters import REQUIRED, Kind, Parameter
-from ur_emulator.controller.hands import MAX_LEVER, MAX_LOAD, MAX_PUSH, MAX_PUSH_TIME
-from ur_emulator.controller.wires import ANALOG_GROUPS, DIGITAL_GROUPS, MAX_ANALOG
+from ur_emulator.box_log import LogEntry
+from ur_emulator.commands.inputs import SetAnalogInput, SetDigitalInput
+from ur_emulator.commands.obstacles import AddObstacle, RemoveObstacle
+from ur_emulator.commands.operation import Operation, arguments_of
+from ur_emulator.commands.operator import AnswerRequest, ClosePopup
+from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetSpeedSlider, StopProgram
+from ur_emulator.commands.push import AttachPayload, Push
+from ur_emulator.commands.safety import (
+    PressEmergencyStop,
+    ReducedMode,
+    ReleaseEmergencyStop,
+    RestartSafety,
+    SafeguardStop,
+    TriggerFault,
+    TriggerProtectiveStop,
+    TriggerViolation,
+    UnlockProtectiveStop,
+)
+from ur_emulator.control.program_run import RunProgram
+from ur_emulator.control.reading import AddToLog, ReadIdentity, ReadLog, ReadState
+from ur_emulator.control.waiting import WaitUntil
 from ur_emulator.errors import ArgumentError
 
-MAX_WAIT = 3600.0  # s
-DEFAULT_WAIT = 10.0  # s
-
-APPLIED = "`tick`: the cycle in which it was applied"
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
-@dataclass(frozen=True, slots=True)
-class Operation:
-    """Something that can be done to a box, or asked of it.
+def method(operation: Callable[P, Operation[R]]) -> Callable[Concatenate[BoxOperations, P], R]:
+    """Return the method for an operation: its parameters are those of the dataclass."""
+    signature = inspect.signature(operation)
 
-    Attributes:
-        name: of the method, of the path below /v1/, of the sub-command.
-        meaning: one sentence.
-        parameters: what it takes.
-        result: what the JSON object that it returns holds.
-        only_reads: it changes nothing: a property in Python, GET in HTTP.
+    def call(box: BoxOperations, /, *args: P.args, **kwargs: P.kwargs) -> R:
+        bound = signature.bind(*args, **kwargs)
+        bound.apply_defaults()
+        # Read here: the box must not wait for a disk.
+        given = {
+            name: value.read_text(encoding="utf-8") if isinstance(value, Path) else value
+            for name, value in bound.arguments.items()
+        }
+        result: Any = box._perform(call.__name__, given)
+        returned: R = result["tick"] if isinstance(result, dict) else result
+        return returned
+
+    box = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
+    call.__doc__ = f"{inspect.getdoc(operation)}\n\n{arguments_of(operation)}".rstrip()  # type: ignore[arg-type]
+    call.__dict__["operation"] = operation
+    call.__dict__["__signature__"] = signature.replace(parameters=[box, *signature.parameters.values()])
+    return call
+
+
+class Reading(Generic[R]):
+    """The property for an operation that only reads.
+
+    Args:
+        operation: the operation.
+        read: how it is asked for in Python, if not through the loop.
     """
 
-    name: str
-    meaning: str
-    parameters: tuple[Parameter, ...] = ()
-    result: str = APPLIED
-    only_reads: bool = False
+    def __init__(
+        self, operation: Callable[[], Operation[R]], read: Callable[[BoxOperations], R] | None = None
+    ) -> None:
+        self.operation = operation
+        self.__doc__ = inspect.getdoc(operation)
+        self.__name__ = ""
+        self._read = read
 
-    def check(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all arguments as the action wants them, defaults filled in.
-
-        Raises:
-            ArgumentError: one does not fit, is missing, or has an unknown name.
-        """
-        names = [parameter.name for parameter in self.parameters]
-        for name in arguments:
-            if name not in names:
-                known = f"it takes {', '.join(names)}" if names else "it takes none"
-                raise ArgumentError(f"{self.name} has no parameter {ascii(name)[:60]}: {known}")
-        checked = {}
-        for parameter in self.parameters:
-            value = arguments.get(parameter.name, parameter.default)
-            if value is REQUIRED:
-                raise ArgumentError(f"{self.name} needs {parameter.name}: {parameter.allowed}")
-            checked[parameter.name] = parameter.check(value)
-        return checked
+    @overload
+    def __get__(self, box: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, box: BoxOperations, owner: type) -> R: ...
+    def __get__(self, box: BoxOperations | None, owner: type) -> R | Self:
+        if box is None:
+            return self
+        if self._read is not None:
+            return self._read(box)
+        result: R = box._perform(self.__name__, {})
+        return result
 
 
-def _names(
-    enum: type[RobotMode] | type[SafetyMode] | type[ProgramState] | type[ReportLevel],
-) -> tuple[str, ...]:
-    return tuple(member.name for member in enum)
+class BoxOperations:
+    """What people and tests do to a box."""
 
+    def _perform(self, name: str, arguments: Mapping[str, Any]) -> Any:
+        """Have an operation done; return its result."""
+        raise NotImplementedError
 
-def _choice(name: str, meaning: str, choices: tuple[str, ...], default: Any = REQUIRED) -> Parameter:
-    return Parameter(name, Kind.CHOICE, meaning, choices=choices, default=default)
+    def _log_entries(self) -> tuple[LogEntry, ...]:
+        """Return the last entries of the log, the oldest first; from any thread, also after the box ended."""
+        raise NotImplementedError
 
-
-_ACTIVE = Parameter("active", Kind.BOOLEAN, "begin, or end it", default=True)
-_COG = Parameter(
-    "cog", Kind.VECTOR, "centre of gravity in the flange frame", "m", high=MAX_LEVER, default=(0.0, 0.0, 0.0)
-)
-
-OPERATIONS: tuple[Operation, ...] = (
     # --- what is going on
-    Operation(
-        "state",
-        "What the box is doing at the end of its last cycle.",
-        result="modes, joints, tool, force, inputs and outputs, program, popups and questions, time",
-        only_reads=True,
-    ),
-    Operation(
-        "log",
-        "What PolyScope's log tab would show.",
-        (
-            Parameter(
-                "after",
-                Kind.INTEGER,
-                "leave out so many entries: the `next` of the call before",
-                low=0,
-                default=0,
-            ),
-            _choice("level", "leave out what weighs less", _names(ReportLevel), "DEBUG"),
-        ),
-        "`entries`, the oldest first, and `next`, to be given as `after` in the next call",
-        only_reads=True,
-    ),
-    Operation(
-        "identity",
-        "What the box is.",
-        result="software, robot model, serial number, pace, seed, fidelity, address and ports",
-        only_reads=True,
-    ),
-    Operation(
-        "wait_until",
-        "Wait until all conditions hold at the end of a cycle, and return the state then.",
-        (
-            _choice("robot_mode", "the robot mode is this", _names(RobotMode), None),
-            _choice("safety_mode", "the safety mode is this", _names(SafetyMode), None),
-            _choice("program_state", "the program state is this", _names(ProgramState), None),
-            Parameter("steady", Kind.BOOLEAN, "the arm stands still, or not", default=None),
-            Parameter("popup", Kind.BOOLEAN, "a popup is shown, or none", default=None),
-            Parameter("question", Kind.BOOLEAN, "a program waits for an answer, or none does", default=None),
-            Parameter("log", Kind.TEXT, "an entry of the log contains this", default=None),
-            Parameter("after", Kind.INTEGER, "entries of the log that do not count", low=0, default=0),
-            Parameter(
-                "timeout",
-                Kind.NUMBER,
-                "give up after so long in real time",
-                "s",
-                0.0,
-                MAX_WAIT,
-                default=DEFAULT_WAIT,
-            ),
-        ),
-        "the state, as `state` gives it",
-    ),
-    # --- wires
-    Operation(
-        "set_digital_input",
-        "Let a digital input be high or low from now on.",
-        (
-            _choice("group", "which inputs", tuple(DIGITAL_GROUPS)),
-            Parameter("n", Kind.INTEGER, "number of the input: 0 to 7, of the tool 0 to 1", low=0, high=7),
-            Parameter("level", Kind.BOOLEAN, "high or low"),
-        ),
-    ),
-    Operation(
-        "set_analog_input",
-        "Let an analogue input have a voltage or a current from now on.",
-        (
-            _choice("group", "which inputs", tuple(ANALOG_GROUPS)),
-            Parameter("n", Kind.INTEGER, "number of the input", low=0, high=1),
-            Parameter(
-                "value",
-                Kind.NUMBER,
-                "in V, or in A where the input measures current",
-                low=0.0,
-                high=MAX_ANALOG,
-            ),
-        ),
-    ),
-    # --- hands
-    Operation(
-        "push",
-        "Push the flange as a hand would; a zero force ends it.",
-        (
-            Parameter("force", Kind.VECTOR, "in base axes", "N", high=MAX_PUSH),
-            Parameter(
-                "point",
-                Kind.VECTOR,
-                "where it acts, in the flange frame",
-                "m",
-                high=MAX_LEVER,
-                default=(0.0, 0.0, 0.0),
-            ),
-            Parameter(
-                "duration",
-                Kind.NUMBER,
-                "for so long in robot time; until the next push if left out",
-                "s",
-                0.0,
-                MAX_PUSH_TIME,
-                default=None,
-            ),
-        ),
-    ),
-    Operation(
-        "attach_payload",
-        "Hang a load on the flange that no program has declared.",
-        (Parameter("mass", Kind.NUMBER, "of the load", "kg", 0.0, MAX_LOAD), _COG),
-    ),
-    Operation(
-        "add_obstacle",
-        "Put a fixed obstacle somewhere; one of the same name gives way.",
-        (
-            Parameter("name", Kind.TEXT, "to remove it by"),
-            _choice("shape", "what it is; a plane has no end", ("box", "sphere", "capsule", "plane")),
-            Parameter(
-                "size",
-                Kind.VECTOR,
-                "box: three edges; sphere: radius; capsule: radius, length; plane: none",
-                "m",
-                lengths=(0, 3),
-            ),
-            Parameter(
-                "pose",
-                Kind.VECTOR,
-                "of its middle in the base frame, position in m and rotation vector in rad",
-                lengths=(6, 6),
-            ),
-        ),
-    ),
-    Operation(
-        "remove_obstacle",
-        "Take an obstacle away.",
-        (Parameter("name", Kind.TEXT, "of the obstacle"),),
-    ),
+    state = Reading(ReadState)
+    log = Reading(ReadLog, lambda box: box._log_entries())
+    identity = Reading(ReadIdentity)
+    wait_until = method(WaitUntil)
+    # --- inputs
+    set_digital_input = method(SetDigitalInput)
+    set_analog_input = method(SetAnalogInput)
+    # --- what acts on the arm
+    push = method(Push)
+    attach_payload = method(AttachPayload)
+    add_obstacle = method(AddObstacle)
+    remove_obstacle = method(RemoveObstacle)
     # --- safety
-    Operation(
-        "emergency_stop",
-        "Press an emergency stop button.",
-        (_choice("kind", "the pendant's button, or that of the surroundings", ("robot", "system"), "robot"),),
-    ),
-    Operation("release_emergency_stop", "Release all emergency stop buttons; the power stays off."),
-    Operation("safeguard_stop", "Open the safeguard, or close it again.", (_ACTIVE,)),
-    Operation("reduced_mode", "Switch reduced mode on or off, as its input does.", (_ACTIVE,)),
-    Operation("protective_stop", "Stop the arm as a safety function would."),
-    Operation("unlock_protective_stop", "End a protective stop at once, without the dashboard's 5 s."),
-    Operation(
-        "trigger_violation",
-        "Let the safety system find a violation.",
-        (Parameter("text", Kind.TEXT, "for log and clients", default="Safety violation requested"),),
-    ),
-    Operation(
-        "trigger_fault",
-        "Let the safety system find a fault in itself.",
-        (Parameter("text", Kind.TEXT, "for log and clients", default="Safety fault requested"),),
-    ),
-    Operation("restart_safety", "Restart the safety system; the power is off then."),
+    emergency_stop = method(PressEmergencyStop)
+    release_emergency_stop = method(ReleaseEmergencyStop)
+    safeguard_stop = method(SafeguardStop)
+    reduced_mode = method(ReducedMode)
+    protective_stop = method(TriggerProtectiveStop)
+    unlock_protective_stop = method(UnlockProtectiveStop)
+    trigger_violation = method(TriggerViolation)
+    trigger_fault = method(TriggerFault)
+    restart_safety = method(RestartSafety)
     # --- power
-    Operation("power_on", "Power the joints; the brakes stay closed."),
-    Operation("power_off", "Close the brakes and cut the power."),
-    Operation("release_brakes", "Go to RUNNING, powering on first if need be."),
+    power_on = method(PowerOn)
+    power_off = method(PowerOff)
+    release_brakes = method(ReleaseBrakes)
     # --- programs
-    Operation(
-        "run_program",
-        "Run a program in place of the one that runs.",
-        (
-            Parameter("script", Kind.SCRIPT, "text of a program, as sent to port 30002", default=None),
-            Parameter("file", Kind.TEXT, "or a file in the folder of programs, as for `load`", default=None),
-        ),
-        "`program`: its name, and `tick`: the cycle in which it began",
-    ),
-    Operation("stop_program", "End the program, if one runs."),
-    Operation("pause_program", "Let the program stand still, and the arm come to rest on its path."),
-    Operation("resume_program", "Let a paused program go on."),
-    Operation(
-        "set_speed",
-        "Set the speed slider.",
-        (Parameter("fraction", Kind.NUMBER, "of full speed", low=0.0, high=1.0),),
-    ),
+    run_program = method(RunProgram)
+    stop_program = method(StopProgram)
+    pause_program = method(PauseProgram)
+    resume_program = method(ResumeProgram)
+    set_speed = method(SetSpeedSlider)
     # --- the operator
-    Operation(
-        "answer",
-        "Answer a question of a program.",
-        (
-            Parameter("value", Kind.ANSWER, "of the type that was asked for"),
-            Parameter(
-                "id",
-                Kind.INTEGER,
-                "number of the question; the oldest that fits if left out",
-                low=1,
-                default=None,
-            ),
-        ),
-        "`id`: number of the question, and `tick`",
-    ),
-    Operation("close_popups", "Press the button of all popups."),
-    Operation(
-        "add_to_log",
-        "Write a line into the log.",
-        (Parameter("text", Kind.TEXT, "the line"),),
-    ),
-)
+    answer = method(AnswerRequest)
+    close_popups = method(ClosePopup)
+    add_to_log = method(AddToLog)
 
-BY_NAME: dict[str, Operation] = {operation.name: operation for operation in OPERATIONS}
+
+OPERATIONS: dict[str, type[Operation[Any]]] = {}
+for _name, _member in vars(BoxOperations).items():
+    if hasattr(_member, "operation"):
+        _member.__name__ = _name
+        OPERATIONS[_name] = _member.operation
+
+
+def make(name: str, arguments: Mapping[str, Any]) -> Operation[Any]:
+    """Return an operation as it was asked for; one of `OPERATIONS`.
+
+    Raises:
+        ArgumentError: an argument does not fit, is missing, or has an unknown name.
+    """
+    rows = OPERATIONS[name].parameters
+    known = [row.name for row in rows]
+    for given in arguments:
+        if given not in known:
+            takes = f"it takes {', '.join(known)}" if known else "it takes none"
+            raise ArgumentError(f"{name} has no parameter {ascii(given)[:60]}: {takes}")
+    for row in rows:
+        if row.is_required and row.name not in arguments:
+            raise ArgumentError(f"{name} needs {row.name}: {row.allowed}")
+    return OPERATIONS[name](**arguments)
 
 
 def describe() -> list[dict[str, Any]]:
-    """Return the table as JSON has it."""
+    """Return all operations as JSON has them."""
     return [
         {
-            "name": operation.name,
+            "name": name,
             "method": "GET" if operation.only_reads else "POST",
             "meaning": operation.meaning,
             "parameters": [
                 {
-                    "name": parameter.name,
-                    "type": parameter.kind.value,
-                    "meaning": parameter.meaning,
-                    "allowed": parameter.allowed,
-                    "required": parameter.is_required,
-                    "default": None if parameter.is_required else parameter.default,
+                    "name": row.name,
+                    "type": row.kind.value,
+                    "meaning": row.meaning,
+                    "allowed": row.allowed,
+                    "required": row.is_required,
+                    "default": None if row.is_required else row.default,
                 }
-                for parameter in operation.parameters
+                for row in operation.parameters
             ],
             "result": operation.result,
         }
-        for operation in OPERATIONS
+        for name, operation in OPERATIONS.items()
     ]

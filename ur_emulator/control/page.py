@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
+from ur_emulator.commands.operation import Operation
+from ur_emulator.commands.parameters import Kind, Parameter
 from ur_emulator.control.http_client import DEFAULT_PORT
-from ur_emulator.control.operations import OPERATIONS, Operation
-from ur_emulator.control.parameters import Kind, Parameter
+from ur_emulator.control.operations import OPERATIONS
 
 _INTRODUCTION = f"""\
 # The control API
@@ -66,12 +68,12 @@ file of this machine; `ctl OPERATION --help` lists the options.
 
 def render() -> str:
     """Return the page."""
-    return "\n".join([_INTRODUCTION, *map(_section, OPERATIONS)])
+    return "\n".join([_INTRODUCTION, *(_section(*row) for row in OPERATIONS.items())])
 
 
-def _section(operation: Operation) -> str:
+def _section(name: str, operation: type[Operation[Any]]) -> str:
     verb = "GET" if operation.only_reads else "POST"
-    lines = [f"### {operation.name}\n", f"{operation.meaning} ({verb})\n"]
+    lines = [f"### {name}\n", f"{operation.meaning} ({verb})\n"]
     if operation.parameters:
         lines += ["| parameter | is | allowed | default |", "|---|---|---|---|"]
         lines += [_row(parameter) for parameter in operation.parameters]

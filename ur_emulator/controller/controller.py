@@ -8,17 +8,18 @@ time is the tick.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 
 from protocol.primary_messages import ReportLevel
 from protocol.ur_types import ControlMode, RobotMode
-from ur_emulator.controller import commands as cmd
-from ur_emulator.controller.command_desk import CommandDesk
+from ur_emulator.controller.command import Command
 from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US
 from ur_emulator.controller.events import (
     ErrorReported,
     Event,
     RobotModeChanged,
 )
+from ur_emulator.controller.flange_push import FlangePush
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (
@@ -33,6 +34,7 @@ from ur_emulator.controller.safety_system import SafetySystem
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.controller.watchdogs import WatchdogAction
+from ur_emulator.errors import RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
@@ -53,7 +55,7 @@ UNLOCK_CYCLES = round(UNLOCK_DELAY * 1_000_000 / PERIOD_US) + 2
 
 
 class Controller:
-    """One control box without its ports."""
+    """One control box without its ports; commands act on its public parts (`command.Box`)."""
 
     def __init__(
         self,
@@ -93,8 +95,8 @@ class Controller:
         self.state.place_arm = self._place_arm
         self._payload = self.state.payload
         self.programs = ProgramSlot(self.state, network)
-        self._safety = SafetySystem(self.state, self.programs)
-        self._desk = CommandDesk(self.state, self.plant, self.programs, self._safety)
+        self.safety = SafetySystem(self.state, self.programs)
+        self.push = FlangePush(self.plant, self.period_s)
         self.state.mode.command(ModeCommand.BOOT)
         # The first cycle only makes the first snapshot; nothing moves in it.
         self.tick(())
@@ -111,9 +113,9 @@ class Controller:
             self.programs.has_work
             or self.state.motion.is_moving
             or self.state.mode.is_changing
-            or self._safety.is_stopping
+            or self.safety.is_stopping
             or self._settle > 0
-            or self._desk.is_pushing
+            or self.push.will_end
         )
 
     @property
@@ -126,7 +128,7 @@ class Controller:
         events, self.state.events = self.state.events, []
         return events
 
-    def tick(self, commands: Iterable[cmd.Command]) -> Snapshot:
+    def tick(self, commands: Iterable[Command]) -> Snapshot:
         """Advance one control cycle.
 
         Args:
@@ -138,11 +140,12 @@ class Controller:
         state = self.state
         state.tick += 1
         n_events = len(state.events)
-        was_pushing = self._desk.is_pushing
+        was_pushing = self.push.will_end
         if was_pushing:
-            self._desk.step()
+            self.push.step()
         for command in commands:
-            self._desk.obey(command)
+            with suppress(RefusedError):  # who wants to know has submitted it with `done`
+                command.apply(self)
         self._step_modes()
         self._step_scripts()
         was_active = was_pushing or self.programs.has_work or state.motion.is_moving or state.mode.is_changing
@@ -172,9 +175,9 @@ class Controller:
             self._mode = state.mode.mode
             state.events.append(RobotModeChanged(int(self._mode)))
             if self._mode is RobotMode.RUNNING:
-                self._safety.check_range()
-        if self._safety.is_busy:
-            self._safety.step()
+                self.safety.check_range()
+        if self.safety.is_busy:
+            self.safety.step()
         if state.watchdogs and not self.programs.is_paused:
             self._check_watchdogs()
         if state.encoders.decoding:
@@ -188,7 +191,7 @@ class Controller:
         self.programs.step()
         if state.power_off_requested:
             state.power_off_requested = False
-            self._safety.cut_power()
+            self.safety.cut_power()
         if state.payload is not self._payload:
             # What a program declares is taken to be really there: the arm carries it from now on.
             self._payload = state.payload
@@ -209,8 +212,8 @@ class Controller:
         self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
         if running and state.safety.is_watched:
             violation = find_violation(state.robot, sensed, self._saturated_s)
-            if self._safety.is_busy and violation is None:
-                violation = self._safety.find_violation(sensed)
+            if self.safety.is_busy and violation is None:
+                violation = self.safety.find_violation(sensed)
             if control and violation is None:
                 violation = state.compliance.find_violation(state.robot, sensed)
             if violation is None and state.stop_requested:
@@ -257,7 +260,7 @@ class Controller:
         state = self.state
         self._settle = UNLOCK_CYCLES
         state.events.append(violation.error)
-        self._safety.happen(SafetyEvent.PROTECTIVE_STOP)
+        self.safety.happen(SafetyEvent.PROTECTIVE_STOP)
         if violation.blocked:
             state.motion.place(actual_q)
             self.plant.rest_trim()

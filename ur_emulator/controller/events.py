@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from protocol.primary_messages import ReportLevel, RequestedType
-from urscript import RunningProgram
+
+if TYPE_CHECKING:
+    from urscript import RunningProgram
 
 
 @dataclass(frozen=True, slots=True)

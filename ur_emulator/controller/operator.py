@@ -1,6 +1,6 @@
 """What programs ask of the operator: values, and popups to be closed. Nobody stands there: a client answers.
 
-Answers come as `commands.AnswerRequest` and `commands.ClosePopup`.
+Answers come as `AnswerRequest` and `ClosePopup` of `ur_emulator.commands.operator`.
 """
 
 from __future__ import annotations
@@ -84,15 +84,20 @@ class Operator:
         """Take a question off the screen, answered or not."""
         self._open.pop(request.request_id, None)
 
-    def answer(self, value: Answer, request_id: int | None = None) -> None:
-        """Answer a question, or the oldest; one that does not exist or wants another type stays as it is."""
+    def answer(self, value: Answer, request_id: int | None = None) -> int | None:
+        """Answer a question, or the oldest; one that does not exist or wants another type stays as it is.
+
+        Returns:
+            Number of the question that was answered; None if none was.
+        """
         for request in self.requests:
             if request_id in (None, request.request_id):
                 answer = _as_asked(request.kind, value)
                 if answer is not None:
                     request.answer = answer
                     self._finish(request)
-                    return
+                    return request.request_id
+        return None
 
     def close_popups(self) -> None:
         """Press the button of every popup."""

@@ -8,10 +8,21 @@ pair whose channels differ is no fault is chosen.
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import Enum
 
 from ur_emulator.controller.io import CONFIGURABLE_SHIFT
-from ur_emulator.controller.safety_commands import SafetyInput
 from ur_emulator.controller.safety_modes import SafetyEvent
+
+N_INPUT_PAIRS = 4
+
+
+class SafetyInput(Enum):
+    """What a pair of configurable inputs can be set up for. Source: UR3/CB3 manual, configurable I/O."""
+
+    EMERGENCY_STOP = "emergency stop"  # low presses the system emergency stop
+    REDUCED = "reduced"  # low switches reduced mode on
+    SAFEGUARD_RESET = "safeguard reset"  # a rising edge resets
+
 
 _PRESSED = {
     "robot": SafetyEvent.ROBOT_EMERGENCY_PRESSED,

@@ -5,15 +5,12 @@ The tables are in `safety_modes`. In cycles in which nothing of this goes on nob
 
 from __future__ import annotations
 
-from protocol.primary_messages import ReportLevel
-from protocol.rtde_types import RobotStatusBits
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.controller import safety_commands as cmd
 from ur_emulator.controller.cycle import controller_time
-from ur_emulator.controller.events import ErrorReported, SafetyModeChanged
+from ur_emulator.controller.events import SafetyModeChanged
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.controller.safety import Violation
-from ur_emulator.controller.safety_inputs import SafetyInputs
+from ur_emulator.controller.safety_inputs import SafetyInput, SafetyInputs
 from ur_emulator.controller.safety_modes import EVENTS, ROW, ArmEffect, ProgramEffect, SafetyEvent
 from ur_emulator.controller.speed_limiter import SpeedLimiter, joint_limits
 from ur_emulator.controller.state import ControllerState
@@ -24,23 +21,19 @@ from ur_emulator.scripting.program_slot import ProgramSlot
 # The drives follow their targets by 30 to 50 ms; the brakes wait for them, but no longer than the second [s].
 BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
 
-_BITS = {
-    cmd.Button.TEACH: int(RobotStatusBits.TEACH_BUTTON_PRESSED),
-    cmd.Button.POWER: int(RobotStatusBits.POWER_BUTTON_PRESSED),
-}
-
 
 class SafetySystem:
     """Acts on the safety state, and on everything that has to follow.
 
     Attributes:
+        inputs: buttons and inputs, which are pressed and set here.
         is_busy: `step` and `find_violation` want their turn in every cycle.
     """
 
     def __init__(self, state: ControllerState, programs: ProgramSlot) -> None:
         self._state = state
         self._programs = programs
-        self._inputs = SafetyInputs(self.happen)
+        self.inputs = SafetyInputs(self.happen)
         self._cut_after: int | None = None
         self._rests_since: int | None = None
         self._is_waiting = False
@@ -51,39 +44,9 @@ class SafetySystem:
         """True until the power is cut after an emergency stop."""
         return self._cut_after is not None
 
-    def obey(self, command: cmd.SafetyCommand) -> None:
-        """Do what a command says."""
-        match command:
-            case cmd.PressEmergencyStop(kind):
-                self._inputs.press(kind)
-            case cmd.ReleaseEmergencyStop():
-                self._inputs.release()
-            case cmd.SafeguardStop(active):
-                self._inputs.guard(active)
-            case cmd.RequireSafeguardReset(required):
-                self._inputs.require_reset(required)
-            case cmd.ResetSafeguard():
-                self._inputs.reset()
-            case cmd.ReducedMode(active):
-                self._inputs.reduce(active)
-            case cmd.TriggerViolation(text):
-                self._report(text, ReportLevel.VIOLATION)
-                self.happen(SafetyEvent.VIOLATION)
-            case cmd.TriggerFault(text):
-                self._report(text, ReportLevel.FAULT)
-                self.happen(SafetyEvent.FAULT)
-            case cmd.ChangeSafetySettings():
-                self.cut_power()
-                self._state.mode.command(ModeCommand.ASK_TO_CONFIRM)
-            case cmd.ConfirmSafety():
-                self._state.mode.command(ModeCommand.CONFIRM)
-            case cmd.PressButton(button, pressed):
-                bits = self._state.buttons & ~_BITS[button]
-                self._state.buttons = bits | (_BITS[button] if pressed else 0)
-                if button is cmd.Button.TEACH:
-                    self._state.compliance.press(pressed)
-            case cmd.AssignSafetyInput(pair, function):
-                self._inputs.assign(pair, function)
+    def assign_input(self, pair: int, function: SafetyInput | None) -> None:
+        """Set up a pair of configurable inputs as a safety input; None frees them."""
+        self.inputs.assign(pair, function)
         self._update()
 
     def happen(self, event: SafetyEvent) -> None:
@@ -120,8 +83,8 @@ class SafetySystem:
     def step(self) -> None:
         """Do at the start of a cycle what is due."""
         state = self._state
-        if self._inputs.assigned:
-            self._inputs.step(state.io.digital_in)
+        if self.inputs.assigned:
+            self.inputs.step(state.io.digital_in)
         if state.safety.has(SafetyMode.RECOVERY) and self._is_in_range():
             self.happen(SafetyEvent.RANGE_KEPT)
         if self._cut_after is not None:
@@ -193,13 +156,10 @@ class SafetySystem:
             for low, q, high in zip(robot.q_min, self._state.snapshot.actual_q, robot.q_max, strict=True)
         )
 
-    def _report(self, text: str, level: ReportLevel) -> None:
-        self._state.events.append(ErrorReported(0, 0, level, text))
-
     def _update(self) -> None:
         self.is_busy = (
             self._cut_after is not None
-            or bool(self._inputs.assigned)
+            or bool(self.inputs.assigned)
             or self._state.limiter is not None
             or self._state.safety.has(SafetyMode.RECOVERY)
         )

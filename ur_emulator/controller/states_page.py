@@ -55,8 +55,7 @@ _HEAD = """\
 Made from `ur_emulator/controller/safety_modes.py`, `robot_mode.py` and `states_page.py` by `make docs`.
 Letters: D documented, O observed, I inferred, C chosen; see [fidelity.md](fidelity.md).
 
-Commands are those of `ur_emulator.controller.commands` and `safety_commands`; `ControlBox.submit` takes
-them.
+Commands are those of `ur_emulator.commands`; `ControlBox.submit` takes them.
 
 ## Safety mode
 

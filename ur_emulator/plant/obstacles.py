@@ -8,20 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import cos, hypot, inf, isfinite, sin
+from math import cos, hypot, inf, sin
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.errors import PlantError
+from ur_emulator.errors import RefusedError
 from ur_emulator.models.robot_model import Vector6
 
 OBSTACLES = "obstacles"
 SLOTS = 16
 
-# Limits that keep absurd numbers from the physics: how far away, how small and how large [m].
-FARTHEST, SMALLEST, LARGEST = 5.0, 0.001, 5.0
+# A shape that is not in use, and the part of a plane that is drawn [m].
+_UNUSED, _DRAWN = 0.001, 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +30,11 @@ class Shape:
 
     Attributes:
         geom: MuJoCo's type.
-        sizes: what its sizes mean, in order [m].
-        to_mujoco: those as MuJoCo's sizes.
+        to_mujoco: its sizes, as `AddObstacle` has them, as MuJoCo's sizes.
         half_extent: half edges of the smallest box around it [m]; infinite for what has no end.
     """
 
     geom: mujoco.mjtGeom
-    sizes: tuple[str, ...]
     to_mujoco: Callable[..., tuple[float, float, float]]
     half_extent: Callable[..., tuple[float, float, float]]
 
@@ -44,43 +42,18 @@ class Shape:
 SHAPES: dict[str, Shape] = {
     "box": Shape(
         mujoco.mjtGeom.mjGEOM_BOX,
-        ("edge along x", "edge along y", "edge along z"),
         lambda x, y, z: (x / 2, y / 2, z / 2),
         lambda x, y, z: (x / 2, y / 2, z / 2),
     ),
-    "sphere": Shape(mujoco.mjtGeom.mjGEOM_SPHERE, ("radius",), lambda r: (r, 0.0, 0.0), lambda r: (r, r, r)),
+    "sphere": Shape(mujoco.mjtGeom.mjGEOM_SPHERE, lambda r: (r, 0.0, 0.0), lambda r: (r, r, r)),
     "capsule": Shape(
         mujoco.mjtGeom.mjGEOM_CAPSULE,
-        ("radius", "length along z without the ends"),
         lambda r, length: (r, length / 2, 0.0),
         lambda r, length: (r, r, length / 2 + r),
     ),
     # A wall without end; what is on the side of negative z is inside it.
-    "plane": Shape(mujoco.mjtGeom.mjGEOM_PLANE, (), lambda: (LARGEST, LARGEST, 0.1), lambda: (inf, inf, inf)),
+    "plane": Shape(mujoco.mjtGeom.mjGEOM_PLANE, lambda: (_DRAWN, _DRAWN, 0.1), lambda: (inf, inf, inf)),
 }
-
-
-def check_obstacle(name: str, shape: str, size: Sequence[float], pose: Sequence[float]) -> None:
-    """Refuse what is no obstacle.
-
-    Raises:
-        PlantError: says what was given and what is allowed.
-    """
-    if not name:
-        raise PlantError("obstacle without a name given: it needs one, to be removed by")
-    if shape not in SHAPES:
-        raise PlantError(f"obstacle {name}: shape {shape!r} given: choose one of {', '.join(SHAPES)}")
-    wanted = SHAPES[shape].sizes
-    if len(size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in size):
-        raise PlantError(
-            f"obstacle {name}: size {list(size)} given: a {shape} needs {len(wanted)} numbers "
-            f"({', '.join(wanted) or 'none'}), each {SMALLEST:g} to {LARGEST:g} m"
-        )
-    if len(pose) != 6 or not all(map(isfinite, pose)) or hypot(*pose[:3]) > FARTHEST:
-        raise PlantError(
-            f"obstacle {name}: pose {list(pose)} given: six finite numbers x, y, z, rx, ry, rz are needed, "
-            f"at most {FARTHEST:g} m away"
-        )
 
 
 def add_slots(spec: mujoco.MjSpec) -> None:
@@ -90,7 +63,7 @@ def add_slots(spec: mujoco.MjSpec) -> None:
         body.add_geom(
             name=f"{OBSTACLES}_{i}",
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            size=[SMALLEST, 0.0, 0.0],
+            size=[_UNUSED, 0.0, 0.0],
             contype=0,
             conaffinity=0,
             mass=0.0,
@@ -100,19 +73,24 @@ def add_slots(spec: mujoco.MjSpec) -> None:
 class Obstacles:
     """Those that stand around one arm.
 
-    Attributes:
-        slots: name to the index of its shape, in the order in which they came.
+    Args:
+        model: of the arm, with slots for them.
+        q: where the hinges are (6,) [rad], kept up to date by the physics: nothing can be put into the arm.
     """
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, q: NDArray[np.float64]) -> None:
         self._model = model
+        self._q = q
         self._body: int = model.body(OBSTACLES).id
         self._first: int = model.geom(f"{OBSTACLES}_0").id
-        self.slots: dict[str, int] = {}
+        self._slots: dict[str, int] = {}
 
-    def put(
-        self, name: str, shape: str, size: Sequence[float], pose: Vector6, q: NDArray[np.float64]
-    ) -> None:
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names, in the order in which they came."""
+        return tuple(self._slots)
+
+    def put(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
         """Put an obstacle somewhere; one of the same name gives way to it.
 
         Args:
@@ -120,33 +98,31 @@ class Obstacles:
             shape: one of SHAPES.
             size: as the shape wants it [m].
             pose: of its middle in the base frame [m, rad].
-            q: where the hinges are now [rad]: nothing can be put into the arm.
 
         Raises:
-            PlantError: it is no obstacle, the arm is there, or there are too many; all stays as it was.
+            RefusedError: the arm is there, or there are too many; all stays as it was.
         """
-        check_obstacle(name, shape, size, pose)
-        slot = next(i for i in range(SLOTS + 1) if i not in self.slots.values())
-        if slot == SLOTS and name not in self.slots:
-            raise PlantError(f"obstacle {name}: there are {SLOTS} already, remove one first")
+        slot = next(i for i in range(SLOTS + 1) if i not in self._slots.values())
+        if slot == SLOTS and name not in self._slots:
+            raise RefusedError(f"obstacle {name}: there are {SLOTS} already, remove one first")
         in_place = slot == SLOTS
         if in_place:
-            slot = self.slots[name]
+            slot = self._slots[name]
             before = self._read(slot)
         self._write(slot, SHAPES[shape], size, pose)
-        if self._touches(slot, q):
+        if self._touches(slot):
             if in_place:
                 self._restore(slot, before)
             else:
                 self._hide(slot)
-            raise PlantError(f"obstacle {name}: the arm is where it should stand, move one of them")
+            raise RefusedError(f"obstacle {name}: the arm is where it should stand, move one of them")
         if not in_place:
             self.remove(name)
-        self.slots[name] = slot
+        self._slots[name] = slot
 
     def remove(self, name: str) -> None:
         """Take an obstacle away; one that does not stand there is none."""
-        slot = self.slots.pop(name, None)
+        slot = self._slots.pop(name, None)
         if slot is not None:
             self._hide(slot)
 
@@ -187,9 +163,9 @@ class Obstacles:
         m = self._model
         return m.geom_type, m.geom_size, m.geom_aabb, m.geom_rbound, m.geom_pos, m.geom_quat
 
-    def _touches(self, slot: int, q: NDArray[np.float64]) -> bool:
+    def _touches(self, slot: int) -> bool:
         data = mujoco.MjData(self._model)
-        data.qpos[:] = q
+        data.qpos[:] = self._q
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_comPos(self._model, data)
         mujoco.mj_collision(self._model, data)

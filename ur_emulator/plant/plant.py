@@ -28,7 +28,7 @@ from ur_emulator.models.calibration import calibrated_dh, draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import FLANGE, GRAVITY
 from ur_emulator.models.random_streams import random_stream
-from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
+from ur_emulator.models.robot_model import RobotModel, Vector3, six
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.contact import contact_wrench
 from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX, Drives
@@ -68,6 +68,7 @@ class Plant:
     Attributes:
         calibration: the factory calibration of this arm, for the controller's kinematics.
         dead_time: the delay drawn for this box, from the start of a cycle to the drives acting on it [s].
+        obstacles: what stands around the arm.
 
     Raises:
         PlantError: when the cycle is not a whole multiple of the physics step.
@@ -125,7 +126,7 @@ class Plant:
         # In force mode and after it, until the arm is moved away; see `rest_trim`.
         self._trim_rests = False
         self._loads = Loads(self._model, data)
-        self._obstacles = Obstacles(self._model)
+        self.obstacles = Obstacles(self._model, data.qpos)
         self._error = np.zeros(6)
         self._ripple = np.zeros(6)
         self._braked = True
@@ -234,23 +235,6 @@ class Plant:
             PlantError: when a number is not finite.
         """
         self._loads.push(force, point)
-
-    @property
-    def obstacles(self) -> tuple[str, ...]:
-        """Names of the obstacles that stand around the arm, in the order in which they came."""
-        return tuple(self._obstacles.slots)
-
-    def put_obstacle(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
-        """Put an obstacle somewhere; see `Obstacles.put`.
-
-        Raises:
-            PlantError: it is no obstacle, the arm is there, or there are too many; all stays as it was.
-        """
-        self._obstacles.put(name, shape, size, pose, self._qpos)
-
-    def remove_obstacle(self, name: str) -> None:
-        """Take an obstacle away; one that does not stand there is none."""
-        self._obstacles.remove(name)
 
     # --- the cycle ---
 

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from protocol.primary_messages import ReportLevel
 from ur_emulator.box_log import BoxLog
-from ur_emulator.controller.commands import Command
+from ur_emulator.controller.command import Command, Done, Submitted
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
@@ -66,9 +66,9 @@ class ServedBox:
         """Let a port hear of every cycle."""
         self._publishers.append(publisher)
 
-    def submit(self, command: Command) -> None:
-        """Take a command for the next cycle."""
-        self._commands.append(command)
+    def submit(self, command: Command, done: Done | None = None) -> None:
+        """Take a command for the next cycle; `done` is told then what has come of it."""
+        self._commands.append(command if done is None else Submitted(command, done))
 
     def announce(self, event: Event) -> None:
         """Publish an event at once, outside of a cycle."""

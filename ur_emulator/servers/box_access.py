@@ -8,13 +8,13 @@ happened when it is answered.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.box_log import BoxLog, LogEntry
-from ur_emulator.controller import commands as cmd
+from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
@@ -92,12 +92,20 @@ class BoxAccess:
 
     # --- steps
 
-    def apply(self, command: cmd.Command) -> Generator[None, None, None]:
-        """Ask for something, and end after the cycle in which it was done."""
-        tick = self.snapshot.tick
-        self._box.submit(command)
-        while self.snapshot.tick == tick:
+    def apply(self, command: Command) -> Generator[None, None, Any]:
+        """Ask for something, and end after the cycle in which it was applied.
+
+        Returns:
+            What the command has to tell.
+
+        Raises:
+            RefusedError: it was refused.
+        """
+        outcome: Future[Any] = Future()
+        self._box.submit(command, settle(outcome))
+        while not outcome.done():
             yield
+        return outcome.result()
 
     def in_worker(self, job: Callable[[], T]) -> Generator[None, None, T]:
         """Do something that takes longer than a cycle in a thread of its own, one job at a time.
@@ -121,3 +129,15 @@ class BoxAccess:
         """End the worker; what is queued is dropped, what is being done comes to nothing."""
         if self._worker is not None:
             self._worker.shutdown(wait=False, cancel_futures=True)
+
+
+def settle(future: Future[Any]) -> Callable[[Any, Exception | None], None]:
+    """Return what makes a result or an error that of a future."""
+
+    def done(result: Any, error: Exception | None) -> None:
+        if error is None:
+            future.set_result(result)
+        else:
+            future.set_exception(error)
+
+    return done

@@ -7,18 +7,22 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Generator
+from contextlib import suppress
 from importlib.metadata import version as package_version
 from typing import TypeVar
 
 from protocol.dashboard_commands import USER_ROLES, DashboardCommand
 from protocol.dashboard_connection import CommandReceived
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.operator import ClosePopup, ShowPopup
+from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
+from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
-from ur_emulator.errors import EmulatorError
+from ur_emulator.errors import EmulatorError, RefusedError
 from ur_emulator.servers.box_access import BUILD, BUILD_DATE, BoxAccess
 from ur_emulator.servers.box_reports import BoxFacts, BoxReports
-from ur_emulator.servers.program_desk import Loading, ProgramDesk
+from ur_emulator.servers.program_player import MissingFileRefusal, ProgramPlayer
 
 # Name that a simulator gives when nothing is loaded. Source: replies of URSim 3.14 as the public client
 # library expects them.
@@ -26,6 +30,7 @@ UNNAMED = "<unnamed>"
 
 Steps = Generator[str | None, None, str]
 Answer = str | Steps
+Action = Generator[None, None, None]
 T = TypeVar("T")
 
 
@@ -33,33 +38,33 @@ class DashboardAnswers:
     """Finds the answer to a command."""
 
     def __init__(
-        self, access: BoxAccess, desk: ProgramDesk, reports: BoxReports, shut_down: Callable[[], None]
+        self, access: BoxAccess, player: ProgramPlayer, reports: BoxReports, shut_down: Callable[[], None]
     ) -> None:
         """Bind the commands to a box.
 
         Args:
             access: of the box.
-            desk: holds the loaded program.
+            player: holds the loaded program.
             reports: writes the log and reports.
             shut_down: closes the box.
         """
         self._access = access
-        self._desk = desk
+        self._player = player
         self._shut_down = shut_down
         self._reports = reports
         self._user_role = "NONE"
         self._methods: dict[str, Callable[[DashboardCommand, str, str], Answer]] = {
             "load": self._load,
-            "play": lambda row, _, client: self._done(row, desk.play(client)),
-            "stop": lambda row, *_: self._done(row, desk.stop()),
-            "pause": lambda row, *_: self._done(row, desk.pause()),
+            "play": lambda row, _, client: self._done(row, player.play(client)),
+            "stop": lambda row, *_: self._done(row, player.stop()),
+            "pause": lambda row, *_: self._done(row, player.pause()),
             "quit": lambda row, *_: row.reply(),
             "shutdown": self._shutdown,
-            "running": lambda row, *_: row.reply(running=str(desk.is_running).lower()),
+            "running": lambda row, *_: row.reply(running=str(player.is_running).lower()),
             "robotmode": lambda row, *_: row.reply(mode=RobotMode(access.snapshot.robot_mode).name),
             "get loaded program": self._loaded_program,
-            "popup": lambda row, text, _: self._applied(row, cmd.ShowPopup(text)),
-            "close popup": lambda row, *_: self._applied(row, cmd.ClosePopup()),
+            "popup": lambda row, text, _: self._applied(row, ShowPopup(text)),
+            "close popup": lambda row, *_: self._applied(row, ClosePopup()),
             "addToLog": self._add_to_log,
             "isProgramSaved": lambda row, *_: row.reply(saved="true", program=self._file_name),
             "programState": lambda row, *_: row.reply(state=self._state_word(), program=self._file_name),
@@ -68,9 +73,9 @@ class DashboardAnswers:
             ),
             "setUserRole": self._set_user_role,
             "getUserRole": lambda row, *_: row.reply(role=self._user_role),
-            "power on": lambda row, *_: self._applied(row, cmd.PowerOn()),
-            "power off": lambda row, *_: self._applied(row, cmd.PowerOff()),
-            "brake release": lambda row, *_: self._applied(row, cmd.ReleaseBrakes()),
+            "power on": lambda row, *_: self._applied(row, PowerOn()),
+            "power off": lambda row, *_: self._applied(row, PowerOff()),
+            "brake release": lambda row, *_: self._applied(row, ReleaseBrakes()),
             "safetymode": lambda row, *_: row.reply(mode=SafetyMode(access.snapshot.safety_mode).name),
             "safetystatus": lambda row, *_: row.reply(
                 status=SafetyStatus(access.snapshot.safety_status).name
@@ -78,7 +83,7 @@ class DashboardAnswers:
             "unlock protective stop": self._unlock,
             "close safety popup": lambda row, *_: row.reply(),
             "load installation": self._load_installation,
-            "restart safety": lambda row, *_: self._applied(row, cmd.RestartSafety()),
+            "restart safety": lambda row, *_: self._applied(row, RestartSafety()),
             "get serial number": lambda row, *_: row.reply(serial=access.identity.serial_number),
             "get robot model": lambda row, *_: row.reply(model=access.identity.model),
             "generate flight report": self._flight_report,
@@ -94,52 +99,60 @@ class DashboardAnswers:
 
     @property
     def _file_name(self) -> str:
-        return self._desk.loaded.file_name if self._desk.loaded else UNNAMED
+        return self._player.loaded.file_name if self._player.loaded else UNNAMED
 
     def _state_word(self) -> str:
         if self._access.snapshot.runtime_state == ProgramState.PAUSED:
             return "PAUSED"
-        return "PLAYING" if self._desk.is_running else "STOPPED"
+        return "PLAYING" if self._player.is_running else "STOPPED"
 
     def _loaded_program(self, row: DashboardCommand, *_: str) -> str:
-        loaded = self._desk.loaded
+        loaded = self._player.loaded
         return row.reply(path=loaded.wire_path) if loaded else row.reply("none")
 
     def _load(self, row: DashboardCommand, name: str, _: str) -> Steps:
         if not row.replies_when_done(self._access.identity.version):
-            if not self._desk.folder.has(name):
+            if not self._player.folder.has(name):
                 return row.reply("not_found", name=name)
-            yield row.reply(path=self._desk.folder.find(name).wire_path)
-        outcome = yield from self._desk.load(name)
-        return self._loading_reply(row, outcome, name, lambda: _path_of(self._desk.loaded))
+            yield row.reply(path=self._player.folder.find(name).wire_path)
+        loading = self._player.load(name)
+        return (yield from self._loaded(row, loading, name, lambda: _path_of(self._player.loaded)))
 
     def _load_installation(self, row: DashboardCommand, name: str, _: str) -> Steps:
-        outcome = yield from self._desk.load_installation(name)
-        return self._loading_reply(row, outcome, name, lambda: _path_of(self._desk.installation))
+        loading = self._player.load_installation(name)
+        return (yield from self._loaded(row, loading, name, lambda: _path_of(self._player.installation)))
 
     @staticmethod
-    def _loading_reply(row: DashboardCommand, outcome: Loading, name: str, path: Callable[[], str]) -> str:
-        if outcome is Loading.DONE:
-            return row.reply(path=path())
-        return row.reply("not_found" if outcome is Loading.MISSING else "failed", name=name)
-
-    def _done(self, row: DashboardCommand, action: Generator[None, None, bool]) -> Steps:
-        """Answer when an action has come to its end, or, in older software, when it has begun."""
-        if row.replies_when_done(self._access.identity.version):
-            done = yield from action
-            return row.reply("ok" if done else "failed")
+    def _loaded(row: DashboardCommand, loading: Action, name: str, path: Callable[[], str]) -> Steps:
+        """Answer when a file is loaded, or is not."""
         try:
-            next(action)
-        except StopIteration as end:
-            return row.reply("ok" if end.value else "failed")
+            yield from loading
+        except RefusedError as refusal:
+            return row.reply("not_found" if isinstance(refusal, MissingFileRefusal) else "failed", name=name)
+        return row.reply(path=path())
+
+    def _done(self, row: DashboardCommand, action: Action) -> Steps:
+        """Answer when an action has come to its end, or, in older software, when it has begun."""
+        waits = row.replies_when_done(self._access.identity.version)
+        try:
+            for _ in action:
+                if not waits:
+                    break
+                yield None
+            else:
+                return row.reply("ok")
+        except RefusedError:
+            return row.reply("failed")
         yield row.reply()
-        yield from action
+        with suppress(RefusedError):
+            yield from action
         return ""
 
     # --- the box
 
-    def _applied(self, row: DashboardCommand, command: cmd.Command) -> Steps:
-        yield from self._access.apply(command)
+    def _applied(self, row: DashboardCommand, command: Command) -> Steps:
+        with suppress(RefusedError):
+            yield from self._access.apply(command)
         return row.reply()
 
     def _unlock(self, row: DashboardCommand, *_: str) -> Answer:
@@ -148,11 +161,11 @@ class DashboardAnswers:
             self._access.snapshot.timestamp
         ):
             return row.reply("too_early")
-        return self._applied(row, cmd.UnlockProtectiveStop())
+        return self._applied(row, UnlockProtectiveStop())
 
     def _shutdown(self, row: DashboardCommand, _: str, client: str) -> Steps:
         self._access.note(f"Shut down by {client}")
-        yield from self._access.apply(cmd.PowerOff())
+        yield from self._access.apply(PowerOff())
         yield row.reply()
         self._shut_down()
         return ""
@@ -198,7 +211,7 @@ class DashboardAnswers:
         return row.reply()
 
     def _facts(self) -> BoxFacts:
-        access, desk = self._access, self._desk
+        access, player = self._access, self._player
         return BoxFacts(
             serial_number=access.identity.serial_number,
             versions={
@@ -210,10 +223,10 @@ class DashboardAnswers:
             snapshot=access.snapshot,
             log=access.log,
             programs={
-                "program": _path_of(desk.loaded),
-                "installation": _path_of(desk.installation),
+                "program": _path_of(player.loaded),
+                "installation": _path_of(player.installation),
             },
-            script=desk.script,
+            script=player.script,
         )
 
 

@@ -13,7 +13,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from protocol.errors import RemoteProtocolError
-from ur_emulator.controller.commands import Command, WriteModbus
+from ur_emulator.commands.client_writes import WriteModbus
+from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.port_map import PortAddressError, can_write, read_coil, read_register

@@ -14,10 +14,18 @@ from concurrent.futures import ThreadPoolExecutor
 from protocol.primary_messages import ReportLevel
 from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptItem
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes, StartFreedrive
+from ur_emulator.commands.programs import (
+    PauseProgram,
+    ResumeProgram,
+    SetSpeedSlider,
+    StartProgram,
+    StopProgram,
+)
+from ur_emulator.commands.safety import ConfirmSafety, UnlockProtectiveStop
+from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
-from ur_emulator.controller.hands import GuideByHand
-from ur_emulator.controller.safety_commands import ConfirmSafety
+from ur_emulator.errors import ArgumentError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.interpreter import collection_put_off
 from urscript import compile_program
@@ -28,15 +36,15 @@ from urscript.parser import prepare
 
 # The controller's own words and the command each stands for; words that change nothing here map to None.
 # Source: what PolyScope and public clients send on the script ports (protocol.controller_words).
-WORDS: dict[str, cmd.Command | None] = {
-    "power on": cmd.PowerOn(),
-    "power off": cmd.PowerOff(),
-    "set robotmode run": cmd.ReleaseBrakes(),
-    "set robotmode freedrive": GuideByHand(),
-    "set unlock protective stop": cmd.UnlockProtectiveStop(),
-    "stop program": cmd.StopProgram(),
-    "pause program": cmd.PauseProgram(),
-    "resume program": cmd.ResumeProgram(),
+WORDS: dict[str, Command | None] = {
+    "power on": PowerOn(),
+    "power off": PowerOff(),
+    "set robotmode run": ReleaseBrakes(),
+    "set robotmode freedrive": StartFreedrive(),
+    "set unlock protective stop": UnlockProtectiveStop(),
+    "stop program": StopProgram(),
+    "pause program": PauseProgram(),
+    "resume program": ResumeProgram(),
     "set real": None,
     "set sim": None,
     "confirm user safety parameters": ConfirmSafety(),
@@ -55,7 +63,7 @@ class ProgramIntake:
         self,
         loop: EventLoop,
         version: SoftwareVersion,
-        submit: Callable[[cmd.Command], None],
+        submit: Callable[[Command], None],
         announce: Callable[[Event], None],
     ) -> None:
         """Start the worker.
@@ -103,7 +111,7 @@ class ProgramIntake:
             result = ScriptFailed(1, 1, f"the program cannot be compiled: {error!r}")
         self._loop.call_soon_threadsafe(lambda: self._finish(result, sender, cost))
 
-    def _finish(self, result: cmd.Command | Event | None, sender: object, cost: int) -> None:
+    def _finish(self, result: Command | Event | None, sender: object, cost: int) -> None:
         """Hand on a result; runs in the loop."""
         if self._is_closed:
             return
@@ -111,16 +119,16 @@ class ProgramIntake:
         if not self._waiting[sender]:
             del self._waiting[sender]
             self._flooding.discard(sender)
-        if isinstance(result, cmd.Command):
+        if isinstance(result, Command):
             self._submit(result)
         elif result is not None:
             self._announce(result)
 
-    def _translate(self, item: ScriptItem) -> cmd.Command | Event | None:
+    def _translate(self, item: ScriptItem) -> Command | Event | None:
         match item:
             case ProgramText(text, _, kind):
                 try:
-                    return cmd.StartProgram(compile_program(text, catalogue=self._catalogue))
+                    return StartProgram(compile_program(text, catalogue=self._catalogue))
                 except ScriptError as error:
                     # Arguments are counted when the call runs, so that of a `sec` is one of its exceptions.
                     secondary = kind == "sec" and isinstance(error, ScriptTypeError)
@@ -135,14 +143,11 @@ class ProgramIntake:
                 return _warning(f"a script {what} of more than {limit} bytes was dropped")
 
 
-def _speed_command(text: str, argument: str) -> cmd.Command | Event:
+def _speed_command(text: str, argument: str) -> Command | Event:
     try:
-        fraction = float(argument)
-    except ValueError:
-        fraction = float("nan")
-    if 0.0 <= fraction <= 1.0:
-        return cmd.SetSpeedSlider(fraction)
-    return _warning(f"'{text}' was ignored: the speed slider takes 0 to 1")
+        return SetSpeedSlider(float(argument))
+    except (ValueError, ArgumentError):
+        return _warning(f"'{text}' was ignored: the speed slider takes 0 to 1")
 
 
 def _warning(text: str) -> Event:

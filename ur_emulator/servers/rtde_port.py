@@ -13,7 +13,8 @@ from protocol.rtde_connection import DataReceived, RtdeConnection
 from protocol.rtde_messages import SetupInputs, SetupOutputs, TextMessage
 from protocol.rtde_types import TextLevel
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.controller.commands import Command, WriteInputs
+from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot

@@ -1,10 +1,10 @@
 """The control API over HTTP: `GET /v1/state`, `POST /v1/push` with a JSON object, and so on.
 
-h11 knows HTTP/1.1; operations are the desk's. One request of a client is answered after the other. A page in
-somebody's browser must not reach a box by accident or on purpose, so a request has to name the box's own
-address as its host (a name that was bent to 127.0.0.1 is refused), and must not come from a page of another
-origin. Everything is bounded: header, body, what a client sends ahead, and the number of clients, the one
-that has been silent longest makes room for a new one.
+h11 knows HTTP/1.1; `runner` does the operations. One request of a client is answered after the other. A page
+in somebody's browser must not reach a box by accident or on purpose, so a request has to name the box's own
+address as its host (a foreign name that resolves to 127.0.0.1 is refused), and must not come from a page of
+another origin. Everything is bounded: header, body, what a client sends ahead, and the number of clients, the
+one that has been silent longest makes room for a new one.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from urllib.parse import parse_qsl, urlsplit
 import h11
 
 from ur_emulator.box_log import LogEntry
-from ur_emulator.control.desk import ControlDesk, Job
-from ur_emulator.control.operations import BY_NAME, Operation, describe
+from ur_emulator.commands.operation import Operation
+from ur_emulator.control.operations import OPERATIONS, describe
+from ur_emulator.control.runner import Job, OperationRunner
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError
@@ -32,6 +33,7 @@ MAX_BODY = 1024 * 1024
 MAX_AHEAD = MAX_BODY + MAX_HEADER
 MAX_CLIENTS = 64
 PREFIX = "/v1/"
+_LIST = "operations"
 _JSON = "application/json"
 
 
@@ -58,20 +60,18 @@ class _Session:
     in_serve: bool = False
 
 
-class ControlPort:
-    """Answers HTTP requests."""
+class HttpPort:
+    """Answers HTTP requests.
 
-    def __init__(self, desk: ControlDesk, host: str) -> None:
-        """Serve a box.
+    Args:
+        runner: runs the operations.
+        host: address that the port is bound to.
+    """
 
-        Args:
-            desk: has operations done.
-            host: address that the port is bound to.
-        """
-        self._desk = desk
+    def __init__(self, runner: OperationRunner, host: str) -> None:
+        self._runner = runner
         self._host = host.lower()
         self._sessions: dict[Connection, _Session] = {}
-        desk.load()
 
     @property
     def clients(self) -> tuple[Connection, ...]:
@@ -112,7 +112,7 @@ class ControlPort:
         """Forget the client; what it waits for is forgotten, what it has begun takes its course."""
         session = self._sessions.pop(connection, None)
         if session is not None and session.job is not None:
-            self._desk.cancel(session.job)
+            self._runner.cancel(session.job)
 
     def publish(self, snapshot: Snapshot) -> None:
         """Nothing is streamed on this port."""
@@ -135,7 +135,7 @@ class ControlPort:
         except _HttpError as error:
             self._reject(connection, session, error.status, str(error))
         except Exception as error:  # a defect of ours must not end the box
-            self._desk.complain(f"a request of {connection.peer} could not be answered: {error!r}")
+            self._runner.complain(f"a request of {connection.peer} could not be answered: {error!r}")
             connection.close()
         finally:
             session.in_serve = False
@@ -170,11 +170,11 @@ class ControlPort:
         request, body, session.body = session.request, bytes(session.body), bytearray()
         assert request is not None
         try:
-            operation, arguments = self._understand(request, body)
+            name, arguments = self._understand(request, body)
         except _HttpError as error:
             self._finish(connection, session, error.status, {"error": str(error)}, error.allow)
             return
-        if operation is None:
+        if name == _LIST:
             self._finish(connection, session, 200, {"operations": describe()})
             return
 
@@ -186,32 +186,31 @@ class ControlPort:
                 self._finish(connection, session, _status_of(error), {"error": str(error)})
             self._serve(connection, session)
 
-        session.job = self._desk.begin(operation.name, arguments, done)
-        session.is_waiting = session.job is not None and operation.name == "wait_until"
+        session.job = self._runner.begin(name, arguments, done)
+        session.is_waiting = session.job is not None and name == "wait_until"
         if session.is_waiting and connection.has_ended:
             connection.close()
 
-    def _understand(self, request: h11.Request, body: bytes) -> tuple[Operation | None, Mapping[str, Any]]:
-        """Return the operation that a request asks for, None for the table, and what it is given."""
+    def _understand(self, request: h11.Request, body: bytes) -> tuple[str, Mapping[str, Any]]:
+        """Return the name of what a request asks for, and what it is given."""
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in request.headers}
         self._check_origin(headers)
         path, _, query = request.target.decode("latin-1").partition("?")
         name = path.removeprefix(PREFIX) if path.startswith(PREFIX) else ""
-        operation = BY_NAME.get(name)
-        if operation is None and name != "operations":
+        operation = OPERATIONS.get(name)
+        if operation is None and name != _LIST:
             raise _HttpError(
                 404, f"there is no {ascii(path)[:60]}: GET {PREFIX}operations lists what there is"
             )
-        method, allowed = request.method.decode("latin-1"), _methods(operation)
-        if method not in allowed:
-            raise _HttpError(
-                405, f"{name} is asked with {' or '.join(allowed)}, not {method[:20]}", ", ".join(allowed)
-            )
+        method = request.method.decode("latin-1")
+        allowed = "GET" if operation is None or operation.only_reads else "POST"
+        if method != allowed:
+            raise _HttpError(405, f"{name} is asked with {allowed}, not {method[:20]}", allowed)
         if operation is None:
-            return None, {}
+            return name, {}
         if method == "GET":
-            return operation, _from_query(operation, query)
-        return operation, _from_body(headers.get("content-type", ""), body)
+            return name, _from_query(operation, query)
+        return name, _from_body(headers.get("content-type", ""), body)
 
     def _check_origin(self, headers: Mapping[str, str]) -> None:
         host = headers.get("host", "")
@@ -229,7 +228,7 @@ class ControlPort:
             name = urlsplit(f"//{host}").hostname or ""
             if name in ("localhost", self._host):
                 return True
-            # Bound to all addresses: any address will do, for nobody can bend an address as one can a name.
+            # Bound to all addresses: any address will do, but no name: it could resolve to any of them.
             return ip_address(self._host).is_unspecified and bool(ip_address(name))
         except ValueError:
             return False
@@ -302,11 +301,7 @@ def _status_of(error: EmulatorError) -> int:
     return 503 if isinstance(error, NotRunningError) else 500
 
 
-def _methods(operation: Operation | None) -> tuple[str, ...]:
-    return ("GET",) if operation is None or operation.only_reads else ("POST",)
-
-
-def _from_query(operation: Operation, query: str) -> dict[str, Any]:
+def _from_query(operation: type[Operation[Any]], query: str) -> dict[str, Any]:
     parameters = {parameter.name: parameter for parameter in operation.parameters}
     try:
         given = parse_qsl(query, keep_blank_values=True, max_num_fields=20)

@@ -1,14 +1,18 @@
-"""What an operation of the control API may be given: types, ranges, and one line for what does not fit."""
+"""What an operation may be given: types, ranges, units, and one line for what does not fit.
+
+Declared on the fields of the operation's dataclass with `parameter`; the type comes from the annotation.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, field
 from enum import Enum
 from itertools import islice
 from math import hypot, isfinite
-from typing import Any
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin
 
 from ur_emulator.errors import ArgumentError
 
@@ -30,6 +34,8 @@ class Kind(Enum):
     ANSWER = "true, false, number or text"
 
 
+# Kinds of parameters by the type of their field; what has other arguments, see `_kind_of`.
+_KINDS = {float: Kind.NUMBER, int: Kind.INTEGER, bool: Kind.BOOLEAN, str: Kind.TEXT}
 _COUNTS = {(3, 3): "three", (6, 6): "six", (0, 3): "up to three"}
 
 
@@ -66,6 +72,20 @@ class Parameter:
     choices: tuple[str, ...] = ()
     lengths: tuple[int, int] = (3, 3)
     default: Any = REQUIRED
+
+    @classmethod
+    def of(cls, declared: Field[Any], annotation: Any) -> Parameter:
+        """Return what a field of an operation declares.
+
+        Args:
+            declared: the field, made with `parameter`.
+            annotation: its type, not as a string.
+        """
+        details = {**_details_of(annotation), **declared.metadata}
+        if details.get("choices"):
+            details["kind"] = Kind.CHOICE
+        default = REQUIRED if declared.default is MISSING else declared.default
+        return cls(declared.name, default=default, **details)
 
     @property
     def is_required(self) -> bool:
@@ -156,6 +176,44 @@ class Parameter:
             return None
         vector = tuple(map(float, numbers))
         return vector if self.high is None or hypot(*vector) <= self.high else None
+
+
+def parameter(
+    meaning: str,
+    unit: str = "",
+    low: float | None = None,
+    high: float | None = None,
+    *,
+    default: Any = MISSING,
+    **details: Any,
+) -> Any:
+    """Declare a field of an operation's dataclass; see `Parameter`.
+
+    Args:
+        meaning: what it is, as a phrase.
+        unit: of numbers.
+        low: least number.
+        high: greatest number; of a vector, its greatest length.
+        default: taken when it is not given; without it the parameter is required.
+        details: `kind`, `choices` or `lengths`, where the type of the field does not tell.
+    """
+    declared = {"meaning": meaning, "unit": unit, "low": low, "high": high, **details}
+    return field(default=default, metadata=declared)
+
+
+def _details_of(annotation: Any) -> dict[str, Any]:
+    """Return the kind of a field by its type, and what else the type tells."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin in (Union, UnionType):
+        types = [one for one in arguments if one is not NoneType]
+        return _details_of(types[0]) if len(types) == 1 else {"kind": Kind.ANSWER}
+    if origin is Literal:
+        return {"kind": Kind.CHOICE, "choices": arguments}
+    if origin is tuple:
+        return {"kind": Kind.VECTOR, "lengths": (len(arguments), len(arguments))}
+    if origin is Sequence:
+        return {"kind": Kind.VECTOR}
+    return {"kind": _KINDS[annotation]}
 
 
 def _is_integer(value: Any) -> bool:

@@ -1,20 +1,20 @@
 """The program that is loaded, and what the buttons of PolyScope do with it: load, play, pause, stop.
 
-Every action is a step function (see `box_access`); it tells whether it has succeeded, the log tells why not.
+Every action is a step function (see `box_access`). What cannot be done is refused, and the log says why.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping
-from enum import Enum
-from typing import TYPE_CHECKING
+from contextlib import suppress
+from typing import TYPE_CHECKING, NoReturn
 
 from protocol.ur_types import ProgramState, RobotMode
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.safety_modes import MOVING_MODES
 from ur_emulator.controller.status_bits import RUNNING_STATES
-from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.errors import FileMissingError, ProgramFileError, RefusedError
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation, load_installation
 from ur_emulator.servers.box_access import BoxAccess
@@ -34,20 +34,19 @@ _NOT_UP = frozenset(
 )
 _PAUSED = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
 
+Steps = Generator[None, None, None]
 # A program that can be started, or why it cannot.
 Outcome = CompiledProgram | ScriptFailed
 
 
-class Loading(Enum):
-    """What has come of loading a file."""
-
-    DONE = "done"
-    MISSING = "missing"
-    FAILED = "failed"
+class MissingFileRefusal(RefusedError):
+    """A file is not loaded because there is none of that name."""
 
 
-class ProgramDesk:
-    """Holds the loaded program and its installation.
+class ProgramPlayer:
+    """Holds the loaded program and its installation, and plays it.
+
+    Every action raises `RefusedError` when it cannot be done.
 
     Attributes:
         folder: of all programs.
@@ -82,91 +81,98 @@ class ProgramDesk:
 
     # --- actions
 
-    def load(self, name: str) -> Generator[None, None, Loading]:
+    def load(self, name: str) -> Steps:
         """Load a program and its installation; what was loaded stays if that fails."""
-        if self._access.controller.programs.is_running:
-            return self._failed(f"load {name}", "a program runs, stop it first")
+        what = f"load {name}"
+        self._must_be_stopped(what)
         try:
             loaded, ready = yield from self._access.in_worker(lambda: self._read(name))
         except Exception as error:  # a defect of ours must not end the box
-            return self._failed(f"load {name}", error)
+            self._refuse(what, error)
         self.loaded, self._ready = loaded, ready
         self.installation = loaded.installation or self.installation
         self._access.note(f"Loaded program: {loaded.wire_path}")
         if isinstance(ready, ScriptFailed):
             self._access.note(f"{loaded.file_name} will not start: {ready.log_text or ready.text}")
-        return Loading.DONE
 
-    def load_installation(self, name: str) -> Generator[None, None, Loading]:
+    def load_installation(self, name: str) -> Steps:
         """Load an installation; the one before stays if that fails."""
-        if self._access.controller.programs.is_running:
-            return self._failed(f"load installation {name}", "a program runs, stop it first")
+        what = f"load installation {name}"
+        self._must_be_stopped(what)
         try:
             self.installation = yield from self._access.in_worker(
                 lambda: load_installation(self.folder, name)
             )
         except Exception as error:  # as above
-            return self._failed(f"load installation {name}", error)
+            self._refuse(what, error)
         self._access.note(f"Loaded installation: {self.installation.wire_path}")
-        return Loading.DONE
 
-    def play(self, client: str) -> Generator[None, None, bool]:
+    def play(self, client: str) -> Steps:
         """Let a paused program go on, or start the loaded one from the top.
 
         Args:
             client: address of who wants it; External Control asks there if no PC is named.
         """
-        if (obstacle := self._obstacle()) or (self.loaded is None and not self.is_paused):
-            return self._refused("play", obstacle or "no program is loaded")
+        self._must_be_able_to_play()
         if self.is_paused:
-            yield from self._access.apply(cmd.ResumeProgram())
-            return not self.is_paused
+            try:
+                yield from self._access.apply(ResumeProgram())
+            except RefusedError:
+                if self.is_paused:  # otherwise somebody else was quicker
+                    raise
+            return
         program = yield from self._prepare(client)
         if isinstance(program, ScriptFailed):
             self._access.announce(program)
-            return self._refused("play", "the program does not compile")
-        if obstacle := self._obstacle() or ("a program is paused" if self.is_paused else ""):
-            return self._refused("play", obstacle)  # it took a while to get here
-        yield from self._access.apply(cmd.StartProgram(program))
-        latest = self._access.controller.programs.latest
-        return latest is not None and latest.program is program
+            self._refuse("play", "the program does not compile")
+        self._must_be_able_to_play()  # it took a while to get here
+        if self.is_paused:
+            self._refuse("play", "a program is paused")
+        yield from self._access.apply(StartProgram(program))
 
-    def pause(self) -> Generator[None, None, bool]:
+    def pause(self) -> Steps:
         """Pause the program that plays, and end when the arm rests."""
         if not self.is_running or self.is_paused:
-            return self._refused("pause", "no program plays")
-        yield from self._access.apply(cmd.PauseProgram())
+            self._refuse("pause", "no program plays")
+        with suppress(RefusedError):  # it has ended meanwhile
+            yield from self._access.apply(PauseProgram())
         while self._access.snapshot.runtime_state == ProgramState.PAUSING:
             yield
-        return self._access.controller.programs.is_running or self._refused("pause", "the program has ended")
+        if not self._access.controller.programs.is_running:
+            self._refuse("pause", "the program has ended")
 
-    def stop(self) -> Generator[None, None, bool]:
+    def stop(self) -> Steps:
         """Stop the program, if one is running or paused, and end when the arm rests."""
         if self._access.snapshot.robot_mode in _NOT_UP:
-            return self._refused("stop", "the controller is not up")
+            self._refuse("stop", "the controller is not up")
         stopped = self._access.controller.programs.latest
-        yield from self._access.apply(cmd.StopProgram())
+        yield from self._access.apply(StopProgram())
         while (
             self._access.snapshot.runtime_state == ProgramState.STOPPING
             and self._access.controller.programs.latest is stopped
         ):
             yield
-        return True
 
     # --- how
 
-    def _obstacle(self) -> str:
-        """Return why no program can be started or go on; "" if nothing stands against it."""
+    def _must_be_stopped(self, what: str) -> None:
+        if self._access.controller.programs.is_running:
+            self._refuse(what, "a program runs, stop it first")
+
+    def _must_be_able_to_play(self) -> None:
+        """Refuse to play while something stands against it."""
         snapshot = self._access.snapshot
         if snapshot.safety_mode not in MOVING_MODES:
-            return "the robot is stopped for safety"
+            self._refuse("play", "the robot is stopped for safety")
         if snapshot.robot_mode != RobotMode.RUNNING:
-            return f"the robot is in {RobotMode(snapshot.robot_mode).name}, it must be RUNNING"
+            mode = RobotMode(snapshot.robot_mode).name
+            self._refuse("play", f"the robot is in {mode}, it must be RUNNING")
         if self.is_running and not self.is_paused:
-            return "a program plays already"
+            self._refuse("play", "a program plays already")
         if self._access.controller.state.operator.requests:
-            return "a popup waits to be closed, or a question for its answer"
-        return ""
+            self._refuse("play", "a popup waits to be closed, or a question for its answer")
+        if self.loaded is None and not self.is_paused:
+            self._refuse("play", "no program is loaded")
 
     def _read(self, name: str) -> tuple[LoadedProgram, Outcome | None]:
         """Read and compile a program; in the worker."""
@@ -199,10 +205,8 @@ class ProgramDesk:
         except Exception as error:  # a defect of ours must not end the box
             return ScriptFailed(1, 1, f"{loaded.file_name} cannot be compiled: {error!r}")
 
-    def _failed(self, what: str, why: object) -> Loading:
-        self._refused(what, why if isinstance(why, str | ProgramFileError) else repr(why))
-        return Loading.MISSING if isinstance(why, FileMissingError) else Loading.FAILED
-
-    def _refused(self, what: str, why: object) -> bool:
-        self._access.note(f"{what} failed: {why}")
-        return False
+    def _refuse(self, what: str, why: str | Exception) -> NoReturn:
+        """Refuse an action, and write into the log why."""
+        text = f"{what} failed: {why if isinstance(why, str | ProgramFileError) else repr(why)}"
+        self._access.note(text)
+        raise MissingFileRefusal(text) if isinstance(why, FileMissingError) else RefusedError(text)

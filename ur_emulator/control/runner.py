@@ -1,7 +1,6 @@
-"""Where operations are handed in: by other threads, which wait for the result, and by the control port.
+"""Runs operations: those of other threads, which wait for the result, and those of the HTTP port.
 
-All is done in the thread of the loop, step by step as cycles pass. Actions are loaded with the first
-operation, so that a box that nobody controls carries nothing of them.
+All is done in the thread of the loop, step by step as cycles pass.
 """
 
 from __future__ import annotations
@@ -11,41 +10,23 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ur_emulator.commands.operation import Operation
+from ur_emulator.control.operations import make
+from ur_emulator.control.step_operation import Context, StepOperation, Steps
+from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import ControlError, EmulatorError, NotRunningError
 from ur_emulator.realtime.event_loop import EventLoop
-
-if TYPE_CHECKING:
-    from ur_emulator.control.actions import Actions, Steps
-    from ur_emulator.servers.box_access import BoxAccess
-    from ur_emulator.servers.program_desk import ProgramDesk
+from ur_emulator.servers.box_access import settle
 
 # Told of what has come of an operation: its result, or the error that ended it.
-Done = Callable[[Any, EmulatorError | None], None]
+Finished = Callable[[Any, EmulatorError | None], None]
 # What was given is shown in the log up to so many characters.
 _MAX_SHOWN = 60
 _ENDED = "the box has ended: operations need one that runs"
-_NOT_LOGGED = frozenset({"wait_until", "add_to_log"})
-
-
-@dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What the actions need beside the box.
-
-    Attributes:
-        access: to the box.
-        desk: loads program files.
-        clock: monotonic seconds.
-        identity: returns what `identity` tells.
-    """
-
-    access: BoxAccess
-    desk: ProgramDesk
-    clock: Callable[[], float]
-    identity: Callable[[], dict[str, Any]]
 
 
 @dataclass(eq=False, slots=True)
@@ -53,27 +34,25 @@ class Job:
     """An operation under way."""
 
     steps: Steps
-    done: Done
+    done: Finished
 
 
-class ControlDesk:
-    """Has operations done."""
+class OperationRunner:
+    """Runs operations on one box.
 
-    def __init__(self, loop: EventLoop, around: Surroundings) -> None:
-        """Open.
+    Args:
+        loop: of the box.
+        context: what their steps need.
+    """
 
-        Args:
-            loop: of the box.
-            around: what the actions need.
-        """
+    def __init__(self, loop: EventLoop, context: Context) -> None:
         self._loop = loop
-        self._around = around
-        self._actions: Actions | None = None
+        self._context = context
         self._jobs: list[Job] = []
         self._lock = threading.Lock()
         self._handed_in: deque[tuple[str, Mapping[str, Any], Future[Any]]] = deque()
         self._is_closed = False
-        around.access.on_job_done.append(self.go_on)
+        context.access.on_job_done.append(self.go_on)
 
     @property
     def clients(self) -> tuple[()]:
@@ -88,7 +67,6 @@ class ControlDesk:
         Raises:
             ControlError: it was not done.
         """
-        self.load()
         if self._loop.is_own_thread:
             raise ControlError(f"{name} called in the thread of the box, which cannot wait: use `submit`")
         future: Future[Any] = Future()
@@ -99,17 +77,9 @@ class ControlDesk:
         self._loop.call_soon_threadsafe(self._take_in)
         return future.result()
 
-    def load(self) -> Actions:
-        """Load the actions, which takes some milliseconds; from any thread."""
-        if self._actions is None:
-            from ur_emulator.control.actions import Actions
-
-            self._actions = Actions(self._around)
-        return self._actions
-
     # --- in the loop
 
-    def begin(self, name: str, arguments: Mapping[str, Any], done: Done) -> Job | None:
+    def begin(self, name: str, arguments: Mapping[str, Any], done: Finished) -> Job | None:
         """Begin an operation; `done` may be told before this returns, then there is no job.
 
         Args:
@@ -131,7 +101,7 @@ class ControlDesk:
 
     def complain(self, text: str) -> None:
         """Write into the log what went wrong here."""
-        self._around.access.announce(LogAdded("Control", text))
+        self._context.access.announce(LogAdded("Control", text))
 
     def publish(self, snapshot: Snapshot) -> None:
         """Look at what is under way after a cycle."""
@@ -168,17 +138,14 @@ class ControlDesk:
                 if not self._handed_in:
                     return
                 name, arguments, future = self._handed_in.popleft()
-            self.begin(name, arguments, _teller(future))
+            self.begin(name, arguments, settle(future))
 
     def _steps(self, name: str, arguments: Mapping[str, Any]) -> Steps:
         """Check what was given, write it into the log, do it."""
-        from ur_emulator.control.operations import BY_NAME
-
-        operation = BY_NAME[name]
-        checked = operation.check(arguments)
-        if not (operation.only_reads or name in _NOT_LOGGED):
-            self._around.access.announce(LogAdded("Control", _shown(name, arguments)))
-        return (yield from self.load().begin(name, checked))
+        operation = make(name, arguments)
+        if operation.is_logged and not operation.only_reads:
+            self._context.access.announce(LogAdded("Control", _shown(name, arguments)))
+        return (yield from _steps_of(operation, self._context))
 
     def _advance(self, job: Job) -> bool:
         """Take one step; return whether that was the last."""
@@ -195,14 +162,13 @@ class ControlDesk:
         return True
 
 
-def _teller(future: Future[Any]) -> Done:
-    def tell(result: Any, error: EmulatorError | None) -> None:
-        if error is None:
-            future.set_result(result)
-        else:
-            future.set_exception(error)
-
-    return tell
+def _steps_of(operation: Operation[Any], context: Context) -> Steps:
+    """Return the steps of an operation; a command is applied in the next cycle."""
+    if isinstance(operation, StepOperation):
+        return (yield from operation.steps(context))
+    assert isinstance(operation, Command)
+    result = yield from context.access.apply(operation)
+    return {**(result or {}), "tick": context.access.snapshot.tick}
 
 
 def _shown(name: str, arguments: Mapping[str, Any]) -> str:

@@ -1,0 +1,44 @@
+"""What clients write: input variables of RTDE, and the robot's Modbus map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from protocol.rtde_types import RtdeValue
+from ur_emulator.controller.client_inputs import write_inputs
+from ur_emulator.controller.command import Box
+from ur_emulator.controller.port_map import write_range
+
+
+@dataclass(frozen=True, slots=True)
+class WriteInputs:
+    """Write input variables of RTDE.
+
+    Attributes:
+        values: names of `protocol.rtde_fields.INPUTS` with their values, in order.
+    """
+
+    values: tuple[tuple[str, RtdeValue], ...]
+
+    def apply(self, box: Box) -> None:
+        """Write them in order."""
+        write_inputs(box.state, self.values)
+
+
+@dataclass(frozen=True, slots=True)
+class WriteModbus:
+    """Write neighbouring addresses of the robot's Modbus map; what cannot be written is left out.
+
+    Attributes:
+        is_coils: coils, otherwise registers.
+        first: lowest address.
+        values: 0 or 1 for a coil, 0 to 65535 for a register.
+    """
+
+    is_coils: bool
+    first: int
+    values: tuple[int, ...]
+
+    def apply(self, box: Box) -> None:
+        """Write them in order."""
+        write_range(box.state, self.is_coils, self.first, self.values)

@@ -1,0 +1,68 @@
+"""What is wired to the inputs of the box and the tool: levels and values from outside.
+
+No client of a real box can send these; they are for tests and for people at the emulator.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ur_emulator.commands.operation import CommandOperation
+from ur_emulator.commands.parameters import parameter
+from ur_emulator.controller.command import Box
+from ur_emulator.controller.io import (
+    ANALOG_RANGE,
+    CONFIGURABLE_SHIFT,
+    N_CONFIGURABLE,
+    N_STANDARD,
+    N_TOOL,
+    TOOL_SHIFT,
+)
+from ur_emulator.errors import ArgumentError, RefusedError
+
+DigitalGroup = Literal["standard", "configurable", "tool"]
+# Groups of digital inputs: (lowest bit of the digital word, number of inputs).
+DIGITAL_GROUPS: dict[DigitalGroup, tuple[int, int]] = {
+    "standard": (0, N_STANDARD),
+    "configurable": (CONFIGURABLE_SHIFT, N_CONFIGURABLE),
+    "tool": (TOOL_SHIFT, N_TOOL),
+}
+
+
+class SetDigitalInput(CommandOperation):
+    """Let a digital input be high or low from now on."""
+
+    group: DigitalGroup = parameter("which inputs")
+    n: int = parameter("number of the input: 0 to 7, of the tool 0 to 1", low=0, high=7)
+    level: bool = parameter("high or low")
+
+    def check_together(self) -> None:
+        """Refuse a number that the group does not have."""
+        count = DIGITAL_GROUPS[self.group][1]
+        if self.n >= count:
+            raise ArgumentError(f"{self.group} digital input {self.n} given: allowed are 0 to {count - 1}")
+
+    def apply(self, box: Box) -> None:
+        """Change the level."""
+        io, mask = box.state.io, 1 << (DIGITAL_GROUPS[self.group][0] + self.n)
+        io.digital_in = io.digital_in | mask if self.level else io.digital_in & ~mask
+
+
+class SetAnalogInput(CommandOperation):
+    """Let an analogue input have a voltage or a current from now on."""
+
+    group: Literal["standard", "tool"] = parameter("which inputs")
+    n: int = parameter("number of the input", low=0, high=1)
+    value: float = parameter("in V, or in A where the input measures current", low=0.0, high=10.0)
+
+    def apply(self, box: Box) -> None:
+        """Change the value, if it is in the range of what the input measures now."""
+        io = box.state.io
+        line = (io.analog_in if self.group == "standard" else io.tool_analog_in)[self.n]
+        low, high = ANALOG_RANGE[line.domain]
+        if not low <= self.value <= high:
+            raise RefusedError(
+                f"{self.value:g} given for {self.group} analog input {self.n}, which measures {low:g} to "
+                f"{high:g} {'V' if line.domain else 'A'} now"
+            )
+        line.value = self.value

@@ -1,0 +1,53 @@
+"""Power, brakes, and who moves the arm: the buttons of the initialisation screen and their words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ur_emulator.commands.operation import CommandOperation
+from ur_emulator.controller.command import Box, inform
+from ur_emulator.controller.robot_mode import ModeCommand
+from ur_emulator.controller.safety_modes import ROW
+
+
+class PowerOn(CommandOperation):
+    """Power the joints; the brakes stay closed."""
+
+    def apply(self, box: Box) -> None:
+        """Go from POWER_OFF to IDLE; nothing happens when the joints are powered already."""
+        _give_power(box, ModeCommand.POWER_ON)
+
+
+class PowerOff(CommandOperation):
+    """Close the brakes and cut the power."""
+
+    def apply(self, box: Box) -> None:
+        """Do so from any mode; the program ends."""
+        box.safety.cut_power()
+
+
+class ReleaseBrakes(CommandOperation):
+    """Go to RUNNING, powering on first if need be."""
+
+    def apply(self, box: Box) -> None:
+        """Open the brakes; a client's freedrive ends with it."""
+        box.state.compliance.by_client = False
+        _give_power(box, ModeCommand.BRAKE_RELEASE)
+
+
+@dataclass(frozen=True, slots=True)
+class StartFreedrive:
+    """Go into freedrive, as `set robotmode freedrive` asks; `set robotmode run` ends it."""
+
+    def apply(self, box: Box) -> None:
+        """Let the arm be guided by hand from this cycle on."""
+        box.state.compliance.guide(by_client=True)
+
+
+def _give_power(box: Box, command: ModeCommand) -> None:
+    """Power the joints or open their brakes, if the safety mode allows it; clients are told if not."""
+    mode = box.state.safety.mode
+    if ROW[mode].may_have_power:
+        box.state.mode.command(command)
+    else:
+        inform(box.state, f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].way_out}")

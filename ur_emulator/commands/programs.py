@@ -1,0 +1,90 @@
+"""The running program: start, stop, pause and resume it, and the speed slider."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from protocol.ur_types import ProgramState, RobotMode
+from ur_emulator.commands.operation import CommandOperation
+from ur_emulator.commands.parameters import parameter
+from ur_emulator.controller.command import Box, inform
+from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.controller.safety_modes import ROW
+from ur_emulator.errors import RefusedError
+
+if TYPE_CHECKING:
+    from ur_emulator.controller.state import ControllerState
+    from urscript import CompiledProgram
+
+
+@dataclass(frozen=True, slots=True)
+class StartProgram:
+    """Run a compiled program; a primary program replaces the one that runs, a `sec` runs beside it."""
+
+    program: CompiledProgram
+
+    def apply(self, box: Box) -> None:
+        """Start it if the robot may move; clients are told if not."""
+        obstacle = _why_not_running(box.state)
+        if obstacle:
+            text = f"program {self.program.name} not started: {obstacle}"
+            box.state.events.append(ScriptFailed(1, 1, text))
+            raise RefusedError(text)
+        box.programs.start(self.program)
+
+
+class StopProgram(CommandOperation):
+    """End the program, if one runs."""
+
+    def apply(self, box: Box) -> None:
+        """End it, as the `stop program` line and the dashboard's `stop` do."""
+        box.programs.stop()
+
+
+class PauseProgram(CommandOperation):
+    """Let the program stand still, and the arm come to rest on its path."""
+
+    def apply(self, box: Box) -> None:
+        """Pause a program that plays."""
+        if not box.programs.is_running or box.programs.is_paused:
+            raise RefusedError(f"there is no program to pause: the program state is {_program_state(box)}")
+        box.programs.pause()
+
+
+class ResumeProgram(CommandOperation):
+    """Let a paused program go on."""
+
+    def apply(self, box: Box) -> None:
+        """Let it go on if the robot may move; clients are told if not."""
+        if not box.programs.is_paused:
+            raise RefusedError(f"there is no program to resume: the program state is {_program_state(box)}")
+        obstacle = _why_not_running(box.state)
+        if obstacle:
+            text = f"program {box.programs.name} stays paused: {obstacle}"
+            inform(box.state, text)
+            raise RefusedError(text)
+        box.programs.resume()
+
+
+class SetSpeedSlider(CommandOperation):
+    """Set the speed slider."""
+
+    fraction: float = parameter("of full speed", low=0.0, high=1.0)
+
+    def apply(self, box: Box) -> None:
+        """Move it; the arm follows from this cycle on."""
+        box.state.speed_slider = self.fraction
+
+
+def _why_not_running(state: ControllerState) -> str:
+    """Return why no program may move the arm now; "" if one may."""
+    if state.safety.is_stopped:
+        safety = state.safety.mode
+        return f"the robot is in {safety.name}, it must be RUNNING: {ROW[safety].way_out}"
+    mode = state.mode.mode
+    return "" if mode is RobotMode.RUNNING else f"the robot is in {mode.name}, it must be RUNNING"
+
+
+def _program_state(box: Box) -> str:
+    return ProgramState(box.state.snapshot.runtime_state).name

@@ -1,0 +1,65 @@
+"""`run_program`: a program from its text or from a file in the folder of programs."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from ur_emulator.commands.parameters import Kind, parameter
+from ur_emulator.commands.programs import StartProgram
+from ur_emulator.control.step_operation import Context, StepOperation, Steps
+from ur_emulator.errors import ArgumentError, RefusedError
+
+if TYPE_CHECKING:
+    from protocol.ur_types import SoftwareVersion
+    from urscript import CompiledProgram
+
+
+class RunProgram(StepOperation[int]):
+    """Run a program in place of the one that runs.
+
+    In Python the script may also be the path of a file of this machine.
+
+    Raises:
+        ArgumentError: the program does not compile.
+        RefusedError: the box does not run programs now, or cannot use the file.
+    """
+
+    script: str | Path | None = parameter(
+        "text of a program, as sent to port 30002", kind=Kind.SCRIPT, default=None
+    )
+    file: str | None = parameter("or a file in the folder of programs, as for `load`", default=None)
+    result: ClassVar[str] = "`program`: its name, and `tick`: the cycle in which it began"
+
+    def steps(self, context: Context) -> Steps:
+        """Compile and start a text, or play a file as the dashboard does; what runs is stopped before."""
+        access, player = context.access, context.player
+        if (self.script is None) == (self.file is None):
+            raise ArgumentError("run_program needs either script, the text, or file, a name")
+        if self.file is not None:
+            with suppress(RefusedError):  # without a controller that is up, `play` says so
+                yield from player.stop()
+            yield from player.load(self.file)
+            yield from player.play("127.0.0.1")
+            name = access.controller.programs.name
+        else:
+            job = partial(_compile, str(self.script), access.identity.version)
+            program: CompiledProgram = yield from access.in_worker(job)
+            yield from access.apply(StartProgram(program))
+            name = program.name
+        return {"program": name, "tick": access.snapshot.tick}
+
+
+def _compile(text: str, version: SoftwareVersion) -> CompiledProgram:
+    """Compile a program; in the worker."""
+    # The command line loads this module, too: nothing heavy at its top.
+    from urscript import compile_program
+    from urscript.catalogue import catalogue_for
+    from urscript.errors import ScriptError
+
+    try:
+        return compile_program(text, catalogue=catalogue_for(version))
+    except ScriptError as error:
+        raise ArgumentError(f"the program does not compile: {error.log_text or error.wire_text}") from None

@@ -1,0 +1,69 @@
+"""Operations that ask the box what is going on, and the one that writes into its log."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from protocol.primary_messages import ReportLevel
+from ur_emulator.box_log import LogEntry
+from ur_emulator.commands.parameters import parameter
+from ur_emulator.control.box_state import BoxState, take_state
+from ur_emulator.control.step_operation import Context, StepOperation, Steps
+from ur_emulator.controller.events import LogAdded
+
+
+class ReadState(StepOperation[BoxState]):
+    """What the box is doing at the end of its last cycle."""
+
+    result: ClassVar[str] = (
+        "modes, joints, tool, force, inputs and outputs, program, popups and questions, time"
+    )
+    only_reads: ClassVar[bool] = True
+
+    def steps(self, context: Context) -> Steps:
+        """Take the state."""
+        yield from ()
+        return take_state(context.access.controller)
+
+
+class ReadLog(StepOperation[tuple[LogEntry, ...]]):
+    """What PolyScope's log tab would show."""
+
+    after: int = parameter("leave out so many entries: the `next` of the call before", low=0, default=0)
+    level: str = parameter(
+        "leave out what weighs less", choices=tuple(ReportLevel.__members__), default="DEBUG"
+    )
+    result: ClassVar[str] = "`entries`, the oldest first, and `next`, to be given as `after` in the next call"
+    only_reads: ClassVar[bool] = True
+
+    def steps(self, context: Context) -> Steps:
+        """Pick the entries."""
+        yield from ()
+        log, least = context.access.box_log, ReportLevel[self.level]
+        entries = [entry for entry in log.since(self.after) if entry.level >= least]
+        return {"entries": entries, "next": max(self.after, log.count)}
+
+
+class ReadIdentity(StepOperation[dict[str, Any]]):
+    """What the box is."""
+
+    result: ClassVar[str] = "software, robot model, serial number, pace, seed, fidelity, address and ports"
+    only_reads: ClassVar[bool] = True
+
+    def steps(self, context: Context) -> Steps:
+        """Ask the box."""
+        yield from ()
+        return context.identity()
+
+
+class AddToLog(StepOperation[int]):
+    """Write a line into the log."""
+
+    text: str = parameter("the line")
+    is_logged: ClassVar[bool] = False
+
+    def steps(self, context: Context) -> Steps:
+        """Write it; that needs no cycle."""
+        yield from ()
+        context.access.announce(LogAdded("Control", self.text))
+        return {"tick": context.access.snapshot.tick}

@@ -1,0 +1,48 @@
+"""StepOperation: an operation that takes no cycle or several, done in steps (see `servers.box_access`)."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ur_emulator.commands.operation import Operation, R_co
+
+if TYPE_CHECKING:
+    from ur_emulator.servers.box_access import BoxAccess
+    from ur_emulator.servers.program_player import ProgramPlayer
+
+Steps = Generator[None, None, Any]
+
+
+@dataclass(slots=True)
+class Context:
+    """What the steps of operations need.
+
+    Attributes:
+        access: to the box.
+        player: loads and plays program files.
+        clock: monotonic seconds.
+        identity: returns what `identity` tells.
+    """
+
+    access: BoxAccess
+    player: ProgramPlayer
+    clock: Callable[[], float]
+    identity: Callable[[], dict[str, Any]]
+
+
+class StepOperation(Operation[R_co]):
+    """An operation that says itself what it does, step by step."""
+
+    @abstractmethod
+    def steps(self, context: Context) -> Steps:
+        """Do it; yield for every look at the box.
+
+        Returns:
+            The result: an object that JSON can hold, or a dataclass.
+
+        Raises:
+            ControlError: it cannot be done, or not now.
+        """

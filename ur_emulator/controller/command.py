@@ -1,0 +1,77 @@
+"""What the controller is asked: commands, applied in order at the beginning of a cycle.
+
+A command is any record that can be applied to the parts of a box; those that clients, people and tests use
+are in `ur_emulator.commands`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+from protocol.primary_messages import ReportLevel
+from ur_emulator.controller.events import ErrorReported
+from ur_emulator.errors import RefusedError
+
+if TYPE_CHECKING:
+    from ur_emulator.controller.flange_push import FlangePush
+    from ur_emulator.controller.safety_system import SafetySystem
+    from ur_emulator.controller.state import ControllerState
+    from ur_emulator.plant.plant import Plant
+    from ur_emulator.scripting.program_slot import ProgramSlot
+
+# What a command has to tell; most have nothing.
+Result = Mapping[str, Any] | None
+# Told in the cycle in which a command was applied what has come of it: its result, or why it was refused.
+Done = Callable[[Result, RefusedError | None], None]
+
+
+class Box(Protocol):
+    """The parts of a box that commands act on.
+
+    Attributes:
+        state: modes, inputs and outputs, questions, events.
+        plant: the arm and what surrounds it.
+        push: what pushes the flange.
+        programs: what runs.
+        safety: is asked before power, brakes and programs.
+    """
+
+    state: ControllerState
+    plant: Plant
+    push: FlangePush
+    programs: ProgramSlot
+    safety: SafetySystem
+
+
+@runtime_checkable
+class Command(Protocol):
+    """Something that is done to a box at the beginning of a cycle."""
+
+    def apply(self, box: Box) -> Result:
+        """Do it; a `RefusedError` says why not."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Submitted:
+    """A command of somebody who wants to know what has come of it."""
+
+    command: Command
+    done: Done
+
+    def apply(self, box: Box) -> Result:
+        """Apply the command and hand back its result or its refusal."""
+        try:
+            result = self.command.apply(box)
+        except RefusedError as refusal:
+            self.done(None, refusal)
+            return None
+        self.done(result, None)
+        return result
+
+
+def inform(state: ControllerState, text: str) -> None:
+    """Tell clients and log why something is not done."""
+    state.events.append(ErrorReported(0, 0, ReportLevel.INFO, text))

@@ -1,0 +1,46 @@
+"""What pushes the flange: a force from outside, for a while or until the next one."""
+
+from __future__ import annotations
+
+from ur_emulator.models.robot_model import Vector3
+from ur_emulator.plant.plant import Plant
+
+_NOTHING: Vector3 = (0.0, 0.0, 0.0)
+
+
+class FlangePush:
+    """Pushes an arm and counts the cycles of a push that ends by itself.
+
+    Args:
+        plant: the arm.
+        period_s: duration of a cycle [s].
+    """
+
+    __slots__ = ("_cycles_left", "_period_s", "_plant")
+
+    def __init__(self, plant: Plant, period_s: float) -> None:
+        self._plant = plant
+        self._period_s = period_s
+        self._cycles_left = 0
+
+    @property
+    def will_end(self) -> bool:
+        """True while a push lasts that ends by itself."""
+        return self._cycles_left > 0
+
+    def begin(self, force: Vector3, point: Vector3, duration: float | None) -> None:
+        """Push from this cycle on.
+
+        Args:
+            force: in base axes [N]; zero ends the push before.
+            point: where it acts, in the flange frame [m].
+            duration: for so long [s]; None until the next push.
+        """
+        self._cycles_left = 0 if duration is None else round(duration / self._period_s)
+        self._plant.push(force if duration is None or self._cycles_left else _NOTHING, point)
+
+    def step(self) -> None:
+        """Count a cycle of a push that lasts for a while; end it after the last."""
+        self._cycles_left -= 1
+        if not self._cycles_left:
+            self._plant.push(_NOTHING)
