@@ -24,14 +24,34 @@ MAY_HAVE_EFFECTS = {
     "ur_emulator": {"realtime", "servers", "control", "emulator.py", "cli.py", "pytest_plugin.py"},
     "pc_client": {"driver", "experiment", "commands", "sweep", "executors.py", "cli.py"},
 }
+# Inside `ur_emulator`: a package imports those before it, also for types only; those on one line import each other.
+BOX_ORDER = (
+    {"errors"},
+    {"models"},
+    {"kinematics"},
+    {"motion"},
+    {"plant"},
+    {"controller", "scripting"},
+    {"box_log"},
+    {"commands"},
+    {"programs"},
+    {"realtime"},
+    {"servers"},
+    {"control"},
+    {"emulator", "rack"},
+)
+
+
+def imported_modules(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            yield node.module
 
 
 def imports(path):
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            yield node.module.split(".")[0]
+    return (name.split(".")[0] for name in imported_modules(path))
 
 
 def modules(package):
@@ -46,6 +66,19 @@ def test_packages_import_only_what_their_row_allows(package):
         for path in modules(package)
         for name in imports(path)
         if name not in allowed
+    }
+    assert not wrong
+
+
+@pytest.mark.parametrize("level", range(len(BOX_ORDER)), ids=lambda k: "+".join(sorted(BOX_ORDER[k])))
+def test_packages_of_the_box_import_in_one_direction(level):
+    allowed = set().union(*BOX_ORDER[: level + 1])
+    wrong = {
+        f"{path.relative_to(ROOT)}: {module}"
+        for path in modules("ur_emulator")
+        if path.relative_to(ROOT / "ur_emulator").parts[0].removesuffix(".py") in BOX_ORDER[level]
+        for module in imported_modules(path)
+        if module.startswith("ur_emulator.") and module.split(".")[1] not in allowed
     }
     assert not wrong
 

@@ -1,14 +1,17 @@
 """What the operations do to a box, called as methods from another thread."""
 
+import queue
 import threading
 from pathlib import Path
 
 import pytest
-from box_support import Bench, connect
+from box_support import TIMEOUT, Bench, connect
 from control_support import control_box
 
 from ur_emulator import ControlBox
 from ur_emulator.commands.inputs import SetAnalogInput, SetDigitalInput
+from ur_emulator.commands.obstacles import RemoveObstacle
+from ur_emulator.commands.operator import AnswerRequest
 from ur_emulator.commands.programs import StopProgram
 from ur_emulator.commands.push import Push
 from ur_emulator.errors import (
@@ -403,6 +406,20 @@ def test_a_text_that_nobody_can_send_on_is_refused(box):
 
 
 # --- threads and life
+
+
+def test_who_submits_a_command_is_told_what_has_come_of_it(box):
+    told = queue.SimpleQueue()
+    for command in (Push((1, 0, 0), duration=0.1), RemoveObstacle("wall"), AnswerRequest(1), StopProgram()):
+        box.submit(command, lambda result, refusal: told.put((result, refusal and str(refusal))))
+    assert [told.get(timeout=TIMEOUT) for _ in range(4)] == [
+        (None, None),
+        (None, "there is no obstacle 'wall': there is none"),
+        (None, "1 answers no question: none is open"),
+        (None, None),
+    ]
+    box.submit(RemoveObstacle("wall"))  # nobody wants to know
+    assert box.state.robot_mode == "RUNNING"
 
 
 def test_a_box_that_does_not_run_says_so():

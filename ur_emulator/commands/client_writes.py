@@ -21,7 +21,6 @@ class WriteInputs:
     values: tuple[tuple[str, RtdeValue], ...]
 
     def apply(self, box: Box) -> None:
-        """Write them in order."""
         write_inputs(box.state, self.values)
 
 
@@ -40,5 +39,4 @@ class WriteModbus:
     values: tuple[int, ...]
 
     def apply(self, box: Box) -> None:
-        """Write them in order."""
         write_range(box.state, self.is_coils, self.first, self.values)

@@ -37,13 +37,11 @@ class SetDigitalInput(CommandOperation):
     level: bool = parameter("high or low")
 
     def check_together(self) -> None:
-        """Refuse a number that the group does not have."""
         count = DIGITAL_GROUPS[self.group][1]
         if self.n >= count:
             raise ArgumentError(f"{self.group} digital input {self.n} given: allowed are 0 to {count - 1}")
 
     def apply(self, box: Box) -> None:
-        """Change the level."""
         io, mask = box.state.io, 1 << (DIGITAL_GROUPS[self.group][0] + self.n)
         io.digital_in = io.digital_in | mask if self.level else io.digital_in & ~mask
 
@@ -56,7 +54,6 @@ class SetAnalogInput(CommandOperation):
     value: float = parameter("in V, or in A where the input measures current", low=0.0, high=10.0)
 
     def apply(self, box: Box) -> None:
-        """Change the value, if it is in the range of what the input measures now."""
         io = box.state.io
         line = (io.analog_in if self.group == "standard" else io.tool_analog_in)[self.n]
         low, high = ANALOG_RANGE[line.domain]

@@ -37,7 +37,6 @@ class AddObstacle(CommandOperation):
     )
 
     def check_together(self) -> None:
-        """Refuse what is no obstacle."""
         if not self.name:
             raise ArgumentError("obstacle without a name given: it needs one, to be removed by")
         wanted = SIZES[self.shape]
@@ -53,7 +52,6 @@ class AddObstacle(CommandOperation):
             )
 
     def apply(self, box: Box) -> None:
-        """Put it there, if neither the arm nor too many others are in the way."""
         try:
             box.plant.obstacles.put(self.name, self.shape, self.size, six(self.pose))
         except RefusedError as refusal:
@@ -67,7 +65,6 @@ class RemoveObstacle(CommandOperation):
     name: str = parameter("of the obstacle")
 
     def apply(self, box: Box) -> None:
-        """Take it away, if it is there."""
         known = box.plant.obstacles.names
         if self.name not in known:
             there = f"are {', '.join(known)}" if known else "is none"

@@ -24,7 +24,6 @@ class AnswerRequest(CommandOperation):
     result: ClassVar[str] = "`id`: number of the question, and `tick`"
 
     def apply(self, box: Box) -> Result:
-        """Answer; nothing changes if no question of that type stands."""
         operator = box.state.operator
         asked = [r for r in operator.requests if r.kind is not RequestedType.NONE]
         answered = operator.answer(self.value, self.id)
@@ -40,7 +39,6 @@ class ClosePopup(CommandOperation):
     """Press the button of all popups."""
 
     def apply(self, box: Box) -> None:
-        """Close them; programs that wait for it go on."""
         box.state.operator.close_popups()
 
 
@@ -51,6 +49,5 @@ class ShowPopup:
     text: str
 
     def apply(self, box: Box) -> None:
-        """Show it."""
         box.state.operator.show(self.text)
         box.state.events.append(PopupShown("Popup", self.text, False, False, False))

@@ -14,7 +14,6 @@ class PowerOn(CommandOperation):
     """Power the joints; the brakes stay closed."""
 
     def apply(self, box: Box) -> None:
-        """Go from POWER_OFF to IDLE; nothing happens when the joints are powered already."""
         _give_power(box, ModeCommand.POWER_ON)
 
 
@@ -22,7 +21,6 @@ class PowerOff(CommandOperation):
     """Close the brakes and cut the power."""
 
     def apply(self, box: Box) -> None:
-        """Do so from any mode; the program ends."""
         box.safety.cut_power()
 
 
@@ -30,7 +28,6 @@ class ReleaseBrakes(CommandOperation):
     """Go to RUNNING, powering on first if need be."""
 
     def apply(self, box: Box) -> None:
-        """Open the brakes; a client's freedrive ends with it."""
         box.state.compliance.by_client = False
         _give_power(box, ModeCommand.BRAKE_RELEASE)
 
@@ -40,7 +37,6 @@ class StartFreedrive:
     """Go into freedrive, as `set robotmode freedrive` asks; `set robotmode run` ends it."""
 
     def apply(self, box: Box) -> None:
-        """Let the arm be guided by hand from this cycle on."""
         box.state.compliance.guide(by_client=True)
 
 

@@ -25,7 +25,6 @@ class StartProgram:
     program: CompiledProgram
 
     def apply(self, box: Box) -> None:
-        """Start it if the robot may move; clients are told if not."""
         obstacle = _why_not_running(box.state)
         if obstacle:
             text = f"program {self.program.name} not started: {obstacle}"
@@ -38,7 +37,6 @@ class StopProgram(CommandOperation):
     """End the program, if one runs."""
 
     def apply(self, box: Box) -> None:
-        """End it, as the `stop program` line and the dashboard's `stop` do."""
         box.programs.stop()
 
 
@@ -46,7 +44,6 @@ class PauseProgram(CommandOperation):
     """Let the program stand still, and the arm come to rest on its path."""
 
     def apply(self, box: Box) -> None:
-        """Pause a program that plays."""
         if not box.programs.is_running or box.programs.is_paused:
             raise RefusedError(f"there is no program to pause: the program state is {_program_state(box)}")
         box.programs.pause()
@@ -56,7 +53,6 @@ class ResumeProgram(CommandOperation):
     """Let a paused program go on."""
 
     def apply(self, box: Box) -> None:
-        """Let it go on if the robot may move; clients are told if not."""
         if not box.programs.is_paused:
             raise RefusedError(f"there is no program to resume: the program state is {_program_state(box)}")
         obstacle = _why_not_running(box.state)
@@ -73,7 +69,6 @@ class SetSpeedSlider(CommandOperation):
     fraction: float = parameter("of full speed", low=0.0, high=1.0)
 
     def apply(self, box: Box) -> None:
-        """Move it; the arm follows from this cycle on."""
         box.state.speed_slider = self.fraction
 
 

@@ -26,7 +26,6 @@ class Push(CommandOperation):
     )
 
     def apply(self, box: Box) -> None:
-        """Push from this cycle on."""
         box.push.begin(self.force, self.point, self.duration)
 
 
@@ -39,5 +38,4 @@ class AttachPayload(CommandOperation):
     )
 
     def apply(self, box: Box) -> None:
-        """Hang it there; from now on programs only declare a payload."""
         box.plant.hang(self.mass, self.cog)

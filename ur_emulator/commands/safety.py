@@ -30,7 +30,6 @@ class PressEmergencyStop(CommandOperation):
     )
 
     def apply(self, box: Box) -> None:
-        """Press it; it stays pressed."""
         box.safety.inputs.press(self.kind)
 
 
@@ -38,7 +37,6 @@ class ReleaseEmergencyStop(CommandOperation):
     """Release all emergency stop buttons; the power stays off."""
 
     def apply(self, box: Box) -> None:
-        """Release those that were pressed by command."""
         box.safety.inputs.release()
 
 
@@ -48,7 +46,6 @@ class SafeguardStop(CommandOperation):
     active: bool = parameter("begin, or end it", default=True)
 
     def apply(self, box: Box) -> None:
-        """Open or close it."""
         box.safety.inputs.guard(self.active)
 
 
@@ -58,7 +55,6 @@ class ReducedMode(CommandOperation):
     active: bool = parameter("begin, or end it", default=True)
 
     def apply(self, box: Box) -> None:
-        """Switch it."""
         box.safety.inputs.reduce(self.active)
 
 
@@ -66,7 +62,6 @@ class TriggerProtectiveStop(CommandOperation):
     """Stop the arm as a safety function would."""
 
     def apply(self, box: Box) -> None:
-        """Ask for it; the arm is stopped at the end of this cycle."""
         box.state.stop_requested = True
 
 
@@ -74,7 +69,6 @@ class UnlockProtectiveStop(CommandOperation):
     """End a protective stop at once, without the dashboard's 5 s."""
 
     def apply(self, box: Box) -> None:
-        """Return to what stands beside it, if there is one."""
         safety = box.state.safety
         if not safety.has(SafetyMode.PROTECTIVE_STOP):
             raise RefusedError(
@@ -89,7 +83,6 @@ class TriggerViolation(CommandOperation):
     text: str = parameter("for log and clients", default="Safety violation requested")
 
     def apply(self, box: Box) -> None:
-        """Report it; the arm brakes, then its power is cut."""
         box.state.events.append(ErrorReported(0, 0, ReportLevel.VIOLATION, self.text))
         box.safety.happen(SafetyEvent.VIOLATION)
 
@@ -100,7 +93,6 @@ class TriggerFault(CommandOperation):
     text: str = parameter("for log and clients", default="Safety fault requested")
 
     def apply(self, box: Box) -> None:
-        """Report it; the arm brakes, then its power is cut."""
         box.state.events.append(ErrorReported(0, 0, ReportLevel.FAULT, self.text))
         box.safety.happen(SafetyEvent.FAULT)
 
@@ -109,7 +101,6 @@ class RestartSafety(CommandOperation):
     """Restart the safety system; the power is off then."""
 
     def apply(self, box: Box) -> None:
-        """Forget what had stopped the robot."""
         box.safety.happen(SafetyEvent.RESTART)
 
 
@@ -123,7 +114,6 @@ class RequireSafeguardReset:
     required: bool
 
     def apply(self, box: Box) -> None:
-        """Set it up."""
         box.safety.inputs.require_reset(self.required)
 
 
@@ -132,7 +122,6 @@ class ResetSafeguard:
     """Press the safeguard's reset button; it counts once the safeguard is closed."""
 
     def apply(self, box: Box) -> None:
-        """Press it."""
         box.safety.inputs.reset()
 
 
@@ -154,7 +143,6 @@ class AssignSafetyInput:
             raise ArgumentError(f"input pair {self.pair} given: allowed are 0 to {N_INPUT_PAIRS - 1}")
 
     def apply(self, box: Box) -> None:
-        """Set them up."""
         box.safety.assign_input(self.pair, self.function)
 
 
@@ -163,7 +151,6 @@ class ChangeSafetySettings:
     """Touch the safety settings: the power goes off and CONFIRM_SAFETY begins."""
 
     def apply(self, box: Box) -> None:
-        """Cut the power and ask for the settings to be confirmed."""
         box.safety.cut_power()
         box.state.mode.command(ModeCommand.ASK_TO_CONFIRM)
 
@@ -173,7 +160,6 @@ class ConfirmSafety:
     """Confirm the safety settings, as `confirm user safety parameters` does."""
 
     def apply(self, box: Box) -> None:
-        """Confirm them."""
         box.state.mode.command(ModeCommand.CONFIRM)
 
 
@@ -192,7 +178,6 @@ class PressButton:
     pressed: bool
 
     def apply(self, box: Box) -> None:
-        """Press it or let it go."""
         state, bit = box.state, self.button.value
         state.buttons = state.buttons | bit if self.pressed else state.buttons & ~bit
         if self.button is Button.TEACH:

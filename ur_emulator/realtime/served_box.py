@@ -13,7 +13,6 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.realtime.pacing import Pacer, RealtimePacer
-from ur_emulator.servers.connection import Connection
 
 # While time stands still, every port repeats itself at its own rate, in real seconds: clients take silence
 # for a dead robot.
@@ -57,9 +56,9 @@ class ServedBox:
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._publishers: list[Publisher] = []
         self._commands: list[Command] = []
-        self.backlog: set[Connection] = set()
+        self.backlog: set[object] = set()
         self.on_failure: Callable[[Exception], None] | None = None
-        self._given_up: set[Connection] = set()
+        self._given_up: set[object] = set()
         self._last_frame = -math.inf
 
     def attach(self, publisher: Publisher) -> None:
