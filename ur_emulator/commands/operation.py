@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass, fields
 from inspect import getdoc
-from typing import Any, ClassVar, Generic, TypeVar, dataclass_transform, get_type_hints
+from typing import ClassVar, Generic, TypeVar, dataclass_transform, get_type_hints
 
 from ur_emulator.commands.parameters import Parameter, parameter
 from ur_emulator.controller.command import Box, Result
@@ -72,9 +72,3 @@ class CommandOperation(Operation[int]):
         Raises:
             RefusedError: the state of the box stands against it.
         """
-
-
-def arguments_of(row: type[Operation[Any]]) -> str:
-    """Return the parameters of an operation as the section of a docstring; "" without any."""
-    lines = [f"    {p.name}: {p.meaning} ({p.allowed})." for p in row.parameters]
-    return "\n".join(["Args:", *lines]) if lines else ""

@@ -10,14 +10,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field
 from enum import Enum
 from itertools import islice
-from math import hypot, isfinite
+from math import hypot, inf, isfinite
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 from ur_emulator.errors import ArgumentError
 
-# Characters of a text such as a log line or a popup, and of a program.
-MAX_TEXT, MAX_SCRIPT = 1000, 500_000
 _WORDS = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
 
 
@@ -34,17 +32,11 @@ class Kind(Enum):
     ANSWER = "true, false, number or text"
 
 
-# Kinds of parameters by the type of their field; what has other arguments, see `_kind_of`.
+# Kinds of parameters by the type of their field, beside those that `_details_of` takes apart.
 _KINDS = {float: Kind.NUMBER, int: Kind.INTEGER, bool: Kind.BOOLEAN, str: Kind.TEXT}
+# Characters of a text such as a log line or a popup, and of a program.
+_LENGTHS = {Kind.TEXT: 1000, Kind.SCRIPT: 500_000}
 _COUNTS = {(3, 3): "three", (6, 6): "six", (0, 3): "up to three"}
-
-
-class _Required:
-    def __repr__(self) -> str:
-        return "required"
-
-
-REQUIRED = _Required()
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,23 +47,24 @@ class Parameter:
         name: as in Python, JSON and on the command line.
         kind: its type.
         meaning: what it is, as a phrase.
+        default: taken when it is not given; None where leaving it out means something of its own, MISSING
+            where it must be given.
         unit: of numbers.
         low: least number.
         high: greatest number; of a vector, its greatest length.
         choices: of a CHOICE.
         lengths: of a VECTOR: least and greatest number of numbers.
-        default: taken when it is not given; None where leaving it out means something of its own.
     """
 
     name: str
     kind: Kind
     meaning: str
+    default: Any
     unit: str = ""
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
     lengths: tuple[int, int] = (3, 3)
-    default: Any = REQUIRED
 
     @classmethod
     def of(cls, declared: Field[Any], annotation: Any) -> Parameter:
@@ -84,13 +77,12 @@ class Parameter:
         details = {**_details_of(annotation), **declared.metadata}
         if details.get("choices"):
             details["kind"] = Kind.CHOICE
-        default = REQUIRED if declared.default is MISSING else declared.default
-        return cls(declared.name, default=default, **details)
+        return cls(declared.name, default=declared.default, **details)
 
     @property
     def is_required(self) -> bool:
         """True if it must be given."""
-        return self.default is REQUIRED
+        return self.default is MISSING
 
     @property
     def allowed(self) -> str:
@@ -107,7 +99,7 @@ class Parameter:
             case Kind.NUMBER | Kind.INTEGER if self.low is not None:
                 return f"{self.kind.value} from {self.low:g}{unit}"
             case Kind.TEXT | Kind.SCRIPT:
-                return f"text of at most {self._max_length} characters"
+                return f"text of at most {_LENGTHS[self.kind]} characters"
             case _:
                 return f"{self.kind.value}{unit}"
 
@@ -141,31 +133,28 @@ class Parameter:
             case _:
                 return text
 
-    @property
-    def _max_length(self) -> int:
-        return MAX_SCRIPT if self.kind is Kind.SCRIPT else MAX_TEXT
-
     def _checked(self, value: Any) -> Any:
         """Return the value, or None if it does not fit."""
         match self.kind:
             case Kind.BOOLEAN:
                 return bool(value) if value in (True, False) and isinstance(value, int) else None
             case Kind.INTEGER:
-                return value if _is_integer(value) and self._is_in_range(value) else None
+                return value if isinstance(value, int) and self._is_in_range(value) else None
             case Kind.NUMBER:
-                return float(value) if _is_number(value) and self._is_in_range(value) else None
+                return float(value) if self._is_in_range(value) else None
             case Kind.CHOICE:
                 return value if isinstance(value, str) and value in self.choices else None
             case Kind.TEXT | Kind.SCRIPT:
-                return value if _is_text(value) and len(value) <= self._max_length else None
+                return value if _is_text(value, _LENGTHS[self.kind]) else None
             case Kind.VECTOR:
                 return self._vector(value)
             case Kind.ANSWER:
-                fits = isinstance(value, bool) or _is_number(value) or _is_text(value)
-                return value if fits and (not isinstance(value, str) or len(value) <= MAX_TEXT) else None
+                fits = isinstance(value, bool) or _is_number(value) or _is_text(value, _LENGTHS[Kind.TEXT])
+                return value if fits else None
 
-    def _is_in_range(self, value: float) -> bool:
-        return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
+    def _is_in_range(self, value: Any) -> bool:
+        low, high = -inf if self.low is None else self.low, inf if self.high is None else self.high
+        return _is_number(value) and low <= value <= high
 
     def _vector(self, value: Any) -> tuple[float, ...] | None:
         if not isinstance(value, Iterable) or isinstance(value, str | bytes | Mapping):
@@ -216,10 +205,6 @@ def _details_of(annotation: Any) -> dict[str, Any]:
     return {"kind": _KINDS[annotation]}
 
 
-def _is_integer(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
 def _is_number(value: Any) -> bool:
     try:
         return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
@@ -227,9 +212,9 @@ def _is_number(value: Any) -> bool:
         return False
 
 
-def _is_text(value: Any) -> bool:
+def _is_text(value: Any, most: int) -> bool:
     """A lone surrogate is no text: nothing can send it on."""
-    return isinstance(value, str) and not any("\ud800" <= c <= "\udfff" for c in value)
+    return isinstance(value, str) and len(value) <= most and not any("\ud800" <= c <= "\udfff" for c in value)
 
 
 def _short(value: Any) -> str:

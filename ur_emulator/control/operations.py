@@ -16,7 +16,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, overload
 from ur_emulator.box_log import LogEntry
 from ur_emulator.commands.inputs import SetAnalogInput, SetDigitalInput
 from ur_emulator.commands.obstacles import AddObstacle, RemoveObstacle
-from ur_emulator.commands.operation import Operation, arguments_of
+from ur_emulator.commands.operation import Operation
 from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetSpeedSlider, StopProgram
@@ -58,9 +58,13 @@ def method(operation: Callable[P, Operation[R]]) -> Callable[Concatenate[BoxOper
         return returned
 
     box = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
-    call.__doc__ = f"{inspect.getdoc(operation)}\n\n{arguments_of(operation)}".rstrip()  # type: ignore[arg-type]
+    rows = operation.parameters  # type: ignore[attr-defined]  # the class of an operation, which is callable
+    arguments = [f"    {row.name}: {row.meaning} ({row.allowed})." for row in rows]
+    call.__doc__ = "\n".join([inspect.getdoc(operation) or "", *(["", "Args:", *arguments] if rows else [])])
     call.__dict__["operation"] = operation
-    call.__dict__["__signature__"] = signature.replace(parameters=[box, *signature.parameters.values()])
+    call.__dict__["__signature__"] = signature.replace(
+        parameters=[box, *signature.parameters.values()], return_annotation=inspect.Signature.empty
+    )
     return call
 
 

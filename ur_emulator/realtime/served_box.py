@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from protocol.primary_messages import ReportLevel
 from ur_emulator.box_log import BoxLog
@@ -56,9 +56,9 @@ class ServedBox:
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._publishers: list[Publisher] = []
         self._commands: list[Command] = []
-        self.backlog: set[object] = set()
+        self.backlog: set[Any] = set()
         self.on_failure: Callable[[Exception], None] | None = None
-        self._given_up: set[object] = set()
+        self._given_up: set[Any] = set()
         self._last_frame = -math.inf
 
     def attach(self, publisher: Publisher) -> None:
