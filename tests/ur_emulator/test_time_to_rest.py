@@ -13,7 +13,8 @@ from pc_client.driver.watchdog import REST_SPEED
 from pc_client.kinematics.robot_model import ROBOTS
 from protocol.ur_types import ProgramState, SafetyMode
 from protocol.velocity_stream import VelocityMode, encode_velocity
-from ur_emulator.controller import commands as cmd
+from ur_emulator.commands.programs import ResumeProgram
+from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 
 PERIOD = 0.008  # s
 ALLOWED = 0.3  # s
@@ -121,12 +122,12 @@ def test_a_speed_slider_that_was_moved_does_not_make_the_stop_longer():
 
 def test_what_is_resumed_on_the_pendant_while_the_client_is_frozen_comes_to_rest_in_time_too():
     arm = Turning("ur3", 0)
-    arm.tick(1, cmd.TriggerProtectiveStop())
+    arm.tick(1, TriggerProtectiveStop())
     arm.tick(800)
     assert arm.now.runtime_state == ProgramState.PAUSED
     stopped_at = arm.now.target_q[0]
-    arm.tick(1, cmd.UnlockProtectiveStop())
-    arm.tick(1, cmd.ResumeProgram())
+    arm.tick(1, UnlockProtectiveStop())
+    arm.tick(1, ResumeProgram())
     moving = [any(arm.tick().target_qd) for _ in range(120)]
     assert not any(moving[int(ALLOWED / PERIOD) :])
     assert abs(arm.now.target_q[0] - stopped_at) < 0.05
