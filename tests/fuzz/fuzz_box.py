@@ -125,7 +125,7 @@ class FuzzBox:
             pace="lockstep", port_base=None, seed=rng.randrange(100), programs=folder, control_port=0
         )
         box._loop._wake = lambda: None
-        box._intake.close()
+        box._intake._worker.shutdown()
         box._intake._worker = _AtOnce()
         # Most of the time would go into compiling the same programs again and again.
         box._intake._translate = lru_cache(maxsize=300)(box._intake._translate)
