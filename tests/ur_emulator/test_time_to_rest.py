@@ -13,7 +13,7 @@ from pc_client.driver.watchdog import REST_SPEED
 from pc_client.kinematics.robot_model import ROBOTS
 from protocol.ur_types import ProgramState, SafetyMode
 from protocol.velocity_stream import VelocityMode, encode_velocity
-from ur_emulator.commands.programs import ResumeProgram
+from ur_emulator.commands.programs import ResumeProgram, SetSpeedSlider
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 
 PERIOD = 0.008  # s
@@ -115,7 +115,7 @@ def test_an_arm_that_still_speeds_up_does_not_go_on_speeding_up():
 
 def test_a_speed_slider_that_was_moved_does_not_make_the_stop_longer():
     arm = Turning("ur3", 0)
-    arm.tick(1, cmd.SetSpeedSlider(0.3))
+    arm.tick(1, SetSpeedSlider(0.3))
     arm.send(VelocityMode.VELOCITY, [ROBOTS["ur3"].limits.qd_max[0], 0, 0, 0, 0, 0])
     assert (arm.ticks_to_rest() + WAITS_FOR_THE_READ) * PERIOD <= ALLOWED
 
