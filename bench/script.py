@@ -8,7 +8,7 @@ from typing import Any
 
 from urscript import NEXT_CYCLE, HostFunction, ProgramStatus, RunningProgram, ScriptThread, compile_program
 from urscript.dialect import Dialect
-from urscript.parser import prepare
+from urscript.syntax.parser import prepare
 
 ROUNDS = 5  # of each measurement; the best one counts, the others were disturbed
 N_FUNCTIONS = 60

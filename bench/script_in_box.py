@@ -13,7 +13,7 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from urscript import CompiledProgram, compile_program
-from urscript.parser import prepare
+from urscript.syntax.parser import prepare
 
 ROUNDS = 20  # of each measurement; the best one counts, the others were disturbed
 N_THREADS = 20

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from urscript import nodes
 from urscript.catalogue import CB3_3_15
 from urscript.errors import ScriptSyntaxError
-from urscript.parser import parse
 from urscript.source import Source
-from urscript.walk import all_expressions, all_statements, own_expressions
+from urscript.syntax import nodes
+from urscript.syntax.parser import parse
+from urscript.syntax.walk import all_expressions, all_statements, own_expressions
 
 TESTS = Path(__file__).parent
 FOLDERS = ("urscript", "ur_emulator")

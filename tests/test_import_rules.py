@@ -24,7 +24,7 @@ MAY_HAVE_EFFECTS = {
     "ur_emulator": {"realtime", "servers", "control", "emulator.py", "cli.py", "pytest_plugin.py"},
     "pc_client": {"driver", "experiment", "commands", "sweep", "executors.py", "cli.py"},
 }
-# Inside `ur_emulator`: a package imports those before it, also for types only; those on one line import each other.
+# Inside a package: each part imports those before it, also for types only; those on one line import each other.
 BOX_ORDER = (
     {"errors"},
     {"models"},
@@ -40,12 +40,35 @@ BOX_ORDER = (
     {"control"},
     {"emulator", "rack"},
 )
+LANGUAGE_ORDER = (
+    {"courtesy", "dialect", "errors", "source", "values"},
+    {"syntax"},
+    {"layout"},
+    {"catalogue"},
+    {"builtins"},
+    {"names"},
+    {"lint"},
+    {"compile"},
+    {"run"},
+    {"program"},
+    {"advice"},
+    {"diagnostics", "recording_host", "robot"},
+    {"commands"},
+    {"cli"},
+)
+LEVELS = [
+    pytest.param(package, order, level, id=f"{package}-{'+'.join(sorted(order[level]))}")
+    for package, order in (("ur_emulator", BOX_ORDER), ("urscript", LANGUAGE_ORDER))
+    for level in range(len(order))
+]
 
 
 def imported_modules(path):
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module in OURS:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
             yield node.module
 
@@ -70,15 +93,15 @@ def test_packages_import_only_what_their_row_allows(package):
     assert not wrong
 
 
-@pytest.mark.parametrize("level", range(len(BOX_ORDER)), ids=lambda k: "+".join(sorted(BOX_ORDER[k])))
-def test_packages_of_the_box_import_in_one_direction(level):
-    allowed = set().union(*BOX_ORDER[: level + 1])
+@pytest.mark.parametrize(("package", "order", "level"), LEVELS)
+def test_the_parts_of_a_package_import_in_one_direction(package, order, level):
+    allowed = set().union(*order[: level + 1])
     wrong = {
         f"{path.relative_to(ROOT)}: {module}"
-        for path in modules("ur_emulator")
-        if path.relative_to(ROOT / "ur_emulator").parts[0].removesuffix(".py") in BOX_ORDER[level]
+        for path in modules(package)
+        if path.relative_to(ROOT / package).parts[0].removesuffix(".py") in order[level]
         for module in imported_modules(path)
-        if module.startswith("ur_emulator.") and module.split(".")[1] not in allowed
+        if module.startswith(f"{package}.") and module.split(".")[1] not in allowed
     }
     assert not wrong
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         ScriptRuntimeError,
         ScriptSyntaxError,
     )
-    from urscript.host import Host, HostFunction
     from urscript.program import (
         CompiledProgram,
         ProgramStatus,
@@ -29,9 +28,10 @@ if TYPE_CHECKING:
         compile_program,
     )
     from urscript.recording_host import RecordingHost
-    from urscript.threads import ScriptThread
+    from urscript.run.host import Host, HostFunction
+    from urscript.run.threads import ScriptThread
+    from urscript.run.waits import NEXT_CYCLE, Blocked
     from urscript.values import Matrix, Pose
-    from urscript.waits import NEXT_CYCLE, Blocked
 
 _HOME: Final = {
     "ScriptCompileError": "errors",
@@ -39,19 +39,19 @@ _HOME: Final = {
     "ScriptNameError": "errors",
     "ScriptRuntimeError": "errors",
     "ScriptSyntaxError": "errors",
-    "Host": "host",
-    "HostFunction": "host",
+    "Host": "run.host",
+    "HostFunction": "run.host",
     "CompiledProgram": "program",
     "ProgramStatus": "program",
     "RunningProgram": "program",
     "check_program": "program",
     "compile_program": "program",
     "RecordingHost": "recording_host",
-    "ScriptThread": "threads",
+    "ScriptThread": "run.threads",
     "Matrix": "values",
     "Pose": "values",
-    "NEXT_CYCLE": "waits",
-    "Blocked": "waits",
+    "NEXT_CYCLE": "run.waits",
+    "Blocked": "run.waits",
 }
 """Which module each public name lives in."""
 

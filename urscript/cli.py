@@ -16,7 +16,8 @@ from typing import Annotated, Any, Final
 import typer
 
 from urscript.advice import check_for_people, explained
-from urscript.command_support import (
+from urscript.commands.run_command import run
+from urscript.commands.support import (
     STANDARD_INPUT,
     AsJson,
     Software,
@@ -27,9 +28,8 @@ from urscript.command_support import (
 )
 from urscript.diagnostics import Diagnostic, diagnostic_of
 from urscript.errors import ScriptError, ScriptSyntaxError
-from urscript.formatter import format_program
-from urscript.lint_rules import RULES, ScriptWarning
-from urscript.run_command import run
+from urscript.layout.formatter import format_program
+from urscript.lint.rules import RULES, ScriptWarning
 from urscript.source import Source, as_utf8
 
 _GC_THRESHOLD: Final = (100_000, 20, 100)

@@ -13,7 +13,7 @@ from urscript.errors import (
     ScriptSyntaxError,
     ScriptTypeError,
 )
-from urscript.lint_rules import ScriptWarning
+from urscript.lint.rules import ScriptWarning
 from urscript.source import as_utf8
 
 ERROR_CODES: Final[dict[type[ScriptError], str]] = {
@@ -24,7 +24,7 @@ ERROR_CODES: Final[dict[type[ScriptError], str]] = {
     ScriptContextError: "E105",
     ScriptRuntimeError: "E201",
 }
-"""The stable codes of errors; those of warnings are in `lint_rules`."""
+"""The stable codes of errors; those of warnings are in `lint.rules`."""
 
 
 class Diagnostic(NamedTuple):

@@ -12,24 +12,24 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
-from urscript import runtime
 from urscript.catalogue import CB3_3_15, Catalogue
-from urscript.compiler import compile_resolved
+from urscript.compile.compiler import compile_resolved
 from urscript.dialect import Dialect, dialect_for
 from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError
-from urscript.metering import Meter
-from urscript.parser import find_syntax_errors, parse
-from urscript.resolver import resolve
-from urscript.scopes import ResolvedProgram
+from urscript.names.resolver import resolve
+from urscript.names.scopes import ResolvedProgram
+from urscript.run import runtime
+from urscript.run.metering import Meter
+from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread
+from urscript.run.variables import UNDEFINED
 from urscript.source import Source, as_bytes
-from urscript.threads import ProgramHalted, Scheduler, ScriptThread
-from urscript.variables import UNDEFINED
+from urscript.syntax.parser import find_syntax_errors, parse
 
 if TYPE_CHECKING:
     from types import CodeType
 
-    from urscript.host import Host
-    from urscript.lint_rules import ScriptWarning
+    from urscript.lint.rules import ScriptWarning
+    from urscript.run.host import Host
 
 
 def compile_program(
@@ -71,7 +71,7 @@ def check_program(
 
     Names are looked up once the syntax is right.
     """
-    from urscript.lint import find_warnings
+    from urscript.lint.all_warnings import find_warnings
 
     source = Source(as_bytes(text), name)
     dialect = dialect or dialect_for(catalogue.version)

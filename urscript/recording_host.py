@@ -14,11 +14,11 @@ from random import Random
 from typing import Any, Final, NamedTuple
 
 from urscript.catalogue import CB3_3_15, Builtin, Catalogue, Generation, TimeClass
-from urscript.host import HostFunction
 from urscript.program import CompiledProgram, ProgramStatus, RunningProgram
-from urscript.threads import ScriptThread
+from urscript.run.host import HostFunction
+from urscript.run.threads import ScriptThread
+from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
 from urscript.values import Pose
-from urscript.waits import NEXT_CYCLE, Blocked, Wait
 
 MOVE_CYCLES: Final = 3
 """How long every move takes that does not say a time itself."""

@@ -10,7 +10,7 @@
 URScript passes everything by value. Here that is done by never changing a list, pose or matrix once it
 exists: assigning to an element makes a new one (`ops.store_item`). So nobody has to copy, as long as
 nobody, host functions included, changes a list in place after it was handed over.
-This module must not compute (see `ops`) and must not know the robot.
+This module must not compute (see `run.ops`) and must not know the robot.
 """
 
 from __future__ import annotations

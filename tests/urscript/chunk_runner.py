@@ -32,13 +32,13 @@ from unittest import mock
 import pytest
 
 from urscript.catalogue import catalogue_for
+from urscript.compile.inference import StaticTypes, Type
 from urscript.errors import ScriptCompileError, ScriptError
-from urscript.inference import StaticTypes, Type
-from urscript.parser import parse
-from urscript.printer import print_program
+from urscript.layout.printer import print_program
 from urscript.program import ProgramStatus, check_program, compile_program
 from urscript.recording_host import FakeSocket, RecordingHost
 from urscript.source import Source
+from urscript.syntax.parser import parse
 
 MAX_CYCLES = 2_000
 

@@ -2,8 +2,8 @@
 
 from hypothesis import strategies as st
 
-from urscript import nodes
-from urscript.printer import print_expression
+from urscript.layout.printer import print_expression
+from urscript.syntax import nodes
 
 VARIABLES = ["a", "b", "c", "type", "time", "p", "_x1"]
 FUNCTIONS = ["f", "g", "sync", "norm", "to_str", "movej"]

@@ -19,19 +19,19 @@ from urscript import errors
 PACKAGE = Path(urscript.__file__).parent
 CHUNKS = load_chunks(*sorted(Path(__file__).parent.glob("chunks/*.script")))
 # Commands and warnings: they report errors, their own tests look at those.
-NOT_THE_LANGUAGE = re.compile(r"advice/.*|cli\.py|formatter\.py|lint\w*\.py|run_\w+\.py")
+NOT_THE_LANGUAGE = re.compile(r"(advice|layout|lint|commands)/.*|cli\.py")
 ERROR_CLASSES = {
     name for name, value in vars(errors).items() if isinstance(value, type) and issubclass(value, Exception)
 }
 
 OUT_OF_REACH = {
     "catalogue/catalogue.py Catalogue.bind": "for hosts; the compiler binds before the program runs",
-    "compiler.py _FunctionCompiler._assign": "every builtin array has a setter",
-    "compiler.py compile_resolved": "the limits before it are lower than Python's",
-    "ops.py equal": "dialect.MIXED_TYPES_COMPARE",
+    "compile/compiler.py _FunctionCompiler._assign": "every builtin array has a setter",
+    "compile/compiler.py compile_resolved": "the limits before it are lower than Python's",
+    "run/ops.py equal": "dialect.MIXED_TYPES_COMPARE",
     "program.py _resolve": "the resolver is deeper than the compiler in no program short enough for a chunk",
     "program.py RunningProgram._finish": "a fault of a host; test_urscript_lang_running",
-    "runtime.py script_error": "a thousand functions, a fault of a host; test_urscript_lang_running",
+    "run/runtime.py script_error": "a thousand functions, a fault of a host; test_urscript_lang_running",
     "values.py Pose.of": "six items are the grammar's",
     "values.py wrap_int": "dialect.INT_OVERFLOW",
 }
@@ -156,4 +156,9 @@ def test_the_search_finds_the_places():
     sites = list(error_sites())
     assert len(sites) > 80
     assert {"type_error", "explain", "_wrong", "_out_of_range"} <= makers()
-    assert {file for file, *_ in sites} >= {"ops.py", "elements.py", "builtins/urmath.py", "resolver.py"}
+    assert {file for file, *_ in sites} >= {
+        "run/ops.py",
+        "run/elements.py",
+        "builtins/urmath.py",
+        "names/resolver.py",
+    }

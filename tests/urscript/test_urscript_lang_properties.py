@@ -4,14 +4,14 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from urscript import nodes
 from urscript.dialect import Dialect
 from urscript.errors import ScriptCompileError, ScriptSyntaxError
-from urscript.parser import parse
-from urscript.printer import print_program
+from urscript.layout.printer import print_program
 from urscript.program import ProgramStatus, check_program, compile_program
 from urscript.recording_host import RecordingHost
 from urscript.source import Source
+from urscript.syntax import nodes
+from urscript.syntax.parser import parse
 
 several = settings(suppress_health_check=list(HealthCheck), max_examples=80)
 

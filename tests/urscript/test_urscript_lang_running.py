@@ -6,7 +6,7 @@ import pytest
 
 from urscript import NEXT_CYCLE, Blocked, ProgramStatus, RecordingHost, ScriptRuntimeError, compile_program
 from urscript.dialect import Dialect
-from urscript.variables import UNDEFINED
+from urscript.run.variables import UNDEFINED
 
 
 class Host(RecordingHost):

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urscript import Matrix, Pose, RecordingHost, ScriptRuntimeError, compile_program, ops
+from urscript import Matrix, Pose, RecordingHost, ScriptRuntimeError, compile_program
+from urscript.run import ops
 from urscript.values import log_form, str_form, type_name, wrap_int
 
 numbers = st.one_of(

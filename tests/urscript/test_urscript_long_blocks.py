@@ -4,14 +4,14 @@ import ast
 
 import pytest
 
-import urscript.long_blocks
-from urscript.compiler import compile_resolved
-from urscript.long_blocks import LONGEST, pieces
-from urscript.parser import parse
+import urscript.compile.long_blocks
+from urscript.commands.tracing import LineTracer
+from urscript.compile.compiler import compile_resolved
+from urscript.compile.long_blocks import LONGEST, pieces
 from urscript.program import ProgramStatus, compile_program
 from urscript.recording_host import RecordingHost
 from urscript.source import Source
-from urscript.tracing import LineTracer
+from urscript.syntax.parser import parse
 
 FILLING = "  x = x + 1\n" * (2 * LONGEST)
 
@@ -47,7 +47,7 @@ end
 
 
 def run(text, longest, monkeypatch):
-    monkeypatch.setattr(urscript.long_blocks, "LONGEST", longest)
+    monkeypatch.setattr(urscript.compile.long_blocks, "LONGEST", longest)
     program = compile_program(text)
     host = RecordingHost()
     lines = []
@@ -89,7 +89,7 @@ def test_no_piece_is_long_and_none_is_left_from_inside():
         for piece in made:
             assert len(piece) <= LONGEST
             if len(piece) > 1 and len(made) > 1:
-                assert not any(urscript.long_blocks._leaves(statement) for statement in piece)
+                assert not any(urscript.compile.long_blocks._leaves(statement) for statement in piece)
 
     body = parse(Source(PROGRAM))[0].body
     check(body, False)

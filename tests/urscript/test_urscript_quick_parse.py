@@ -10,8 +10,8 @@ from lark.exceptions import LarkError
 from test_urscript_lang_properties import WORDS, functions, statements, threads
 
 from urscript.errors import ScriptSyntaxError
-from urscript.parser import _lark, _quick
-from urscript.printer import print_program
+from urscript.layout.printer import print_program
+from urscript.syntax.parser import _lark, _quick
 
 CHUNKS = sorted(Path(__file__).parent.glob("chunks/*.script"))
 

@@ -10,10 +10,10 @@ from urscript.advice import check_for_people
 from urscript.advice.checking import RULES, advise, first_syntax_error
 from urscript.cli import app
 from urscript.errors import ScriptSyntaxError
-from urscript.parser import parse
-from urscript.printer import print_program
+from urscript.layout.printer import print_program
 from urscript.program import check_program, compile_program
 from urscript.source import Source, as_utf8
+from urscript.syntax.parser import parse
 
 
 def body(*lines):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from urscript.cli import app
-from urscript.lint_rules import RULES
+from urscript.lint.rules import RULES
 
 PAGE = Path(__file__).parents[2] / "docs" / "urscript-tool.md"
 PROGRAM = re.compile(r"^`(\w+\.script)`:\n\n```urscript\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -10,11 +10,11 @@ from typer.testing import CliRunner
 
 from urscript.cli import app
 from urscript.errors import ScriptSyntaxError
-from urscript.formatter import format_program
-from urscript.parser import parse
-from urscript.printer import print_program
+from urscript.layout.formatter import format_program
+from urscript.layout.printer import print_program
 from urscript.source import Source
-from urscript.walk import same_tree
+from urscript.syntax.parser import parse
+from urscript.syntax.walk import same_tree
 
 ROOT = Path(__file__).parents[2]
 SCRIPTS = sorted(
@@ -24,7 +24,7 @@ SCRIPTS = sorted(
 )
 COMMENTS = []
 LEXER = Lark(
-    (ROOT / "urscript" / "grammar.lark").read_text(encoding="utf-8"),
+    (ROOT / "urscript" / "syntax" / "grammar.lark").read_text(encoding="utf-8"),
     parser="lalr",
     lexer="basic",
     lexer_callbacks={"COMMENT": COMMENTS.append},

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import urscript.run_command
+import urscript.commands.run_command
 from ur_emulator.models.robots import ROBOTS
 from ur_emulator.script_robots import MAKER
 from urscript.cli import app
@@ -285,7 +285,7 @@ def test_wrong_options_say_what_is_allowed(run, words, allowed):
 
 
 def test_without_a_robot_it_only_writes_down(run, monkeypatch):
-    monkeypatch.setattr(urscript.run_command, "find_makers", list)
+    monkeypatch.setattr(urscript.commands.run_command, "find_makers", list)
     result = run(body(f"movej({HOME})"))
     assert result.stdout == "    0.000 s  p: movej([0, -1.5708, 0, -1.5708, 0, 0], 1.4, 1.05, 0, 0)\n"
     assert result.stderr == "finished after 0.024 s of robot time (no robot)\n"

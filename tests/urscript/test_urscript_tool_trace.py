@@ -6,9 +6,9 @@ import pytest
 from typer.testing import CliRunner
 
 from urscript.cli import app
+from urscript.commands.tracing import LineTracer
 from urscript.program import compile_program
 from urscript.recording_host import RecordingHost
-from urscript.tracing import LineTracer
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """def p():

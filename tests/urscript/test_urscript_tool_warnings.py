@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from urscript.cli import app
-from urscript.lint_rules import RULES
+from urscript.lint.rules import RULES
 from urscript.program import check_program
 
 

@@ -13,8 +13,8 @@ from ur_emulator.motion.generators import StopJ
 from ur_emulator.motion.tool import Tool
 from ur_emulator.scripting.arm_taking import Cycles, floats, require_positive, take_arm
 from urscript.errors import ScriptRuntimeError
+from urscript.run.waits import NEXT_CYCLE
 from urscript.values import Pose
-from urscript.waits import NEXT_CYCLE
 
 # Encoders beyond have a tick for an atom, or none for the whole robot.
 FEWEST_TICKS, MOST_TICKS = 1e-3, 1e9

@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import six
-from urscript.threads import ProgramHalted
+from urscript.run.threads import ProgramHalted
 
 
 def error_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:

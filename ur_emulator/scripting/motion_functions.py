@@ -18,8 +18,8 @@ from ur_emulator.motion.tool import Tool
 from ur_emulator.scripting.arm_taking import Cycles, floats, require_positive, take_arm
 from ur_emulator.scripting.speed_functions import speed_functions
 from urscript.errors import ScriptRuntimeError
+from urscript.run.waits import NEXT_CYCLE
 from urscript.values import Pose
-from urscript.waits import NEXT_CYCLE
 
 # Acceleration and speed of moves that give none. Source: URScript manual, module variables of motion.
 JOINT_DEFAULTS = (1.4, 1.05)  # rad/s^2, rad/s

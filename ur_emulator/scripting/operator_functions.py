@@ -10,7 +10,7 @@ from ur_emulator.controller.events import PopupShown, ValueRequested
 from ur_emulator.controller.operator import Answer, OperatorRequest
 from ur_emulator.controller.state import ControllerState
 from urscript.builtins.text import wire_text
-from urscript.waits import Blocked
+from urscript.run.waits import Blocked
 
 _KINDS = {
     "boolean": RequestedType.BOOLEAN,

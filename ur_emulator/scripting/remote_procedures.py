@@ -12,9 +12,9 @@ from typing import Any, Final
 
 from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, RemoteServer
 from urscript.errors import ScriptRuntimeError
-from urscript.threads import ScriptThread
+from urscript.run.threads import ScriptThread
+from urscript.run.waits import Blocked
 from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type, script_text
-from urscript.waits import Blocked
 
 _POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
 # The method that a handle answers itself.
@@ -45,7 +45,7 @@ class ProgramRemotes:
 
 
 class RemoteHandle:
-    """A value whose methods are remote procedures (see urscript.host.Handle)."""
+    """A value whose methods are remote procedures (see urscript.run.host.Handle)."""
 
     script_type: Final = "remote procedure handle"
 

@@ -28,7 +28,7 @@ from urscript.builtins import pure_builtins
 
 
 class RobotHost:
-    """The host of one running program (see urscript.host.Host)."""
+    """The host of one running program (see urscript.run.host.Host)."""
 
     def __init__(self, state: ControllerState, network: Network) -> None:
         """Bind the builtins.

@@ -16,7 +16,7 @@ from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.network import Network, ScriptSocket
 from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
-from urscript.waits import GIVE_WAY, Blocked
+from urscript.run.waits import GIVE_WAY, Blocked
 
 # socket_open gives up after this [s of robot time]. Source: URScript manual, socket_open.
 OPEN_TIMEOUT = 2.0

@@ -12,7 +12,7 @@ from ur_emulator.motion.servo_j import ServoJ
 from ur_emulator.motion.speed_l import SpeedL, StopL
 from ur_emulator.motion.tool import Tool
 from ur_emulator.scripting.arm_taking import LEAST_LIMIT, Cycles, floats, require_positive, take_arm
-from urscript.waits import NEXT_CYCLE
+from urscript.run.waits import NEXT_CYCLE
 
 
 def speed_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:

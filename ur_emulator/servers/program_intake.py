@@ -32,7 +32,7 @@ from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.courtesy import giving_way
 from urscript.errors import ScriptError, ScriptTypeError
-from urscript.parser import prepare
+from urscript.syntax.parser import prepare
 
 # The controller's own words and the command each stands for; words that change nothing here map to None.
 # Source: what PolyScope and public clients send on the script ports (protocol.controller_words).

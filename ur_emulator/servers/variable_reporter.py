@@ -22,7 +22,7 @@ from protocol.primary_program import (
 from protocol.primary_values import MAX_NESTING, TypedValue, ValueType, encode_value, value_codes
 from protocol.ur_types import SoftwareVersion
 from urscript import Matrix, Pose, RunningProgram, ScriptThread
-from urscript.variables import UNDEFINED
+from urscript.run.variables import UNDEFINED
 
 # Names or values in one package [bytes]: clients hold packages of up to 4096 bytes, or of 2000.
 MAX_BODY = 1900

@@ -17,10 +17,10 @@ from urscript.advice.problem import Advice, Problem, Rule
 from urscript.advice.rough_tokens import RoughText
 from urscript.catalogue import CB3_3_15, Catalogue
 from urscript.errors import ScriptCompileError, ScriptNameError, ScriptSyntaxError
-from urscript.lint_rules import ScriptWarning
-from urscript.parser import find_syntax_errors, parse
+from urscript.lint.rules import ScriptWarning
 from urscript.program import check_program
 from urscript.source import Source, as_bytes
+from urscript.syntax.parser import find_syntax_errors, parse
 
 RULES: Final[tuple[Rule, ...]] = (
     characters.quotes,

@@ -1,0 +1,1 @@
+"""What the commands of `urscript` do behind their options, above all `urscript run`."""

@@ -1,0 +1,175 @@
+"""`urscript run`: a program on an emulated robot, or on one that only writes down what it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+from urscript.advice import explained
+from urscript.catalogue import Catalogue
+from urscript.commands.move_watch import MoveWatch
+from urscript.commands.run_story import JsonStory, Story, TextStory
+from urscript.commands.support import AsJson, Software, catalogue_of, read_program, show, shown_name
+from urscript.commands.tracing import LineTracer, TracedLine
+from urscript.errors import ScriptCompileError
+from urscript.program import CompiledProgram, ProgramStatus, compile_program
+from urscript.recording_host import RecordedCall, RecordingHost
+from urscript.robot import Report, ReportKind, RobotMaker, RunStatus, ScriptRobot, find_makers
+from urscript.source import Source
+
+NO_ROBOT: Final = "none"
+EXIT_CODES: Final = {
+    RunStatus.FINISHED: 0,
+    RunStatus.RUNNING: 0,
+    RunStatus.FAILED: 1,
+    RunStatus.STOPPED: 1,
+    RunStatus.INTERRUPTED: 130,
+}
+
+
+def run(
+    file: Annotated[Path, typer.Argument(help="Program to run; - reads it.", show_default=False)],
+    software: Software = "3.15",
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            help="Arm to run it on, e.g. ur3; none only writes down what it is told.",
+            show_default="the first that is installed",
+        ),
+    ] = None,
+    fidelity: Annotated[
+        str | None, typer.Option(help="How true the arm is, e.g. ideal.", show_default="typical")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Which arm it is: calibration, friction, noise.", min=0)] = 0,
+    limit: Annotated[
+        float, typer.Option(help="Robot seconds after which to stop a program.", min=0.0)
+    ] = 60.0,
+    answer: Annotated[
+        list[str] | None,
+        typer.Option(help="What the operator answers; once for each question.", show_default=False),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show texts of textmsg and errors only.")] = False,
+    as_json: AsJson = False,
+    trace: Annotated[
+        bool, typer.Option("--trace", help="Show each line before it is executed: cycle, thread, line.")
+    ] = False,
+    trace_lines: Annotated[int, typer.Option(help="Lines after which --trace falls silent.", min=1)] = 1000,
+) -> None:
+    """Run a program on an emulated robot, as fast as it goes; exit 1 if it is wrong or fails."""
+    if trace and as_json:
+        raise typer.BadParameter("--trace shows lines, --json one document: choose one")
+    catalogue = catalogue_of(software)
+    source = Source(read_program(file), shown_name(file))
+    story: Story = JsonStory(source, str(file)) if as_json else TextStory(source, quiet=quiet)
+    make = _find_robot(robot, fidelity, seed, catalogue, answer or ())
+    try:
+        program = compile_program(source.text, catalogue=catalogue, name=source.name)
+    except ScriptCompileError as error:
+        story.wrong(explained(error))
+        raise typer.Exit(1) from None
+    n_lines = trace_lines if trace else 0
+    if make is None:
+        status = _run_without_robot(program, catalogue, limit, story, n_lines)
+    else:
+        status = _run_on(make(), program, limit, story, n_lines)
+    if EXIT_CODES[status]:
+        raise typer.Exit(EXIT_CODES[status])
+
+
+def _find_robot(
+    name: str | None, fidelity: str | None, seed: int, catalogue: Catalogue, answers: Sequence[str]
+) -> Callable[[], ScriptRobot] | None:
+    """What makes the robot of that name, or the usual one; None for none."""
+    if name == NO_ROBOT:
+        return None
+    makers = find_makers()
+    if name is None and not makers:
+        return None
+    maker = next((maker for maker in makers if name is None or name.lower() in maker.names), None)
+    if maker is None:
+        known = ", ".join([*(known for maker in makers for known in maker.names), NO_ROBOT])
+        raise typer.BadParameter(f"no robot {name!r} is installed; there are {known}", param_hint="--robot")
+    _require_known(fidelity, maker)
+
+    def make() -> ScriptRobot:
+        return maker.make(
+            (name or maker.names[0]).lower(),
+            fidelity=fidelity or maker.fidelities[0],
+            seed=seed,
+            software=catalogue.version,
+            answers=answers,
+        )
+
+    return make
+
+
+def _require_known(fidelity: str | None, maker: RobotMaker) -> None:
+    if fidelity is not None and fidelity not in maker.fidelities:
+        known = ", ".join(maker.fidelities)
+        raise typer.BadParameter(f"no fidelity {fidelity!r}; there are {known}", param_hint="--fidelity")
+
+
+def _run_on(
+    robot: ScriptRobot, program: CompiledProgram, limit: float, story: Story, trace_lines: int
+) -> RunStatus:
+    watch = MoveWatch(program, robot.step_time, lambda: robot.time, story.move)
+
+    def report(report: Report) -> None:
+        watch.flush(all_streams=False)
+        story.report(report)
+
+    with _tracer(program, lambda: round(robot.time / robot.step_time), trace_lines):
+        end = robot.run(watch.program, limit, report)
+    watch.flush()
+    story.end(end.status, end.robot_time, robot.title, end)
+    return end.status
+
+
+def _run_without_robot(
+    program: CompiledProgram, catalogue: Catalogue, limit: float, story: Story, trace_lines: int
+) -> RunStatus:
+    def seconds() -> float:
+        return host.cycle * host.step_time
+
+    def tell_call(call: RecordedCall) -> None:
+        story.call(seconds(), call.thread, call.name, call.arguments)
+
+    def tell_text(text: str) -> None:
+        story.report(Report(seconds(), ReportKind.TEXT, text))
+
+    host = RecordingHost(catalogue=catalogue, on_message=tell_text, on_call=tell_call)
+    status = RunStatus.FINISHED
+    try:
+        with _tracer(program, lambda: host.cycle, trace_lines):
+            running = host.run(program, max_cycles=int(min(limit / host.step_time, 1e15)))
+    except KeyboardInterrupt:
+        status = RunStatus.INTERRUPTED
+    else:
+        if running.error is not None:
+            status = RunStatus.FAILED
+            error = running.error
+            failure = Report(seconds(), ReportKind.FAILURE, error.message, error.line, error.column)
+            story.report(failure)
+        elif running.status is ProgramStatus.RUNNING:
+            status = RunStatus.RUNNING
+            running.kill()
+    story.end(status, seconds(), "no robot", None)
+    return status
+
+
+def _tracer(program: CompiledProgram, cycle: Callable[[], int], limit: int) -> AbstractContextManager[Any]:
+    """Shows up to `limit` lines while they are executed; none for 0."""
+    if not limit:
+        return nullcontext()
+
+    def show_line(traced: TracedLine) -> None:
+        show(f"{cycle():6d}  {traced.thread}:{traced.line}: {traced.text}")
+
+    def stop() -> None:
+        show(f"trace stops after {limit} lines (--trace-lines)", error=True)
+
+    return LineTracer(program, show_line, stop, limit)

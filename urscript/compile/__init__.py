@@ -1,0 +1,1 @@
+"""Resolved program to Python code: static types, expressions, statements."""

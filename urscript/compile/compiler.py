@@ -1,0 +1,285 @@
+"""Resolved program -> Python code object.
+
+Every function and thread becomes one Python function of a flat module; those that may block become
+generators, all others stay plain functions. Variables of the program body are module globals, so threads
+and nested functions share them. `runtime` provides the other names the code uses.
+
+Statements are counted where control turns back or enters a function, not one by one: the count of a block
+is known before it runs (of an `if`, its longest arm).
+
+Python compiles a function in one go and nothing else runs meanwhile, so each one is compiled alone, and a
+long program body in parts (`long_blocks`): the control cycle must not wait for it.
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from types import CodeType
+from typing import Any
+
+from urscript.catalogue import Catalogue
+from urscript.compile import long_blocks
+from urscript.compile.expressions import ExpressionCompiler
+from urscript.compile.inference import SCALARS, StaticTypes
+from urscript.compile.python_tree import (
+    call,
+    constant,
+    expression_statement,
+    function,
+    load,
+    place,
+    spend,
+    store,
+)
+from urscript.courtesy import give_way
+from urscript.dialect import Dialect
+from urscript.errors import ScriptContextError
+from urscript.names.scopes import FunctionScope, ResolvedProgram
+from urscript.source import Span
+from urscript.syntax import nodes
+from urscript.syntax.nodes import Block, Expression, Statement
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """The functions of a program.
+
+    Attributes:
+        codes: Each defines one function when it is executed.
+        constants: Values the code refers to by name.
+        function_names: Python function -> function of the script.
+    """
+
+    codes: tuple[CodeType, ...]
+    constants: dict[str, Any]
+    function_names: dict[str, str]
+
+
+def compile_resolved(
+    program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect, file_name: str
+) -> Compiled:
+    """Compile a program without errors to Python.
+
+    Raises:
+        ScriptContextError: Something is nested deeper than Python can; loops are limited before.
+    """
+    types = StaticTypes(program, catalogue)
+    expressions = ExpressionCompiler(program, types, catalogue, dialect)
+    codes: list[CodeType] = []
+    function_names: dict[str, str] = {}
+    try:
+        for scope in program.scopes():
+            for made in _FunctionCompiler(program, types, expressions, scope).compile():
+                function_names[made.name] = scope.name
+                codes.append(compile(ast.Module([made], []), file_name, "exec", dont_inherit=True))
+    except SyntaxError as error:
+        raise ScriptContextError(
+            f"the program cannot be compiled: {error.msg}",
+            line=error.lineno or 1,
+            column=(error.offset or 0) + 1,
+            source=program.source,
+        ) from None
+    return Compiled(tuple(codes), expressions.constants, function_names)
+
+
+def _cost(block: Block) -> int:
+    """Statements that one pass through `block` runs at most; the bodies of loops count for themselves."""
+    cost = 0
+    for statement in block:
+        if isinstance(statement, nodes.If):
+            arms = [arm.body for arm in statement.arms]
+            cost += 1 + max(_cost(body) for body in [*arms, statement.otherwise or ()])
+        elif not isinstance(statement, (nodes.Function, nodes.Label)):
+            cost += 1
+            value = getattr(statement, "value", None)
+            if isinstance(value, nodes.ListLiteral):
+                cost += len(value.items) // 16  # long lists take as long as many statements
+    return cost
+
+
+class _FunctionCompiler:
+    """Compiles one function, thread or program body."""
+
+    def __init__(
+        self,
+        program: ResolvedProgram,
+        types: StaticTypes,
+        expressions: ExpressionCompiler,
+        scope: FunctionScope,
+    ) -> None:
+        self._program = program
+        self._types = types
+        self._expressions = expressions
+        self._scope = scope
+        self._globals_stored: set[str] = {"_b"}
+        self._parts: list[ast.FunctionDef] = []
+        self._step = give_way()
+
+    def compile(self) -> list[ast.FunctionDef]:
+        """The Python function, after those that compute its defaults and the parts of a long body."""
+        scope = self._scope
+        parameters: list[str] = []
+        defaults: list[ast.FunctionDef] = []
+        prologue: list[ast.stmt] = []
+        types = self._types
+        span = scope.node.span if scope.node is not None else _first_span(scope.body)
+        span = Span(span.line, span.column, span.line, span.column + 1)
+        if scope.parent is not None and scope.node is not None:
+            for parameter in scope.node.parameters:
+                parameters.append(f"v_{parameter.name}")
+                if parameter.default is not None:
+                    name = f"{scope.python_name}_{parameter.name}"
+                    default = self._default(name, parameter.default)
+                    defaults.append(default)
+                    prologue.append(self._fill_in(parameter, default))
+        prologue.insert(0, spend(_cost(scope.body) + 1, span))
+        for name in sorted(scope.locals - {name.removeprefix("v_") for name in parameters}):
+            # Others are neither read before they are set nor compared with what they held.
+            if name in scope.unsure or types.variable(name, scope) not in SCALARS:
+                prologue.append(store(f"v_{name}", load("_UNDEFINED", span), span))
+        body = self._block(scope.body)
+        if scope.recursive:
+            body = self._with_depth(body, span)
+        declared = ast.Global(sorted(self._globals_stored), **place(span))
+        whole = function(scope.python_name, parameters, [declared, *prologue, *body], span)
+        return [*defaults, *self._parts, whole]
+
+    def _default(self, name: str, value: Expression) -> ast.FunctionDef:
+        """A function of its own for each default: it runs in the call, but sees globals only."""
+        result = self._expressions.compile(value, self._scope.around())
+        return function(name, [], [ast.Return(result, **place(value.span))], value.span)
+
+    def _fill_in(self, parameter: nodes.Parameter, default: ast.FunctionDef) -> ast.stmt:
+        """`if v_x is _MISSING: v_x = default()`."""
+        span = parameter.span
+        at = place(span)
+        value: ast.expr = call(default.name, [], span)
+        if any(isinstance(node, (ast.Yield, ast.YieldFrom)) for node in ast.walk(default)):
+            value = ast.YieldFrom(value, **at)
+        left_out = ast.Compare(load(f"v_{parameter.name}", span), [ast.Is()], [load("_MISSING", span)], **at)
+        return ast.If(left_out, [store(f"v_{parameter.name}", value, span)], [], **at)
+
+    def _with_depth(self, body: list[ast.stmt], span: Span) -> list[ast.stmt]:
+        """`_d = _enter(_T)`, then `body` with `_leave(_d)` in the end whatever happens."""
+        at = place(span)
+        enter = store("_d", call("_enter", [load("_T", span)], span), span)
+        leave = expression_statement(call("_leave", [load("_d", span)], span), span)
+        return [enter, ast.Try(body, [], [], [leave], **at)]
+
+    # --- statements --------------------------------------------------------------------------------------
+
+    def _block(self, block: Block) -> list[ast.stmt]:
+        result: list[ast.stmt] = []
+        # Only the variables of the program body are the same in another function: they are global.
+        for piece in long_blocks.pieces(block) if self._scope is self._program.main else [block]:
+            if len(piece) > 1 and piece is not block:
+                result.extend(self._part(piece))
+                continue
+            for statement in piece:
+                result.extend(self._statement(statement))
+        return result or [ast.Pass(**place(_first_span(block)))]
+
+    def _part(self, piece: Block) -> list[ast.stmt]:
+        """A function of its own for a piece of the program body; returns the call of it."""
+        stored, self._globals_stored = self._globals_stored, {"_b"}
+        made = [(statement.span, self._statement(statement)) for statement in piece]
+        body = [each for _, some in made for each in some]
+        span = next((span for span, some in made if some), None)
+        globals_stored, self._globals_stored = self._globals_stored, stored
+        if span is None:  # definitions only
+            return []
+        name = f"{long_blocks.PART}{len(self._parts)}"
+        declared = ast.Global(sorted(globals_stored), **place(span))
+        self._parts.append(long_blocks.part(name, [declared, *body], span))
+        return [long_blocks.call_of(name, span)]
+
+    def _statement(self, statement: Statement) -> list[ast.stmt]:
+        if self._step is not None:
+            self._step()
+        span, scope = statement.span, self._scope
+        at = place(span)
+        match statement:
+            case nodes.Assign():
+                return [self._assign(statement)]
+            case nodes.Evaluate(value=value):
+                return [expression_statement(self._effect(value), span)]
+            case nodes.If(arms=arms, otherwise=otherwise):
+                return self._if(arms, otherwise)
+            case nodes.While(condition=condition, body=body):
+                test = self._expressions.condition(condition, scope)
+                turn = spend(max(1, _cost(body)), condition.span)
+                return [ast.While(test, [turn, *self._block(body)], [], **at)]
+            case nodes.Return(value=value):
+                result = None if value is None else self._expressions.compile(value, scope)
+                return [ast.Return(result, **at)]
+            case nodes.Join(thread=thread):
+                joined = call("_join", [load("_T", span), self._expressions.compile(thread, scope)], span)
+                return [expression_statement(ast.YieldFrom(joined, **at), span)]
+            case nodes.Kill(thread=thread):
+                killed = call("_kill", [load("_T", span), self._expressions.compile(thread, scope)], span)
+                return [expression_statement(killed, span)]
+            case nodes.Simple(word="break"):
+                return [ast.Break(**at)]
+            case nodes.Simple(word="continue"):
+                return [ast.Continue(**at)]
+            case nodes.Simple(word="halt"):
+                return [expression_statement(call("_halt", [], span), span)]
+            case nodes.Label(text=text):
+                target = ast.Attribute(load("_T", span), "label", ast.Store(), **at)
+                return [ast.Assign([target], constant(text, span), **at)]
+        # Definitions are compiled on their own, declarations have done their work. A critical section needs
+        # no code: a thread is never interrupted but inside calls that take time, and those release it.
+        return []
+
+    def _effect(self, value: Expression) -> ast.expr:
+        if isinstance(value, nodes.Name) and value.name == "pause" and "pause" in self._program.builtins:
+            made = call("b_pause", [load("_T", value.span)], value.span)
+            return ast.YieldFrom(made, **place(value.span))
+        return self._expressions.compile(value, self._scope)
+
+    def _if(self, arms: tuple[nodes.Arm, ...], otherwise: Block | None) -> list[ast.stmt]:
+        """From the last arm to the first: a chain of any length needs no recursion here."""
+        rest = self._block(otherwise) if otherwise else []
+        for arm in reversed(arms):
+            test = self._expressions.condition(arm.condition, self._scope)
+            rest = [ast.If(test, self._block(arm.body), rest, **place(arm.span))]
+        return rest
+
+    def _assign(self, statement: nodes.Assign) -> ast.stmt:
+        target, span, scope = statement.target, statement.span, self._scope
+        value = self._expressions.compile(statement.value, scope)
+        # Element by element towards the variable; the old content is read after the new value is known,
+        # because computing that may take time in which another thread changes the variable.
+        while not isinstance(target, nodes.Name):
+            if isinstance(target, nodes.Index):
+                array = self._expressions.array(target.target, scope)
+                indices = [self._expressions.compile(index, scope) for index in target.indices]
+                if array is not None:
+                    if array.setter is None:
+                        raise ScriptContextError(f"'{array.name}' cannot be assigned to").locate(
+                            self._program.source, span.line, span.column
+                        )
+                    made = call(f"b_{array.setter}", [load("_T", span), *indices, value], span)
+                    return expression_statement(made, span)
+                helper = "_store_item" if len(indices) == 1 else "_store_cell"
+            else:
+                helper, indices = "_store_member", [constant(target.name, span)]
+            old = self._expressions.compile(target.target, scope)
+            value = call(helper, [value, *indices, old], span)
+            inner = target.target
+            assert isinstance(inner, (nodes.Name, nodes.Index, nodes.Member))
+            target = inner
+        is_local = target.name in scope.locals and statement.scope != "global"
+        name = f"v_{target.name}" if is_local else f"g_{target.name}"
+        if not is_local:
+            self._globals_stored.add(name)
+        if isinstance(statement.target, nodes.Name):
+            holder = scope if is_local else self._program.main
+            if self._types.variable(target.name, holder) not in SCALARS:
+                value = call("_assign", [value, load(name, span), constant(target.name, span)], span)
+        return store(name, value, span)
+
+
+def _first_span(block: Block) -> Span:
+    return block[0].span if block else Span(1, 1, 1, 2)

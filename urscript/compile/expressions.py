@@ -1,0 +1,291 @@
+"""Expressions -> Python expressions.
+
+Where the static types are evident the Python operator itself is emitted, elsewhere a call of `ops`. A call
+that may take time becomes `yield from`. Names: `v_x` local, `g_x` global, `b_f` builtin; the rest of the
+names a compiled program uses is listed in `runtime`.
+"""
+
+from __future__ import annotations
+
+import ast
+from typing import Any, Final
+
+from urscript import dialect
+from urscript.catalogue import Catalogue
+from urscript.compile.inference import StaticTypes, Type, is_number
+from urscript.compile.python_tree import call, constant, load, place
+from urscript.dialect import Dialect
+from urscript.names.scopes import FunctionScope, ResolvedProgram
+from urscript.source import Span
+from urscript.syntax import nodes
+from urscript.syntax.nodes import Expression
+from urscript.values import INT_MAX, INT_MIN, Pose
+
+_ARITHMETIC: Final[dict[str, tuple[str, type[ast.operator]]]] = {
+    "+": ("_add", ast.Add),
+    "-": ("_sub", ast.Sub),
+    "*": ("_mul", ast.Mult),
+    "/": ("_div", ast.Div),
+    "%": ("_mod", ast.Mod),
+}
+_COMPARISON: Final[dict[str, tuple[str, type[ast.cmpop]]]] = {
+    "==": ("_equal", ast.Eq),
+    "!=": ("_unequal", ast.NotEq),
+    "<": ("_less", ast.Lt),
+    "<=": ("_less_equal", ast.LtE),
+    ">": ("_greater", ast.Gt),
+    ">=": ("_greater_equal", ast.GtE),
+}
+_PLAIN = (bool, int, float, str, type(None))
+
+
+class ExpressionCompiler:
+    """Compiles the expressions of one program.
+
+    Attributes:
+        constants: Values that cannot stand in Python code as they are, by the name given to them.
+    """
+
+    def __init__(
+        self, program: ResolvedProgram, types: StaticTypes, catalogue: Catalogue, dialect: Dialect
+    ) -> None:
+        self._program = program
+        self._types = types
+        self._catalogue = catalogue
+        self._dialect = dialect
+        self.constants: dict[str, Any] = {}
+
+    def compile(self, expression: Expression, scope: FunctionScope) -> ast.expr:
+        """The Python expression with the value of `expression`."""
+        span = expression.span
+        match expression:
+            case nodes.Name(name=name):
+                return self._variable(name, span, scope)
+            case (
+                nodes.BoolLiteral(value=value)
+                | nodes.IntLiteral(value=value)
+                | nodes.FloatLiteral(value=value)
+            ):
+                return constant(value, span)
+            case nodes.StringLiteral(value=text):
+                return constant(text, span)
+            case nodes.NoneLiteral():
+                return constant(None, span)
+            case nodes.Binary():
+                return self._binary(expression, scope)
+            case nodes.Call():
+                return self._call(expression, scope)
+            case nodes.Index():
+                return self._index(expression, scope)
+            case nodes.Prefix():
+                return self._prefix(expression, scope)
+            case nodes.ListLiteral(items=items):
+                values = ast.List(self._all(items, scope), ast.Load(), **place(span))
+                return values if self._are_numbers(items, scope) else call("_list", [values], span)
+            case nodes.PoseLiteral(items=items):
+                return self._pose(items, span, scope)
+            case nodes.Run(thread=thread):
+                callee = scope.find_function(thread)
+                assert callee is not None
+                return call("_run", [load(callee.python_name, span), constant(thread, span)], span)
+            case nodes.MethodCall():
+                return self._method(expression, scope)
+            case nodes.Member(target=target, name=name):
+                return call("_member", [self.compile(target, scope), constant(name, span)], span)
+        raise TypeError(f"not an expression: {expression!r}")
+
+    def condition(self, expression: Expression, scope: FunctionScope) -> ast.expr:
+        """`expression` as a Python bool."""
+        value = self.compile(expression, scope)
+        if self._types.of(expression, scope) is Type.BOOL:
+            return value
+        return call("_truth", [value], expression.span)
+
+    # --- variables and literals --------------------------------------------------------------------------
+
+    def _variable(self, name: str, span: Span, scope: FunctionScope) -> ast.expr:
+        if name in scope.locals:
+            python_name, unsure = f"v_{name}", name in scope.unsure
+        elif name in self._program.globals:
+            python_name, unsure = f"g_{name}", name in self._program.unsure_globals
+        else:
+            return constant(self._catalogue.variables[name].value, span)
+        if not unsure:
+            return load(python_name, span)
+        at = place(span)
+        is_set = ast.Compare(load(python_name, span), [ast.IsNot()], [load("_UNDEFINED", span)], **at)
+        complain = call("_undefined", [constant(name, span)], span)
+        return ast.IfExp(is_set, load(python_name, span), complain, **at)
+
+    def _pose(self, items: tuple[Expression, ...], span: Span, scope: FunctionScope) -> ast.expr:
+        values = self._all(items, scope)
+        if all(isinstance(value, ast.Constant) for value in values) and self._are_numbers(items, scope):
+            return self.shared(Pose.of(value.value for value in values), span)  # type: ignore[attr-defined]
+        maker = "_Pose" if self._are_numbers(items, scope) else "_pose"
+        return call(maker, values, span)
+
+    def shared(self, value: Any, span: Span) -> ast.expr:
+        """A constant of any type; lists and poses are never changed, so one object serves all."""
+        if type(value) in _PLAIN:
+            return constant(value, span)
+        name = f"k{len(self.constants)}"
+        self.constants[name] = value
+        return load(name, span)
+
+    def _all(self, items: tuple[Expression, ...], scope: FunctionScope) -> list[ast.expr]:
+        return [self.compile(item, scope) for item in items]
+
+    def _are_numbers(self, items: tuple[Expression, ...], scope: FunctionScope) -> bool:
+        return all(is_number(self._types.of(item, scope)) for item in items)
+
+    # --- operators ---------------------------------------------------------------------------------------
+
+    def _binary(self, expression: nodes.Binary, scope: FunctionScope) -> ast.expr:
+        operator, span = expression.operator, expression.span
+        if operator in ("and", "or", "xor"):
+            return self._logic(expression, scope)
+        left, right = self.compile(expression.left, scope), self.compile(expression.right, scope)
+        left_type, right_type = (
+            self._types.of(expression.left, scope),
+            self._types.of(expression.right, scope),
+        )
+        if operator in _COMPARISON:
+            helper, comparison = _COMPARISON[operator]
+            same_scalar = left_type is right_type and left_type in (Type.BOOL, Type.STRING)
+            if (is_number(left_type) and is_number(right_type)) or (same_scalar and operator in ("==", "!=")):
+                return ast.Compare(left, [comparison()], [right], **place(span))
+            return call(helper, [left, right], span)
+        helper, python_operator = _ARITHMETIC[operator]
+        if is_number(left_type) and is_number(right_type) and operator != "%":
+            raw = ast.BinOp(left, python_operator(), right, **place(span))
+            if operator == "/":
+                if not dialect.EXACT_DIVISION_GIVES_INT:
+                    return raw
+            elif Type.FLOAT in (left_type, right_type):
+                return raw
+            elif left_type is right_type is Type.INT:
+                return self._wrapped(raw, span)
+        return call(helper, [left, right], span)
+
+    def _wrapped(self, raw: ast.expr, span: Span) -> ast.expr:
+        """`_i if INT_MIN <= (_i := raw) <= INT_MAX else _wrap(_i)`: a result of 32 bits."""
+        at = place(span)
+        bound = ast.NamedExpr(ast.Name("_i", ast.Store(), **at), raw, **at)
+        fits = ast.Compare(
+            constant(INT_MIN, span), [ast.LtE(), ast.LtE()], [bound, constant(INT_MAX, span)], **at
+        )
+        return ast.IfExp(fits, load("_i", span), call("_wrap", [load("_i", span)], span), **at)
+
+    def _logic(self, expression: nodes.Binary, scope: FunctionScope) -> ast.expr:
+        operator, at = expression.operator, place(expression.span)
+        if operator == "xor":
+            left, right = self.condition(expression.left, scope), self.condition(expression.right, scope)
+            return ast.Compare(left, [ast.NotEq()], [right], **at)
+        # A chain of one operator leans left; flat, it costs no nesting.
+        operands: list[Expression] = []
+        chain: Expression = expression
+        while isinstance(chain, nodes.Binary) and chain.operator == operator:
+            operands.append(chain.right)
+            chain = chain.left
+        operands.append(chain)
+        values = [self.condition(operand, scope) for operand in reversed(operands)]
+        if self._dialect.short_circuit:
+            return ast.BoolOp(ast.And() if operator == "and" else ast.Or(), values, **at)
+        result = values[0]
+        for value in values[1:]:
+            result = ast.BinOp(result, ast.BitAnd() if operator == "and" else ast.BitOr(), value, **at)
+        return result
+
+    def _prefix(self, expression: nodes.Prefix, scope: FunctionScope) -> ast.expr:
+        operand, span = expression.operand, expression.span
+        if expression.operator == "not":
+            return ast.UnaryOp(ast.Not(), self.condition(operand, scope), **place(span))
+        kind = self._types.of(operand, scope)
+        value = self.compile(operand, scope)
+        if expression.operator == "+":
+            return value if is_number(kind) else call("_pos", [value], span)
+        if isinstance(operand, (nodes.IntLiteral, nodes.FloatLiteral)):
+            return constant(-operand.value, span)
+        if kind is Type.FLOAT:
+            return ast.UnaryOp(ast.USub(), value, **place(span))
+        return call("_neg", [value], span)
+
+    def _index(self, expression: nodes.Index, scope: FunctionScope) -> ast.expr:
+        target, indices, span = expression.target, expression.indices, expression.span
+        array = self.array(target, scope)
+        if array is not None:
+            return call(
+                f"b_{array.getter}", [load("_T", span), *(self.compile(i, scope) for i in indices)], span
+            )
+        values = [self.compile(target, scope), *self._all(indices, scope)]
+        if len(indices) == 2:
+            return call("_cell", values, span)
+        constant_index = isinstance(target, nodes.Name) and isinstance(indices[0], nodes.IntLiteral)
+        if constant_index and self._types.of(target, scope) in (Type.NUMBERS, Type.POSE):
+            return ast.Subscript(values[0], values[1], ast.Load(), **place(span))
+        return call("_item", values, span)
+
+    def array(self, target: Expression, scope: FunctionScope) -> Any:
+        """The builtin array that `target` names, unless a variable hides it."""
+        if not isinstance(target, nodes.Name) or target.name in scope.locals:
+            return None
+        return None if target.name in self._program.globals else self._catalogue.arrays.get(target.name)
+
+    # --- calls -------------------------------------------------------------------------------------------
+
+    def _call(self, expression: nodes.Call, scope: FunctionScope) -> ast.expr:
+        callee = scope.find_function(expression.function)
+        if callee is not None:
+            return self._user_call(expression, callee, scope)
+        span = expression.span
+        if expression.function == "sync":
+            return ast.Yield(load("_NEXT_CYCLE", span), **place(span))
+        positional = [argument for argument in expression.arguments if argument.name is None]
+        named = {argument.name: argument for argument in expression.arguments if argument.name is not None}
+        arguments: list[ast.expr] = [load("_T", span)]
+        for slot in self._catalogue.static_bind(expression.function, len(positional), tuple(named)):
+            if slot[0] == "arg":
+                arguments.append(self.compile(positional[slot[1]].value, scope))
+            elif slot[0] == "kw":
+                arguments.append(self.compile(named[slot[1]].value, scope))
+            else:
+                arguments.append(self.shared(slot[1], span))
+        made = call(f"b_{expression.function}", arguments, span)
+        if self._catalogue[expression.function].may_wait:
+            return ast.YieldFrom(made, **place(span))
+        return made
+
+    def _user_call(self, expression: nodes.Call, callee: FunctionScope, scope: FunctionScope) -> ast.expr:
+        assert callee.node is not None
+        span = expression.span
+        made = call(callee.python_name, [], span)
+        parameters = callee.node.parameters
+        given = set()
+        for position, argument in enumerate(expression.arguments):
+            value = self.compile(argument.value, scope)
+            if argument.name is None:
+                made.args.append(value)
+                given.add(parameters[position].name)
+            else:
+                made.keywords.append(ast.keyword(f"v_{argument.name}", value, **place(span)))
+                given.add(argument.name)
+        for parameter in parameters:
+            if parameter.name not in given:
+                left_out = load("_MISSING", span)
+                made.keywords.append(ast.keyword(f"v_{parameter.name}", left_out, **place(span)))
+        return ast.YieldFrom(made, **place(span)) if callee.blocks else made
+
+    def _method(self, expression: nodes.MethodCall, scope: FunctionScope) -> ast.expr:
+        span = expression.span
+        positional = [self.compile(a.value, scope) for a in expression.arguments if a.name is None]
+        names = [constant(a.name, span) for a in expression.arguments if a.name is not None]
+        values = [self.compile(a.value, scope) for a in expression.arguments if a.name is not None]
+        at = place(span)
+        arguments: list[ast.expr] = [
+            load("_T", span),
+            self.compile(expression.target, scope),
+            constant(expression.method, span),
+            ast.List(positional, ast.Load(), **at),
+            ast.Dict(list(names), values, **at),
+        ]
+        return ast.YieldFrom(call("_method", arguments, span), **at)

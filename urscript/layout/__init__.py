@@ -1,0 +1,1 @@
+"""Tree to text in the canonical layout, comments kept: `urscript fmt`."""

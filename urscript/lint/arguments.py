@@ -1,0 +1,101 @@
+"""Warnings about arguments that a builtin refuses: literals of another type, length or range."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from urscript.builtins import PURE
+from urscript.catalogue import Catalogue
+from urscript.catalogue.argument_checks import compile_check, fits, type_error
+from urscript.catalogue.types import Builtin, Param
+from urscript.errors import ScriptRuntimeError
+from urscript.lint.names import expressions_read
+from urscript.lint.rules import REFUSED_ARGUMENT, ScriptWarning
+from urscript.names.scopes import ResolvedProgram
+from urscript.syntax import nodes
+from urscript.syntax.nodes import Expression
+from urscript.values import Pose
+
+
+class Literal(NamedTuple):
+    """What is known of a value before the program runs.
+
+    Attributes:
+        value: The value; numbers that are not known are 0 in it.
+        whole: All of it is known, not only type and length.
+    """
+
+    value: Any
+    whole: bool
+
+
+def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
+    """Everything this module warns about, in no order; pure functions check their arguments themselves."""
+    for scope, call in expressions_read(program):
+        if not isinstance(call, nodes.Call) or scope.find_function(call.function) is not None:
+            continue
+        builtin = catalogue.lookup(call.function)
+        if builtin is None or builtin.name in PURE:
+            continue
+        for param, argument in _arguments(call, builtin, catalogue):
+            message = _refused(builtin, param, argument)
+            if message:
+                yield ScriptWarning(REFUSED_ARGUMENT, message, argument.span, program.source)
+
+
+def _arguments(
+    call: nodes.Call, builtin: Builtin, catalogue: Catalogue
+) -> Iterator[tuple[Param, Expression]]:
+    """The arguments that are given, beside their parameters."""
+    positional = [item.value for item in call.arguments if item.name is None]
+    named = {item.name: item.value for item in call.arguments if item.name is not None}
+    slots = catalogue.static_bind(builtin.name, len(positional), tuple(named))
+    for param, slot in zip(builtin.params, slots, strict=False):
+        if slot[0] == "arg":
+            yield param, positional[slot[1]]
+        elif slot[0] == "kw":
+            yield param, named[slot[1]]
+
+
+def _refused(builtin: Builtin, param: Param, argument: Expression) -> str | None:
+    literal = _literal(argument)
+    if literal is None:
+        return None
+    if literal.whole:
+        try:
+            compile_check(replace(builtin, params=(param,)))([literal.value])
+        except ScriptRuntimeError as error:
+            return error.message
+        return None
+    if fits(param.type, literal.value):
+        return None
+    return type_error(builtin.name, param.name, param.type, literal.value).message
+
+
+def _literal(expression: Expression) -> Literal | None:
+    """What is known of an expression; None if nothing is."""
+    match expression:
+        case (
+            nodes.IntLiteral(value=value)
+            | nodes.FloatLiteral(value=value)
+            | nodes.BoolLiteral(value=value)
+            | nodes.StringLiteral(value=value)
+        ):
+            return Literal(value, True)
+        case nodes.Prefix(
+            operator="-" | "+" as sign, operand=nodes.IntLiteral() | nodes.FloatLiteral() as number
+        ):
+            return Literal(-number.value if sign == "-" else number.value, True)
+        case nodes.ListLiteral(items=items) | nodes.PoseLiteral(items=items):
+            parts = [_literal(item) for item in items]
+            if any(isinstance(item, nodes.ListLiteral) for item in items):
+                return None  # a matrix
+            values = [0 if part is None else part.value for part in parts]
+            whole = all(part is not None and part.whole for part in parts)
+            if isinstance(expression, nodes.ListLiteral):
+                return Literal(values, whole)
+            if all(type(value) in (int, float) for value in values):
+                return Literal(Pose.of(values), whole)
+    return None

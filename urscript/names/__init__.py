@@ -1,0 +1,1 @@
+"""Which variable and which function each name of a program means, before it runs."""

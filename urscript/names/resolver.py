@@ -1,0 +1,315 @@
+"""Static names: every variable and function is found before the program runs, as a controller does.
+
+Rules (language notes 1.6): variables of the program body are global; `global x` makes one from anywhere,
+`local x` one of this function only; a plain assignment means the global of that name if there is one
+anywhere in the program, else a local; a nested function sees its own locals and the globals, not the locals
+around it; a function may be used before its definition; a name in a branch that never runs counts too.
+
+All errors of a program are collected, the first one in the text is raised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from urscript.catalogue import Catalogue
+from urscript.catalogue.binding import Shape
+from urscript.courtesy import give_way
+from urscript.dialect import MAX_LOOP_DEPTH, Dialect
+from urscript.errors import (
+    ScriptCompileError,
+    ScriptContextError,
+    ScriptNameError,
+    ScriptSyntaxError,
+    ScriptTypeError,
+)
+from urscript.names.assignment import find_unsure
+from urscript.names.call_graph import mark_recursion, spread_blocking
+from urscript.names.scopes import FunctionScope, ResolvedProgram
+from urscript.source import Source, Span
+from urscript.syntax import nodes
+from urscript.syntax.nodes import Block, Expression, Statement
+from urscript.syntax.walk import (
+    all_expressions,
+    all_statements,
+    child_expressions,
+    own_blocks,
+    own_expressions,
+)
+
+MOST_SUGGESTIONS: Final = 40
+"""Unknown names of one program for which another one is suggested."""
+
+
+def resolve(
+    block: Block, source: Source, catalogue: Catalogue, dialect: Dialect
+) -> tuple[ResolvedProgram, list[ScriptCompileError]]:
+    """Find every name of a parsed program.
+
+    Returns:
+        What was found, and all errors in the order of the text; with errors the program cannot be compiled.
+    """
+    resolver = _Resolver(source, catalogue, dialect)
+    program = resolver.resolve(block)
+    return program, sorted(resolver.errors, key=lambda error: (error.line, error.column))
+
+
+def statement_name(block: Block) -> str:
+    """What a program without `def` is called: the function its first statement calls.
+
+    Source: key messages of one-line programs on the primary interface.
+    """
+    for statement in block:
+        for expression in own_expressions(statement):
+            for part in all_expressions(expression):
+                if isinstance(part, nodes.Call):
+                    return part.function
+        if isinstance(statement, nodes.Simple):
+            return statement.word
+    return "unnamed"
+
+
+def _definition_and_calls(block: Block) -> tuple[nodes.Function | None, tuple[Statement, ...]]:
+    """The one definition that is the whole program, and the calls of it that people write below."""
+    items = tuple(item for item in block if not isinstance(item, nodes.Label))
+    if not items or not isinstance(items[0], nodes.Function) or items[0].kind == "thread":
+        return None, ()
+    definition, calls = items[0], items[1:]
+    its_call = nodes.Evaluate(nodes.Call(definition.name, ()))
+    return (definition, calls) if all(item == its_call for item in calls) else (None, ())
+
+
+class _Resolver:
+    """One pass that declares, one that looks up."""
+
+    def __init__(self, source: Source, catalogue: Catalogue, dialect: Dialect) -> None:
+        self.source = source
+        self.catalogue = catalogue
+        self.dialect = dialect
+        self.errors: list[ScriptCompileError] = []
+        self._n_unknown = 0
+        self._step = give_way()
+
+    def resolve(self, block: Block) -> ResolvedProgram:
+        self.program = program = self._open(block)
+        self._declare(program.main)
+        for scope in program.functions:
+            self._declare_locals(scope)
+        for scope in program.scopes():
+            self._look_up(scope)
+        mark_recursion(program)
+        spread_blocking(program)
+        find_unsure(program)
+        return program
+
+    def _open(self, block: Block) -> ResolvedProgram:
+        """The frame of the program: a single definition is the program itself, other text is its body.
+
+        Calls of that program after its definition do not count: on a port it has run before they come.
+        """
+        function, calls = _definition_and_calls(block)
+        if function is not None:
+            if function.parameters:
+                self._error(ScriptContextError("a program takes no parameters"), function.parameters[0].span)
+            main = FunctionScope(function.name, function, None, function.body, "main")
+            return ResolvedProgram(self.source, function.kind, function.name, main, calls)
+        name = statement_name(block)
+        return ResolvedProgram(self.source, "statement", name, FunctionScope(name, None, None, block, "main"))
+
+    # --- declaring ---------------------------------------------------------------------------------------
+
+    def _declare(self, scope: FunctionScope) -> None:
+        """Enter the functions of `scope`, and the globals that its statements make, then go inside."""
+        for statement in all_statements(scope.body):
+            if isinstance(statement, nodes.Function):
+                self._declare_function(statement, scope)
+            elif isinstance(statement, (nodes.Assign, nodes.Declare)) and (
+                scope is self.program.main or statement.scope == "global"
+            ):
+                name = _declared_name(statement)
+                if name is not None:
+                    self.program.globals.add(name)
+                    if statement.scope == "global":
+                        self.program.declared_globals[name] = None
+
+    def _declare_function(self, function: nodes.Function, scope: FunctionScope) -> None:
+        if function.kind == "sec":
+            self._error(
+                ScriptContextError("a secondary program cannot stand inside another program"), function.span
+            )
+        python_name = f"f{len(self.program.functions)}_{function.name}"
+        inner = FunctionScope(function.name, function, scope, function.body, python_name)
+        scope.functions[function.name] = inner
+        self.program.functions.append(inner)
+        self._declare(inner)
+
+    def _declare_locals(self, scope: FunctionScope) -> None:
+        """Enter the locals of a function, once all globals of the program are known."""
+        assert scope.node is not None
+        for parameter in scope.node.parameters:
+            if parameter.name in scope.locals:
+                self._error(ScriptContextError(f"parameter '{parameter.name}' twice"), parameter.span)
+            scope.locals.add(parameter.name)
+        for statement in all_statements(scope.body):
+            if not isinstance(statement, (nodes.Assign, nodes.Declare)) or statement.scope == "global":
+                continue
+            name = _declared_name(statement)
+            if name is not None and (statement.scope == "local" or name not in self.program.globals):
+                scope.locals.add(name)
+
+    # --- looking up --------------------------------------------------------------------------------------
+
+    def _look_up(self, scope: FunctionScope) -> None:
+        if scope.node is not None and scope.parent is not None:
+            for parameter in scope.node.parameters:
+                if parameter.default is not None:
+                    # A default belongs to the scope around: it sees no parameters. It runs in the callee.
+                    self._expression(parameter.default, scope.around(), runs_in=scope)
+        self._block(scope.body, scope, loops=0)
+
+    def _block(self, block: Block, scope: FunctionScope, loops: int) -> None:
+        """Look up the names of a block that stands inside so many loops."""
+        for statement in block:
+            self._statement(statement, scope, loops)
+            inside = loops + isinstance(statement, nodes.While)
+            for inner in own_blocks(statement):
+                self._block(inner, scope, inside)
+
+    def _statement(self, statement: Statement, scope: FunctionScope, loops: int) -> None:
+        if self._step is not None:
+            self._step()
+        match statement:
+            case nodes.While() if loops == MAX_LOOP_DEPTH:
+                message = f"loops are nested more than {MAX_LOOP_DEPTH} deep"
+                self._error(ScriptContextError(message), statement.span)
+            case nodes.Simple(word="break" | "continue" as word) if not loops:
+                self._error(ScriptContextError(f"'{word}' outside a loop"), statement.span)
+            case nodes.Join():
+                scope.blocks = True
+            case nodes.Evaluate(value=nodes.Name(name="pause")) if self._is_pause(scope):
+                scope.blocks = True
+                self.program.builtins.add("pause")
+                return
+        for expression in own_expressions(statement):
+            self._expression(expression, scope, scope)
+
+    def _is_pause(self, scope: FunctionScope) -> bool:
+        return self.dialect.has_pause and "pause" not in scope.locals | self.program.globals
+
+    def _expression(self, expression: Expression, scope: FunctionScope, runs_in: FunctionScope) -> None:
+        """Look up the names of `expression` in `scope`; `runs_in` is the function that executes it."""
+        match expression:
+            case nodes.Name(name=name):
+                self._variable(name, expression.span, scope)
+            case nodes.Call():
+                self._call(expression, scope, runs_in)
+            case nodes.Run():
+                self._run(expression, scope)
+            case nodes.MethodCall(arguments=arguments):
+                # A remote procedure waits for its answer; what the value is shows at run time only.
+                runs_in.blocks = True
+                self._argument_order(arguments)
+            case nodes.Index(target=nodes.Name(name=name), indices=indices) if self._is_array(name, scope):
+                array = self.catalogue.arrays[name]
+                self.program.builtins.update(filter(None, (array.getter, array.setter)))
+                if len(indices) > 1:
+                    self._error(ScriptTypeError(f"{name} takes one index, got 2"), expression.span)
+                for index in indices:
+                    self._expression(index, scope, runs_in)
+                return
+            case nodes.IntLiteral(value=value) if value == 2**31:
+                self._error(ScriptSyntaxError("an integer has 32 bits; write a float"), expression.span)
+            case nodes.Prefix(operator="-", operand=nodes.IntLiteral()):
+                return
+        for part in child_expressions(expression):
+            self._expression(part, scope, runs_in)
+
+    def _is_array(self, name: str, scope: FunctionScope) -> bool:
+        return name in self.catalogue.arrays and name not in scope.locals and name not in self.program.globals
+
+    def _variable(self, name: str, span: Span, scope: FunctionScope) -> None:
+        if name in scope.locals or name in self.program.globals or name in self.catalogue.variables:
+            return
+        if name in self.catalogue or scope.find_function(name) is not None:
+            hint = f"'{name}' is a function, call it as {name}(...)"
+            self._error(ScriptNameError(name, hint=hint), span)
+        else:
+            self._unknown(
+                name, span, lambda: [*scope.locals, *self.program.globals, *self.catalogue.variables]
+            )
+
+    def _call(self, call: nodes.Call, scope: FunctionScope, runs_in: FunctionScope) -> None:
+        if not self._argument_order(call.arguments):
+            return
+        callee = scope.find_function(call.function)
+        if callee is not None:
+            runs_in.callees.add(callee)
+            self._check_arguments(call, callee)
+            return
+        builtin = self.catalogue.lookup(call.function)
+        if builtin is None:
+            self._unknown(
+                call.function, call.span, lambda: [*scope.visible_functions(), *self.catalogue.names]
+            )
+            return
+        self.program.builtins.add(call.function)
+        runs_in.blocks = runs_in.blocks or builtin.may_wait
+        try:
+            self.catalogue.static_bind(call.function, *_shape(call.arguments))
+        except ScriptTypeError as error:
+            self._error(error, call.span)
+
+    def _run(self, run: nodes.Run, scope: FunctionScope) -> None:
+        callee = scope.find_function(run.thread)
+        if callee is None:
+            self._unknown(run.thread, run.span, lambda: list(scope.visible_functions()))
+        elif callee.node is not None and callee.node.parameters:
+            self._error(ScriptTypeError(f"cannot run {run.thread}: a thread takes no parameters"), run.span)
+
+    def _check_arguments(self, call: nodes.Call, callee: FunctionScope) -> None:
+        """Count and names of the arguments of a user function."""
+        assert callee.node is not None
+        names = [parameter.name for parameter in callee.node.parameters]
+        optional = {parameter.name for parameter in callee.node.parameters if parameter.default is not None}
+        try:
+            Shape(call.function, names, optional).check(*_shape(call.arguments))
+        except ScriptTypeError as error:
+            self._error(error, call.span)
+
+    def _argument_order(self, arguments: tuple[nodes.Argument, ...]) -> bool:
+        """Positional arguments come before named ones."""
+        seen_name = False
+        for argument in arguments:
+            if argument.name is not None:
+                seen_name = True
+            elif seen_name:
+                self._error(ScriptSyntaxError("a positional argument after a named one"), argument.span)
+                return False
+        return True
+
+    # --- reporting ---------------------------------------------------------------------------------------
+
+    def _unknown(self, name: str, span: Span, known: Callable[[], list[str]]) -> None:
+        self._n_unknown += 1
+        # Looking for names that look alike takes a while; who has so many wrong ones has another problem.
+        alike = self.catalogue.suggest(name, known()) if self._n_unknown <= MOST_SUGGESTIONS else None
+        hint = f"did you mean '{alike}'?" if alike else None
+        name_only = Span(span.line, span.column, span.line, span.column + len(name))
+        self._error(ScriptNameError(name, hint=hint), name_only)
+
+    def _error(self, error: ScriptCompileError, span: Span) -> None:
+        width = span.end_column - span.column if span.line == span.end_line else 1
+        self.errors.append(error.locate(self.source, span.line, span.column, width))
+
+
+def _declared_name(statement: nodes.Assign | nodes.Declare) -> str | None:
+    if isinstance(statement, nodes.Declare):
+        return statement.name
+    return statement.target.name if isinstance(statement.target, nodes.Name) else None
+
+
+def _shape(arguments: tuple[nodes.Argument, ...]) -> tuple[int, tuple[str, ...]]:
+    """Number of positional arguments, names of the named ones."""
+    keywords = tuple(argument.name for argument in arguments if argument.name is not None)
+    return len(arguments) - len(keywords), keywords

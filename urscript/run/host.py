@@ -1,0 +1,57 @@
+"""What a program needs from the robot it runs on: the seam between the language and the box.
+
+The language knows flow, text and mathematics; everything with an effect on the world, or a look at it, is
+a function of the host. `recording_host` is a host without a robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+from urscript.run.threads import ScriptThread
+from urscript.run.waits import Wait
+
+HostFunction = Callable[..., Any]
+"""Called as `f(thread, *arguments)`: all parameters of the catalogue row in order, defaults filled in, types
+checked. If the row may take time it is a generator function that yields `waits`, else it returns the value.
+Raises ScriptRuntimeError with the message alone. Must not change lists it is given or has returned."""
+
+
+class Host(Protocol):
+    """A robot, as seen by a running program."""
+
+    step_time: float
+    """Length of a control cycle in s: 0.008 on a CB3."""
+
+    def builtins(self) -> Mapping[str, HostFunction]:
+        """The effects this robot offers, by URScript name; asked once for each program start.
+
+        A name that is pure (see `urscript.builtins`) may be offered too and then replaces it: `random`.
+        """
+        ...
+
+    def textmsg(self, text: str) -> None:
+        """Show `text` in the log and send it to the primary clients."""
+        ...
+
+    def thread_ended(self, thread: ScriptThread) -> None:
+        """A thread ended, by itself or killed: what it owned (the arm) is free again."""
+        ...
+
+    def program_ended(self) -> None:
+        """The program ended, for whatever reason: close its sockets, leave its modes."""
+        ...
+
+
+@runtime_checkable
+class Handle(Protocol):
+    """A value with methods, such as a remote-procedure handle."""
+
+    script_type: str
+
+    def call_method(
+        self, thread: ScriptThread, method: str, arguments: Sequence[Any], named: Mapping[str, Any]
+    ) -> Generator[Wait, None, Any]:
+        """Call `handle.method(arguments)`; raises ScriptRuntimeError when there is no such method."""
+        ...

@@ -1,0 +1,295 @@
+"""The names that compiled programs use, and the way back from a Python exception to a place in the script.
+
+| name | is |
+|---|---|
+| `_T` | the running thread, set by the scheduler |
+| `_b` | statements left in this cycle, set by the scheduler |
+| `_add` ... | the operators of `ops`, `elements` and `variables` |
+| `_run`, `_kill`, `_join`, `_halt`, `_over`, `_enter`, `_leave` | flow |
+| `b_name` | a builtin, called with the thread first |
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Generator, Iterable, Mapping
+from itertools import islice
+from math import ceil
+from types import CodeType, FrameType, TracebackType
+from typing import Any, Final
+
+from urscript.builtins import PURE
+from urscript.catalogue import Catalogue
+from urscript.compile.long_blocks import PART
+from urscript.dialect import Dialect
+from urscript.errors import ScriptBudgetError, ScriptRuntimeError, StackEntry
+from urscript.run import elements, ops, variables
+from urscript.run.host import Handle, Host
+from urscript.run.metering import COSTS, HOST_COST, PURE_COST, START_COST, Meter
+from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread, join
+from urscript.run.waits import NEXT_CYCLE, Wait
+from urscript.source import Source
+from urscript.values import Pose, a_type, log_form, type_name, wrap_int
+
+
+def _over() -> None:
+    raise ScriptBudgetError
+
+
+def _halt() -> None:
+    raise ProgramHalted
+
+
+def _method(
+    thread: ScriptThread, target: Any, method: str, arguments: list[Any], named: dict[str, Any]
+) -> Generator[Wait, None, Any]:
+    if isinstance(target, Handle):
+        return (yield from target.call_method(thread, method, arguments, named))
+    raise ScriptRuntimeError(f"{a_type(target)} has no method '{method}'")
+
+
+def _member(target: Any, name: str) -> Any:
+    raise ScriptRuntimeError(f"{a_type(target)} has no member '{name}'")
+
+
+def _store_member(value: Any, name: str, target: Any) -> Any:
+    raise ScriptRuntimeError(f"{a_type(target)} has no member '{name}' to assign to")
+
+
+_COMMON: Final[dict[str, Any]] = {
+    "_MISSING": object(),
+    "_NEXT_CYCLE": NEXT_CYCLE,
+    "_UNDEFINED": variables.UNDEFINED,
+    "_undefined": variables.undefined,
+    "_Pose": Pose,
+    "_pose": elements.make_pose,
+    "_list": elements.make_list,
+    "_item": elements.item,
+    "_cell": elements.cell,
+    "_store_item": elements.store_item,
+    "_store_cell": elements.store_cell,
+    "_member": _member,
+    "_store_member": _store_member,
+    "_method": _method,
+    "_truth": ops.truth,
+    "_wrap": wrap_int,
+    "_add": ops.add,
+    "_sub": ops.sub,
+    "_mul": ops.mul,
+    "_div": ops.div,
+    "_mod": ops.mod,
+    "_neg": ops.neg,
+    "_pos": ops.pos,
+    "_equal": ops.equal,
+    "_unequal": ops.unequal,
+    "_less": ops.less,
+    "_less_equal": ops.less_equal,
+    "_greater": ops.greater,
+    "_greater_equal": ops.greater_equal,
+    "_join": join,
+    "_halt": _halt,
+    "_over": _over,
+}
+
+
+_ARITHMETIC: Final = {
+    "_add": "+",
+    "_sub": "-",
+    "_mul": "*",
+    "_div": "/",
+    "_mod": "%",
+    "_neg": "-",
+    "_pos": "+",
+}
+
+
+def base_namespace(dialect: Dialect, meter: Meter) -> dict[str, Any]:
+    """The names that do not depend on the host: operators and values."""
+
+    def enter(thread: ScriptThread) -> ScriptThread:
+        thread.depth += 1
+        if thread.depth > dialect.recursion_limit:
+            raise ScriptRuntimeError(f"functions call themselves more than {dialect.recursion_limit} deep")
+        return thread
+
+    def leave(thread: ScriptThread) -> None:
+        thread.depth -= 1
+
+    assign = variables.assign if dialect.list_resize == "error" else variables.assign_resizing
+    names = {**_COMMON, "_assign": assign, "_enter": enter, "_leave": leave}
+    if not dialect.array_arithmetic:
+        names |= {name: ops.without_arrays(sign, _COMMON[name]) for name, sign in _ARITHMETIC.items()}
+    return names | meter.operations(names)
+
+
+def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any], meter: Meter) -> dict[str, Any]:
+    """The names through which a program reaches its own scheduler."""
+
+    def run(function: Callable[[], Any], name: str) -> ScriptThread:
+        meter.charge(START_COST)
+        return scheduler.start(function, name, namespace["_T"])
+
+    return {"_run": run, "_kill": scheduler.kill}
+
+
+# --- builtins ------------------------------------------------------------------------------------------
+
+
+def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, meter: Meter) -> dict[str, Any]:
+    """The builtins a program uses; those with effects get the check of their arguments in front."""
+    offered = host.builtins()
+    flow = _flow_builtins(host)
+    bound: dict[str, Any] = {}
+    if catalogue.methods:
+        bound["_method"] = _declared_methods(catalogue.methods)
+    for name in names:
+        function = flow.get(name) or offered.get(name)
+        if function is not None:
+            checked = _checked(name, function, catalogue)
+            bound[f"b_{name}"] = meter.function(checked, COSTS.get(name, HOST_COST), name)
+        elif name in PURE:
+            pure = _without_thread(PURE[name])
+            bound[f"b_{name}"] = meter.function(pure, COSTS.get(name, PURE_COST), name)
+        else:
+            bound[f"b_{name}"] = _declared_only(name)
+    return bound
+
+
+def _flow_builtins(host: Host) -> dict[str, Callable[..., Any]]:
+    """Builtins that are part of the language: they need no robot but the length of its cycle and its log."""
+
+    def textmsg(thread: ScriptThread, first: Any, second: Any) -> None:
+        host.textmsg(log_form(first) + log_form(second))
+
+    def sleep(thread: ScriptThread, seconds: float) -> Generator[Wait, None, None]:
+        # Whole cycles that cover the time; the small slack keeps 0.016 s at two.
+        for _ in range(ceil(seconds / host.step_time - 1e-9)):
+            yield NEXT_CYCLE
+
+    return {"textmsg": textmsg, "sleep": sleep}
+
+
+def _checked(name: str, function: Callable[..., Any], catalogue: Catalogue) -> Callable[..., Any]:
+    builtin = catalogue.lookup(name)
+    if builtin is None or not builtin.params:
+        return function
+    check = catalogue.check
+
+    def call(thread: ScriptThread, *arguments: Any) -> Any:
+        check(builtin, arguments)
+        return function(thread, *arguments)
+
+    return call
+
+
+def _without_thread(function: Callable[..., Any]) -> Callable[..., Any]:
+    def call(thread: ScriptThread, *arguments: Any) -> Any:
+        return function(*arguments)
+
+    return call
+
+
+def _declared_methods(methods: Mapping[str, frozenset[str]]) -> Callable[..., Any]:
+    def call(
+        thread: ScriptThread, target: Any, method: str, arguments: list[Any], named: dict[str, Any]
+    ) -> Generator[Wait, None, Any]:
+        if method in methods.get(type_name(target), ()):
+            raise _not_modelled(f"{method} of {a_type(target)}")
+        return (yield from _method(thread, target, method, arguments, named))
+
+    return call
+
+
+def _not_modelled(what: str) -> ScriptRuntimeError:
+    return ScriptRuntimeError(
+        f"{what} is declared only: this box does not model it yet (docs/urscript-coverage.md)"
+    )
+
+
+def _declared_only(name: str) -> Callable[..., Any]:
+    def call(thread: ScriptThread, *arguments: Any) -> Any:
+        raise _not_modelled(name)
+
+    return call
+
+
+# --- from Python's exceptions back to the script ---------------------------------------------------------
+
+
+def script_error(
+    error: Exception, file_name: str, names: Mapping[str, str], source: Source
+) -> ScriptRuntimeError:
+    """The run-time error that `error` is for the program, with place and calls.
+
+    Where static types are evident the compiler uses Python's own operators; what those raise is translated.
+
+    Args:
+        error: What came out of a thread.
+        file_name: The pseudo file name of the compiled program.
+        names: Python function name -> name in the script.
+        source: The text of the program.
+    """
+    stack, innermost = _stack(error.__traceback__, file_name, names)
+    if isinstance(error, ScriptRuntimeError):
+        found = error
+    elif innermost is not None and isinstance(error, IndexError):
+        found = ScriptRuntimeError(_bad_index(innermost, stack[-1], source))
+    elif innermost is not None and isinstance(error, ZeroDivisionError):
+        found = ScriptRuntimeError("division by zero")
+    elif isinstance(error, RecursionError):
+        found = ScriptRuntimeError("calls are nested too deeply")
+    else:
+        found = ScriptRuntimeError(f"internal error of this box: {type(error).__name__}: {error}")
+        found.__cause__ = error
+    found.stack = tuple(stack)
+    return found
+
+
+def _bad_index(frame: FrameType, place: StackEntry, source: Source) -> str:
+    """What a bare subscript went wrong with: the compiler emits it for a number after a variable only."""
+    form = re.match(r"(\w+)\s*\[\s*(\d+)", source.line(place.line)[place.column - 1 :])
+    if form is not None:
+        variable = frame.f_locals.get(f"v_{form[1]}", frame.f_globals.get(f"g_{form[1]}"))
+        try:
+            elements.item(variable, int(form[2]))
+        except ScriptRuntimeError as error:
+            return error.message
+    return "index is out of range"
+
+
+def _stack(
+    traceback: TracebackType | None, file_name: str, names: Mapping[str, str]
+) -> tuple[list[StackEntry], FrameType | None]:
+    """The calls inside the script, outermost first, and the innermost frame if it is the script's own."""
+    stack: list[StackEntry] = []
+    innermost = None
+    while traceback is not None:
+        innermost = traceback.tb_frame
+        code = innermost.f_code
+        if code.co_filename == file_name:
+            if stack and code.co_name.startswith(PART):
+                stack.pop()  # the call of a piece of the program body is no call of the script
+            line, column = _position(code, traceback.tb_lasti)
+            stack.append(StackEntry(names.get(code.co_name, code.co_name), line, column))
+        else:
+            innermost = None
+        traceback = traceback.tb_next
+    return stack, innermost
+
+
+def _position(code: CodeType, instruction: int) -> tuple[int, int]:
+    """Line and column (from 1) of the instruction at byte offset `instruction`."""
+    line, _, column, _ = next(islice(code.co_positions(), instruction // 2, None), (None,) * 4)
+    return line or 1, 1 if column is None else column + 1
+
+
+def thread_position(thread: ScriptThread, file_name: str) -> tuple[int, int]:
+    """Where in the script a suspended thread stands: line and column of the innermost call."""
+    place = (1, 1)
+    body: Any = thread.body
+    while body is not None and hasattr(body, "gi_frame"):
+        frame = body.gi_frame
+        if frame is not None and frame.f_code.co_filename == file_name:
+            place = _position(frame.f_code, frame.f_lasti)
+        body = body.gi_yieldfrom
+    return place

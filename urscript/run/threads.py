@@ -1,0 +1,281 @@
+"""Cooperative threads: who runs when within one control cycle.
+
+Every runnable thread runs once a cycle, the main thread first, then the others by age, in the same order
+every cycle; each runs until it uses its slice up (`NEXT_CYCLE`) or waits (`Blocked`). A thread whose
+condition comes true later in the cycle (a `join` on a thread that ends) goes on in the same cycle with
+what is left of its budget. Nothing is ever interrupted, so a critical section is the natural state; calls
+that take time are the only places where others run, inside a critical section too. Source: script manual,
+thread scheduling; the fixed order: streaming programs stutter without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from typing import Any, Final, cast
+
+from urscript.dialect import MAX_THREADS, PROGRAM_BUDGET
+from urscript.errors import ScriptRuntimeError
+from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
+from urscript.values import a_type
+
+ThreadBody = Generator[Wait, None, Any]
+
+
+class ThreadKilled(BaseException):
+    """Unwinds a thread that killed itself or its parent; no error, so nobody may catch it by accident."""
+
+
+class ProgramHalted(BaseException):
+    """Unwinds the thread that executed `halt`."""
+
+
+class ScriptThread:
+    """One thread of a program, and the value of its handle in the script.
+
+    Attributes:
+        thread_id: From 1 (the main thread) in the order of starts.
+        name: Name of the `thread` definition; of the main thread the program's.
+        parent: The thread that ran it.
+        finished: It ended or was killed.
+        wait: What it waits for; None when it can run in the next cycle.
+        label: Text of the last `$` line it passed.
+        budget: Statements it may still run in this cycle.
+        slice_used: Not to be run again in this cycle.
+        depth: How deep it is in recursive functions.
+        body: The generator that runs it.
+    """
+
+    __slots__ = (
+        "body",
+        "budget",
+        "children",
+        "depth",
+        "finished",
+        "label",
+        "name",
+        "parent",
+        "slice_used",
+        "thread_id",
+        "wait",
+    )
+
+    script_type: Final = "thread"
+
+    def __init__(self, thread_id: int, name: str, parent: ScriptThread | None, body: ThreadBody) -> None:
+        self.thread_id = thread_id
+        self.name = name
+        self.parent = parent
+        self.body = body
+        self.children: list[ScriptThread] = []
+        self.finished = False
+        self.wait: Blocked | None = None
+        self.label = ""
+        self.budget = 0
+        self.slice_used = False
+        self.depth = 0
+
+    def family(self) -> Iterator[ScriptThread]:
+        """Its unfinished descendants, deepest first, then itself."""
+        for child in self.children:
+            yield from child.family()
+        if not self.finished:
+            yield self
+
+    def __str__(self) -> str:
+        return str(self.thread_id)
+
+    def __repr__(self) -> str:
+        state = "finished" if self.finished else "waiting" if self.wait else "runnable"
+        return f"<thread {self.thread_id} {self.name!r} {state}>"
+
+
+class Scheduler:
+    """Runs the threads of one program.
+
+    Attributes:
+        threads: Unfinished threads, the main thread first, then by age.
+        main: The thread whose end ends the program.
+    """
+
+    def __init__(
+        self, namespace: dict[str, Any], budget: int, thread_ended: Callable[[ScriptThread], None]
+    ) -> None:
+        """Args: the globals of the compiled program, statements per thread and cycle, a notice of ends."""
+        self._namespace = namespace
+        self._budget = budget
+        self._left = 0
+        self._thread_ended = thread_ended
+        self._count = 0
+        self._some_finished = False
+        self.threads: list[ScriptThread] = []
+        self.main: ScriptThread | None = None
+
+    def start(self, function: Callable[[], Any], name: str, parent: ScriptThread | None) -> ScriptThread:
+        """Start `function` as a thread; it first runs when its turn in the cycle comes.
+
+        Raises:
+            ScriptRuntimeError: the program has as many threads as it may.
+        """
+        # Those that end stay in the list until the end of the cycle.
+        if len(self.threads) >= MAX_THREADS <= sum(not thread.finished for thread in self.threads):
+            raise ScriptRuntimeError(f"a program may have {MAX_THREADS} threads at the same time")
+        self._count += 1
+        thread = ScriptThread(self._count, name, parent, _as_body(function))
+        thread.budget = self._budget
+        if parent is None:
+            self.main = thread
+        else:
+            parent.children.append(thread)
+        self.threads.append(thread)
+        return thread
+
+    def step(self) -> None:
+        """Run one control cycle; what a thread raises goes through."""
+        threads = self.threads
+        budget = self._budget
+        self._left = budget * PROGRAM_BUDGET
+        for thread in threads:
+            thread.slice_used = False
+            thread.budget = budget
+        first_pass = True
+        while True:
+            progress = False
+            waits_inside = False
+            index = 0
+            # The list grows while it is walked: a new thread gets its slice in the cycle of its start.
+            while index < len(threads):
+                thread = threads[index]
+                index += 1
+                if thread.slice_used:
+                    continue
+                wait = thread.wait
+                if wait is not None:
+                    if wait.outside and not first_pass:
+                        continue
+                    if not wait.ready():
+                        waits_inside = waits_inside or not wait.outside
+                        continue
+                    thread.wait = None
+                self._resume(thread)
+                if thread.finished and thread is self.main:
+                    return
+                progress = True
+                wait = thread.wait
+                if wait is not None and not wait.outside:
+                    waits_inside = True
+            if not (progress and waits_inside):
+                break
+            first_pass = False
+        if self._some_finished:
+            self._some_finished = False
+            self.threads = [thread for thread in threads if not thread.finished]
+
+    def _resume(self, thread: ScriptThread) -> None:
+        namespace = self._namespace
+        namespace["_T"] = thread
+        namespace["_b"] = budget = min(thread.budget, self._left)
+        proceed = thread.body.send
+        try:
+            while True:
+                wait = proceed(None)
+                if wait is NEXT_CYCLE:
+                    thread.slice_used = True
+                    break
+                if not wait.ready():
+                    thread.wait = wait
+                    thread.budget = cast(int, namespace["_b"])
+                    break
+                if 2 * namespace["_b"] < budget:
+                    thread.slice_used = True
+                    break
+        except StopIteration:
+            self._end(thread)
+        except ThreadKilled:
+            self._end(thread)
+        self._left -= budget - cast(int, namespace["_b"])
+
+    def _end(self, thread: ScriptThread) -> None:
+        thread.finished = True
+        thread.slice_used = True
+        thread.wait = None
+        # Threads it left running belong to its parent now: killing that stops them too.
+        if thread.parent is not None:
+            thread.parent.children.remove(thread)
+            thread.parent.children.extend(thread.children)
+        for child in thread.children:
+            child.parent = thread.parent
+        thread.children = []
+        self._some_finished = True
+        self._thread_ended(thread)
+
+    def kill(self, by: ScriptThread | None, handle: Any) -> None:
+        """Stop the thread of `handle` and its children; 0 stands for no thread and does nothing.
+
+        Raises:
+            ThreadKilled: The killer is among them.
+            ScriptRuntimeError: `handle` is no thread.
+        """
+        thread = thread_of(handle, "kill")
+        if thread is None:
+            return
+        kills_itself = False
+        for member in list(thread.family()):
+            if member is by:
+                kills_itself = True
+                continue
+            member.body.close()
+            self._end(member)
+        if kills_itself:
+            raise ThreadKilled
+
+    def kill_all(self) -> Exception | None:
+        """Stop every thread, children first; returns the first error of a builtin cleaning up, if any."""
+        fault: Exception | None = None
+        for thread in reversed(self.threads):
+            if thread.finished:
+                continue
+            try:
+                thread.body.close()
+            except Exception as error:
+                fault = fault or error
+            self._end(thread)
+        self.threads = []
+        return fault
+
+
+def join(by: ScriptThread, handle: Any) -> ThreadBody:
+    """Wait until the thread of `handle` ends; 0 stands for no thread and does nothing."""
+    thread = thread_of(handle, "join")
+    if thread is by:
+        raise ScriptRuntimeError("a thread cannot join itself")
+    if thread is not None and not thread.finished:
+        yield Blocked(lambda: thread.finished)
+
+
+def thread_of(handle: Any, word: str) -> ScriptThread | None:
+    """The thread a handle stands for; None for an integer, because handles are preset to 0 and killed anyway.
+
+    Source: driver scripts.
+    """
+    if isinstance(handle, ScriptThread):
+        return handle
+    if type(handle) is int or handle is None:
+        return None
+    raise ScriptRuntimeError(f"{word} needs a thread handle, got {a_type(handle)}")
+
+
+def _as_body(function: Callable[[], Any]) -> ThreadBody:
+    """`function` as a thread body: one that cannot block is a plain function and runs at once."""
+    if function.__code__.co_flags & _IS_GENERATOR:
+        return cast(ThreadBody, function())
+    return _run_at_once(function)
+
+
+_IS_GENERATOR: Final = 0x20
+"""inspect.CO_GENERATOR, without importing inspect."""
+
+
+def _run_at_once(function: Callable[[], Any]) -> ThreadBody:
+    function()
+    return
+    yield NEXT_CYCLE

@@ -1,0 +1,1 @@
+"""Text to tree: the grammar, the parser, the nodes and walks over them."""
