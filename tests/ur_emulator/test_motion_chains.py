@@ -230,24 +230,50 @@ def is_accepted(targets):
     return all(find_invalid_setpoint(ARM.robot, a, b, DT) is None for a, b in pairs)
 
 
-@settings(max_examples=25, deadline=None)
-@given(st.lists(moves, min_size=2, max_size=5))
-def test_moves_that_can_be_ridden_one_by_one_can_be_ridden_as_a_chain(makers):
+def can_be_ridden_one_by_one(makers):
     q = HOME
     try:
         for make in makers:
             alone = ride(Move(make(q, TOOL.pose(q))), q)
-            assume(is_accepted(alone))
+            if not is_accepted(alone):
+                return False
             q = alone[-1].q
     except UnreachableError:
-        assume(False)
-    targets, legs, _ = run_chain(makers)
+        return False
+    return True
+
+
+def check_chain(makers):
+    targets, legs, outcomes = run_chain(makers)
     assert is_accepted(targets)
     at_q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
     assert np.abs(np.diff(qd, axis=0)).max() / DT <= 1.6 * JOINT_ACCELERATION
     assert np.abs(np.diff(at_q, axis=0) / DT - 0.5 * (qd[1:] + qd[:-1])).max() < 0.25
     assert targets[-1].q == pytest.approx(legs[-1].goal, abs=1e-8)
     assert targets[-1] == JointTarget(targets[-1].q)
+    return targets, legs, outcomes
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(moves, min_size=2, max_size=5))
+def test_moves_that_can_be_ridden_one_by_one_can_be_ridden_as_a_chain(makers):
+    assume(can_be_ridden_one_by_one(makers))
+    check_chain(makers)
+
+
+# Chains that random search has found, in round numbers.
+FOUND = {
+    "an arc that nearly stretches the elbow": [
+        arc(at(0.0515, 0.0515, 0.0662), at(0, -0.0244, -0.0533, -0.0522, -0.2713, -0.5921), r=0.03, v=0.05),
+        joints((-0.39, -1.9, -1.9, -1.9, 1.094, 0.301)),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_chains_that_random_search_has_found_can_be_ridden(name):
+    assert can_be_ridden_one_by_one(FOUND[name])
+    check_chain(FOUND[name])
 
 
 @settings(max_examples=20, deadline=None)
@@ -258,10 +284,8 @@ def test_moves_that_can_be_ridden_one_by_one_can_be_ridden_as_a_chain(makers):
 )
 def test_chains_of_the_tool_keep_to_their_path_and_limits(waypoints, v, process):
     makers = [straight(p, r=r, v=v, process=process) for p, r in waypoints]
-    try:
-        targets, legs, _ = run_chain(makers)
-    except UnreachableError:
-        assume(False)
+    assume(can_be_ridden_one_by_one(makers))
+    targets, legs, _ = run_chain(makers)
     assert speeds(targets).max() <= v * (1 + 1e-6)
     assert tool_accelerations(targets).max() <= A * (1 + 5e-3) + 1e-6
     points = positions(targets)

@@ -44,11 +44,13 @@ class Sample(NamedTuple):
         s: way of the tool [m].
         q: joint angles [rad].
         slope: their derivative with respect to s [rad/m].
+        aspect: `Tool.aspect` there.
     """
 
     s: float
     q: Vector6
     slope: Vector6
+    aspect: bool
 
 
 class JointLimit(NamedTuple):
@@ -82,6 +84,23 @@ def survey(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tuple[Sam
             if not _extend(samples, path, tool, end, speed, _HALVINGS):
                 break
     return tuple(samples)
+
+
+def reaches(samples: tuple[Sample, ...], end: float, robot: RobotModel) -> bool:
+    """Return whether the arm can follow a path up to its end.
+
+    It cannot where even at the least speed a joint would be too fast: through a singularity, or at the end of
+    a joint's range, where the inverse kinematics gives angles that are one turn less.
+    """
+    return (
+        bool(samples)
+        and samples[-1].s >= end
+        and not any(
+            LEAST_SPEED * abs(q - p) > most * (b.s - a.s)
+            for a, b in pairwise(samples)
+            for p, q, most in zip(a.q, b.q, robot.qd_max, strict=True)
+        )
+    )
 
 
 def joint_limits(samples: tuple[Sample, ...], robot: RobotModel) -> tuple[JointLimit, ...]:
@@ -134,11 +153,15 @@ def _take(samples: list[Sample], path: PosePath, tool: Tool, s: float, near: Vec
     q = tool.joints(pose, near)
     if q is None:
         return False
-    samples.append(Sample(s, q, tool.rates(q, twist)))
+    samples.append(Sample(s, q, tool.rates(q, twist), tool.aspect(q)))
     return True
 
 
 def _is_rough(a: Sample, b: Sample, robot: RobotModel, speed: float) -> bool:
+    if (
+        a.aspect != b.aspect
+    ):  # where a path comes close to a singularity and goes back, the arm stays on its side
+        return True
     way = b.s - a.s
     for k, most in enumerate(robot.qd_max):
         u, w, middle = a.slope[k], b.slope[k], _middle(a, b, k, way)

@@ -49,6 +49,10 @@ class Tool:
         transposed = jacobian.T
         return six(np.linalg.solve(transposed @ jacobian + _DAMPING, transposed @ np.array(twist)).tolist())
 
+    def aspect(self, q: Sequence[float]) -> bool:
+        """Return on which side of the singularities the arm is: the sign of the Jacobian's determinant."""
+        return bool(np.linalg.det(self.arm.jacobian(q, self.tcp)) > 0.0)
+
     def twist(self, q: Sequence[float], qd: Sequence[float]) -> Vector6:
         """Return the tool's twist for joint speeds `qd` [rad/s]."""
         return six((self.arm.jacobian(q, self.tcp) @ np.array(qd)).tolist())
