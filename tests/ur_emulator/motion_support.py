@@ -74,6 +74,20 @@ def distance_to_polyline(points, corners):
     return best
 
 
+class RecordedMove(Move):
+    """A move that notes the legs that joined it."""
+
+    def __init__(self, leg):
+        super().__init__(leg)
+        self.legs = [leg]
+
+    def _join(self, leg):
+        joined = super()._join(leg)
+        if joined:
+            self.legs.append(leg)
+        return joined
+
+
 def run_chain(makers, q=HOME, limit=20000):
     """Ride moves one after the other as a program does: each in the cycle in which the one before gives way.
 
@@ -86,24 +100,22 @@ def run_chain(makers, q=HOME, limit=20000):
         All targets, the legs that were travelled, and what became of those that were to follow.
     """
     targets = [JointTarget(tuple(q), ZERO6)]
-    makers, legs, outcomes = list(makers), [], []
-    while makers:
+    makers, legs, outcomes, first = list(makers), [], [], None
+    while makers or first is not None:
         last = targets[-1]
-        legs.append(makers.pop(0)(last.q, TOOL.pose(last.q)))
-        move = Move(legs[-1])
-        refused = False
+        move = RecordedMove(first or makers.pop(0)(last.q, TOOL.pose(last.q)))
+        refused = first is not None
         while not move.done:
             while (
                 makers and not refused and not move.done and move.open and move.leg.r > 0 and move.taken < 4
             ):
-                leg = makers[0](move.leg.goal, move.leg.goal_pose)
-                outcomes.append(move.follow(leg))
+                outcomes.append(move.follow(makers[0](move.leg.goal, move.leg.goal_pose)))
                 refused = outcomes[-1] is Follow.REFUSED
                 if not refused:
                     makers.pop(0)
                     move.taken += outcomes[-1] is Follow.SKIPPED
-                if outcomes[-1] is Follow.BLENDED:
-                    legs.append(leg)
             targets.append(move.step(targets[-1], DT, 1.0))
             assert len(targets) < limit
+        first = move.left_out if refused else None
+        legs += move.legs
     return targets, legs, outcomes

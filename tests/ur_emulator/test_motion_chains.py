@@ -136,6 +136,24 @@ def test_waypoints_whose_blends_overlap_are_left_out_without_a_stop():
     assert len(targets) <= len(ride(Move(straight(at(0.126, 0, 0))(HOME, START)))) + 2
 
 
+@pytest.mark.parametrize("fixed", [False, True])
+def test_an_arc_begins_at_the_waypoint_before_it_also_where_blends_overlap(fixed):
+    near, via, goal = at(0.08, 0.03, 0.0), at(0.11, 0.06, 0.0), at(0.08, 0.09, 0.0)
+    makers = [
+        straight(at(0.08, 0.0, 0.0), r=0.02),
+        straight(near, r=0.02),
+        arc(via, goal, fixed=fixed, v=0.1),
+    ]
+    targets, legs, outcomes = run_chain(makers)
+    assert outcomes == [Follow.SKIPPED, Follow.BLENDED]
+    assert len(legs) == 3
+    # The blends take at most half of the way between the waypoints; from there on it is the circle.
+    points = positions(targets)
+    assert np.linalg.norm(points - near[:3], axis=1).min() < 0.015
+    on_arc = points[np.linalg.norm(points - via[:3], axis=1) < 0.03]
+    assert np.linalg.norm(on_arc - at(0.08, 0.06, 0.0)[:3], axis=1) == pytest.approx(0.03, abs=1e-6)
+
+
 def test_a_program_that_only_moves_to_one_place_with_a_blend_still_takes_time():
     bench = Bench(fidelity="ideal")
     bench.start("def f():\n  p0 = get_target_tcp_pose()\n  while True:\n    movel(p0, r=0.01)\n  end\nend\n")
@@ -263,6 +281,22 @@ def test_moves_that_can_be_ridden_one_by_one_can_be_ridden_as_a_chain(makers):
 
 # Chains that random search has found, in round numbers.
 FOUND = {
+    "an arc behind a waypoint that overlaps, from another start too fast for the shoulder": [
+        joints_to(at(0.009, -0.029, 0.0, -0.579, -0.486, 0.104), r=0.03, v=3.0, a=10.0),
+        straight(at(-0.019, -0.027, 0.01, -0.465, -0.3, -0.484), r=0.03, process=True),
+        arc(at(0.04, -0.04, 0.062), at(-0.005, -0.014, 0.079), r=0.01, fixed=True, v=1.0),
+    ],
+    "an arc behind a waypoint that overlaps, from another start out of reach": [
+        arc(at(-0.04, -0.062, 0.036), at(0.01, 0.0, -0.015, 0.113, 0.421, -0.043), r=0.01, v=0.05, a=0.3),
+        straight(at(0.0, 0.0, -0.027, -0.321, 0.0, 0.0), r=0.01, v=0.05, a=0.3),
+        arc(at(0.069, 0.008, -0.027), at(-0.063, -0.044, 0.0, 0.0, -0.194, 0.3), r=0.03, v=1.0, a=0.3),
+    ],
+    "a line behind a waypoint that overlaps, from another start beyond the range of wrist 3": [
+        joints_to(at(0.0, -0.08, 0.007, 0.137, -0.181, -0.323), a=10.0),
+        arc(at(0.043, 0.01, -0.045), at(-0.027, 0.018, -0.001), r=0.01, fixed=True),
+        joints((0.0, -1.269, -2.008, -1.422, 1.57, 0.796), a=0.5, r=0.03),
+        straight(at(-0.04, 0.068, 0.08, 0.327, 0.173, 0.6), r=0.01, v=0.05, process=True),
+    ],
     "an arc that nearly stretches the elbow": [
         arc(at(0.0515, 0.0515, 0.0662), at(0, -0.0244, -0.0533, -0.0522, -0.2713, -0.5921), r=0.03, v=0.05),
         joints((-0.39, -1.9, -1.9, -1.9, 1.094, 0.301)),

@@ -156,6 +156,20 @@ def test_a_move_whose_blend_overlaps_is_skipped():
     assert TOOL.pose(targets[-1].q) == pytest.approx(goal, abs=1e-9)
 
 
+def test_a_waypoint_is_left_out_only_if_the_arm_gets_to_the_next_one_without_it():
+    near, goal = at(-0.08, 0.02, 0.0), at(-0.14, 0.0, 0.0)
+    first = line(START, at(-0.08, 0.0, 0.0), r=0.02)
+    q = TOOL.joints(near, HOME)
+    turn = move_j(first.goal, (*q[:5], q[5] - 2 * math.pi), TOOL, a=1.4, v=1.05, r=0.02)
+    last = line(near, goal, turn.goal)
+    targets, outcomes = follow_when_open(Move(first), [turn, last])
+    assert outcomes == [Follow.SKIPPED, Follow.BLENDED]
+    # Without the waypoint wrist 3 would not make its turn.
+    assert targets[-1].q == pytest.approx(last.goal, abs=1e-8)
+    assert targets[-1].q[5] < -5.0
+    assert np.abs(np.diff([t.q for t in targets], axis=0)).max() < 3.2 * DT
+
+
 def test_a_late_follower_gets_a_smaller_blend_or_none_but_never_a_jump():
     first, second, _ = corner_moves(START, r=0.03)
     for late in range(0, 40, 4):

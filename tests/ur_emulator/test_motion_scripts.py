@@ -115,6 +115,20 @@ def test_overlapping_blends_are_told_and_the_waypoint_is_left_out(bench):
     assert bench.now.target_tcp_pose[:3] == pytest.approx((0.25, -0.15, 0.25), abs=1e-9)
 
 
+@pytest.mark.parametrize("late", [0, 2, 10, 20, 30, 40, 50])
+def test_an_arc_behind_a_waypoint_that_overlaps_is_the_programmed_one_however_late_it_comes(bench, late):
+    bench.run(
+        f"def f():\n  movel({shifted(0.1)}, v=0.1, r=0.03)\n  movel({shifted(0.1, 0.04)}, v=0.1, r=0.03)\n  i = 0\n"
+        f"  while i < {late}:\n    sync()\n    i = i + 1\n  end\n"
+        f"  movec({shifted(0.13, 0.07)}, {shifted(0.1, 0.1)}, v=0.1)\nend\n"
+    )
+    assert [e.text for e in errors(bench)] == ["Overlapping Blends"]
+    points = np.array([s.target_tcp_pose[:3] for s in bench.snapshots])
+    assert points[-1] == pytest.approx((0.35, -0.15, 0.25), abs=1e-9)
+    right = points[points[:, 1] > -0.19]
+    assert np.linalg.norm(right - (0.35, -0.18, 0.25), axis=1) == pytest.approx(0.03, abs=1e-6)
+
+
 def test_the_target_waypoint_stays_the_same_during_a_move(bench):
     said = bench.run(
         f"def f():\n  thread watch():\n    i = 0\n    while i < 4:\n      sleep(0.1)\n"

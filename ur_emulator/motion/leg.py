@@ -20,6 +20,8 @@ _STANDSTILL = 1e12
 _FASTEST, _STRONGEST = 1e6, 1e9
 # Points tried on the way out of a blend zone, and halvings to find its border.
 _SAMPLES, _HALVINGS = 16, 30
+# Two ways to one pose end in the same joint angles if no joint differs by more [rad].
+_SAME = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +91,30 @@ class Leg:
             stretch = min(t / (way / top + top / a), _STANDSTILL)
             v, a = top / stretch, a / stretch**2
         return replace(self, v=min(v, _FASTEST), a=min(a, _STRONGEST))
+
+    def starting_at(self, q: Vector6, pose: Pose) -> Leg | None:
+        """Return the straight way to the same joint angles from another start.
+
+        Args:
+            q: joint angles at the start [rad].
+            pose: of the tool there.
+
+        Returns:
+            None for an arc, whose circle depends on its start, and where the arm would not arrive in the same
+            joint angles.
+        """
+        path, limits = self.path, {"a": self.a, "v": self.v, "t": self.t, "r": self.r}
+        if self.goal is None:
+            return None
+        if isinstance(path, JointLine):
+            return move_j(q, self.goal, self.tool, **limits)
+        if not isinstance(path, ToolPath) or not isinstance(path.path, PoseLine):
+            return None
+        leg = move_tool(PoseLine(pose, self.goal_pose), q, self.tool, **limits, process=self.process)
+        arrives = leg.goal is not None and all(
+            abs(a - b) < _SAME for a, b in zip(leg.goal, self.goal, strict=True)
+        )
+        return leg if arrives else None
 
     @property
     def _way_rate(self) -> float | None:

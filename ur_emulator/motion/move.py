@@ -14,7 +14,6 @@ from enum import Enum
 from itertools import accumulate
 from math import dist
 
-from protocol.pose import Pose
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.blend import blend
 from ur_emulator.motion.leg import Leg
@@ -29,7 +28,11 @@ _LEAD_CYCLES = 2
 
 
 class Follow(Enum):
-    """What became of a move that was to follow another one."""
+    """What became of a move that was to follow another one.
+
+    `BLENDED`: it joined the chain. `SKIPPED`: its waypoint is left out, as long as the move behind it can do
+    without. `REFUSED`: the arm stops first.
+    """
 
     BLENDED = "blended"
     SKIPPED = "skipped"
@@ -43,6 +46,7 @@ class Move:
         done: at rest at the last waypoint.
         left: the instruction has given way: another one may follow, or the arm stops at the waypoint.
         taken: moves that joined since the last cycle.
+        left_out: the move behind the last one of the chain if its waypoint is left out for now.
     """
 
     def __init__(self, leg: Leg) -> None:
@@ -63,6 +67,7 @@ class Move:
         self.done = self._plan.duration <= 0.0 and self._wait <= 0.0
         self.left = False
         self.taken = 0
+        self.left_out: Leg | None = None
 
     @property
     def goal(self) -> Vector6 | None:
@@ -71,8 +76,8 @@ class Move:
 
     @property
     def leg(self) -> Leg:
-        """The last leg."""
-        return self._leg
+        """The last leg that was commanded: the next one begins at its waypoint."""
+        return self._leg if self.left_out is None else self.left_out
 
     @property
     def duration(self) -> float:
@@ -89,20 +94,33 @@ class Move:
         s, speed = self._plan.at(self._time + _LEAD_CYCLES * self._cycle)
         return not self._stopping.can_stop(s, speed)
 
-    def overlaps(self, pose: Pose, r: float) -> bool:
-        """Return whether the blend at a next waypoint would overlap with the one at the last.
+    def follow(self, leg: Leg) -> Follow:
+        """Let another leg follow, if this one still may; its path begins at the waypoint of `leg`.
+
+        A waypoint whose blend overlaps with the one before it is left out: the next move goes there straight
+        from the waypoint before. Where it cannot, since it is an arc or since the arm would not arrive, the
+        waypoint stays, and its blend gets smaller.
 
         Source: URScript manual CB3 3.15, movej: "if the blend region of this move overlaps with the blend
-        radius of previous or following waypoints, this move will be skipped".
+        radius of previous or following waypoints, this move will be skipped". That it may stay is chosen.
         """
-        return r > 0.0 and self._leg.r + r > dist(self._leg.goal_pose[:3], pose[:3])
-
-    def follow(self, leg: Leg) -> Follow:
-        """Let another leg follow, if this one still may; its path begins at this one's waypoint."""
         if self.done or self._wait > 0.0 or self._leg.r <= 0.0:
             return Follow.REFUSED
-        if self.overlaps(leg.goal_pose, leg.r):
+        if (left_out := self.left_out) is not None:
+            last = self._leg
+            direct = None if last.goal is None else leg.starting_at(last.goal, last.goal_pose)
+            if direct is not None:
+                leg = direct
+            elif not self._join(left_out):
+                return Follow.REFUSED
+        if leg.r > 0.0 and self._leg.r + leg.r > dist(self._leg.goal_pose[:3], leg.goal_pose[:3]):
+            if leg.goal is not None and leg.path.length > 0.0:
+                self.left_out = leg
             return Follow.SKIPPED
+        return Follow.BLENDED if self._join(leg) else Follow.REFUSED
+
+    def _join(self, leg: Leg) -> bool:
+        """Blend the last leg into another one; False if the arm is too fast for any blend."""
         s, speed = self._plan.at(self._time)
         ahead = self._ahead(s)
         last, radius = ahead[-1], self._leg.r
@@ -119,14 +137,15 @@ class Move:
                 planned = plan([part for piece in pieces for part in piece.intervals], speed)
                 if planned is not None:
                     self._leg = second
+                    self.left_out = None
                     self._zone = _zone(second, found.enter)
                     self._pieces = pieces
                     self._use(planned)
                     self.left = False
                     self.taken += 1
-                    return Follow.BLENDED
+                    return True
             radius *= _SHRINK
-        return Follow.REFUSED
+        return False
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Advance on the path by `scale * dt`.
@@ -159,6 +178,7 @@ class Move:
     def abandon(self) -> None:
         """Give the move up: whoever waits for its end need not wait longer."""
         self.done = True
+        self.left_out = None
 
     def _use(self, found: SpeedPlan) -> None:
         """Begin a plan for the pieces now."""

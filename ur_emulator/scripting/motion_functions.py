@@ -39,39 +39,36 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         return Tool(state.arm, state.tcp_offset)
 
     def travel(
-        thread: object,
-        goal: ToolPose,
-        r: float,
-        make: Callable[[Vector6, ToolPose], Leg],
-        *,
-        may_overlap: bool = False,
+        thread: object, make: Callable[[Vector6, ToolPose], Leg], *, may_overlap: bool = False
     ) -> Cycles:
-        """Follow a leg to a tool pose; from rest, or out of a blend.
+        """Follow a leg; from rest, or out of a blend.
 
         Args:
             thread: that moves.
-            goal: tool pose at the waypoint.
-            r: blend radius there [m].
             make: makes the leg for joint angles and tool pose at its start.
             may_overlap: nothing is said of a waypoint that is left out.
         """
         move = motion.move_of(thread)
         if move is not None and move.left and not move.done:
-            if move.overlaps(goal, r):
-                if not may_overlap:
-                    state.events.append(OVERLAPPING_BLENDS)
-                move.taken += 1
-                if may_overlap or move.taken >= MOST_PER_CYCLE:
-                    yield NEXT_CYCLE
-                return
-            corner = move.leg
-            if corner.goal is not None and corner.tool.tcp == state.tcp_offset:
-                outcome = move.follow(make(corner.goal, corner.goal_pose))
+            last = move.leg
+            if last.goal is not None and last.tool.tcp == state.tcp_offset:
+                outcome = move.follow(make(last.goal, last.goal_pose))
                 if outcome is Follow.BLENDED:
                     yield from ride(move)
                     return
+                if outcome is Follow.SKIPPED:
+                    if not may_overlap:
+                        state.events.append(OVERLAPPING_BLENDS)
+                    move.taken += 1
+                    if may_overlap or move.taken >= MOST_PER_CYCLE:
+                        yield NEXT_CYCLE
+                    return
             while not move.done:
                 yield NEXT_CYCLE
+            if move.left_out is not None:  # without a blend none overlaps
+                take_arm(state, thread, lead := Move(move.left_out))
+                while not lead.done:
+                    yield NEXT_CYCLE
         if any(motion.path.qd):  # a move begins at rest, also after a program that was replaced in motion
             take_arm(state, thread, stop := StopJ(motion.stop_deceleration))
             while not stop.done:
@@ -98,7 +95,7 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         def make(start: Vector6, _: ToolPose) -> Leg:
             return move_j(start, joints_of(q, start), tool(), a=a, v=v, t=t, r=r)
 
-        return travel(thread, pose_of(q), r, make)
+        return travel(thread, make)
 
     def joints_of(target: Any, near: Vector6) -> Vector6:
         if not isinstance(target, Pose):
@@ -113,7 +110,6 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
 
     def along(
         thread: object,
-        goal: ToolPose,
         make_path: Callable[[ToolPose], PosePath],
         a: float,
         v: float,
@@ -125,17 +121,17 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         def make(q: Vector6, start: ToolPose) -> Leg:
             return move_tool(make_path(start), q, tool(), a=a, v=v, t=t, r=r, process=process)
 
-        return travel(thread, goal, r, make)
+        return travel(thread, make)
 
     def movel(thread: object, pose: Any, a: float, v: float, t: float, r: float) -> Cycles:
         a, v = _limits("movel", a, v, t, r, TOOL_DEFAULTS)
         goal = pose_of(pose)
-        return along(thread, goal, lambda start: PoseLine(start, goal), a, v, t, r, process=False)
+        return along(thread, lambda start: PoseLine(start, goal), a, v, t, r, process=False)
 
     def movep(thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
         _require_limits("movep", a, v, 0.0, r)
         goal = pose_of(pose)
-        return along(thread, goal, lambda start: PoseLine(start, goal), a, v, 0.0, r, process=True)
+        return along(thread, lambda start: PoseLine(start, goal), a, v, 0.0, r, process=True)
 
     def servoc(thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
         _require_limits("servoc", a, v, 0.0, r)
@@ -145,7 +141,7 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
             return move_tool(PoseLine(start, goal), q, tool(), a=a, v=v, r=r, process=True)
 
         # Drivers call it with the same pose again and again: nothing to warn of.
-        return travel(thread, goal, r, make, may_overlap=True)
+        return travel(thread, make, may_overlap=True)
 
     def movec(
         thread: object, pose_via: Any, pose_to: Any, a: float, v: float, r: float, mode: float
@@ -153,7 +149,7 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         _require_limits("movec", a, v, 0.0, r)
         via, goal, fixed = pose_of(pose_via), pose_of(pose_to), mode == 1
         return along(
-            thread, goal, lambda start: arc_through(start, via, goal, fixed=fixed), a, v, 0.0, r, process=True
+            thread, lambda start: arc_through(start, via, goal, fixed=fixed), a, v, 0.0, r, process=True
         )
 
     def set_pos(thread: object, q: Any) -> None:
