@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from datetime import datetime
 from enum import IntEnum
 from typing import ClassVar
 
@@ -83,6 +84,7 @@ class RequestedType(IntEnum):
 
 
 _SINCE_3_3 = since((3, 3))
+_NEW_FORM = SoftwareVersion(3, 10)  # of the version message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,14 +281,25 @@ _BY_TYPE = {message.MESSAGE_TYPE: message for message in MESSAGES}
 _HEADER = struct.Struct(">QbB")  # timestamp, source, message type
 
 
-def version_message(version: SoftwareVersion, build_date: str = "03-05-2019, 06:39:00") -> VersionMessage:
-    """The version message of a controller; the date has the form of software 3.10 and later."""
+def version_message(
+    version: SoftwareVersion, built: datetime = datetime(2019, 5, 3, 6, 39)
+) -> VersionMessage:
+    """Return the version message of a controller.
+
+    Up to 3.2 the build number stands in the place of the third number; from 3.10 on it is 0. The date has two
+    forms. Source: captures of 3.3 and 3.10; that both changes came with 3.10 is assumed.
+
+    Args:
+        version: four numbers.
+        built: date and time of the build.
+    """
+    is_new = version >= _NEW_FORM
     return VersionMessage(
         major=version.major,
         minor=version.minor,
-        bugfix=version.bugfix,
-        build=version.build,
-        build_date=build_date,
+        bugfix=version.bugfix if _SINCE_3_3.covers(version) else version.build,
+        build=0 if is_new else version.build,
+        build_date=built.strftime("%d-%m-%Y, %H:%M:%S" if is_new else "%b %d %Y, %H:%M:%S"),
     )
 
 

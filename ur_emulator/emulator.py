@@ -30,12 +30,13 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.models.software import software_of
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.loop_runner import LoopRunner
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
-from ur_emulator.servers.box_access import BUILD, BoxAccess, BoxIdentity
+from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from ur_emulator.servers.box_reports import BoxReports
 from ur_emulator.servers.dashboard_answers import DashboardAnswers
 from ur_emulator.servers.dashboard_port import DashboardPort
@@ -109,7 +110,8 @@ class ControlBox(BoxOperations):
             EmulatorError: an argument is not among the allowed ones.
         """
         model = robot_by_name(robot)
-        software = _parse_version(version)
+        asked = _parse_version(version)
+        software = software_of(asked)
         imperfections = fidelity_by_name(fidelity)
         named_pace = _parse_pace(pace)
         if not 0.0 < speed < math.inf:
@@ -135,22 +137,20 @@ class ControlBox(BoxOperations):
         modbus = CodecLoader(self._loop)
         self._network = LoopNetwork(self._loop, modbus, host)
         controller = Controller(model, imperfections, seed, self._network, mode=RobotMode.RUNNING)
-        controller.state.ports.version = (software.major, software.minor)
+        controller.state.ports.version = (asked.major, asked.minor)
         self._box = ServedBox(
             controller, make_pacer(named_pace, controller.period_s, speed, phase), self._loop.expect_soon
         )
-        self._intake = ProgramIntake(self._loop, software, self._box.submit, self._box.announce)
+        self._intake = ProgramIntake(self._loop, software.version, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         player = ProgramPlayer(self._access, ProgramFolder(None if programs is None else Path(programs)))
         self._reports = BoxReports(player.folder)
-        states = StateEncoder(software, controller.state.arm)
+        states = StateEncoder(software.version, controller.state.arm)
         # In the order in which they hear of a cycle: first those whose clients act on it.
         ports: dict[str, ServedPort] = {
-            "realtime": RealtimePort(software, self._intake),
-            "rtde": RtdePort(
-                identity.version._replace(build=BUILD), controller, self._box.submit, self._box.announce
-            ),
+            "realtime": RealtimePort(software.version, self._intake),
+            "rtde": RtdePort(software.version, controller, self._box.submit, self._box.announce),
             "primary": PrimaryPort(software, controller, self._intake, states, all_messages=True),
             "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
             "dashboard": DashboardPort(
@@ -158,13 +158,13 @@ class ControlBox(BoxOperations):
                 DashboardAnswers(self._access, player, self._reports, self._shut_down),
             ),
             "modbus": ModbusPort(controller, self._box.submit, modbus),
-            "realtime_ro": RealtimePort(software, None),
+            "realtime_ro": RealtimePort(software.version, None),
             "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
             "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),
         }
         self.control_port = 0
         self._facts = {
-            "software": str(identity.version),
+            "software": str(asked),
             "robot": identity.model,
             "serial_number": identity.serial_number,
             "pace": named_pace.value,

@@ -17,6 +17,7 @@ from protocol.primary_packages import RobotState, decode_package
 from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
+from ur_emulator.models.software import software_of
 from ur_emulator.servers.primary_port import PrimaryPort
 from ur_emulator.servers.robot_state import StateEncoder
 
@@ -154,7 +155,11 @@ def test_the_secondary_port_tells_of_nothing():
 
     bench, client = Bench(), Client()
     port = PrimaryPort(
-        VERSION, bench.controller, None, StateEncoder(VERSION, bench.controller.state.arm), all_messages=False
+        software_of(VERSION),
+        bench.controller,
+        None,
+        StateEncoder(VERSION, bench.controller.state.arm),
+        all_messages=False,
     )
     port.opened(client)
     greeting = [

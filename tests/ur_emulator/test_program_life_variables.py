@@ -17,6 +17,7 @@ from protocol.primary_values import TypedValue, ValueType
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.commands.programs import StopProgram
+from ur_emulator.models.software import software_of
 from ur_emulator.servers.label_reporter import LabelReporter, parse_label
 from ur_emulator.servers.primary_port import PrimaryPort
 from ur_emulator.servers.robot_state import StateEncoder
@@ -60,7 +61,7 @@ class PortBench(Bench):
     def __init__(self, version=VERSION, *, all_messages=True):
         super().__init__(fidelity="ideal")
         self.port = PrimaryPort(
-            version,
+            software_of(version),
             self.controller,
             None,
             StateEncoder(version, self.controller.state.arm),

@@ -33,6 +33,7 @@ from ur_emulator.controller import events
 from ur_emulator.controller.safety import hardest_joint
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.models.software import software_of
 from ur_emulator.servers.event_messages import message_for
 from ur_emulator.servers.primary_port import PrimaryPort
 from ur_emulator.servers.program_intake import SPEED_WORD, WORDS
@@ -73,7 +74,7 @@ class PortBench(Bench):
         self.taken = []
         states = StateEncoder(version, self.controller.state.arm)
         self.primary, self.secondary, self.primary_ro, self.secondary_ro = self.ports = [
-            PrimaryPort(version, self.controller, intake, states, all_messages=every)
+            PrimaryPort(software_of(version), self.controller, intake, states, all_messages=every)
             for intake in (self, None)
             for every in (True, False)
         ]
@@ -93,6 +94,11 @@ class PortBench(Bench):
         return self.now
 
 
+def greeting_size(version):
+    """The date has 20 characters from 3.10 on and 21 before; the build number came with 3.3."""
+    return 55 if version >= SoftwareVersion(3, 10) else 56 if version >= SoftwareVersion(3, 3) else 52
+
+
 @pytest.mark.parametrize("version", VERSIONS, ids=str)
 def test_the_greeting_of_every_version(version):
     bench = PortBench(version)
@@ -102,7 +108,7 @@ def test_the_greeting_of_every_version(version):
         assert isinstance(decode_package(first_segment, version), M.VersionMessage)
         packages = client.take(version)
         expected = [
-            (M.VersionMessage, 55 if version >= SoftwareVersion(3, 3) else 51),
+            (M.VersionMessage, greeting_size(version)),
             (M.StartupMessage, 24),
             *([(SafetyTolerances, 181)] if version >= SoftwareVersion(3, 10) else []),
             (RobotState, state_size(version, first=True)),

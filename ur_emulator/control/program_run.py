@@ -45,7 +45,7 @@ class RunProgram(StepOperation[int]):
             yield from player.play("127.0.0.1")
             name = access.controller.programs.name
         else:
-            job = partial(_compile, str(self.script), access.identity.version)
+            job = partial(_compile, str(self.script), access.identity.software.version)
             program: CompiledProgram = yield from access.in_worker(job)
             yield from access.apply(StartProgram(program))
             name = program.name

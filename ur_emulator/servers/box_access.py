@@ -12,20 +12,15 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from protocol.ur_types import SoftwareVersion
 from ur_emulator.box_log import BoxLog, LogEntry
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.models.software import Software
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.scripting.network import Network
-
-# PolyscopeVersion carries four numbers and a date; clients search for the numbers. The date is that of CB3
-# 3.15.8's manual.
-BUILD = 106339
-BUILD_DATE = "Nov 30 2021"
 
 T = TypeVar("T")
 
@@ -35,12 +30,12 @@ class BoxIdentity:
     """What the box says of itself.
 
     Attributes:
-        version: of its software.
+        software: four numbers and a date.
         model: as people write it, "UR3".
         serial_number: digits; see protocol.ur_types.simulated_serial.
     """
 
-    version: SoftwareVersion
+    software: Software
     model: str
     serial_number: str
 

@@ -20,7 +20,7 @@ from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.errors import EmulatorError, RefusedError
-from ur_emulator.servers.box_access import BUILD, BUILD_DATE, BoxAccess
+from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.box_reports import BoxFacts, BoxReports
 from ur_emulator.servers.program_player import MissingFileRefusal, ProgramPlayer
 
@@ -69,7 +69,7 @@ class DashboardAnswers:
             "isProgramSaved": lambda row, *_: row.reply(saved="true", program=self._file_name),
             "programState": lambda row, *_: row.reply(state=self._state_word(), program=self._file_name),
             "PolyscopeVersion": lambda row, *_: row.reply(
-                version=str(access.identity.version._replace(build=BUILD)), date=BUILD_DATE
+                version=str(access.identity.software.version), date=access.identity.software.day
             ),
             "setUserRole": self._set_user_role,
             "getUserRole": lambda row, *_: row.reply(role=self._user_role),
@@ -111,7 +111,7 @@ class DashboardAnswers:
         return row.reply(path=loaded.wire_path) if loaded else row.reply("none")
 
     def _load(self, row: DashboardCommand, name: str, _: str) -> Steps:
-        if not row.replies_when_done(self._access.identity.version):
+        if not row.replies_when_done(self._access.identity.software.version):
             if not self._player.folder.has(name):
                 return row.reply("not_found", name=name)
             yield row.reply(path=self._player.folder.find(name).wire_path)
@@ -133,7 +133,7 @@ class DashboardAnswers:
 
     def _done(self, row: DashboardCommand, action: Action) -> Steps:
         """Answer when an action has come to its end, or, in older software, when it has begun."""
-        waits = row.replies_when_done(self._access.identity.version)
+        waits = row.replies_when_done(self._access.identity.software.version)
         try:
             for _ in action:
                 if not waits:
@@ -215,7 +215,7 @@ class DashboardAnswers:
         return BoxFacts(
             serial_number=access.identity.serial_number,
             versions={
-                "software": str(access.identity.version._replace(build=BUILD)),
+                "software": str(access.identity.software.version),
                 "robot": access.identity.model,
                 "emulator": package_version("ur-hil"),
                 "python": platform.python_version(),

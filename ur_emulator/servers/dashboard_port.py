@@ -51,7 +51,7 @@ class DashboardPort:
     def opened(self, connection: Connection) -> None:
         """Send the greeting line; a client that says no more may still hear."""
         connection.hear_out(self.ended)
-        session = _Session(DashboardConnection(Role.ROBOT, self._access.identity.version))
+        session = _Session(DashboardConnection(Role.ROBOT, self._access.identity.software.version))
         self._sessions[connection] = session
         connection.send(session.lines.greet())
 

@@ -17,6 +17,7 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.events import Event, ProgramStarted, ProgramStopped
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.models.software import Software
 from ur_emulator.servers.connection import Connection
 from ur_emulator.servers.event_messages import message_for
 from ur_emulator.servers.label_reporter import LabelReporter
@@ -36,7 +37,7 @@ class PrimaryPort:
 
     def __init__(
         self,
-        version: SoftwareVersion,
+        software: Software,
         controller: Controller,
         intake: ProgramIntake | None,
         states: StateEncoder,
@@ -46,13 +47,13 @@ class PrimaryPort:
         """Prepare the greeting.
 
         Args:
-            version: decides sizes and contents.
+            software: decides sizes and contents, and is told in the greeting.
             controller: its snapshot greets new clients.
             intake: takes script text; None makes the port read-only.
             states: encodes the states, shared by the ports of a box.
             all_messages: True on the primary port; the secondary one only sends the greeting.
         """
-        self._version = version
+        version = self._version = software.version
         self._controller = controller
         self._intake = intake
         self._states = states
@@ -62,7 +63,7 @@ class PrimaryPort:
         self._variables = VariableReporter(version)
         self._labels = LabelReporter(version)
         self._was_running = controller.snapshot.robot_mode == RobotMode.RUNNING
-        self._greeting = encode_message_package(version_message(version), version)
+        self._greeting = encode_message_package(version_message(version, software.built), version)
         self._second_greeting = encode_message_package(StartupMessage(), version)
         if version >= _TOLERANCES_SINCE:
             self._second_greeting += encode_safety_tolerances()

@@ -60,7 +60,7 @@ class ProgramPlayer:
         self.loaded: LoadedProgram | None = None
         self.installation: Installation | None = None
         self._ready: Outcome | None = None
-        self._catalogue: Catalogue = catalogue_for(access.identity.version)
+        self._catalogue: Catalogue = catalogue_for(access.identity.software.version)
 
     # --- state
 

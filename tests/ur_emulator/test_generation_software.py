@@ -1,0 +1,44 @@
+"""One software version gives one answer on all ports that tell it: numbers, build and date."""
+
+import json
+import zipfile
+
+import pytest
+from box_support import MessageReader, connect
+from dashboard_support import Dashboard, write_programs
+from rtde_support import RtdeClient
+
+from protocol import primary_messages as M
+from protocol import rtde_messages as R
+from protocol.ur_types import SoftwareVersion
+from ur_emulator import ControlBox
+
+# Version given, all four numbers, day, and what the version message says: third number, build, date.
+TOLD = [
+    ("3.2.0", (3, 2, 0, 19171), "Jan 01 2016", (19171, 0, "Jan 01 2016, 00:00:00")),
+    ("3.4.5", (3, 4, 5, 60), "Jul 08 2016", (5, 60, "Jul 08 2016, 16:07:20")),
+    ("3.12.1", (3, 12, 1, 76000), "May 03 2019", (1, 0, "03-05-2019, 06:39:00")),
+    ("3.15.8", (3, 15, 8, 106339), "Nov 30 2021", (8, 0, "30-11-2021, 00:00:00")),
+    ("3.15.8.7", (3, 15, 8, 7), "Nov 30 2021", (8, 0, "30-11-2021, 00:00:00")),
+]
+REPORTS_SINCE = SoftwareVersion(3, 13)
+
+
+@pytest.mark.parametrize(("given", "numbers", "day", "message"), TOLD, ids=[row[0] for row in TOLD])
+def test_every_port_tells_the_same_software(tmp_path, given, numbers, day, message):
+    version = SoftwareVersion(*numbers)
+    folder = write_programs(tmp_path)
+    with ControlBox(version=given, pace="lockstep", port_base=None, programs=folder) as box:
+        with connect(box, "rtde") as sock:
+            assert RtdeClient(sock).ask(R.GetControllerVersion()).version == version
+        with connect(box, "primary") as sock:
+            told = MessageReader(sock).message(M.VersionMessage)
+        assert (told.major, told.minor) == numbers[:2]
+        assert (told.bugfix, told.build, told.build_date) == message
+        with Dashboard(box) as dashboard:
+            assert dashboard.ask("PolyscopeVersion") == f"URSoftware {version} ({day})"
+            if version >= REPORTS_SINCE:
+                assert dashboard.ask("generate flight report").endswith(":1")
+                with zipfile.ZipFile(folder / "flightreports" / "flightreport_1.zip") as report:
+                    assert json.loads(report.read("versions.json"))["software"] == str(version)
+        assert box.identity["software"] == given
