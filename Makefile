@@ -49,16 +49,7 @@ format: $(STAMP) ## put the code into its canonical layout
 	$(BIN)/ruff check --fix .
 
 docs: $(STAMP) ## rewrite the generated pages
-	$(BIN)/python -m urscript.catalogue.coverage > docs/urscript-coverage.md
-	$(BIN)/python -m ur_emulator.controller.port_map_page > docs/protocol/modbus.md
-	$(BIN)/python -m ur_emulator.control.page > docs/control.md
-	$(BIN)/python -m ur_emulator.controller.states_page > docs/states.md
-	$(BIN)/python -m protocol.dashboard_page > docs/protocol/dashboard.md
-	$(BIN)/python -m protocol.ports_page > docs/protocol/README.md
-	$(BIN)/python -m protocol.realtime_page > docs/protocol/realtime.md
-	$(BIN)/python -m protocol.primary_page > docs/protocol/primary.md
-	$(BIN)/python -m protocol.rtde_page > docs/protocol/rtde.md
-	$(BIN)/python -m protocol.scripts_page > docs/protocol/scripts.md
+	$(BIN)/python -m docs.generate
 
 pictures: $(STAMP) ## draw the pictures of docs/contact.md (needs off-screen OpenGL, e.g. libegl1)
 	$(BIN)/python docs/make_contact_pictures.py

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
-from protocol import dashboard_page
 from protocol import dashboard_replies as R
 from protocol.dashboard_commands import COMMANDS, find, match_command, unknown_command_reply
 from protocol.dashboard_connection import (
@@ -24,11 +22,6 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
 
 V3_15 = SoftwareVersion(3, 15, 8)
-PAGE = Path(__file__).parents[2] / "docs" / "protocol" / "dashboard.md"
-
-
-def test_the_page_is_made_from_the_table():
-    assert PAGE.read_text() == dashboard_page.render(), "run: make docs"
 
 
 def events(connection, data, step=None):

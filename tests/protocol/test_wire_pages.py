@@ -1,4 +1,4 @@
-"""The pages docs/protocol/*.md are made from the tables, leave nothing out, and what they show works."""
+"""The pages docs/protocol/*.md leave nothing out, and what they show works."""
 
 import dataclasses
 import re
@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from protocol import ports_page, primary_page, realtime_page, rtde_page, scripts_page
+from docs.generate import ports_page, primary_page, realtime_page, rtde_page, scripts_page
+from docs.generate.page_parts import table
 from protocol.__main__ import _parser
 from protocol.controller_words import CONTROLLER_WORDS
-from protocol.page_parts import table
 from protocol.primary_layout import SUB_PACKAGES
 from protocol.primary_messages import MESSAGES
 from protocol.realtime_columns import COLUMNS, VERSIONS
@@ -19,18 +19,6 @@ from protocol.ur_types import Ports, SoftwareVersion
 from protocol.wire_record import wire_fields
 
 FOLDER = Path(__file__).parents[2] / "docs" / "protocol"
-PAGES = {
-    "README.md": ports_page,
-    "realtime.md": realtime_page,
-    "primary.md": primary_page,
-    "rtde.md": rtde_page,
-    "scripts.md": scripts_page,
-}
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_a_page_is_made_from_its_tables(name):
-    assert (FOLDER / name).read_text() == PAGES[name].render(), "run: make docs"
 
 
 def test_every_page_of_the_folder_is_linked_from_the_overview():
@@ -93,9 +81,9 @@ def test_every_word_is_on_the_page_of_scripts():
     assert all(f"| `{word.text}" in page for word in CONTROLLER_WORDS)
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_the_commands_that_pages_show_exist(name):
-    for command in re.findall(r"python -m protocol ([^`\n]+)", PAGES[name].render()):
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.md")), ids=lambda path: path.name)
+def test_the_commands_that_pages_show_exist(path):
+    for command in re.findall(r"python -m protocol ([^`\n]+)", path.read_text()):
         if "FILE" not in command and command not in ("layout", "decode"):
             _parser().parse_args(shlex.split(command))
 

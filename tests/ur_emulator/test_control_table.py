@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from ur_emulator.commands.obstacles import SIZES
 from ur_emulator.commands.parameters import Kind
 from ur_emulator.control.operations import OPERATIONS, BoxOperations, Reading, describe, make
-from ur_emulator.control.page import render
 from ur_emulator.control.waiting import CONDITIONS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ArgumentError
@@ -163,10 +162,6 @@ def test_the_table_is_json():
     rows = json.loads(json.dumps(describe(), allow_nan=False))
     assert [row["name"] for row in rows] == list(OPERATIONS)
     assert all(row["meaning"].endswith(".") for row in rows)
-
-
-def test_the_page_is_up_to_date():
-    assert (ROOT / "docs" / "control.md").read_text() == render(), "run `make docs`"
 
 
 def test_the_command_line_loads_no_physics():

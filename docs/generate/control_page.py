@@ -1,8 +1,7 @@
-"""docs/control.md: `python -m ur_emulator.control.page > docs/control.md`."""
+"""The page docs/control.md, made from the operations of the control API."""
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 from ur_emulator.commands.operation import Operation
@@ -89,7 +88,3 @@ def _row(parameter: Parameter) -> str:
     if parameter.kind is Kind.BOOLEAN and default != "required":
         default = default.lower()
     return f"| `{parameter.name}` | {parameter.meaning} | {parameter.allowed} | {default} |"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

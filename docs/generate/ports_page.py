@@ -1,15 +1,11 @@
-"""The page docs/protocol/README.md: all ports of a control box, and where to read about each.
-
-python -m protocol.ports_page > docs/protocol/README.md
-"""
+"""The page docs/protocol/README.md: all ports of a control box, and where to read about each."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from protocol.page_parts import table
+from docs.generate.page_parts import table
 from protocol.ur_types import Ports
 
 __all__ = ["ROWS", "PortRow", "render"]
@@ -43,7 +39,7 @@ ROWS: tuple[PortRow, ...] = (
 _INTRODUCTION = """\
 # The ports of the box
 
-Made from `protocol/ports_page.py` and `protocol/ur_types.py` by `make docs`.
+Made from `docs/generate/ports_page.py` and `protocol/ur_types.py` by `make docs`.
 
 `ur-emulator serve` opens these ports, with the numbers of a real control box, which most clients have
 built in; `--port-base N` adds N to all of them, and several boxes live side by side on loopback addresses
@@ -86,7 +82,3 @@ def _rows() -> Iterator[tuple[object, ...]]:
     for row in ROWS:
         takes = f"[{row.takes}](scripts.md)" if row.takes == _SCRIPT else row.takes
         yield getattr(numbers, row.name), row.sends, row.rate, takes, f"[{row.page}]({row.page})"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

@@ -1,14 +1,9 @@
-"""The page docs/protocol/scripts.md, made from the table of controller words and the limits of the channel.
-
-python -m protocol.scripts_page > docs/protocol/scripts.md
-"""
+"""The page docs/protocol/scripts.md, made from the controller words and the limits of the channel."""
 
 from __future__ import annotations
 
-import sys
-
+from docs.generate.page_parts import table
 from protocol.controller_words import CONTROLLER_WORDS
-from protocol.page_parts import table
 from protocol.script_channel import MAX_LINE, MAX_PROGRAM
 
 _INTRODUCTION = f"""\
@@ -61,7 +56,3 @@ def render() -> str:
     )
     end = "\nTo its clients the emulated arm is the real one: `set real` and `set sim` change nothing.\n"
     return "\n".join((_INTRODUCTION, *table(("word", "does", "known from"), rows), end))
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

@@ -1,11 +1,6 @@
-"""The page docs/protocol/modbus.md, made from the tables of the robot's Modbus map.
-
-python -m ur_emulator.controller.port_map_page > docs/protocol/modbus.md
-"""
+"""The page docs/protocol/modbus.md, made from the tables of the robot's Modbus map."""
 
 from __future__ import annotations
-
-import sys
 
 from ur_emulator.controller.port_map import COILS, REGISTERS, PortRow
 
@@ -78,7 +73,3 @@ def _line(row: PortRow) -> str:
     # What gives no value can be read all the same, as 0.
     access = ("R" if row.read or not row.write else "") + ("W" if row.write else "")
     return f"| {where} | {row.meaning} | {access} |"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

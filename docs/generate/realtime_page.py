@@ -1,14 +1,10 @@
-"""The page docs/protocol/realtime.md, made from the table of columns.
-
-python -m protocol.realtime_page > docs/protocol/realtime.md
-"""
+"""The page docs/protocol/realtime.md, made from the table of columns."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 
-from protocol.page_parts import MARKS, example, table
+from docs.generate.page_parts import MARKS, example, table
 from protocol.realtime_columns import COLUMNS, VERSIONS, RealtimeColumn
 from protocol.realtime_layout import layout_for_version
 from protocol.ur_types import SoftwareVersion
@@ -86,7 +82,3 @@ def _first(row: RealtimeColumn) -> str:
         for majors in ((3,), (5,))
     )
     return " / ".join(f"{first.major}.{first.minor}" if first else "-" for first in firsts)
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

@@ -1,11 +1,7 @@
-"""The page docs/states.md, made from the tables of the state machines.
-
-python -m ur_emulator.controller.states_page > docs/states.md
-"""
+"""The page docs/states.md, made from the tables of the state machines."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import NamedTuple
@@ -52,7 +48,8 @@ PROGRAM_WAYS: tuple[ProgramWay, ...] = (
 _HEAD = """\
 # States of the box
 
-Made from `ur_emulator/controller/safety_modes.py`, `robot_mode.py` and `states_page.py` by `make docs`.
+Made from `ur_emulator/controller/safety_modes.py`, `robot_mode.py` and
+`docs/generate/states_page.py` by `make docs`.
 Letters: D documented, O observed, I inferred, C chosen; see [fidelity.md](fidelity.md).
 
 Commands are those of `ur_emulator.commands`; `ControlBox.submit` takes them.
@@ -266,7 +263,3 @@ def _joint_rows() -> Iterator[tuple[str, str, str]]:
             if JOINT_MODES[robot, row.mode] is not plain
         ]
         yield robot.name, f"{plain.name} ({int(plain)})", ", ".join(others)
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

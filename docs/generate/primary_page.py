@@ -1,17 +1,13 @@
-"""The page docs/protocol/primary.md, made from the tables of sub-packages and messages.
-
-python -m protocol.primary_page > docs/protocol/primary.md
-"""
+"""The page docs/protocol/primary.md, made from the tables of sub-packages and messages."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from typing import Any
 
+from docs.generate.page_parts import MARKS, example, table
 from protocol.capture import StreamDecoder
 from protocol.layout_text import type_name
-from protocol.page_parts import MARKS, example, table
 from protocol.primary_layout import SUB_PACKAGES
 from protocol.primary_messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
 from protocol.primary_packages import (
@@ -189,7 +185,3 @@ def _numbers(names: Any) -> str:
 
 def _first_line(record: type[Any]) -> str:
     return (record.__doc__ or "").strip().splitlines()[0]
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

@@ -1,11 +1,6 @@
-"""The page docs/protocol/dashboard.md, made from the table of commands.
-
-python -m protocol.dashboard_page > docs/protocol/dashboard.md
-"""
+"""The page docs/protocol/dashboard.md, made from the table of commands."""
 
 from __future__ import annotations
-
-import sys
 
 from protocol.dashboard_commands import (
     COMMANDS,
@@ -63,7 +58,3 @@ def _line(row: DashboardCommand) -> str:
     done = f"{row.done_since.major}.{row.done_since.minor}" if row.done_since else ""
     cells = (f"`{name}`", row.does, f"`{row.replies['ok']}`", others, since, done)
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

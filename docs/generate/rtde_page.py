@@ -1,18 +1,14 @@
-"""The page docs/protocol/rtde.md, made from the tables of variables, states and types.
-
-python -m protocol.rtde_page > docs/protocol/rtde.md
-"""
+"""The page docs/protocol/rtde.md, made from the tables of variables, states and types."""
 
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterator
 from itertools import groupby
 
+from docs.generate.page_parts import MARKS, example, table
 from protocol.capture import RtdeDecoder
 from protocol.dashboard_connection import Role
-from protocol.page_parts import MARKS, example, table
 from protocol.rtde_codec import MAX_NAMES_SIZE, data_header
 from protocol.rtde_connection import MAX_REQUEST_SIZE, RtdeConnection
 from protocol.rtde_fields import INPUTS, OUTPUTS, RtdeField
@@ -144,7 +140,3 @@ def _example() -> str:
     sent += recipe.encode((63.536, (0.3944052, -1.7645076, -2.0996064, -0.1029924, 1.295028, 1.857006), 1))
     command = f"python -m protocol decode rtde --live 127.0.0.1 --names {','.join(names)}"
     return example(command, RtdeDecoder(names).feed(sent))
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

@@ -1,24 +1,18 @@
-"""The page `docs/urscript-coverage.md`, generated from the tables: which builtin is modelled how well.
-
-Run `python -m urscript.catalogue.coverage > docs/urscript-coverage.md` after changing a table; a test
-compares the two.
-"""
+"""The page `docs/urscript-coverage.md`, generated from the tables: which builtin is modelled how well."""
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from collections.abc import Iterable
 
-from .catalogue import ALL_ROWS, CB3_3_15, catalogue_for
-from .types import Builtin, Support
+from urscript.catalogue.catalogue import ALL_ROWS, CB3_3_15, catalogue_for
+from urscript.catalogue.types import Builtin, Support
 
 _HEAD = """\
 # URScript coverage
 
 Every builtin function that a controller knows, and how this box models it. The page is generated from the
-tables in `urscript/catalogue/`; do not edit it, run
-`python -m urscript.catalogue.coverage > docs/urscript-coverage.md`.
+tables in `urscript/catalogue/`; do not edit it, run `make docs`.
 
 * **exact**: does what the manual says, as far as the manual says it.
 * **approximate**: works; the note says what differs or is assumed.
@@ -118,7 +112,3 @@ def render() -> str:
         *_later_table(row for row in ALL_ROWS if not row.is_in(CB3_3_15.version)),
     ]
     return "\n".join(lines) + "\n"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(render())

@@ -1,0 +1,1 @@
+"""Makes the pages that come from tables: one module a page."""

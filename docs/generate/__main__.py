@@ -1,0 +1,35 @@
+"""Writes all pages that are made from tables: `make docs`."""
+
+from pathlib import Path
+
+from docs.generate import (
+    control_page,
+    coverage_page,
+    dashboard_page,
+    port_map_page,
+    ports_page,
+    primary_page,
+    realtime_page,
+    rtde_page,
+    scripts_page,
+    states_page,
+)
+
+DOCS = Path(__file__).parents[1]
+PAGES = {
+    "control.md": control_page.render,
+    "states.md": states_page.render,
+    "urscript-coverage.md": coverage_page.render,
+    "protocol/README.md": ports_page.render,
+    "protocol/dashboard.md": dashboard_page.render,
+    "protocol/modbus.md": port_map_page.render,
+    "protocol/primary.md": primary_page.render,
+    "protocol/realtime.md": realtime_page.render,
+    "protocol/rtde.md": rtde_page.render,
+    "protocol/scripts.md": scripts_page.render,
+}
+"""What makes each page, by its path below `docs/`."""
+
+if __name__ == "__main__":
+    for path, render in PAGES.items():
+        (DOCS / path).write_text(render(), encoding="utf-8")
