@@ -193,7 +193,7 @@ def test_a_script_that_sends_to_a_peer_that_never_reads_is_told(lockstep_box):
 
 @pytest.mark.parametrize("target", ["full backlog", "refused", "unknown name", "no address", "zero byte"])
 def test_an_open_that_cannot_succeed_returns_false(box, monkeypatch, target):
-    monkeypatch.setattr(pacing, "HANG_LIMIT", 0.1)  # s, instead of ten
+    monkeypatch.setattr(pacing, "HANG_LIMIT", 0.1)  # s, instead of a minute
     with ExitStack() as stack:
         host = {"unknown name": "robot.invalid", "no address": "a..b", "zero byte": "a\0b"}.get(
             target, "127.0.0.1"

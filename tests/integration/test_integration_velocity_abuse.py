@@ -142,7 +142,7 @@ def test_hold_ramps_to_rest_and_keeps_the_program(lockstep_box):
 
 @pytest.mark.parametrize("size", [1, 4, 27])
 def test_half_a_message_and_silence_end_the_program_in_the_end(lockstep_box, monkeypatch, size):
-    monkeypatch.setattr(pacing, "HANG_LIMIT", 0.1)  # s, instead of ten
+    monkeypatch.setattr(pacing, "HANG_LIMIT", 0.1)  # s, instead of a minute
     with Messages(lockstep_box) as primary, VelocitySession(lockstep_box, read_timeout=0.2) as session:
         session.spin_up()
         session.reverse.sendall(struct.pack(">7i", 1, *(INT_MAX,) * 6)[:size])

@@ -81,33 +81,68 @@ def test_lockstep_ticks_at_once_while_something_goes_on_and_never_otherwise():
     assert not pacer.may_tick(1e6, Box(is_active=False))
 
 
+def wait(pacer, box, seconds, begin=0.0):
+    """Ask as often as the loop does; returns after how many seconds the first cycle may begin, or None."""
+    for k in range(round(seconds / PERIOD)):
+        if pacer.may_tick(begin + k * PERIOD, box):
+            return k * PERIOD
+    return None
+
+
 def test_lockstep_holds_time_while_a_script_waits_and_lets_go_after_the_hang_limit_at_real_pace():
     pacer = LockstepPacer(PERIOD)
     box = Box(waits_outside=True)
-    assert not pacer.may_tick(0.0, box)
-    assert not pacer.may_tick(HANG_LIMIT - 1e-3, box)
-    assert pacer.may_tick(HANG_LIMIT + 1e-3, box)
-    assert not pacer.may_tick(HANG_LIMIT + 2e-3, box)
-    assert pacer.may_tick(HANG_LIMIT + 2e-3 + PERIOD, box)
+    let_go = wait(pacer, box, 2 * HANG_LIMIT)
+    assert let_go == pytest.approx(HANG_LIMIT, abs=2 * PERIOD)
+    assert not pacer.may_tick(let_go + 0.5 * PERIOD, box)
+    assert pacer.may_tick(let_go + 1.01 * PERIOD, box)
     box.waits_outside = False
-    assert pacer.may_tick(HANG_LIMIT + 3e-3 + PERIOD, box)
+    assert pacer.may_tick(let_go + 1.02 * PERIOD, box)
 
 
 def test_lockstep_waits_for_readers_but_not_for_ever():
-    pacer = LockstepPacer(PERIOD)
     box = Box(readers_full=True)
-    assert not pacer.may_tick(0.0, box)
-    assert not pacer.may_tick(READER_LIMIT - 1e-3, box)
-    assert box.given_up == 0
-    assert pacer.may_tick(READER_LIMIT + 1e-3, box)
+    assert wait(LockstepPacer(PERIOD), box, 2 * READER_LIMIT) == pytest.approx(READER_LIMIT, abs=2 * PERIOD)
     assert box.given_up == 1
 
 
 def test_the_limits_count_from_the_beginning_of_each_wait():
     pacer = LockstepPacer(PERIOD)
-    assert not pacer.may_tick(0.0, Box(waits_outside=True))
-    assert pacer.may_tick(1.0, Box())
-    assert not pacer.may_tick(HANG_LIMIT + 0.5, Box(waits_outside=True))
+    for begin in (0.0, HANG_LIMIT, 2 * HANG_LIMIT):
+        assert wait(pacer, Box(waits_outside=True), 0.6 * HANG_LIMIT, begin) is None
+        assert pacer.may_tick(begin + 0.7 * HANG_LIMIT, Box())
+    assert wait(pacer, Box(readers_full=True), 0.6 * READER_LIMIT) is None
+    assert pacer.may_tick(0.7 * READER_LIMIT, Box())
+    assert wait(pacer, Box(readers_full=True), 0.6 * READER_LIMIT, READER_LIMIT) is None
+
+
+@pytest.mark.parametrize("waiting", [{"waits_outside": True}, {"readers_full": True}])
+def test_a_box_that_was_stopped_does_not_lose_patience_with_its_clients(waiting):
+    pacer, box = LockstepPacer(PERIOD), Box(**waiting)
+    for hour in range(10):
+        assert wait(pacer, box, 1.0, 3600.0 * hour) is None
+    assert box.given_up == 0
+
+
+@pytest.mark.parametrize("waiting", [{"waits_outside": True}, {"readers_full": True}])
+def test_a_client_that_is_stopped_for_half_a_minute_loses_nothing(waiting):
+    box = Box(**waiting)
+    assert wait(LockstepPacer(PERIOD), box, 40.0) is None
+    assert box.given_up == 0
+
+
+def test_while_a_script_waits_nobody_loses_patience_with_readers():
+    pacer, box = LockstepPacer(PERIOD), Box(waits_outside=True, readers_full=True)
+    assert wait(pacer, box, HANG_LIMIT - 1.0) is None
+    box.waits_outside = False  # the client goes on: it sends first and reads then
+    assert wait(pacer, box, READER_LIMIT - 1.0, HANG_LIMIT) is None
+    assert box.given_up == 0
+
+
+def test_a_script_that_hangs_is_not_held_up_by_readers_as_well():
+    box = Box(waits_outside=True, readers_full=True)
+    assert wait(LockstepPacer(PERIOD), box, 2 * HANG_LIMIT) == pytest.approx(HANG_LIMIT, abs=2 * PERIOD)
+    assert box.given_up == 1
 
 
 def test_pacers_have_names():

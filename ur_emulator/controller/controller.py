@@ -108,13 +108,18 @@ class Controller:
 
     @property
     def is_active(self) -> bool:
-        """True while a program runs, the arm moves or a mode changes: why time passes in lockstep."""
+        """True while the box is busy or the arm settles: why time passes in lockstep."""
+        return self._settle > 0 or self.is_busy
+
+    @property
+    def is_busy(self) -> bool:
+        """True while a program runs, the arm moves, a mode changes or a protective stop is locked."""
         return (
             self.programs.has_work
             or self.state.motion.is_moving
             or self.state.mode.is_changing
             or self.safety.is_stopping
-            or self._settle > 0
+            or self._settle > SETTLE_CYCLES
             or self.push.will_end
         )
 

@@ -12,14 +12,18 @@ import math
 from enum import Enum
 from typing import Protocol
 
+from protocol.patience import Patience
+
 # A box that could not tick for this long (a suspended laptop, a debugger) starts a new time base instead of
 # racing after the old one.
 MAX_BACKLOG = 0.5  # s
+# Both limits below count the time in which this process ran; a client may be stopped for half a minute, by
+# SIGSTOP or in a debugger, and lose nothing.
 # In lockstep, a script that has waited this long in real seconds for bytes gets time anyway, at real pace,
 # so that its own time-out can end the hang.
-HANG_LIMIT = 10.0  # s
+HANG_LIMIT = 60.0  # s
 # In lockstep, a client that has not read for this long in real seconds is not waited for any more.
-READER_LIMIT = 5.0  # s
+READER_LIMIT = 60.0  # s
 
 
 class Pace(Enum):
@@ -110,29 +114,26 @@ class LockstepPacer:
 
     def __init__(self, period_s: float) -> None:
         self._period = period_s
-        self._waiting_since = math.nan
-        self._full_since = math.nan
+        self._outside = Patience()
+        self._readers = Patience()
         self._last_tick = -math.inf
 
     def may_tick(self, now: float, situation: Situation) -> bool:
         """True when something is going on and nothing outside holds time still."""
         if not situation.is_active:
-            self._waiting_since = self._full_since = math.nan
+            self._outside.restart()
+            self._readers.restart()
             return False
+        hangs = situation.waits_outside
+        if not hangs:
+            self._outside.restart()
+        elif self._outside.spent(now) < HANG_LIMIT or now - self._last_tick < self._period:
+            return False  # time stands still anyway: whoever does not read loses nothing
         if situation.readers_full:
-            if math.isnan(self._full_since):
-                self._full_since = now
-            if now - self._full_since < READER_LIMIT:
+            if not hangs and self._readers.spent(now) < READER_LIMIT:
                 return False
             situation.give_up_readers()
-        self._full_since = math.nan
-        if situation.waits_outside:
-            if math.isnan(self._waiting_since):
-                self._waiting_since = now
-            if now - self._waiting_since < HANG_LIMIT or now - self._last_tick < self._period:
-                return False
-        else:
-            self._waiting_since = math.nan
+        self._readers.restart()
         self._last_tick = now
         return True
 

@@ -93,15 +93,21 @@ class ServedBox:
 
     @property
     def readers_full(self) -> bool:
-        """True while a client has frames waiting that it has not read, unless it was given up."""
+        """True while a client has frames waiting that it has not read, unless it was given up.
+
+        Nobody is waited for while the arm only settles: a client that waits for rest would take the frames
+        that are repeated meanwhile for the last ones. They are few and find room in the outbox.
+        """
         if not self.backlog:
             self._given_up.clear()
             return False
         self._given_up &= self.backlog
-        return len(self._given_up) < len(self.backlog)
+        return len(self._given_up) < len(self.backlog) and (bool(self._commands) or self.controller.is_busy)
 
     def give_up_readers(self) -> None:
         """Wait no longer for clients that are behind, until they have caught up."""
+        for client in self.backlog - self._given_up:
+            self.notice(f"{client.peer} does not read: it is not waited for any more and loses frames")
         self._given_up = set(self.backlog)
 
     def fell_behind(self, n_cycles: int) -> None:
