@@ -6,8 +6,9 @@ from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError
 
 CONNECT_TIMEOUT = 2.0
-REPLY_TIMEOUT = 2.5
-"""Longer than a box takes. Source: ur_rtde's dashboard time-out."""
+REPLY_TIMEOUT = 60.0
+"""A server that takes the connection answers within milliseconds; one that is stopped is waited for, or the
+recording would call the serial number unknown."""
 
 _GREETING = "Universal Robots Dashboard Server"
 

@@ -14,6 +14,7 @@ from pc_client.driver.watchdog import software
 from pc_client.errors import DriverError, RobotStoppedError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
+from protocol.patience import LONGEST_STEP, Patience
 from protocol.primary_layout import ConfigurationData, SubPackage
 from protocol.primary_messages import (
     ErrorCodeMessage,
@@ -70,22 +71,24 @@ class PackageStream:
             DriverError: no version message in time, this is no Universal Robots port, or the software is of
                 a CB2, whose packages have other forms.
         """
-        deadline = self._network.now() + VERSION_TIMEOUT
+        waited = Patience()
         while self.version is None:
-            if self._network.now() > deadline:
+            if waited.spent(self._network.now()) > VERSION_TIMEOUT:
                 raise DriverError(
                     f"the {self._name} port says nothing about its version: is this a control box?"
                 )
-            self._early += self._read(0.1) or []
+            self._early += self._read(LONGEST_STEP) or []
         if self.version < OLDEST:
             raise DriverError(software(self.version).complaint)
         return self.version
 
     def wait_for_configuration(self) -> ConfigurationData | None:
         """Return the configuration, which the first state has; None if the robot does not send it in time."""
-        deadline = self._network.now() + VERSION_TIMEOUT
-        while ConfigurationData.SUB_TYPE not in self._newest and self._network.now() <= deadline:
-            self._early += self._read(0.1) or []
+        waited = Patience()
+        while ConfigurationData.SUB_TYPE not in self._newest:
+            if waited.spent(self._network.now()) > VERSION_TIMEOUT:
+                break
+            self._early += self._read(LONGEST_STEP) or []
         return self.newest(ConfigurationData)
 
     def newest(self, record: type[S]) -> S | None:

@@ -12,10 +12,19 @@ from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
+from protocol.patience import LONGEST_STEP, Patience
 from protocol.realtime_layout import MAX_FRAME_SIZE, RealtimeFrame, RealtimeLayout, layout_for_size
+from protocol.ur_types import ProgramState
 
 FRAME_TIMEOUT = 1.0
 """Without a frame for this long [s] the robot counts as gone (125 frames of a CB3 box)."""
+
+STOPPED_TIMEOUT = 120.0
+"""The same for a robot whose time waits for its clients [s]: its arm does not move unattended, so a box that
+is stopped or gets no processor is sat out. Longer than the box itself has patience with others."""
+
+_STEP = 0.5 * LONGEST_STEP
+"""How long one look at the connection waits [s]: all of it counts as patience."""
 
 
 class Arrival(NamedTuple):
@@ -41,9 +50,11 @@ class RealtimeClient:
 
     Attributes:
         last_stamp: newest time stamp seen [s], or None before the first frame.
+        time_waits: the robot's time stands still when nobody wants anything: it has repeated a time stamp
+            while no program ran, which a real controller never does.
     """
 
-    __slots__ = ("_buffer", "_layout", "_network", "_transport", "last_stamp")
+    __slots__ = ("_buffer", "_layout", "_network", "_transport", "last_stamp", "time_waits")
 
     def __init__(self, transport: Transport, network: Network) -> None:
         self._transport = transport
@@ -51,6 +62,7 @@ class RealtimeClient:
         self._buffer = FrameBuffer(MAX_FRAME_SIZE)
         self._layout: RealtimeLayout | None = None
         self.last_stamp: float | None = None
+        self.time_waits = False
 
     @property
     def layout(self) -> RealtimeLayout:
@@ -74,23 +86,27 @@ class RealtimeClient:
         """The robot's address."""
         return self._transport.peer_address
 
-    def receive(self, timeout: float = FRAME_TIMEOUT) -> Arrival:
+    def receive(self) -> Arrival:
         """Wait for at least one frame and take all that are there.
 
         Raises:
-            DriverError: no whole frame within `timeout` [s], the stream ended, or it is no realtime stream.
+            DriverError: no whole frame in time, the stream ended, or it is no realtime stream.
         """
         buffer = self._buffer
-        data = self._transport.receive(timeout)
+        data = self._transport.receive(_STEP)
         try:
             if data:
                 buffer.feed(data)
                 first = buffer.next_frame()
                 if first is not None:  # the usual case: exactly one frame
                     return self._sort(first)
-            return self._receive_slowly(data, timeout)
+            return self._receive_slowly(data)
         except RemoteProtocolError as error:
             raise DriverError(f"the realtime port sends no realtime frames: {error}") from error
+
+    def patience(self, timeout: float) -> float:
+        """How long to wait for what a robot whose time runs by itself does within `timeout` [s]."""
+        return max(timeout, STOPPED_TIMEOUT) if self.time_waits else timeout
 
     def drain(self) -> Arrival | None:
         """Take what has already arrived, without waiting; None when nothing has.
@@ -119,17 +135,18 @@ class RealtimeClient:
         """Close the connection."""
         self._transport.close()
 
-    def _receive_slowly(self, data: bytes | None, timeout: float) -> Arrival:
+    def _receive_slowly(self, data: bytes | None) -> Arrival:
         """Go on until a whole frame is there."""
-        deadline = self._network.now() + timeout
+        waited, timeout = Patience(), self.patience(FRAME_TIMEOUT)
+        waited.spent(self._network.now() - (_STEP if data is None else 0.0))
         while True:
             if data == b"":
                 raise DriverError("the robot closed the realtime connection")
-            if data is None or self._network.now() > deadline:
+            if waited.spent(self._network.now()) > timeout:
                 raise DriverError(
                     f"no realtime frame for {timeout:g} s: the robot or the network to it is gone"
                 )
-            data = self._transport.receive(timeout)
+            data = self._transport.receive(_STEP)
             if data:
                 self._buffer.feed(data)
                 first = self._buffer.next_frame()
@@ -152,5 +169,7 @@ class RealtimeClient:
                 self.last_stamp = stamp
             else:
                 n_heartbeats += 1
+                if getattr(frame, "runtime_state", None) == ProgramState.STOPPED:  # old software has none
+                    self.time_waits = True
             raw = self._buffer.next_frame()
         return Arrival(new, frame, n_heartbeats)

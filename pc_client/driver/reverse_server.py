@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pc_client.driver.transport import Listener, Network, PortTakenError, Transport
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
+from protocol.patience import Patience
 from protocol.velocity_stream import HELLO_SIZE, decode_hello
 
 REVERSE_PORT = 31000
@@ -65,8 +66,8 @@ class ReverseServer:
         """Wait for the program's call and its hello.
 
         Args:
-            meanwhile: called between two looks: reads the other connections and raises when the robot
-                reports an error.
+            meanwhile: called between two looks: reads the other connections, waits for a robot that says
+                nothing at all, and raises when it reports an error.
             timeout: [s].
 
         Returns:
@@ -75,7 +76,7 @@ class ReverseServer:
         Raises:
             DriverError: nobody called in time, or the caller is not our program.
         """
-        deadline = self._network.now() + timeout
+        waited = Patience()
         while True:
             caller = self._listener.accept(_POLL)
             if caller is not None:
@@ -83,13 +84,13 @@ class ReverseServer:
                     break
                 caller.close()  # somebody else found the port
             meanwhile()
-            if self._network.now() > deadline:
+            if waited.spent(self._network.now()) > timeout:
                 raise DriverError(
                     f"the robot's program did not dial back to {self._address}:{self.port} within "
                     f"{timeout:g} s: does a firewall keep it from this TCP port?"
                 )
         try:
-            _read_hello(caller, timeout)
+            self._read_hello(caller, meanwhile, timeout)
         except BaseException:
             caller.close()
             raise
@@ -98,6 +99,24 @@ class ReverseServer:
     def close(self) -> None:
         """Close the listening port."""
         self._listener.close()
+
+    def _read_hello(self, caller: Transport, meanwhile: Callable[[], None], timeout: float) -> None:
+        waited = Patience()
+        received = b""
+        while len(received) < HELLO_SIZE:
+            data = caller.receive(_POLL)
+            if data is None and waited.spent(self._network.now()) <= timeout:
+                meanwhile()
+            elif data:
+                received += data
+            else:
+                raise DriverError(
+                    "the robot's program dialled back but did not say hello: it ended or is another one"
+                )
+        try:
+            decode_hello(received)
+        except RemoteProtocolError as error:
+            raise DriverError(f"the robot's program is not our velocity receiver: {error}") from error
 
 
 def _is_from(caller: str, robot: str) -> bool:
@@ -115,18 +134,3 @@ def _listen(network: Network, address: str, port: int | None) -> Listener:
         if port is not None or not _is_loopback(address):
             raise
         return network.listen(address, 0)
-
-
-def _read_hello(caller: Transport, timeout: float) -> None:
-    received = b""
-    while len(received) < HELLO_SIZE:
-        data = caller.receive(timeout)
-        if not data:
-            raise DriverError(
-                "the robot's program dialled back but did not say hello: it ended or is another one"
-            )
-        received += data
-    try:
-        decode_hello(received)
-    except RemoteProtocolError as error:
-        raise DriverError(f"the robot's program is not our velocity receiver: {error}") from error

@@ -19,15 +19,24 @@ from pc_client.control.tracker import Tracker
 from pc_client.driver.package_stream import PackageStream, raise_on_error
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import receiver_script
-from pc_client.driver.reverse_server import ReverseServer
+from pc_client.driver.reverse_server import DIAL_TIMEOUT, ReverseServer
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
 from pc_client.driver.robot_report import RobotReport, make_report, read_payload, reported_slider
 from pc_client.driver.stop_script import STOP_WORD, stop_script
 from pc_client.driver.transport import Network, TcpNetwork, Transport
 from pc_client.driver.velocity_stream import RowSink, StreamReport, VelocityStream, collector_paused
 from pc_client.driver.waiting import REST_TIMEOUT, wait_for_rest, wait_until
-from pc_client.driver.watchdog import check_idle, check_safety, check_slider, has_ended, is_stopped, software
+from pc_client.driver.watchdog import (
+    ProgramEndedError,
+    check_idle,
+    check_safety,
+    check_slider,
+    has_ended,
+    is_stopped,
+    software,
+)
 from pc_client.errors import DriverError
+from protocol.primary_messages import TextMessage
 from protocol.realtime_layout import RealtimeFrame, RealtimeLayout
 from protocol.ur_types import Ports
 from protocol.velocity_stream import VelocityMode, encode_velocity
@@ -74,7 +83,7 @@ class UrDriver:
         self._network: Network = network or TcpNetwork()
         self._open: list[RealtimeClient | PackageStream | ReverseServer] = []
         self._in_motion = False
-        self._program = ""
+        self._program = self._last_text = ""
         try:
             self._connect()
         except BaseException:
@@ -159,13 +168,16 @@ class UrDriver:
         try:
             with _AlwaysStopped(self) as guard:
                 self._start(receiver_script(server.address, server.port, acceleration=acceleration))
-                reverse = server.accept_program(self._look_after)
+                reverse = server.accept_program(self._look_after, self._frames.patience(DIAL_TIMEOUT))
                 guard.reverse = reverse
                 stream = VelocityStream(
                     self._frames, reverse, self._network, self.info.period, self._raise_robot_errors
                 )
-                with collector_paused():
-                    report = stream.run(tracker, on_row)
+                try:
+                    with collector_paused():
+                        report = stream.run(tracker, on_row)
+                except ProgramEndedError as error:
+                    raise self._explain(error) from error
                 self._wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
                 wait_for_rest(self._frames, self._network)
         finally:
@@ -252,25 +264,38 @@ class UrDriver:
         self._frames.drain()
         self._primary.poll()
         self._scripts.poll()
-        self._program = text
+        self._program, self._last_text = text, ""
         self._scripts.send_program(text)
         self._wait(
             lambda frame: not is_stopped(frame),
             START_TIMEOUT,
-            f"the robot did not start the program within {START_TIMEOUT:g} s: is it in local control?",
+            "the robot did not start the program in time: is it in local control?",
         )
 
     def _raise_robot_errors(self) -> None:
         """Read both script ports; raise what the robot reports about our program, or a moved speed slider."""
         self._scripts.poll()
-        raise_on_error(self._primary.poll(), self._program)
+        messages = self._primary.poll()
+        for message in messages:
+            if isinstance(message, TextMessage):
+                self._last_text = message.text
+        raise_on_error(messages, self._program)
         check_slider(reported_slider(self._primary))
 
+    def _explain(self, error: ProgramEndedError) -> DriverError:
+        """Say why our program has ended, as far as the robot tells."""
+        try:
+            self._raise_robot_errors()
+        except DriverError as reason:
+            return reason
+        said = "the pendant or another client stopped it"
+        if self._last_text:
+            said = f'the robot\'s last message is "{self._last_text}"'
+        return ProgramEndedError(f"{error}; {said}")
+
     def _look_after(self) -> None:
-        """Read everything that has come, while waiting for something else."""
-        arrival = self._frames.drain()
-        if arrival is not None:
-            check_safety(arrival.latest)
+        """Read everything that has come, while waiting for something else; at least one frame comes."""
+        check_safety(self._frames.receive().latest)
         self._raise_robot_errors()
 
     def _wait(self, condition: Callable[[RealtimeFrame], bool], timeout: float, complaint: str) -> None:

@@ -19,6 +19,7 @@ from pc_client.driver.receiver_script import READ_TIMEOUT
 from pc_client.driver.transport import Network, Transport
 from pc_client.driver.watchdog import check_streaming, is_at_full_speed
 from pc_client.errors import DriverError
+from protocol.patience import Patience
 from protocol.realtime_layout import RealtimeFrame
 from protocol.velocity_stream import VelocityMode, encode_velocity
 
@@ -26,7 +27,8 @@ RowSink = Callable[[RealtimeFrame, TrackerStep], None]
 """Takes every new frame with what the tracker made of it."""
 
 LONGEST_STANDSTILL = 5.0
-"""Seconds of our clock that the robot's time may stand still: a command must have been lost."""
+"""Seconds of our clock that the robot's time may stand still: a command must have been lost. Longer where
+time waits for clients: it may wait for another one that is stopped."""
 
 _FRAMES_BEFORE_START = 3
 """New frames after which a robot counts as one whose time runs by itself."""
@@ -172,16 +174,16 @@ class VelocityStream:
 
     def _wait_for_new(self, report: StreamReport) -> list[RealtimeFrame]:
         """Sit out heartbeats until time goes on."""
-        deadline = self._network.now() + LONGEST_STANDSTILL
+        waited, longest = Patience(), self._frames.patience(LONGEST_STANDSTILL)
         while True:
             arrival = self._frames.receive()
             report.heartbeats += arrival.n_heartbeats
             if arrival.new:
                 return arrival.new
             check_streaming(arrival.latest)
-            if self._network.now() > deadline:
+            if waited.spent(self._network.now()) > longest:
                 raise DriverError(
-                    f"the robot's time has stood still for {LONGEST_STANDSTILL:g} s although it has a command"
+                    f"the robot's time has stood still for {longest:g} s although it has a command"
                 )
 
     def _check_waiting(self, answered: float) -> None:

@@ -1,6 +1,7 @@
 """Waiting for something to show in the frames. Looks at every single frame, so that no short state is missed.
 
-Time-outs count by our clock: in a world faster than real time it is the patient one.
+Time-outs count by our clock, while we run: in a world faster than real time it is the patient one. Where the
+robot's time waits for its clients they are longer, since it may wait for another one that is stopped.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.transport import Network
 from pc_client.driver.watchdog import is_at_rest
 from pc_client.errors import DriverError
+from protocol.patience import Patience
 from protocol.realtime_layout import RealtimeFrame
 
 REST_TIMEOUT = 5.0
@@ -34,21 +36,21 @@ def wait_until(
         condition: what to wait for.
         frames: the realtime port.
         network: the clock.
-        timeout: [s].
+        timeout: [s]; of a robot whose time runs by itself.
         complaint: message of the error when it takes longer.
         check: called with the newest frame before the condition is looked at; raises what ends the waiting.
 
     Raises:
         DriverError: it took too long, or the frames ended.
     """
-    deadline = network.now() + timeout
+    waited, longest = Patience(), frames.patience(timeout)
     while True:
         arrival = frames.receive()
         if check is not None:  # first: what went wrong may also meet the condition, e.g. end the program
             check(arrival.latest)
         if any(condition(frame) for frame in arrival.new) or condition(arrival.latest):
             return
-        if network.now() > deadline:
+        if waited.spent(network.now()) > longest:
             raise DriverError(complaint)
 
 
@@ -73,12 +75,12 @@ def wait_for_rest(frames: RealtimeClient, network: Network) -> RealtimeFrame:
             at_rest_since = stamp
         return stamp - at_rest_since >= _REST_TIME
 
-    deadline = network.now() + REST_TIMEOUT
+    waited, longest = Patience(), frames.patience(REST_TIMEOUT)
     while True:
         arrival = frames.receive()
         rested = [has_rested(frame) for frame in arrival.new]
         stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
         if (rested and rested[-1]) or (stands_still and is_at_rest(arrival.latest)):
             return arrival.latest
-        if network.now() > deadline:
-            raise DriverError(f"the arm did not come to rest within {REST_TIMEOUT:g} s")
+        if waited.spent(network.now()) > longest:
+            raise DriverError(f"the arm did not come to rest within {longest:g} s")

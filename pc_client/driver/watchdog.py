@@ -29,6 +29,10 @@ _HOW_TO_GO_ON = {
 }
 
 
+class ProgramEndedError(RobotStoppedError):
+    """The program that follows our velocities runs no more."""
+
+
 def software(version: SoftwareVersion) -> Condition:
     """The controller is of the generation that this client was made for."""
     major = version.major
@@ -138,7 +142,8 @@ def check_streaming(frame: RealtimeFrame) -> None:
     """Check a frame of a running stream.
 
     Raises:
-        RobotStoppedError: the robot may not move any more, or its program has ended.
+        RobotStoppedError: the robot may not move any more.
+        ProgramEndedError: its program has ended.
         DriverError: the robot slows the arm down.
     """
     if frame.safety_mode in SAFE_MODES and frame.robot_mode == RUNNING and frame.runtime_state == PLAYING:
@@ -146,7 +151,7 @@ def check_streaming(frame: RealtimeFrame) -> None:
             raise DriverError(speed_scaling(frame).complaint)
         return
     check_safety(frame)
-    raise RobotStoppedError(
+    raise ProgramEndedError(
         f"the robot's program is {_name(ProgramState, frame.runtime_state)}: it ended before the movement did"
     )
 

@@ -127,7 +127,6 @@ def test_the_process_leaves_with_that_code_and_one_line(arguments, code, tmp_pat
 def hasty(monkeypatch):
     monkeypatch.setattr(package_stream, "VERSION_TIMEOUT", 0.1)
     monkeypatch.setattr(realtime_client, "FRAME_TIMEOUT", 0.1)
-    monkeypatch.setattr(realtime_client.RealtimeClient.receive, "__defaults__", (0.1,))
     monkeypatch.setattr(dashboard_query, "REPLY_TIMEOUT", 0.1)
 
 

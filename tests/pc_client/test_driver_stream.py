@@ -17,6 +17,7 @@ from pc_client.driver.velocity_stream import check_command
 from pc_client.errors import ClientError, DriverError, RobotStoppedError
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.recording.layout import Phase
+from protocol.primary_messages import RuntimeExceptionMessage, TextMessage
 from protocol.velocity_stream import VelocityMode
 
 UR3 = robot_model("ur3")
@@ -373,6 +374,98 @@ def test_time_that_stands_still_for_ever_is_an_error():
         stream(robot)
     assert robot.programs[-1].startswith("def ur_client_stop")
     assert robot.at_rest
+
+
+HALF_A_MINUTE = 30.0
+
+
+def commands_of(robot):
+    stream(robot)
+    return [(command.mode, command.qd) for command in robot.received]
+
+
+def box_is_stopped(robot):
+    """No frame comes for half a minute."""
+    robot.silent_until = robot.clock + HALF_A_MINUTE
+
+
+def box_waits_for_another_client(robot):
+    """Frames repeat for half a minute."""
+    robot.still_until = robot.clock + HALF_A_MINUTE
+
+
+def client_is_stopped(robot):
+    """The clock of the client has jumped when it goes on."""
+    robot.clock += 3600.0
+
+
+def spoilt_lives(robot, action, tick):
+    """Let the robot live on as `action` has it, which happens once, before the cycle `tick`."""
+    live = robot.live
+    robot.silent_until = robot.still_until = -1.0
+    pending = [action]
+
+    def spoilt():
+        if robot.tick == tick and pending:
+            pending.pop()(robot)
+        if robot.clock < robot.silent_until:
+            return
+        if robot.clock < robot.still_until:
+            robot.clock += PERIOD
+            robot.pipes["realtime"].incoming.append(robot.frame())
+            return
+        live()
+
+    robot.live = spoilt
+    return robot
+
+
+@pytest.mark.parametrize("tick", [1001, 1040, 1110, 1115])
+@pytest.mark.parametrize("action", [box_is_stopped, box_waits_for_another_client, client_is_stopped])
+def test_where_time_waits_half_a_minute_changes_nothing(action, tick):
+    assert commands_of(spoilt_lives(FakeRobot(), action, tick)) == commands_of(FakeRobot())
+
+
+def test_a_robot_whose_time_runs_by_itself_is_gone_after_a_second_without_a_frame():
+    robot = spoilt_lives(FakeRobot(lockstep=False), box_is_stopped, 1040)
+    with pytest.raises(DriverError, match="no realtime frame for 1 s"):
+        stream(robot)
+
+
+def test_a_robot_whose_time_runs_by_itself_must_not_stand_still_for_long():
+    robot = spoilt_lives(FakeRobot(lockstep=False), box_waits_for_another_client, 1040)
+    with pytest.raises(DriverError, match="stood still for 5 s although it has a command"):
+        stream(robot)
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        (
+            "velocity_receiver: no message from the client",
+            'last message is "velocity_receiver: no message from the client"',
+        ),
+        (None, "the pendant or another client stopped it"),
+    ],
+)
+def test_a_program_that_ends_early_is_quoted(said, words):
+    def end(robot):
+        if said:
+            robot.report(TextMessage(text=said))
+        program_ends(robot)
+
+    robot = FakeRobot(lockstep=False, on_tick=spoil_at(1040, end))
+    with pytest.raises(RobotStoppedError, match=f"is STOPPED: it ended before the movement did; .*{words}"):
+        stream(robot)
+
+
+def test_an_error_of_the_program_is_told_instead_of_its_end():
+    def fail(robot):
+        robot.report(RuntimeExceptionMessage(line=2, column=3, text="out_of_cheese"))
+        program_ends(robot)
+
+    with pytest.raises(RobotStoppedError, match="failed in line 2, column 3: out_of_cheese"):
+        stream(FakeRobot(lockstep=False, on_tick=spoil_at(1041, fail)))
 
 
 def test_check_command_accepts_the_limits_themselves():

@@ -8,6 +8,7 @@ import struct
 import pytest
 from fake_robot import LAYOUT, FakeRobot
 
+from pc_client.driver import realtime_client
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.transport import PortTakenError, TcpNetwork, TcpTransport
 from pc_client.errors import DriverError
@@ -139,11 +140,12 @@ def test_drain_takes_everything(pair):
     assert client.last_stamp == pytest.approx(1100 * 0.008)
 
 
-def test_no_frames_and_no_realtime_port(pair):
+def test_no_frames_and_no_realtime_port(pair, monkeypatch):
     ours, theirs = pair
     client = RealtimeClient(ours, TcpNetwork())
+    monkeypatch.setattr(realtime_client, "FRAME_TIMEOUT", 0.01)
     with pytest.raises(DriverError, match=r"no realtime frame for 0\.01 s"):
-        client.receive(0.01)
+        client.receive()
     theirs.sendall(b"HTTP/1.0 400 Bad Request\r\n\r\n")
     with pytest.raises(DriverError, match="no realtime frames"):
-        client.receive(1.0)
+        client.receive()

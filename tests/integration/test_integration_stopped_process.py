@@ -1,0 +1,71 @@
+"""In lockstep a process that is stopped, client or box, changes nothing: not a byte of the recording.
+
+Two seconds are longer than the client waits for a frame of a robot whose time runs by itself. That half a minute
+is sat out as well is held where clocks are handed in: test_realtime_pacing.py, test_driver_stream.py.
+"""
+
+import os
+import signal
+import time
+from contextlib import contextmanager
+
+import pytest
+from integration_support import Frames, at, finish, send, serving, start
+
+from pc_client.recording.loader import load_recording
+from protocol.ur_types import ProgramState
+
+STOPPED = 2.0  # s
+
+
+@contextmanager
+def stopped(process):
+    """The block runs while the process is stopped."""
+    process.send_signal(signal.SIGSTOP)
+    os.waitpid(process.pid, os.WUNTRACED)
+    try:
+        yield
+    finally:
+        process.send_signal(signal.SIGCONT)
+
+
+def recording(folder, who):
+    """Run a short movement, in which one process is stopped; returns the bytes of its recording."""
+    folder.mkdir()
+    out = folder / "out"
+    path = out / "uniform_4_1_r1.mcap"
+    with serving(folder, "--pace", "lockstep", "--seed", 7) as box:
+        client = start("pc_client", "run", "uniform_4_1", *at(box), "--out", out)
+        with Frames(box) as frames:
+            frames.until(lambda f: abs(f.target_qd).max() > 0.1 and path.exists())
+        processes = {"client": client, "box": box.process}
+        if who in processes:
+            with stopped(processes[who]):
+                time.sleep(STOPPED)
+                assert not load_recording(path).complete
+        done = finish(client)
+    assert done.code == 0, done.err
+    return path.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    return recording(tmp_path_factory.mktemp("undisturbed") / "run", None)
+
+
+@pytest.mark.parametrize("who", ["client", "box"])
+def test_a_process_that_is_stopped_in_a_movement_changes_no_byte(tmp_path, undisturbed, who):
+    assert recording(tmp_path / "run", who) == undisturbed
+
+
+def test_a_client_that_reads_nothing_for_a_while_is_waited_for_and_loses_nothing(lockstep_box):
+    with Frames(lockstep_box) as late, Frames(lockstep_box) as frames:
+        begin = late.next().timestamp
+        send(lockstep_box, "secondary", "def f():\n  sleep(60)\nend\n")
+        frames.until(
+            lambda f: f.runtime_state == ProgramState.PLAYING and frames.stamps[-2:-1] == frames.stamps[-1:]
+        )
+        held = frames.stamps[-1]
+        assert held < begin + 60.0
+        late.until_stamp(held)
+        assert late.lost() == 0
