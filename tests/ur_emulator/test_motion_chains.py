@@ -29,7 +29,7 @@ from ur_emulator.controller.safety import find_invalid_setpoint
 from ur_emulator.motion.leg import move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
 from ur_emulator.motion.path import PoseLine, arc_through
-from ur_emulator.motion.survey import JOINT_ACCELERATION
+from ur_emulator.motion.path_samples import JOINT_ACCELERATION
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import UnreachableError
 

@@ -61,7 +61,7 @@ def test_no_limit_is_exceeded_and_the_end_is_reached_at_rest(parts):
         before, v_before = s, v
     assert found.at(found.duration) == (pytest.approx(total), 0.0)
     for (s, v, a), t, after in zip(
-        found.segments, found.times, (*found.times[1:], found.duration), strict=True
+        found.phases, found.times, (*found.times[1:], found.duration), strict=True
     ):
         part = interval_at(parts, s + 0.5 * (found.at(after)[0] - s))
         w = v + a * (after - t)
@@ -76,10 +76,10 @@ def test_no_limit_is_exceeded_and_the_end_is_reached_at_rest(parts):
 def test_speed_is_continuous_from_segment_to_segment(parts):
     found = plan(parts, 0.0)
     for k, t in enumerate(found.times[1:], 1):
-        s, v, a = found.segments[k - 1]
+        s, v, a = found.phases[k - 1]
         dt = t - found.times[k - 1]
-        assert v + a * dt == pytest.approx(found.segments[k].v, rel=1e-6, abs=1e-7)
-        assert s + (v + 0.5 * a * dt) * dt == pytest.approx(found.segments[k].s, rel=1e-9, abs=1e-9)
+        assert v + a * dt == pytest.approx(found.phases[k].v, rel=1e-6, abs=1e-7)
+        assert s + (v + 0.5 * a * dt) * dt == pytest.approx(found.phases[k].s, rel=1e-9, abs=1e-9)
 
 
 @settings(deadline=None)

@@ -9,7 +9,7 @@ from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.generators import Generator, StopJ
 from ur_emulator.motion.overlay import Overlay, OverlayChain
 from ur_emulator.motion.path_motion import HOLD, PathMotion
-from ur_emulator.motion.pause import Detour
+from ur_emulator.motion.pause import ReturnToPath
 from ur_emulator.motion.speed_l import StopL
 from ur_emulator.motion.target import ZERO6, JointTarget
 
@@ -42,7 +42,7 @@ class ArmMotion(PathMotion):
     @property
     def is_paused(self) -> bool:
         """True when a pause has brought the arm to rest."""
-        return self._pace.paused and not any(self.target.qd)
+        return self._time_scaling.paused and not any(self.target.qd)
 
     # --- stops
 
@@ -54,7 +54,7 @@ class ArmMotion(PathMotion):
         """
         if self._owner is owner:
             move = self._move
-            if move is not None and move.left:
+            if move is not None and move.returned:
                 self._owner = None
             else:
                 self.stop(self.stop_deceleration)
@@ -66,7 +66,7 @@ class ArmMotion(PathMotion):
         """
         self._abandon()
         self._brake(deceleration)
-        self._pace.reset()
+        self._time_scaling.reset()
 
     def place(self, q: Vector6, qd: Vector6 = ZERO6) -> None:
         """Set the target to `q` [rad], without a path: the joints were moved by something else.
@@ -74,7 +74,7 @@ class ArmMotion(PathMotion):
         If they still move, with `qd` [rad/s], they are ramped to rest. In a pause, what was under way goes on
         from there.
         """
-        if self._pace.paused:
+        if self._time_scaling.paused:
             self._suspend()
         else:
             self._abandon()
@@ -108,8 +108,8 @@ class ArmMotion(PathMotion):
         else:
             self._suspend()
         self._brake(deceleration)
-        self._pace.paused = self._is_special = True
-        self._pace.factor = 0.0
+        self._time_scaling.paused = self._is_special = True
+        self._time_scaling.factor = 0.0
 
     # --- overlays
 
@@ -169,23 +169,25 @@ class ArmMotion(PathMotion):
     def _special_step(self, dt: float, scale: float) -> JointTarget:
         """Do a cycle with overlays or in a pause."""
         before = self.target
-        pace = self._pace.step(dt)
-        if pace > 0.0 or _brakes(self._generator):
-            path = self._advance(dt, scale, pace)
+        time_factor = self._time_scaling.step(dt)
+        if time_factor > 0.0 or _brakes(self._generator):
+            path = self._advance(dt, scale, time_factor)
         else:
             path = self.path = self.path if not any(self.path.qd) else self.path.at_rest()
         if not self._overlays:
             self.target = path
-        elif pace > 0.0 or any(path.qd):
-            self.target = self._chain.displace(path, before, dt, pace)
+        elif time_factor > 0.0 or any(path.qd):
+            self.target = self._chain.displace(path, before, dt, time_factor)
             if self._may_settle():
                 self._take_over_target()
         elif any(before.qd) or any(before.qdd):
             self.target = before.at_rest()
-        self._is_special = bool(self._overlays) or not self._pace.is_normal
+        self._is_special = bool(self._overlays) or not self._time_scaling.is_normal
         return self.target
 
 
 def _brakes(generator: Generator) -> bool:
     """True for what comes to rest by itself, in a pause too."""
-    return isinstance(generator, StopJ | StopL) or (isinstance(generator, Detour) and generator.is_braking)
+    return isinstance(generator, StopJ | StopL) or (
+        isinstance(generator, ReturnToPath) and generator.is_braking
+    )

@@ -18,7 +18,7 @@ from ur_emulator.motion.cubic import Cubic, Vector
 from ur_emulator.motion.joint_path import JointCurve, JointLine, JointPath, ToolPath
 from ur_emulator.motion.leg import Leg
 from ur_emulator.motion.path import PoseLine, PosePath, measure
-from ur_emulator.motion.survey import Sample, reaches, survey
+from ur_emulator.motion.path_samples import Sample, reaches_end, sample_path
 from ur_emulator.motion.tool import UnreachableError
 
 # Beyond this turn the circular blend of a movep gets so narrow that the cubic takes its place.
@@ -76,8 +76,8 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     if isinstance(a, ToolPath) and isinstance(b, ToolPath):
         curve = _tool_curve(first, second, a, b, leave, after)
         v = max(first.v, second.v)
-        samples = survey(curve, first.tool, first.near(leave), v)
-        if not reaches(samples, curve.length, first.tool.arm.robot):
+        samples = sample_path(curve, first.tool, first.near(leave), v)
+        if not reaches_end(samples, curve.length, first.tool.arm.robot):
             return None
         return Blend(
             ToolPath(curve, first.tool), leave, after, 1.0, v / curve.rate, min(first.a, second.a), samples

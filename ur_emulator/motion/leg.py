@@ -11,7 +11,7 @@ from protocol.pose import Pose
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.joint_path import JointLine, JointPath, ToolPath
 from ur_emulator.motion.path import PoseLine, PosePath
-from ur_emulator.motion.survey import Sample, reaches, survey
+from ur_emulator.motion.path_samples import Sample, reaches_end, sample_path
 from ur_emulator.motion.tool import Tool
 
 # A move stretched more than this does not move in any lifetime; keeps its numbers within those of floats.
@@ -191,8 +191,8 @@ def move_tool(
     length = path.length
     if length <= 0.0:
         return Leg(ToolPath(path, tool), tool, near, tool.pose(near), v, a, t, r, process)
-    samples = survey(path, tool, near, max(v, 2.0 * length / t) if t > 0.0 else v)
-    goal = samples[-1].q if reaches(samples, length, tool.arm.robot) else None
+    samples = sample_path(path, tool, near, max(v, 2.0 * length / t) if t > 0.0 else v)
+    goal = samples[-1].q if reaches_end(samples, length, tool.arm.robot) else None
     goal_pose = path.at(length)[0]
     return Leg(ToolPath(path, tool), tool, goal, goal_pose, v, a, t, r, process, samples)
 

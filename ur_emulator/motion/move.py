@@ -17,7 +17,7 @@ from math import dist
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.blend import blend
 from ur_emulator.motion.leg import Leg
-from ur_emulator.motion.piece import Piece, piece_of_blend, piece_of_leg
+from ur_emulator.motion.path_segment import PathSegment, segment_of_blend, segment_of_leg
 from ur_emulator.motion.speed_plan import SpeedPlan, StoppingCurve, plan, stopping_curve
 from ur_emulator.motion.target import JointTarget
 
@@ -44,7 +44,7 @@ class Move:
 
     Attributes:
         done: at rest at the last waypoint.
-        left: the instruction has given way: another one may follow, or the arm stops at the waypoint.
+        returned: the instruction has returned: another one may follow, or the arm stops at the waypoint.
         taken: moves that joined since the last cycle.
         left_out: the move behind the last one of the chain if its waypoint is left out for now.
     """
@@ -55,24 +55,24 @@ class Move:
         self._time = self._time_before = 0.0
         self._cycle = 0.0
         self._zone = _zone(leg, 0.0)
-        self._pieces: list[Piece] = [piece_of_leg(leg, 0.0, 1.0)]
+        self._segments: list[PathSegment] = [segment_of_leg(leg, 0.0, 1.0)]
         self._ends: list[float] = []
         self._plan: SpeedPlan
         self._stopping: StoppingCurve | None = None
-        rest = plan(self._pieces[0].intervals, 0.0)
+        rest = plan(self._segments[0].intervals, 0.0)
         assert rest is not None
         self._use(rest)
         # A move to where the arm is has no way, but may have a duration.
         self._wait = leg.t if leg.path.length <= 0.0 else 0.0
         self.done = self._plan.duration <= 0.0 and self._wait <= 0.0
-        self.left = False
+        self.returned = False
         self.taken = 0
         self.left_out: Leg | None = None
 
     @property
     def goal(self) -> Vector6 | None:
         """Joint angles at the waypoint that the arm is on its way to [rad]; None if it cannot be there."""
-        return self._pieces[self._at(self._plan.at(self._time)[0])].leg.goal
+        return self._segments[self._at(self._plan.at(self._time)[0])].leg.goal
 
     @property
     def leg(self) -> Leg:
@@ -128,20 +128,20 @@ class Move:
         for _ in range(_ATTEMPTS):
             found = blend(self._leg, second, radius, min(self._zone, last.end - last.begin))
             if found is not None:
-                pieces = [
+                segments = [
                     *ahead[:-1],
                     last.cut(end=found.leave),
-                    piece_of_blend(found, second, last.scale),
-                    piece_of_leg(second, found.enter, last.scale * found.scale),
+                    segment_of_blend(found, second, last.scale),
+                    segment_of_leg(second, found.enter, last.scale * found.scale),
                 ]
-                planned = plan([part for piece in pieces for part in piece.intervals], speed)
+                planned = plan([interval for segment in segments for interval in segment.intervals], speed)
                 if planned is not None:
                     self._leg = second
                     self.left_out = None
                     self._zone = _zone(second, found.enter)
-                    self._pieces = pieces
+                    self._segments = segments
                     self._use(planned)
-                    self.left = False
+                    self.returned = False
                     self.taken += 1
                     return True
             radius *= _SHRINK
@@ -164,10 +164,10 @@ class Move:
             return JointTarget(q)
         s, speed = self._plan.at(time)
         k = self._at(s)
-        piece = self._pieces[k]
+        segment = self._segments[k]
         begin = self._ends[k - 1] if k > 0 else 0.0
-        q, slope = piece.path.at(min(piece.begin + (s - begin) / piece.scale, piece.end), near)
-        rate = scale * speed / piece.scale
+        q, slope = segment.path.at(min(segment.begin + (s - begin) / segment.scale, segment.end), near)
+        rate = scale * speed / segment.scale
         qd = six([rate * x for x in slope])
         return JointTarget(q, qd, six([(b - a) / dt for a, b in zip(target.qd, qd, strict=True)]))
 
@@ -181,26 +181,26 @@ class Move:
         self.left_out = None
 
     def _use(self, found: SpeedPlan) -> None:
-        """Begin a plan for the pieces now."""
+        """Begin a plan for the segments now."""
         self._plan = found
         self._time = self._time_before = 0.0
-        self._ends = list(accumulate(piece.length for piece in self._pieces))
+        self._ends = list(accumulate(segment.length for segment in self._segments))
         self._stopping = None
         if self._zone > 0.0:
-            last = self._pieces[-1]
-            intervals = [part for piece in self._pieces for part in piece.intervals]
+            last = self._segments[-1]
+            intervals = [interval for segment in self._segments for interval in segment.intervals]
             self._stopping = stopping_curve(intervals, self._ends[-1] - self._zone * last.scale)
 
     def _at(self, s: float) -> int:
-        """Return which piece a way leads to."""
-        return min(bisect_right(self._ends, s), len(self._pieces) - 1)
+        """Return which segment a way leads to."""
+        return min(bisect_right(self._ends, s), len(self._segments) - 1)
 
-    def _ahead(self, s: float) -> list[Piece]:
-        """Return what is left of the pieces after a way."""
+    def _ahead(self, s: float) -> list[PathSegment]:
+        """Return what is left of the segments after a way."""
         k = self._at(s)
-        piece = self._pieces[k]
-        begin = piece.begin + (s - (self._ends[k - 1] if k > 0 else 0.0)) / piece.scale
-        return [piece.cut(begin=min(begin, piece.end)), *self._pieces[k + 1 :]]
+        segment = self._segments[k]
+        begin = segment.begin + (s - (self._ends[k - 1] if k > 0 else 0.0)) / segment.scale
+        return [segment.cut(begin=min(begin, segment.end)), *self._segments[k + 1 :]]
 
 
 def _zone(leg: Leg, begin: float) -> float:

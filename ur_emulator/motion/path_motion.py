@@ -17,7 +17,7 @@ from __future__ import annotations
 from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.generators import Generator, Hold, StopJ, Streamed
 from ur_emulator.motion.move import Move
-from ur_emulator.motion.pause import PAUSE_RATE, Detour, Pace, Suspended
+from ur_emulator.motion.pause import PAUSE_RATE, ReturnToPath, Suspended, TimeScaling
 from ur_emulator.motion.target import JointTarget
 
 # How fast the speed scaling follows the slider [1/s]: a step would be a step of the joints' speed. Chosen.
@@ -45,7 +45,7 @@ class PathMotion:
         self._renewed = False
         self.scaling_rate = SCALING_RATE
         self._scale = 1.0
-        self._pace = Pace()
+        self._time_scaling = TimeScaling()
         self._suspended: Suspended | None = None
         # A pause, or something else that the usual cycle does not look after: one test in the hot path.
         self._is_special = False
@@ -71,7 +71,7 @@ class PathMotion:
     def _move(self) -> Move | None:
         """The move under way, also while it is interrupted."""
         generator = self._generator if self._suspended is None else self._suspended.generator
-        if isinstance(generator, Detour):
+        if isinstance(generator, ReturnToPath):
             return generator.move
         return generator if isinstance(generator, Move) else None
 
@@ -100,12 +100,12 @@ class PathMotion:
     @property
     def is_pausing(self) -> bool:
         """True from `pause` to `resume`."""
-        return self._pace.paused
+        return self._time_scaling.paused
 
     @property
     def is_returning(self) -> bool:
         """True while the arm goes back to the path that an interruption led it away from."""
-        return isinstance(self._generator, Detour)
+        return isinstance(self._generator, ReturnToPath)
 
     def pause(self, deceleration: float = 0.0) -> None:
         """Ramp the arm to rest on its path; a stream ends like one that is not renewed any more.
@@ -115,12 +115,12 @@ class PathMotion:
         Args:
             deceleration: of the leading axis, if that is faster than the usual ramp [rad/s^2].
         """
-        pace = self._pace
-        if pace.paused:
+        scaling = self._time_scaling
+        if scaling.paused:
             return
-        pace.paused = self._is_special = True
+        scaling.paused = self._is_special = True
         speed = max(map(abs, self.path.qd))
-        pace.slowing = max(PAUSE_RATE, deceleration * pace.factor / speed if speed > 0.0 else 0.0)
+        scaling.slowing = max(PAUSE_RATE, deceleration * scaling.factor / speed if speed > 0.0 else 0.0)
         generator = self._generator
         if isinstance(generator, Streamed):
             self._suspend()
@@ -128,19 +128,19 @@ class PathMotion:
 
     def resume(self) -> None:
         """End a pause: a move goes on where it stopped, a stream if it is renewed in this cycle."""
-        if not self._pace.paused:
+        if not self._time_scaling.paused:
             return
-        self._pace.paused = False
+        self._time_scaling.paused = False
         if (suspended := self._suspended) is not None:
             self._suspended = None
             generator, self._owner, back_to = suspended
-            self._generator = Detour(generator, back_to) if isinstance(generator, Move) else generator
+            self._generator = ReturnToPath(generator, back_to) if isinstance(generator, Move) else generator
             self._renewed = True
 
     def _suspend(self) -> None:
         generator = self._generator
-        if self._suspended is None and isinstance(generator, Move | Detour | Streamed):
-            if isinstance(generator, Detour):
+        if self._suspended is None and isinstance(generator, Move | ReturnToPath | Streamed):
+            if isinstance(generator, ReturnToPath):
                 self._suspended = Suspended(generator.move, self._owner, generator.back_to)
             else:
                 self._suspended = Suspended(generator, self._owner, self.path.q)
@@ -153,7 +153,7 @@ class PathMotion:
 
     # --- cycle
 
-    def _advance(self, dt: float, scale: float, pace: float) -> JointTarget:
+    def _advance(self, dt: float, scale: float, time_factor: float) -> JointTarget:
         """Advance on the path by one cycle."""
         generator = self._generator
         if scale != self._scale:
@@ -163,15 +163,15 @@ class PathMotion:
             if not self._renewed:
                 generator = self._generator = generator.when_lost()
             self._renewed = False
-        path = self.path = generator.step(self.path, dt, scale * pace)
+        path = self.path = generator.step(self.path, dt, scale * time_factor)
         if generator.done and not isinstance(generator, Streamed):
             self._end_of(generator)
         return path
 
     def _end_of(self, generator: Generator) -> None:
-        if isinstance(generator, Detour):
+        if isinstance(generator, ReturnToPath):
             self._generator = generator.move
-            self._pace.factor = 0.0
+            self._time_scaling.factor = 0.0
             self._is_special = True
         else:
             self._generator = HOLD

@@ -21,7 +21,7 @@ PAUSE_RATE = 4.0
 RETURN_SPEED, RETURN_ACCELERATION = 0.25, 1.0
 
 
-class Pace:
+class TimeScaling:
     """How fast time passes on the path: a factor that ramps between 1 and 0.
 
     Attributes:
@@ -68,7 +68,7 @@ class Suspended(NamedTuple):
     q: Vector6
 
 
-class Detour:
+class ReturnToPath:
     """The way back to where a move left its path; then the move itself begins.
 
     Attributes:

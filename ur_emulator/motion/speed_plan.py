@@ -52,7 +52,7 @@ class Interval(NamedTuple):
         return 2.0 * least if least > 0.0 else 0.0
 
 
-class Segment(NamedTuple):
+class Phase(NamedTuple):
     """Part of a plan at constant acceleration: it begins at `s` with speed `v`."""
 
     s: float
@@ -65,13 +65,13 @@ class SpeedPlan:
     """Way and speed over time.
 
     Attributes:
-        segments: in order.
+        phases: in order.
         times: when each begins; the first at 0.
         duration: when the end is reached.
         length: way in all.
     """
 
-    segments: tuple[Segment, ...]
+    phases: tuple[Phase, ...]
     times: tuple[float, ...]
     duration: float
     length: float
@@ -81,7 +81,7 @@ class SpeedPlan:
         if t >= self.duration:
             return self.length, 0.0
         k = max(0, bisect_right(self.times, t) - 1)
-        s, v, a = self.segments[k]
+        s, v, a = self.phases[k]
         dt = t - self.times[k]
         return s + (v + 0.5 * a * dt) * dt, max(0.0, v + a * dt)
 
@@ -121,7 +121,7 @@ def plan(intervals: Sequence[Interval], entry: float) -> SpeedPlan | None:
     if z > backward[0] * _ROUNDING:
         return None
     z = min(z, backward[0])
-    segments: list[Segment] = []
+    phases: list[Phase] = []
     times: list[float] = []
     time = begin = 0.0
     for interval, z_end, down in zip(intervals, backward[1:], slopes, strict=True):
@@ -130,13 +130,13 @@ def plan(intervals: Sequence[Interval], entry: float) -> SpeedPlan | None:
             way = end - done
             if way > _NOTHING * interval.length:
                 v = sqrt(z)
-                segments.append(Segment(begin + done, v, 0.5 * (z_next - z) / way))
+                phases.append(Phase(begin + done, v, 0.5 * (z_next - z) / way))
                 times.append(time)
                 time += 2.0 * way / (v + sqrt(z_next))
                 done = end
             z = z_next
         begin += interval.length
-    return SpeedPlan(tuple(segments), tuple(times), time, begin)
+    return SpeedPlan(tuple(phases), tuple(times), time, begin)
 
 
 def stopping_curve(intervals: Sequence[Interval], stop: float) -> StoppingCurve:

@@ -49,12 +49,12 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
             may_overlap: nothing is said of a waypoint that is left out.
         """
         move = motion.move_of(thread)
-        if move is not None and move.left and not move.done:
+        if move is not None and move.returned and not move.done:
             last = move.leg
             if last.goal is not None and last.tool.tcp == state.tcp_offset:
                 outcome = move.follow(make(last.goal, last.goal_pose))
                 if outcome is Follow.BLENDED:
-                    yield from ride(move)
+                    yield from wait_for_return(move)
                     return
                 if outcome is Follow.SKIPPED:
                     if not may_overlap:
@@ -76,15 +76,15 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         start = motion.path.q
         move = Move(make(start, state.arm.fk(start, state.tcp_offset)))
         take_arm(state, thread, move)
-        yield from ride(move)
+        yield from wait_for_return(move)
 
-    def ride(move: Move) -> Cycles:
+    def wait_for_return(move: Move) -> Cycles:
         """Wait until a move gives way; where waypoints lie close together that may be in this very cycle."""
         if move.done:
             yield NEXT_CYCLE
         while not move.open or (move.taken >= MOST_PER_CYCLE and not move.done):
             yield NEXT_CYCLE
-        move.left = True
+        move.returned = True
 
     def pose_of(target: Any) -> ToolPose:
         return _pose(target) if isinstance(target, Pose) else state.arm.fk(floats(target), state.tcp_offset)

@@ -1,4 +1,4 @@
-"""What a path of the tool asks of the joints, looked at before the tool sets out.
+"""Samples of a path of the tool in joint angles, taken before the tool moves, and the speed that they allow.
 
 Near a singularity a slow tool needs fast joints. So the path is sampled, closer where the joint speeds change
 much, and every part of it gets the greatest speed that keeps the joints within theirs: the tool slows down in
@@ -67,7 +67,7 @@ class JointLimit(NamedTuple):
     bound: tuple[float, float]
 
 
-def survey(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tuple[Sample, ...]:
+def sample_path(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tuple[Sample, ...]:
     """Sample a path; what the arm cannot reach, and all behind it, is left out.
 
     Args:
@@ -86,7 +86,7 @@ def survey(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tuple[Sam
     return tuple(samples)
 
 
-def reaches(samples: tuple[Sample, ...], end: float, robot: RobotModel) -> bool:
+def reaches_end(samples: tuple[Sample, ...], end: float, robot: RobotModel) -> bool:
     """Return whether the arm can follow a path up to its end.
 
     It cannot where even at the least speed a joint would be too fast: through a singularity, or at the end of

@@ -1,4 +1,4 @@
-"""Pieces of a chain of moves: parts of moves and the blends between them, with the limits of their speed."""
+"""Segments of the path of a chain of moves: parts of moves and the blends between them, with their limits."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.blend import Blend
 from ur_emulator.motion.joint_path import JointCurve, JointPath
 from ur_emulator.motion.leg import Leg
+from ur_emulator.motion.path_samples import JOINT_SPEED_SHARE, Sample, joint_limits
 from ur_emulator.motion.speed_plan import Interval
-from ur_emulator.motion.survey import JOINT_SPEED_SHARE, Sample, joint_limits
 
 # Longest way on a bend that is planned at a constant acceleration, in units of 1 / bend; most such ways.
 _SHORT, _MOST = 0.25, 32
@@ -19,7 +19,7 @@ _SHORT, _MOST = 0.25, 32
 Bounds = tuple[tuple[float, float], ...]
 
 
-class Part(NamedTuple):
+class Limits(NamedTuple):
     """Constant limits on a part of a path, in units of the path.
 
     Attributes:
@@ -34,7 +34,7 @@ class Part(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class PathSegment:
     """A part of a path to be travelled.
 
     Attributes:
@@ -42,8 +42,8 @@ class Piece:
         begin, end: of the part [unit].
         scale: units of the chain that one unit of the path counts.
         leg: the move whose waypoint it leads to.
-        parts: limits, of the whole path.
-        intervals: limits of the piece, in units of the chain.
+        limits: of the whole path.
+        intervals: the limits within the segment, in units of the chain.
     """
 
     path: JointPath
@@ -51,7 +51,7 @@ class Piece:
     end: float
     scale: float
     leg: Leg
-    parts: tuple[Part, ...]
+    limits: tuple[Limits, ...]
     intervals: tuple[Interval, ...]
 
     @property
@@ -59,48 +59,48 @@ class Piece:
         """Way in units of the chain."""
         return (self.end - self.begin) * self.scale
 
-    def cut(self, *, begin: float | None = None, end: float | None = None) -> Piece:
-        """Return a shorter piece."""
+    def cut(self, *, begin: float | None = None, end: float | None = None) -> PathSegment:
+        """Return a shorter segment."""
         begin = self.begin if begin is None else begin
         end = self.end if end is None else end
-        intervals = _intervals(self.parts, begin, end, self.scale)
+        intervals = _intervals(self.limits, begin, end, self.scale)
         return replace(self, begin=begin, end=end, intervals=intervals)
 
 
-def piece_of_leg(leg: Leg, begin: float, scale: float) -> Piece:
+def segment_of_leg(leg: Leg, begin: float, scale: float) -> PathSegment:
     """Return a move from a point of its path on."""
     path = leg.path
-    parts = _parts(path, leg.v, leg.a, leg.samples, _robot(leg))
-    intervals = _intervals(parts, begin, path.length, scale)
-    return Piece(path, begin, path.length, scale, leg, parts, intervals)
+    limits = _limits(path, leg.v, leg.a, leg.samples, _robot(leg))
+    intervals = _intervals(limits, begin, path.length, scale)
+    return PathSegment(path, begin, path.length, scale, leg, limits, intervals)
 
 
-def piece_of_blend(blend: Blend, to: Leg, scale: float) -> Piece:
+def segment_of_blend(blend: Blend, to: Leg, scale: float) -> PathSegment:
     """Return a blend that leads into a move."""
     path = blend.path
     v = blend.v
     if isinstance(path, JointCurve):
         for speed, most in zip(path.speeds, _robot(to).qd_max, strict=True):
             v = min(v, JOINT_SPEED_SHARE * most / speed) if speed > 0.0 else v
-    parts = _parts(path, v, blend.a, blend.samples, _robot(to))
-    intervals = _intervals(parts, 0.0, path.length, scale)
-    return Piece(path, 0.0, path.length, scale, to, parts, intervals)
+    limits = _limits(path, v, blend.a, blend.samples, _robot(to))
+    intervals = _intervals(limits, 0.0, path.length, scale)
+    return PathSegment(path, 0.0, path.length, scale, to, limits, intervals)
 
 
-def _intervals(parts: tuple[Part, ...], begin: float, end: float, scale: float) -> tuple[Interval, ...]:
+def _intervals(limits: tuple[Limits, ...], begin: float, end: float, scale: float) -> tuple[Interval, ...]:
     """Return the limits from one point of a path to another, in units of the chain."""
     found: list[Interval] = []
     s = begin
-    for part in parts:
-        way = min(part.end, end) - s
+    for limit in limits:
+        way = min(limit.end, end) - s
         if way > 0.0:
-            bounds = part.bounds
+            bounds = limit.bounds
             # What a bend leaves of the acceleration changes with the speed, so not over long ways.
             n = min(_MOST, max(1, ceil(way / _SHORT * max(b for _, b in bounds))))
             if scale != 1.0:
                 bounds = tuple((scale * a, b / scale) for a, b in bounds)
-            found += n * [Interval(way * scale / n, (scale * part.speed) ** 2, bounds)]
-            s = part.end
+            found += n * [Interval(way * scale / n, (scale * limit.speed) ** 2, bounds)]
+            s = limit.end
     return tuple(found)
 
 
@@ -108,21 +108,21 @@ def _robot(leg: Leg) -> RobotModel:
     return leg.tool.arm.robot
 
 
-def _parts(
+def _limits(
     path: JointPath, v: float, a: float, samples: tuple[Sample, ...], robot: RobotModel
-) -> tuple[Part, ...]:
+) -> tuple[Limits, ...]:
     """Return the limits of a path for a speed, an acceleration and the joints."""
     bound = (a / path.rate, path.bend / path.rate)
     speed = min(v, sqrt(a / path.bend) if path.bend > 0.0 else inf)
-    found: list[Part] = []
+    found: list[Limits] = []
     for limit in joint_limits(samples, robot):
         slower = min(speed, limit.speed)
         bounds = (bound,) if _is_weaker(limit.bound, bound, slower) else (bound, limit.bound)
         if found and found[-1][1:] == (slower, bounds):
             found.pop()
-        found.append(Part(limit.end, slower, bounds))
+        found.append(Limits(limit.end, slower, bounds))
     if not found or found[-1].end < path.length:
-        found.append(Part(path.length, speed, (bound,)))
+        found.append(Limits(path.length, speed, (bound,)))
     return tuple(found)
 
 
