@@ -14,7 +14,7 @@ from rich.progress import track
 from bench import bare_timer
 from bench.box_process import box_process
 from protocol.frame_buffer import FrameBuffer
-from protocol.realtime_layout import MAX_FRAME_SIZE, layout_for_size
+from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
 
 PERIOD = 0.008  # s
 # What starts and takes memory is a box with everything switched on.

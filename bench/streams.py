@@ -18,9 +18,9 @@ from array import array
 
 import numpy as np
 
-from protocol.dashboard_connection import Role
-from protocol.rtde_connection import RtdeConnection
-from protocol.rtde_messages import Request, RequestProtocolVersion, SetupOutputs, Start
+from protocol.dashboard.connection import Role
+from protocol.rtde.connection import RtdeConnection
+from protocol.rtde.messages import Request, RequestProtocolVersion, SetupOutputs, Start
 
 PERIOD = 0.008  # s
 # What a monitor asks for: the time stamp first, then some 500 bytes.

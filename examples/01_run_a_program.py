@@ -3,8 +3,8 @@
 import socket
 
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_messages import KeyMessage, RuntimeExceptionMessage, TextMessage
-from protocol.primary_packages import MAX_PACKAGE_SIZE, decode_package
+from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
+from protocol.primary.packages import MAX_PACKAGE_SIZE, decode_package
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 

@@ -6,7 +6,7 @@ import socket
 import numpy as np
 
 from protocol.frame_buffer import FrameBuffer
-from protocol.realtime_layout import MAX_FRAME_SIZE, layout_for_size
+from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
 from ur_emulator import ControlBox
 
 

@@ -10,24 +10,24 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from protocol.dashboard_connection import Role
+from protocol.dashboard.connection import Role
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_layout import NO_TIME
-from protocol.primary_messages import ThreadLabel, VersionMessage
-from protocol.primary_packages import (
+from protocol.primary.layout import NO_TIME
+from protocol.primary.messages import ThreadLabel, VersionMessage
+from protocol.primary.packages import (
     MAX_PACKAGE_SIZE,
     MIN_PACKAGE_SIZE,
     PackageType,
     RobotState,
     decode_package,
 )
-from protocol.primary_values import TypedValue
-from protocol.realtime_layout import MAX_FRAME_SIZE, layout_for_size
-from protocol.rtde_codec import HEADER_SIZE, decode_message
-from protocol.rtde_messages import DataPackage, RequestProtocolVersionReply, SetupOutputsReply
-from protocol.rtde_recipe import Recipe
-from protocol.rtde_types import REFUSALS, RtdeType
+from protocol.primary.values import TypedValue
+from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
+from protocol.rtde.codec import HEADER_SIZE, decode_message
+from protocol.rtde.messages import DataPackage, RequestProtocolVersionReply, SetupOutputsReply
+from protocol.rtde.recipe import Recipe
+from protocol.rtde.types import REFUSALS, RtdeType
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import wire_fields
 

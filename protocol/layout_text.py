@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from protocol.primary_messages import MESSAGES
-from protocol.primary_packages import state_size, state_types
-from protocol.primary_values import value_codes
-from protocol.realtime_layout import layout_for_version
-from protocol.rtde_fields import INPUTS, OUTPUTS, RtdeField
+from protocol.primary.messages import MESSAGES
+from protocol.primary.packages import state_size, state_types
+from protocol.primary.values import value_codes
+from protocol.realtime.layout import layout_for_version
+from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import WireField, wire_fields
 

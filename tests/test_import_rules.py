@@ -56,9 +56,24 @@ LANGUAGE_ORDER = (
     {"commands"},
     {"cli"},
 )
+PROTOCOL_ORDER = (
+    {"errors", "filled", "frame_buffer", "patience", "pose", "ur_types", "wire_codec", "wire_record"},
+    {"controller_words", "script_channel", "velocity_stream"},
+    {"realtime"},
+    {"dashboard"},
+    {"primary"},
+    {"rtde"},
+    {"capture", "layout_text"},
+    {"live"},
+    {"__main__"},
+)
 LEVELS = [
     pytest.param(package, order, level, id=f"{package}-{'+'.join(sorted(order[level]))}")
-    for package, order in (("ur_emulator", BOX_ORDER), ("urscript", LANGUAGE_ORDER))
+    for package, order in (
+        ("ur_emulator", BOX_ORDER),
+        ("urscript", LANGUAGE_ORDER),
+        ("protocol", PROTOCOL_ORDER),
+    )
     for level in range(len(order))
 ]
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller import events
 from ur_emulator.controller.cycle import controller_time

@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, Unpack
 
 from protocol.errors import LocalProtocolError
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from protocol.ur_types import Ports, RobotMode, SoftwareVersion, simulated_serial
 from ur_emulator.box_log import LogEntry
 from ur_emulator.control.operations import BoxOperations

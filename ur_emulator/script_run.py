@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from protocol.primary_messages import RequestedType
+from protocol.primary.messages import RequestedType
 from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.programs import StartProgram, StopProgram
 from ur_emulator.controller import events as ev

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from protocol.dashboard_commands import (
+from protocol.dashboard.commands import (
     COMMANDS,
     GREETING,
     USER_ROLES,
     DashboardCommand,
     unknown_command_reply,
 )
-from protocol.dashboard_connection import MAX_LINE, MAX_WAITING
+from protocol.dashboard.connection import MAX_LINE, MAX_WAITING
 from protocol.ur_types import SoftwareVersion
 
 _FIRST_CB3 = SoftwareVersion(3, 0)
@@ -17,7 +17,7 @@ _FIRST_CB3 = SoftwareVersion(3, 0)
 _INTRODUCTION = f"""\
 # Dashboard server: port 29999
 
-Made from `protocol/dashboard_commands.py` by `make docs`. Programs, installations and files that the box
+Made from `protocol/dashboard/commands.py` by `make docs`. Programs, installations and files that the box
 writes: [programs.md](../programs.md).
 
 On accept the box sends `{GREETING}`. Then every line of

@@ -8,14 +8,14 @@ from typing import Any
 from docs.generate.page_parts import MARKS, example, table
 from protocol.capture import StreamDecoder
 from protocol.layout_text import type_name
-from protocol.primary_layout import SUB_PACKAGES
-from protocol.primary_messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
-from protocol.primary_packages import (
+from protocol.primary.layout import SUB_PACKAGES
+from protocol.primary.messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
+from protocol.primary.packages import (
     SECONDARY_MESSAGES,
     encode_message_package,
     state_size,
 )
-from protocol.primary_values import value_codes
+from protocol.primary.values import value_codes
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import ALWAYS, WireField, wire_fields
 
@@ -29,7 +29,7 @@ _SIZES = tuple(
 _INTRODUCTION = """\
 # Primary and secondary interface: ports 30001, 30002, 30011 and 30012
 
-Made from `protocol/primary_layout.py` and `protocol/primary_messages.py` by `make docs`.
+Made from `protocol/primary/layout.py` and `protocol/primary/messages.py` by `make docs`.
 
 What the teach pendant itself listens to: ten times a second the whole state of the robot in sub-packages, and
 between the states, on 30001 only, messages: what programs print, when they start, pause, end and fail, error

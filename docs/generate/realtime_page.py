@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from docs.generate.page_parts import MARKS, example, table
-from protocol.realtime_columns import COLUMNS, VERSIONS, RealtimeColumn
-from protocol.realtime_layout import layout_for_version
+from protocol.realtime.columns import COLUMNS, VERSIONS, RealtimeColumn
+from protocol.realtime.layout import layout_for_version
 from protocol.ur_types import SoftwareVersion
 
 _NEWEST = SoftwareVersion(5, 10)  # its frame is the longest: all columns
@@ -14,7 +14,7 @@ _NEWEST = SoftwareVersion(5, 10)  # its frame is the longest: all columns
 _INTRODUCTION = """\
 # Realtime interface: ports 30003 and 30013
 
-Made from `protocol/realtime_columns.py` by `make docs`.
+Made from `protocol/realtime/columns.py` by `make docs`.
 
 The oldest way to watch a robot at full rate, and still the simplest: connect, and a frame comes in every
 control cycle (125 a second; nothing is greeted, nothing has to be asked for). Drivers of the first

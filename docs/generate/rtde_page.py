@@ -8,19 +8,19 @@ from itertools import groupby
 
 from docs.generate.page_parts import MARKS, example, table
 from protocol.capture import RtdeDecoder
-from protocol.dashboard_connection import Role
-from protocol.rtde_codec import MAX_NAMES_SIZE, data_header
-from protocol.rtde_connection import MAX_REQUEST_SIZE, RtdeConnection
-from protocol.rtde_fields import INPUTS, OUTPUTS, RtdeField
-from protocol.rtde_messages import PackageType, Request, RequestProtocolVersion, SetupOutputs, Start
-from protocol.rtde_recipe import Recipe
-from protocol.rtde_types import RobotStatusBits, RtdeType, SafetyStatusBits
+from protocol.dashboard.connection import Role
+from protocol.rtde.codec import MAX_NAMES_SIZE, data_header
+from protocol.rtde.connection import MAX_REQUEST_SIZE, RtdeConnection
+from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField
+from protocol.rtde.messages import PackageType, Request, RequestProtocolVersion, SetupOutputs, Start
+from protocol.rtde.recipe import Recipe
+from protocol.rtde.types import RobotStatusBits, RtdeType, SafetyStatusBits
 from protocol.ur_types import SoftwareVersion
 
 _INTRODUCTION = f"""\
 # RTDE: port 30004
 
-Made from `protocol/rtde_fields.py` and `protocol/rtde_types.py` by `make docs`.
+Made from `protocol/rtde/fields.py` and `protocol/rtde/types.py` by `make docs`.
 
 The interface for programs of today: a client names the variables that it wants and how often, and gets just
 these in binary packages; it may also write inputs, which programs on the robot read. ur_rtde, the maker's

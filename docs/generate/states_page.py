@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
-from protocol.rtde_types import SafetyStatusBits
+from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.controller.robot_mode import JOINT_MODES, PASSING_TIME, TRANSITIONS
 from ur_emulator.controller.safety_modes import EVENTS, MODES, after, mode_of

@@ -15,7 +15,7 @@ from pc_client.driver.robot_info import RobotInfo, read_robot_info
 from pc_client.driver.robot_report import RobotReport, make_report, read_payload
 from pc_client.driver.transport import Network
 from pc_client.errors import DriverError
-from protocol.realtime_layout import RealtimeFrame
+from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 
 _CONNECT_TIMEOUT = 2.0

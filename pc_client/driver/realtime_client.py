@@ -13,7 +13,7 @@ from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
 from protocol.patience import LONGEST_STEP, Patience
-from protocol.realtime_layout import MAX_FRAME_SIZE, RealtimeFrame, RealtimeLayout, layout_for_size
+from protocol.realtime.layout import MAX_FRAME_SIZE, RealtimeFrame, RealtimeLayout, layout_for_size
 from protocol.ur_types import ProgramState
 
 FRAME_TIMEOUT = 1.0

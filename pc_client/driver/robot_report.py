@@ -9,8 +9,8 @@ from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
 from pc_client.driver.rtde_query import ask_rtde
 from pc_client.driver.transport import Network
-from protocol.primary_layout import CartesianInfo, ConfigurationData, RobotModeData
-from protocol.realtime_layout import RealtimeFrame
+from protocol.primary.layout import CartesianInfo, ConfigurationData, RobotModeData
+from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports, RobotType
 
 _CONNECT_TIMEOUT = 2.0

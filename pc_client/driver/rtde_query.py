@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError
-from protocol.dashboard_connection import Role
+from protocol.dashboard.connection import Role
 from protocol.errors import RemoteProtocolError
-from protocol.rtde_connection import DataReceived, RtdeConnection, RtdeEvent
-from protocol.rtde_messages import (
+from protocol.rtde.connection import DataReceived, RtdeConnection, RtdeEvent
+from protocol.rtde.messages import (
     RequestProtocolVersion,
     RequestProtocolVersionReply,
     SetupOutputs,
@@ -16,7 +16,7 @@ from protocol.rtde_messages import (
     StartReply,
     TextMessage,
 )
-from protocol.rtde_types import REFUSALS, RtdeValue
+from protocol.rtde.types import REFUSALS, RtdeValue
 
 CONNECT_TIMEOUT = 2.0
 REPLY_TIMEOUT = 1.0

@@ -36,8 +36,8 @@ from pc_client.driver.watchdog import (
     software,
 )
 from pc_client.errors import DriverError
-from protocol.primary_messages import TextMessage
-from protocol.realtime_layout import RealtimeFrame, RealtimeLayout
+from protocol.primary.messages import TextMessage
+from protocol.realtime.layout import RealtimeFrame, RealtimeLayout
 from protocol.ur_types import Ports
 from protocol.velocity_stream import VelocityMode, encode_velocity
 

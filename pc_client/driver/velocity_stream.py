@@ -20,7 +20,7 @@ from pc_client.driver.transport import Network, Transport
 from pc_client.driver.watchdog import check_streaming, is_at_full_speed
 from pc_client.errors import DriverError
 from protocol.patience import Patience
-from protocol.realtime_layout import RealtimeFrame
+from protocol.realtime.layout import RealtimeFrame
 from protocol.velocity_stream import VelocityMode, encode_velocity
 
 RowSink = Callable[[RealtimeFrame, TrackerStep], None]

@@ -13,7 +13,7 @@ from pc_client.driver.transport import Network
 from pc_client.driver.watchdog import is_at_rest
 from pc_client.errors import DriverError
 from protocol.patience import Patience
-from protocol.realtime_layout import RealtimeFrame
+from protocol.realtime.layout import RealtimeFrame
 
 REST_TIMEOUT = 5.0
 """An arm that is told to stop rests within this [s]; UR's safety stops take 0.4 s."""

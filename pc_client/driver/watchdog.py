@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pc_client.driver.condition import Condition
 from pc_client.errors import DriverError, RobotStoppedError
-from protocol.realtime_layout import RealtimeFrame
+from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 
 RUNNING = float(RobotMode.RUNNING)

@@ -11,7 +11,7 @@ from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.approach import Approach
-from protocol.realtime_layout import RealtimeFrame
+from protocol.realtime.layout import RealtimeFrame
 
 _SETTLE = 0.8
 """Time at the end, position loop closed [s]: four time constants of the feedback."""

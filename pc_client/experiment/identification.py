@@ -26,7 +26,7 @@ from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError, GainMarginError
 from pc_client.kinematics.robot_model import RobotModel
-from protocol.realtime_layout import RealtimeFrame
+from protocol.realtime.layout import RealtimeFrame
 
 _LEAD, _SETTLE = 0.1, 0.3
 _AT_REST = 12

@@ -24,7 +24,7 @@ from pc_client.driver.velocity_stream import StreamReport
 from pc_client.experiment.command_check import broken_limit
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.plan import JointPlan
-from protocol.realtime_layout import RealtimeFrame
+from protocol.realtime.layout import RealtimeFrame
 
 Array = NDArray[np.float64]
 

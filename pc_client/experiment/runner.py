@@ -27,7 +27,7 @@ from pc_client.planning.approach import plan_approach
 from pc_client.planning.plan import JointPlan
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recorder import Recorder
-from protocol.realtime_layout import RealtimeFrame
+from protocol.realtime.layout import RealtimeFrame
 
 LEAD = 0.2
 """Time at rest before a movement, position loop closed [s]: takes up what the approach left."""

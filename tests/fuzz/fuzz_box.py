@@ -17,10 +17,10 @@ from fuzz_replies import READERS
 from fuzz_wire import FakeLoop, Wire
 from states_support import check_wires
 
-from protocol.dashboard_connection import MAX_LINE as DASHBOARD_LINE
-from protocol.dashboard_connection import MAX_WAITING, Role
-from protocol.rtde_connection import MAX_REQUEST_SIZE, DataReceived, RtdeConnection
-from protocol.rtde_messages import RequestProtocolVersion, SetupOutputs, Start
+from protocol.dashboard.connection import MAX_LINE as DASHBOARD_LINE
+from protocol.dashboard.connection import MAX_WAITING, Role
+from protocol.rtde.connection import MAX_REQUEST_SIZE, DataReceived, RtdeConnection
+from protocol.rtde.messages import RequestProtocolVersion, SetupOutputs, Start
 from protocol.script_channel import MAX_LINE, MAX_PROGRAM
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator import ControlBox

@@ -4,11 +4,11 @@ import json
 import struct
 
 from protocol.controller_words import CONTROLLER_WORDS
-from protocol.dashboard_commands import COMMANDS
-from protocol.dashboard_connection import Role
-from protocol.rtde_codec import encode_message
-from protocol.rtde_fields import input_fields, output_fields
-from protocol.rtde_messages import (
+from protocol.dashboard.commands import COMMANDS
+from protocol.dashboard.connection import Role
+from protocol.rtde.codec import encode_message
+from protocol.rtde.fields import input_fields, output_fields
+from protocol.rtde.messages import (
     GetControllerVersion,
     Pause,
     RequestProtocolVersion,

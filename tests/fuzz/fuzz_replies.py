@@ -5,14 +5,14 @@ import re
 
 from box_support import VERSION
 
-from protocol.dashboard_commands import GREETING
-from protocol.dashboard_connection import MAX_LINE, Role
+from protocol.dashboard.commands import GREETING
+from protocol.dashboard.connection import MAX_LINE, Role
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_framing import PackageType
-from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
-from protocol.realtime_layout import layout_for_version
-from protocol.rtde_codec import decode_message
-from protocol.rtde_messages import PackageType as RtdeType
+from protocol.primary.framing import PackageType
+from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
+from protocol.realtime.layout import layout_for_version
+from protocol.rtde.codec import decode_message
+from protocol.rtde.messages import PackageType as RtdeType
 from ur_emulator.servers.modbus_codec import ModbusCodec
 
 REALTIME = layout_for_version(VERSION)

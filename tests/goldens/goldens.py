@@ -25,10 +25,10 @@ from pc_client.control.controller_config import CONTROLLERS  # noqa: E402
 from pc_client.driver.ur_driver import UrDriver  # noqa: E402
 from pc_client.experiment.prepare import load_movements, prepare_experiment  # noqa: E402
 from pc_client.experiment.runner import ExperimentRunner  # noqa: E402
-from protocol.primary_messages import encode_message  # noqa: E402
-from protocol.realtime_layout import layout_for_version  # noqa: E402
-from protocol.rtde_fields import output_fields  # noqa: E402
-from protocol.rtde_recipe import snapshot_encoder  # noqa: E402
+from protocol.primary.messages import encode_message  # noqa: E402
+from protocol.realtime.layout import layout_for_version  # noqa: E402
+from protocol.rtde.fields import output_fields  # noqa: E402
+from protocol.rtde.recipe import snapshot_encoder  # noqa: E402
 from protocol.ur_types import SoftwareVersion  # noqa: E402
 from ur_emulator import ControlBox  # noqa: E402
 from ur_emulator.controller.port_map import read_register  # noqa: E402

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_messages import KeyMessage
-from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, decode_package
-from protocol.realtime_layout import layout_for_version
+from protocol.primary.messages import KeyMessage
+from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, decode_package
+from protocol.realtime.layout import layout_for_version
 from protocol.ur_types import Ports, ProgramState, SoftwareVersion
 from urscript.programs import velocity_receiver
 

@@ -6,9 +6,9 @@ from contextlib import suppress
 import pytest
 from integration_support import HELLO_PROGRAM, STARTED, Frames, Messages, connect, send
 
-from protocol.primary_layout import RobotModeData
-from protocol.primary_messages import ErrorCodeMessage, KeyMessage, RuntimeExceptionMessage, TextMessage
-from protocol.primary_state import RobotState
+from protocol.primary.layout import RobotModeData
+from protocol.primary.messages import ErrorCodeMessage, KeyMessage, RuntimeExceptionMessage, TextMessage
+from protocol.primary.state import RobotState
 from protocol.ur_types import ProgramState
 
 RTDE_GARBAGE = {

@@ -20,7 +20,7 @@ from integration_support import (
 
 from pc_client import cli
 from pc_client.driver import dashboard_query, package_stream, realtime_client
-from protocol.primary_framing import PackageType
+from protocol.primary.framing import PackageType
 from protocol.ur_types import Ports, ProgramState, SafetyMode
 
 FAR = "t,x,y,z\n" + "".join(f"{0.2 * i:.1f},{0.3 + 0.05 * i:.2f},0.1,0.3\n" for i in range(20))

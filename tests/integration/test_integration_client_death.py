@@ -21,7 +21,7 @@ from integration_support import (
 )
 
 from pc_client.recording.loader import load_recording
-from protocol.primary_messages import KeyMessage, TextMessage
+from protocol.primary.messages import KeyMessage, TextMessage
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
 

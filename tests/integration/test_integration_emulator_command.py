@@ -20,7 +20,7 @@ from integration_support import (
     serving,
 )
 
-from protocol.primary_messages import KeyMessage, RuntimeExceptionMessage
+from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage
 from protocol.ur_types import Ports
 from ur_emulator import ControlBox
 from ur_emulator.errors import EmulatorError

@@ -21,7 +21,7 @@ from integration_support import (
 )
 
 import ur_emulator.realtime.pacing as pacing
-from protocol.primary_messages import KeyMessage, RuntimeExceptionMessage, TextMessage
+from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
 from protocol.ur_types import Ports, ProgramState
 from ur_emulator import ControlBox
 from ur_emulator.errors import PortError

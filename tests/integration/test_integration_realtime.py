@@ -5,7 +5,7 @@ import threading
 import pytest
 from integration_support import PERIOD, Frames, Messages, VelocitySession, send, serving
 
-from protocol.primary_messages import TextMessage
+from protocol.primary.messages import TextMessage
 
 
 def test_two_seconds_of_frames_have_consecutive_stamps(realtime_box):

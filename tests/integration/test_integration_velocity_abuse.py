@@ -11,7 +11,7 @@ import pytest
 from integration_support import HELLO_PROGRAM, Frames, Messages, VelocitySession, connect, is_closed, send
 
 import ur_emulator.realtime.pacing as pacing
-from protocol.primary_messages import (
+from protocol.primary.messages import (
     ErrorCodeMessage,
     KeyMessage,
     RuntimeExceptionMessage,

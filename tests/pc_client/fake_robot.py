@@ -14,18 +14,18 @@ from pc_client.driver.transport import PortTakenError
 from pc_client.errors import DriverError
 from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
-from protocol.dashboard_connection import Role
+from protocol.dashboard.connection import Role
 from protocol.pose import T_to_pose, pose_trans
-from protocol.primary_layout import CartesianInfo, ConfigurationData, RobotModeData
-from protocol.primary_messages import (
+from protocol.primary.layout import CartesianInfo, ConfigurationData, RobotModeData
+from protocol.primary.messages import (
     ErrorCodeMessage,
     RuntimeExceptionMessage,
     encode_message,
     version_message,
 )
-from protocol.primary_state import encode_state
-from protocol.realtime_layout import SNAPSHOT_FIELDS, layout_for_version
-from protocol.rtde_connection import RtdeConnection
+from protocol.primary.state import encode_state
+from protocol.realtime.layout import SNAPSHOT_FIELDS, layout_for_version
+from protocol.rtde.connection import RtdeConnection
 from protocol.ur_types import Ports, RobotType, SoftwareVersion
 from protocol.velocity_stream import VelocityMode, decode_velocity, encode_hello
 

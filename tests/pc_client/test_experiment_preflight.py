@@ -18,9 +18,9 @@ from pc_client.errors import DriverError
 from pc_client.experiment.preflight import model_of, preflight, refusal, require
 from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.robot_model import robot_model
-from protocol.primary_layout import ConfigurationData
-from protocol.primary_messages import encode_message, version_message
-from protocol.primary_state import encode_state
+from protocol.primary.layout import ConfigurationData
+from protocol.primary.messages import encode_message, version_message
+from protocol.primary.state import encode_state
 from protocol.ur_types import Ports, RobotType, SoftwareVersion
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import pytest
 
 from protocol.__main__ import main
-from protocol.primary_layout import SUB_PACKAGES
-from protocol.primary_messages import version_message
-from protocol.primary_packages import encode_message_package, encode_package, encode_state
-from protocol.realtime_layout import SNAPSHOT_FIELDS, layout_for_size
+from protocol.primary.layout import SUB_PACKAGES
+from protocol.primary.messages import version_message
+from protocol.primary.packages import encode_message_package, encode_package, encode_state
+from protocol.realtime.layout import SNAPSHOT_FIELDS, layout_for_size
 from protocol.ur_types import SoftwareVersion
 
 VERSION = SoftwareVersion(3, 15, 8)

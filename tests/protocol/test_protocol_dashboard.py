@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from protocol import dashboard_replies as R
-from protocol.dashboard_commands import COMMANDS, find, match_command, unknown_command_reply
-from protocol.dashboard_connection import (
+from protocol.dashboard import replies as R
+from protocol.dashboard.commands import COMMANDS, find, match_command, unknown_command_reply
+from protocol.dashboard.connection import (
     MAX_LINE,
     MAX_WAITING,
     CommandReceived,

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from protocol import primary_layout as L
-from protocol import primary_messages as M
-from protocol import primary_packages as P
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
+from protocol.primary import layout as L
+from protocol.primary import messages as M
+from protocol.primary import packages as P
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_codec import codec_for
 from protocol.wire_record import wire_fields

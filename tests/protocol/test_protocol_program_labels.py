@@ -3,9 +3,9 @@
 import pytest
 from test_protocol_program_variables import NO_TIME, V3_15, read
 
-from protocol import primary_messages as M
 from protocol.errors import RemoteProtocolError
-from protocol.primary_packages import encode_message_package, encode_package
+from protocol.primary import messages as M
+from protocol.primary.packages import encode_message_package, encode_package
 from protocol.ur_types import SoftwareVersion
 
 TWO = M.ProgramThreadsMessage(

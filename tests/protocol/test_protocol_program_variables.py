@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from protocol import primary_program as S
-from protocol import primary_values as V
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, decode_package, encode_package
-from protocol.primary_values import TypedValue, ValueType
+from protocol.primary import program as S
+from protocol.primary import values as V
+from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, decode_package, encode_package
+from protocol.primary.values import TypedValue, ValueType
 from protocol.ur_types import SoftwareVersion
 
 V3_15 = SoftwareVersion(3, 15, 8)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.realtime_columns import CB2_COLUMNS, COLUMNS, VERSIONS
-from protocol.realtime_layout import (
+from protocol.realtime.columns import CB2_COLUMNS, COLUMNS, VERSIONS
+from protocol.realtime.layout import (
     MAX_FRAME_SIZE,
     SNAPSHOT_FIELDS,
     Filled,

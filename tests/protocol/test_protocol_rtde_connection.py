@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol import rtde_messages as M
-from protocol.dashboard_connection import Role
+from protocol.dashboard.connection import Role
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.rtde_codec import MAX_NAMES_SIZE, encode_message
-from protocol.rtde_connection import MAX_REQUEST_SIZE, DataReceived, RtdeConnection
-from protocol.rtde_states import TRANSITIONS, RtdeState, control_rate, cycles_per_package
+from protocol.rtde import messages as M
+from protocol.rtde.codec import MAX_NAMES_SIZE, encode_message
+from protocol.rtde.connection import MAX_REQUEST_SIZE, DataReceived, RtdeConnection
+from protocol.rtde.states import TRANSITIONS, RtdeState, control_rate, cycles_per_package
 from protocol.ur_types import SoftwareVersion
 
 V3_15 = SoftwareVersion(3, 15, 8)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.realtime_columns import COLUMNS, Filled
-from protocol.rtde_fields import INPUTS, OUTPUTS, input_fields, output_fields
-from protocol.rtde_types import RtdeType
+from protocol.realtime.columns import COLUMNS, Filled
+from protocol.rtde.fields import INPUTS, OUTPUTS, input_fields, output_fields
+from protocol.rtde.types import RtdeType
 from protocol.ur_types import SoftwareVersion
 
 V3_15 = SoftwareVersion(3, 15, 8)

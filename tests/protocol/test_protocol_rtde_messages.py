@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol import rtde_messages as M
-from protocol.dashboard_connection import Role
+from protocol.dashboard.connection import Role
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.rtde_codec import HEADER_SIZE, MAX_NAMES_SIZE, data_header, decode_message, encode_message
-from protocol.rtde_connection import RtdeConnection
-from protocol.rtde_fields import OUTPUTS
-from protocol.rtde_recipe import Recipe, snapshot_encoder
-from protocol.rtde_types import RtdeType
+from protocol.rtde import messages as M
+from protocol.rtde.codec import HEADER_SIZE, MAX_NAMES_SIZE, data_header, decode_message, encode_message
+from protocol.rtde.connection import RtdeConnection
+from protocol.rtde.fields import OUTPUTS
+from protocol.rtde.recipe import Recipe, snapshot_encoder
+from protocol.rtde.types import RtdeType
 from protocol.ur_types import SoftwareVersion
 
 ROBOT, PC = Role.ROBOT, Role.PC

@@ -2,18 +2,18 @@
 
 import pytest
 
-from protocol import rtde_messages as R
 from protocol.__main__ import main
 from protocol.capture import RtdeDecoder, StreamDecoder
-from protocol.dashboard_connection import Role
+from protocol.dashboard.connection import Role
 from protocol.errors import RemoteProtocolError
-from protocol.primary_layout import RobotModeData
-from protocol.primary_messages import version_message
-from protocol.primary_packages import encode_message_package, encode_state
-from protocol.rtde_codec import data_header, encode_message
-from protocol.rtde_connection import RtdeConnection
-from protocol.rtde_recipe import Recipe
-from protocol.rtde_types import RtdeType
+from protocol.primary.layout import RobotModeData
+from protocol.primary.messages import version_message
+from protocol.primary.packages import encode_message_package, encode_state
+from protocol.rtde import messages as R
+from protocol.rtde.codec import data_header, encode_message
+from protocol.rtde.connection import RtdeConnection
+from protocol.rtde.recipe import Recipe
+from protocol.rtde.types import RtdeType
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 

@@ -5,8 +5,8 @@ import struct
 from contextlib import contextmanager
 
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
-from protocol.realtime_layout import layout_for_size
+from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
+from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller

@@ -1,8 +1,8 @@
 """An RTDE client without a library, for the tests of the box."""
 
-from protocol import rtde_messages as M
-from protocol.dashboard_connection import Role
-from protocol.rtde_connection import DataReceived, RtdeConnection
+from protocol.dashboard.connection import Role
+from protocol.rtde import messages as M
+from protocol.rtde.connection import DataReceived, RtdeConnection
 
 
 class RtdeClient:

@@ -2,10 +2,10 @@
 
 from box_support import VERSION, Bench
 
-from protocol.primary_layout import JointData, MasterboardData, RobotModeData
-from protocol.primary_packages import decode_package, encode_state
-from protocol.realtime_layout import layout_for_version
-from protocol.rtde_types import RobotStatusBits, SafetyStatusBits
+from protocol.primary.layout import JointData, MasterboardData, RobotModeData
+from protocol.primary.packages import decode_package, encode_state
+from protocol.realtime.layout import layout_for_version
+from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.commands.safety import (

@@ -7,7 +7,7 @@ import pytest
 from box_support import Bench
 
 from protocol.pose import pose_to_T
-from protocol.realtime_layout import SNAPSHOT_FIELDS
+from protocol.realtime.layout import SNAPSHOT_FIELDS
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.models.calibration import calibrated_dh
 

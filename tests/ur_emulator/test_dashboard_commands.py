@@ -6,8 +6,8 @@ import pytest
 from box_support import MessageReader, connect
 from dashboard_support import Dashboard, write_programs
 
-from protocol.dashboard_commands import COMMANDS, match_command
-from protocol.primary_messages import PopupMessage
+from protocol.dashboard.commands import COMMANDS, match_command
+from protocol.primary.messages import PopupMessage
 from protocol.ur_types import RobotMode, SoftwareVersion
 from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.emulator import ControlBox

@@ -12,7 +12,7 @@ from dashboard_support import (
     write_programs,
 )
 
-from protocol.primary_messages import KeyMessage, PopupMessage, RuntimeExceptionMessage, TextMessage
+from protocol.primary.messages import KeyMessage, PopupMessage, RuntimeExceptionMessage, TextMessage
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import EmulatorError, FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder

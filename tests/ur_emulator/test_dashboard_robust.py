@@ -10,7 +10,7 @@ import pytest
 from box_support import FrameReader, connect
 from dashboard_support import Dashboard, external_control, urp, write_programs
 
-from protocol.dashboard_commands import COMMANDS
+from protocol.dashboard.commands import COMMANDS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.servers.dashboard_port import LINES_PER_TURN
 

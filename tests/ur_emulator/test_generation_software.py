@@ -8,8 +8,8 @@ from box_support import MessageReader, connect
 from dashboard_support import Dashboard, write_programs
 from rtde_support import RtdeClient
 
-from protocol import primary_messages as M
-from protocol import rtde_messages as R
+from protocol.primary import messages as M
+from protocol.rtde import messages as R
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 

@@ -6,8 +6,8 @@ from itertools import pairwise
 import pytest
 from test_rtde_port import PortBench
 
-from protocol import rtde_connection
-from protocol import rtde_messages as M
+from protocol.rtde import connection as rtde_connection
+from protocol.rtde import messages as M
 
 Q = ("timestamp", "actual_q", "actual_qd")
 POSE = ("timestamp", "actual_TCP_pose")

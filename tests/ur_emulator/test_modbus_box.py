@@ -20,7 +20,7 @@ from modbus_support import (
     read_request,
 )
 
-from protocol.primary_messages import RuntimeExceptionMessage, TextMessage
+from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
 from ur_emulator.emulator import ControlBox
 from ur_emulator.servers import modbus_link
 

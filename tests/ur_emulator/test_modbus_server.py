@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 from typer.testing import CliRunner
 
-from protocol.primary_messages import TextMessage
+from protocol.primary.messages import TextMessage
 from ur_emulator import ControlBox, cli, rack
 from ur_emulator.controller.port_map import COILS, REGISTERS, read_coil, read_register
 from ur_emulator.errors import PortError, PortPermissionError

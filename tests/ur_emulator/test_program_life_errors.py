@@ -3,7 +3,7 @@
 import pytest
 from box_support import VERSION, Bench, MessageReader, connect
 
-from protocol.primary_messages import (
+from protocol.primary.messages import (
     ErrorCodeMessage,
     KeyMessage,
     ReportLevel,
@@ -13,7 +13,7 @@ from protocol.primary_messages import (
     TextMessage,
     VersionMessage,
 )
-from protocol.primary_packages import RobotState, decode_package
+from protocol.primary.packages import RobotState, decode_package
 from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed

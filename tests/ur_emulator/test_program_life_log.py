@@ -6,7 +6,7 @@ import threading
 import pytest
 from box_support import TIMEOUT, FrameReader, MessageReader, connect
 
-from protocol.primary_messages import (
+from protocol.primary.messages import (
     KeyMessage,
     PopupMessage,
     ReportLevel,

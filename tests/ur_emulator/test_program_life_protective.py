@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from box_support import Bench
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.commands.power import PowerOff
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram

@@ -4,16 +4,16 @@ import pytest
 from box_support import VERSION, Bench, MessageReader, connect
 
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_messages import (
+from protocol.primary.messages import (
     KeyMessage,
     ProgramLabelMessage,
     ProgramThreadsMessage,
     TextMessage,
     ThreadLabel,
 )
-from protocol.primary_packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
-from protocol.primary_program import GlobalVariablesSetup, GlobalVariablesUpdate
-from protocol.primary_values import TypedValue, ValueType
+from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
+from protocol.primary.program import GlobalVariablesSetup, GlobalVariablesUpdate
+from protocol.primary.values import TypedValue, ValueType
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.commands.programs import StopProgram

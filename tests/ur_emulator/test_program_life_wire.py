@@ -3,9 +3,9 @@
 import pytest
 from box_support import Bench, FrameReader, MessageReader, connect
 
-from protocol.primary_layout import RobotModeData
-from protocol.primary_messages import ErrorCodeMessage, KeyMessage, ReportLevel, TextMessage
-from protocol.rtde_types import RobotStatusBits
+from protocol.primary.layout import RobotModeData
+from protocol.primary.messages import ErrorCodeMessage, KeyMessage, ReportLevel, TextMessage
+from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram

@@ -5,7 +5,7 @@ import math
 import pytest
 from box_support import VERSION, Bench, MessageReader, connect
 
-from protocol.primary_messages import (
+from protocol.primary.messages import (
     PopupMessage,
     RequestedType,
     RequestValueMessage,

@@ -7,7 +7,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 import pytest
 from box_support import TIMEOUT, MessageReader, connect, listening_socket
 
-from protocol.primary_messages import KeyMessage, RuntimeExceptionMessage, TextMessage
+from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
 from ur_emulator.emulator import ControlBox
 
 

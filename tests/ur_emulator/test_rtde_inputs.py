@@ -5,10 +5,10 @@ import math
 import pytest
 from box_support import Bench
 
-from protocol.rtde_codec import data_header
-from protocol.rtde_fields import INPUTS, OUTPUTS, output_fields
-from protocol.rtde_recipe import Recipe, snapshot_encoder
-from protocol.rtde_types import RtdeType
+from protocol.rtde.codec import data_header
+from protocol.rtde.fields import INPUTS, OUTPUTS, output_fields
+from protocol.rtde.recipe import Recipe, snapshot_encoder
+from protocol.rtde.types import RtdeType
 from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.commands.client_writes import WriteInputs
 from ur_emulator.commands.safety import TriggerProtectiveStop

@@ -3,9 +3,9 @@
 import pytest
 from box_support import Bench
 
-from protocol import rtde_messages as M
-from protocol.dashboard_connection import Role
-from protocol.rtde_connection import DataReceived, RtdeConnection
+from protocol.dashboard.connection import Role
+from protocol.rtde import messages as M
+from protocol.rtde.connection import DataReceived, RtdeConnection
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.servers.rtde_port import RtdePort
 

@@ -5,8 +5,8 @@ from box_support import MessageReader, connect
 from rtde_support import RtdeClient
 from states_support import BRAKING, COMMANDS, WAY_IN, check_wires, moving
 
-from protocol.primary_layout import MasterboardData, RobotModeData
-from protocol.primary_messages import ErrorCodeMessage, SafetyModeMessage
+from protocol.primary.layout import MasterboardData, RobotModeData
+from protocol.primary.messages import ErrorCodeMessage, SafetyModeMessage
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator import ControlBox
 from ur_emulator.commands.power import ReleaseBrakes

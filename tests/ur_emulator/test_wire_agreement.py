@@ -5,12 +5,12 @@ import math
 import pytest
 from wire_story import Story
 
-from protocol import primary_layout as L
-from protocol.primary_packages import decode_package
-from protocol.realtime_layout import layout_for_version
-from protocol.rtde_fields import output_fields
-from protocol.rtde_recipe import Recipe, snapshot_encoder
-from protocol.rtde_types import RobotStatusBits, SafetyStatusBits
+from protocol.primary import layout as L
+from protocol.primary.packages import decode_package
+from protocol.realtime.layout import layout_for_version
+from protocol.rtde.fields import output_fields
+from protocol.rtde.recipe import Recipe, snapshot_encoder
+from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
 from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.servers.robot_state import StateEncoder

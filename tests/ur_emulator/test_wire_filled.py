@@ -4,12 +4,12 @@ import pytest
 from wire_story import Story
 
 from protocol.filled import Filled
-from protocol.primary_layout import SUB_PACKAGES
-from protocol.primary_packages import decode_package, state_types
-from protocol.realtime_columns import COLUMNS
-from protocol.realtime_layout import layout_for_version
-from protocol.rtde_fields import OUTPUTS, output_fields
-from protocol.rtde_recipe import Recipe, snapshot_encoder
+from protocol.primary.layout import SUB_PACKAGES
+from protocol.primary.packages import decode_package, state_types
+from protocol.realtime.columns import COLUMNS
+from protocol.realtime.layout import layout_for_version
+from protocol.rtde.fields import OUTPUTS, output_fields
+from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import wire_fields
 from ur_emulator.servers.robot_state import StateEncoder

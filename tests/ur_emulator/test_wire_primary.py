@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from box_support import Bench
 
-from protocol import primary_layout as L
-from protocol import primary_messages as M
 from protocol.controller_words import CONTROLLER_WORDS
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary_packages import (
+from protocol.primary import layout as L
+from protocol.primary import messages as M
+from protocol.primary.packages import (
     MAX_PACKAGE_SIZE,
     MIN_PACKAGE_SIZE,
     RobotState,
@@ -18,7 +18,7 @@ from protocol.primary_packages import (
     decode_package,
     state_size,
 )
-from protocol.primary_program import ProgramStateMessage
+from protocol.primary.program import ProgramStateMessage
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.commands.power import ReleaseBrakes
 from ur_emulator.commands.safety import (

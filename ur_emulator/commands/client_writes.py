@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from protocol.rtde_types import RtdeValue
+from protocol.rtde.types import RtdeValue
 from ur_emulator.controller.client_inputs import write_inputs
 from ur_emulator.controller.command import Box
 from ur_emulator.controller.port_map import write_range
@@ -15,7 +15,7 @@ class WriteInputs:
     """Write input variables of RTDE.
 
     Attributes:
-        values: names of `protocol.rtde_fields.INPUTS` with their values, in order.
+        values: names of `protocol.rtde.fields.INPUTS` with their values, in order.
     """
 
     values: tuple[tuple[str, RtdeValue], ...]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Literal
 
-from protocol.primary_messages import ReportLevel
-from protocol.rtde_types import RobotStatusBits
+from protocol.primary.messages import ReportLevel
+from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import SafetyMode
 from ur_emulator.commands.operation import CommandOperation
 from ur_emulator.commands.parameters import parameter

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from protocol.primary_messages import RequestedType
+from protocol.primary.messages import RequestedType
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.commands.inputs import DIGITAL_GROUPS
 from ur_emulator.controller.cycle import controller_time

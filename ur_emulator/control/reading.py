@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import LogEntry
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.control.box_state import BoxState, take_state

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from protocol.primary_messages import RequestedType
+from protocol.primary.messages import RequestedType
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.control.box_state import BoxState, is_steady, take_state

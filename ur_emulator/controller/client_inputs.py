@@ -1,4 +1,4 @@
-"""What the input variables of RTDE do in the box. Names and types stand in `protocol.rtde_fields`.
+"""What the input variables of RTDE do in the box. Names and types stand in `protocol.rtde.fields`.
 
 A register is written at once. Variables that act together, a mask and its values, act whenever one of them
 is written, with the last values of the others; what a mask leaves out is never looked at, since clients
@@ -37,7 +37,7 @@ def write_inputs(state: ControllerState, values: Iterable[tuple[str, Any]]) -> N
 
     Args:
         state: of the controller.
-        values: names with values of the types that `protocol.rtde_fields.INPUTS` gives.
+        values: names with values of the types that `protocol.rtde.fields.INPUTS` gives.
     """
     acts: dict[Callable[[ControllerState], None], None] = {}
     values = tuple(values)

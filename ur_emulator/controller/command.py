@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.errors import RefusedError
 

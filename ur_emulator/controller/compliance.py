@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import hypot
 from typing import TYPE_CHECKING
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, ControlMode, RobotMode
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety import SPEED_TOLERANCE, Violation

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from contextlib import suppress
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US

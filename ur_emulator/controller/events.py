@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from protocol.primary_messages import ReportLevel, RequestedType
+from protocol.primary.messages import ReportLevel, RequestedType
 
 if TYPE_CHECKING:
     from urscript import RunningProgram
@@ -73,7 +73,7 @@ class ScriptFailed:
 
 @dataclass(frozen=True, slots=True)
 class ErrorReported:
-    """The controller reports code C<code>A<argument>; `level` is a protocol.primary_messages.ReportLevel."""
+    """The controller reports code C<code>A<argument>; `level` is a protocol.primary.messages.ReportLevel."""
 
     code: int
     argument: int

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from protocol.primary_messages import RequestedType
+from protocol.primary.messages import RequestedType
 from urscript.values import INT_MAX, INT_MIN, script_text
 
 # Popups for which nobody waits: older ones than the last so many are forgotten.

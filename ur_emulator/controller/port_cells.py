@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from protocol.rtde_types import RobotStatusBits
+from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import SafetyMode
 from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.io import CONFIGURABLE_SHIFT, N_CONFIGURABLE, N_STANDARD, N_TOOL, TOOL_SHIFT

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety_modes import (

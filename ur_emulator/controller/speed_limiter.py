@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import radians
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety import Violation

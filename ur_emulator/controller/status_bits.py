@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from protocol.rtde_types import RobotStatusBits, SafetyStatusBits
+from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.controller.robot_mode import POWERED
 

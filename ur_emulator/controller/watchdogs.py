@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported
 
 # "Fieldbus input disconnected". Source: user reports of C207A0; that it stands for RTDE inputs is inferred.

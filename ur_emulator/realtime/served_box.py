@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import BoxLog
 from ur_emulator.controller.command import Command, Done, Submitted
 from ur_emulator.controller.controller import Controller

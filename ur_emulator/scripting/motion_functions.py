@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from protocol.pose import Pose as ToolPose
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import Vector6

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
-from protocol.primary_messages import RequestedType
+from protocol.primary.messages import RequestedType
 from ur_emulator.controller.events import PopupShown, ValueRequested
 from ur_emulator.controller.operator import Answer, OperatorRequest
 from ur_emulator.controller.state import ControllerState

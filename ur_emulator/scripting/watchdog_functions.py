@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from protocol.rtde_fields import INPUTS
+from protocol.rtde.fields import INPUTS
 from ur_emulator.controller.external_sensor import VARIABLE, ExternalSensor
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.controller.watchdogs import WatchdogAction

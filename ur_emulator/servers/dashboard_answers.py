@@ -11,8 +11,8 @@ from contextlib import suppress
 from importlib.metadata import version as package_version
 from typing import TypeVar
 
-from protocol.dashboard_commands import USER_ROLES, DashboardCommand
-from protocol.dashboard_connection import CommandReceived
+from protocol.dashboard.commands import USER_ROLES, DashboardCommand
+from protocol.dashboard.connection import CommandReceived
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
 from ur_emulator.commands.operator import ClosePopup, ShowPopup
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from protocol.dashboard_connection import MAX_LINE, CommandReceived, DashboardConnection, Role, UnknownCommand
+from protocol.dashboard.connection import MAX_LINE, CommandReceived, DashboardConnection, Role, UnknownCommand
 from protocol.errors import ProtocolError
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot

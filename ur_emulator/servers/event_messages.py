@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from protocol.primary_layout import NO_TIME
-from protocol.primary_messages import (
+from protocol.primary.layout import NO_TIME
+from protocol.primary.messages import (
     ErrorCodeMessage,
     KeyMessage,
     MessageSource,

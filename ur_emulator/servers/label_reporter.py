@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from protocol.primary_messages import ProgramLabelMessage, ProgramThreadsMessage, RobotMessage, ThreadLabel
+from protocol.primary.messages import ProgramLabelMessage, ProgramThreadsMessage, RobotMessage, ThreadLabel
 from protocol.ur_types import SoftwareVersion
 from urscript import RunningProgram
 

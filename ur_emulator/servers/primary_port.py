@@ -9,8 +9,8 @@ its threads stand in PolyScope's tree.
 
 from __future__ import annotations
 
-from protocol.primary_messages import RobotMessage, StartupMessage, version_message
-from protocol.primary_packages import encode_message_package, encode_safety_tolerances
+from protocol.primary.messages import RobotMessage, StartupMessage, version_message
+from protocol.primary.packages import encode_message_package, encode_safety_tolerances
 from protocol.script_channel import ScriptChannel
 from protocol.ur_types import RobotMode, SoftwareVersion
 from ur_emulator.controller.controller import Controller

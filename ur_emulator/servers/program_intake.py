@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 
-from protocol.primary_messages import ReportLevel
+from protocol.primary.messages import ReportLevel
 from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptItem
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes, StartFreedrive

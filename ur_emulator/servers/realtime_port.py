@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from protocol.realtime_layout import layout_for_version
+from protocol.realtime.layout import layout_for_version
 from protocol.script_channel import ScriptChannel
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller.events import Event

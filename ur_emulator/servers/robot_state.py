@@ -6,7 +6,7 @@ import zlib
 
 import numpy as np
 
-from protocol.primary_layout import (
+from protocol.primary.layout import (
     AdditionalInfo,
     CalibrationData,
     CartesianInfo,
@@ -22,8 +22,8 @@ from protocol.primary_layout import (
     ToolData,
     ToolModeInfo,
 )
-from protocol.primary_packages import encode_state
-from protocol.rtde_types import RobotStatusBits
+from protocol.primary.packages import encode_state
+from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import (
     SIMULATED_MASTERBOARD,
     ControlMode,

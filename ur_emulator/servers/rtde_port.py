@@ -1,17 +1,17 @@
 """Port 30004: RTDE. Every client gets the variables it asked for at its own rate, and writes inputs.
 
-What may be said when is `protocol.rtde_connection`'s; here are rates, owners of inputs, and sockets.
+What may be said when is `protocol.rtde.connection`'s; here are rates, owners of inputs, and sockets.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from protocol.dashboard_connection import Role
+from protocol.dashboard.connection import Role
 from protocol.errors import RemoteProtocolError
-from protocol.rtde_connection import DataReceived, RtdeConnection
-from protocol.rtde_messages import SetupInputs, SetupOutputs, TextMessage
-from protocol.rtde_types import TextLevel
+from protocol.rtde.connection import DataReceived, RtdeConnection
+from protocol.rtde.messages import SetupInputs, SetupOutputs, TextMessage
+from protocol.rtde.types import TextLevel
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.client_writes import WriteInputs
 from ur_emulator.controller.command import Command

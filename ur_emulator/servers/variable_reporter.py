@@ -12,14 +12,14 @@ from itertools import groupby
 from typing import Any
 
 from protocol.errors import LocalProtocolError
-from protocol.primary_layout import NO_TIME
-from protocol.primary_program import (
+from protocol.primary.layout import NO_TIME
+from protocol.primary.program import (
     GlobalVariablesSetup,
     GlobalVariablesUpdate,
     encode_program_state,
     encode_values,
 )
-from protocol.primary_values import MAX_NESTING, TypedValue, ValueType, encode_value, value_codes
+from protocol.primary.values import MAX_NESTING, TypedValue, ValueType, encode_value, value_codes
 from protocol.ur_types import SoftwareVersion
 from urscript import Matrix, Pose, RunningProgram, ScriptThread
 from urscript.run.variables import UNDEFINED

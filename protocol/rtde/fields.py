@@ -17,7 +17,7 @@ from functools import cache
 from types import MappingProxyType
 
 from protocol.filled import Filled
-from protocol.rtde_types import RtdeType
+from protocol.rtde.types import RtdeType
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import Since, since
 

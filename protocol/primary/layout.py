@@ -2,7 +2,7 @@
 
 Every class is the table of its bytes after the five-byte header (`i32 size | u8 sub-type`): order, types,
 units and the software that first had a field. Defaults are what an idle CB3 may send. To add a field: add a
-row. How records become packages is in `primary_packages`; what a value means for the robot is the box's
+row. How records become packages is in `primary.packages`; what a value means for the robot is the box's
 business.
 
 Sources: UR "Primary/Secondary Client Interface" (2021, chapters 5.9 and 5.10) and UR "Client_Interface"
@@ -17,14 +17,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from protocol.filled import Filled
-from protocol.primary_setup import (
+from protocol.primary.setup import (
     CalibrationData,
     ConfigurationData,
     KinematicsInfo,
     ToolCommunicationInfo,
     ToolModeInfo,
 )
-from protocol.primary_sub_package import NO_TIME, SubPackage
+from protocol.primary.sub_package import NO_TIME, SubPackage
 from protocol.ur_types import RobotMode, SafetyMode
 from protocol.wire_record import Since, since, wire
 

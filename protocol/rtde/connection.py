@@ -21,11 +21,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from protocol.dashboard_connection import Role
+from protocol.dashboard.connection import Role
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.rtde_codec import HEADER_SIZE, MAX_NAMES_SIZE, data_header, decode_message, encode_message
-from protocol.rtde_fields import RtdeField, input_fields, output_fields
-from protocol.rtde_messages import (
+from protocol.rtde.codec import HEADER_SIZE, MAX_NAMES_SIZE, data_header, decode_message, encode_message
+from protocol.rtde.fields import RtdeField, input_fields, output_fields
+from protocol.rtde.messages import (
     REQUESTS,
     VERSIONS,
     DataPackage,
@@ -46,9 +46,9 @@ from protocol.rtde_messages import (
     StartReply,
     TextMessage,
 )
-from protocol.rtde_recipe import Recipe, snapshot_encoder
-from protocol.rtde_states import TRANSITIONS, RtdeState, control_rate, cycles_per_package
-from protocol.rtde_types import IN_USE, NOT_FOUND, REFUSALS, RtdeType, RtdeValue
+from protocol.rtde.recipe import Recipe, snapshot_encoder
+from protocol.rtde.states import TRANSITIONS, RtdeState, control_rate, cycles_per_package
+from protocol.rtde.types import IN_USE, NOT_FOUND, REFUSALS, RtdeType, RtdeValue
 from protocol.ur_types import SoftwareVersion
 
 __all__ = ["MAX_REQUEST_SIZE", "DataReceived", "RtdeConnection", "RtdeEvent"]

@@ -4,7 +4,7 @@
 
 The size is the only hint at the layout. Both directions run once per control cycle, so both are prepared
 from the table when a layout is first asked for: the encoder is one generated call of `struct.pack`, the
-frame's attributes are slices. Nothing here knows what the values mean; see `realtime_columns` for that.
+frame's attributes are slices. Nothing here knows what the values mean; see `realtime.columns` for that.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import LENGTH_SIZE
-from protocol.realtime_columns import CB2_COLUMNS, COLUMNS, VERSIONS, Filled, RealtimeColumn
+from protocol.realtime.columns import CB2_COLUMNS, COLUMNS, VERSIONS, Filled, RealtimeColumn
 from protocol.ur_types import SoftwareVersion
 
 __all__ = [

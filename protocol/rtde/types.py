@@ -1,7 +1,7 @@
 """Words and data types of RTDE: what a variable looks like in bytes, and what a reply says instead of a type.
 
-Everything is big-endian. Only declarations stand here: the variables are in `rtde_fields`, the packages in
-`rtde_messages`.
+Everything is big-endian. Only declarations stand here: the variables are in `rtde.fields`, the packages in
+`rtde.messages`.
 """
 
 from __future__ import annotations

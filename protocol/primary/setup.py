@@ -1,4 +1,4 @@
-"""Sub-packages of the robot state that do not change while a box lives, in the form of `primary_layout`.
+"""Sub-packages of the robot state that do not change while a box lives, in the form of `primary.layout`.
 
 Two of them, the first, come in the first state of a connection only and after the brakes have opened.
 """
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from protocol.filled import Filled
-from protocol.primary_sub_package import SubPackage
+from protocol.primary.sub_package import SubPackage
 from protocol.ur_types import SIMULATED_MASTERBOARD, SIMULATOR_CHECKSUM
 from protocol.wire_record import Since, since, wire
 

@@ -1,6 +1,6 @@
 """When RTDE data flows: the answer to every request in both states of a connection, and the rate.
 
-Only tables and sums stand here; `rtde_connection` obeys them.
+Only tables and sums stand here; `rtde.connection` obeys them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import NamedTuple
 
-from protocol.rtde_messages import (
+from protocol.rtde.messages import (
     GetControllerVersion,
     Pause,
     Request,

@@ -1,4 +1,4 @@
-"""Bytes of RTDE's packages, see `rtde_messages`, in both protocol versions and both directions.
+"""Bytes of RTDE's packages, see `rtde.messages`, in both protocol versions and both directions.
 
     u16 size, header included | u8 type | payload        big-endian
 
@@ -14,9 +14,9 @@ import struct
 from collections.abc import Callable
 from typing import TypeAlias
 
-from protocol.dashboard_connection import Role
+from protocol.dashboard.connection import Role
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.rtde_messages import (
+from protocol.rtde.messages import (
     DataPackage,
     GetControllerVersion,
     GetControllerVersionReply,

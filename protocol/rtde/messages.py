@@ -1,7 +1,7 @@
-"""RTDE's packages as values: one frozen class each. Their bytes are in `rtde_codec`.
+"""RTDE's packages as values: one frozen class each. Their bytes are in `rtde.codec`.
 
 A request is named after what it asks, its answer is the same name with `Reply`. No package knows what was
-sent before it: that is `rtde_connection`.
+sent before it: that is `rtde.connection`.
 
 Source: UR RTDE guide.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TypeAlias
 
-from protocol.rtde_types import TextLevel
+from protocol.rtde.types import TextLevel
 from protocol.ur_types import SoftwareVersion
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""What the sub-packages of a robot state have in common; their tables are in `primary_layout`."""
+"""What the sub-packages of a robot state have in common; their tables are in `primary.layout`."""
 
 from __future__ import annotations
 

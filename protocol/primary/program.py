@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.primary_framing import PackageType, encode_package
-from protocol.primary_layout import NO_TIME
-from protocol.primary_values import TypedValue, decode_value, encode_value
+from protocol.primary.framing import PackageType, encode_package
+from protocol.primary.layout import NO_TIME
+from protocol.primary.values import TypedValue, decode_value, encode_value
 from protocol.ur_types import SoftwareVersion
 
 __all__ = [

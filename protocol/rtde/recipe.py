@@ -12,8 +12,8 @@ from functools import lru_cache
 from typing import Any
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.rtde_fields import RtdeField
-from protocol.rtde_types import RtdeType, RtdeValue
+from protocol.rtde.fields import RtdeField
+from protocol.rtde.types import RtdeType, RtdeValue
 
 __all__ = ["Recipe", "snapshot_encoder"]
 

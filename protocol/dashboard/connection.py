@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
-from protocol.dashboard_commands import (
+from protocol.dashboard.commands import (
     GREETING,
     DashboardCommand,
     find,

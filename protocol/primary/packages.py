@@ -14,22 +14,22 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.primary_framing import (
+from protocol.primary.framing import (
     HEADER,
     MAX_PACKAGE_SIZE,
     MIN_PACKAGE_SIZE,
     PackageType,
     encode_package,
 )
-from protocol.primary_messages import (
+from protocol.primary.messages import (
     RobotMessage,
     StartupMessage,
     VersionMessage,
     decode_message,
     encode_message,
 )
-from protocol.primary_program import ProgramStateMessage, decode_program_state
-from protocol.primary_state import (
+from protocol.primary.program import ProgramStateMessage, decode_program_state
+from protocol.primary.state import (
     RobotState,
     UnknownSubPackage,
     decode_state,
