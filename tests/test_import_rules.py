@@ -39,9 +39,10 @@ BOX_ORDER = (
     {"servers"},
     {"control"},
     {"emulator", "rack"},
+    {"__main__", "cli", "descriptor_limit", "pytest_plugin", "script_robots", "script_run"},
 )
 LANGUAGE_ORDER = (
-    {"courtesy", "dialect", "errors", "source", "values"},
+    {"courtesy", "dialect", "errors", "programs", "source", "values"},
     {"syntax"},
     {"layout"},
     {"catalogue"},
@@ -67,14 +68,11 @@ PROTOCOL_ORDER = (
     {"live"},
     {"__main__"},
 )
+ORDERS = {"ur_emulator": BOX_ORDER, "urscript": LANGUAGE_ORDER, "protocol": PROTOCOL_ORDER}
 LEVELS = [
     pytest.param(package, order, level, id=f"{package}-{'+'.join(sorted(order[level]))}")
-    for package, order in (
-        ("ur_emulator", BOX_ORDER),
-        ("urscript", LANGUAGE_ORDER),
-        ("protocol", PROTOCOL_ORDER),
-    )
-    for level in range(len(order))
+    for package, order in ORDERS.items()
+    for level in range(len(order) - 1)  # the last imports all
 ]
 
 
@@ -106,6 +104,12 @@ def test_packages_import_only_what_their_row_allows(package):
         if name not in allowed
     }
     assert not wrong
+
+
+@pytest.mark.parametrize("package", ORDERS)
+def test_every_part_of_a_package_has_its_place_in_the_order(package):
+    parts = {path.relative_to(ROOT / package).parts[0].removesuffix(".py") for path in modules(package)}
+    assert parts - {"__init__"} == set().union(*ORDERS[package])
 
 
 @pytest.mark.parametrize(("package", "order", "level"), LEVELS)
