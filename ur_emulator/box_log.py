@@ -15,7 +15,7 @@ from itertools import islice
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller import events
-from ur_emulator.controller.cycle import controller_time
+from ur_emulator.models.robot_generation import RobotGeneration
 
 # The log forgets the oldest beyond this many entries, and cuts what is longer than this many characters.
 MAX_ENTRIES = 5000
@@ -28,6 +28,7 @@ class LogEntry:
 
     Attributes:
         tick: controller cycle in which it was written.
+        time: seconds since controller start.
         level: how serious it is.
         source: who speaks: Program, Controller, Safety, Client, Dashboard.
         text: without line breaks at its end.
@@ -35,15 +36,11 @@ class LogEntry:
     """
 
     tick: int
+    time: float
     level: ReportLevel
     source: str
     text: str
     code: str = ""
-
-    @property
-    def time(self) -> float:
-        """Seconds since controller start."""
-        return controller_time(self.tick)
 
     def __str__(self) -> str:
         code = f"{self.code} " if self.code else ""
@@ -57,8 +54,10 @@ class BoxLog:
         count: entries written so far, those that are forgotten included.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, generation: RobotGeneration) -> None:
+        """Begin an empty log; the generation of the robot decides how long a cycle is."""
         self.count = 0
+        self._generation = generation
         self._entries: deque[LogEntry] = deque(maxlen=MAX_ENTRIES)
         self._followers: list[Callable[[LogEntry], None]] = []
 
@@ -87,7 +86,7 @@ class BoxLog:
         """Write an entry; what is too long is cut."""
         if len(text) > MAX_TEXT:
             text = text[: MAX_TEXT - 3] + "..."
-        entry = LogEntry(tick, level, source, text.rstrip("\r\n"), code)
+        entry = LogEntry(tick, self._generation.seconds(tick), level, source, text.rstrip("\r\n"), code)
         self._entries.append(entry)
         self.count += 1
         for follower in self._followers:

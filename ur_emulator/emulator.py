@@ -29,6 +29,7 @@ from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robot_generation import CB3, RobotGeneration
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.software import software_of
 from ur_emulator.programs.folder import ProgramFolder
@@ -54,7 +55,7 @@ from ur_emulator.servers.script_sockets import LoopNetwork
 if TYPE_CHECKING:
     from ur_emulator.rack import BoxOptions, BoxRack
 
-DEFAULT_VERSION = "3.15.8"
+DEFAULT_VERSION = CB3.default_version
 MAX_PORT = 65535
 
 
@@ -88,6 +89,7 @@ class ControlBox(BoxOperations):
         *,
         loop: EventLoop | None = None,
         phase: float = 0.0,
+        generation: RobotGeneration = CB3,
     ) -> None:
         """Assemble the box; nothing listens before it is started.
 
@@ -105,13 +107,14 @@ class ControlBox(BoxOperations):
                 None: none.
             loop: shared with other boxes, see `BoxRack`, which runs it; None gives the box its own.
             phase: which part of a period its cycles lie after those of the first box of the loop.
+            generation: of the robot: control cycle, physics step, software.
 
         Raises:
             EmulatorError: an argument is not among the allowed ones.
         """
         model = robot_by_name(robot)
-        asked = _parse_version(version)
-        software = software_of(asked)
+        asked = _parse_version(version, generation)
+        software = software_of(asked, generation.builds)
         imperfections = fidelity_by_name(fidelity)
         named_pace = _parse_pace(pace)
         if not 0.0 < speed < math.inf:
@@ -136,7 +139,9 @@ class ControlBox(BoxOperations):
         self._runner = LoopRunner(self._loop, self.close)
         modbus = CodecLoader(self._loop)
         self._network = LoopNetwork(self._loop, modbus, host)
-        controller = Controller(model, imperfections, seed, self._network, mode=RobotMode.RUNNING)
+        controller = Controller(
+            model, imperfections, seed, self._network, mode=RobotMode.RUNNING, generation=generation
+        )
         controller.state.ports.version = (asked.major, asked.minor)
         self._box = ServedBox(
             controller, make_pacer(named_pace, controller.period_s, speed, phase), self._loop.expect_soon
@@ -322,14 +327,15 @@ class ControlBox(BoxOperations):
             self._loop.close()
 
 
-def _parse_version(text: str) -> SoftwareVersion:
+def _parse_version(text: str, generation: RobotGeneration) -> SoftwareVersion:
     try:
         version = SoftwareVersion.parse(text)
     except Exception as error:
         raise EmulatorError(str(error)) from None
-    if version.major != 3:
+    if version.major != generation.major:
         raise EmulatorError(
-            f"version {text} given: this box is a CB3, its software is 3.x, for example {DEFAULT_VERSION}"
+            f"version {text} given: this box is a {generation.name}, its software is {generation.major}.x, "
+            f"for example {generation.default_version}"
         )
     return version
 

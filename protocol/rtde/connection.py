@@ -47,7 +47,7 @@ from protocol.rtde.messages import (
     TextMessage,
 )
 from protocol.rtde.recipe import Recipe, snapshot_encoder
-from protocol.rtde.states import TRANSITIONS, RtdeState, control_rate, cycles_per_package
+from protocol.rtde.states import TRANSITIONS, RtdeState
 from protocol.rtde.types import IN_USE, NOT_FOUND, REFUSALS, RtdeType, RtdeValue
 from protocol.ur_types import SoftwareVersion
 
@@ -89,7 +89,7 @@ class RtdeConnection:
         protocol_version: 1 until another one is agreed on.
         state: whether data packages flow.
         input_recipes: what the client may write, by recipe id.
-        cycles_per_package: at the robot's end, control cycles from one data package to the next.
+        frequency: at the robot's end, data packages a second that were asked for last [Hz]; None for all.
     """
 
     def __init__(self, our_role: Role, version: SoftwareVersion = _NEWEST_CB3) -> None:
@@ -104,7 +104,7 @@ class RtdeConnection:
         self.protocol_version = VERSIONS[0]
         self.state = RtdeState.PAUSED
         self.input_recipes: dict[int, Recipe] = {}
-        self.cycles_per_package = 1
+        self.frequency: float | None = None
 
     def receive_data(self, data: bytes) -> None:
         """Take what the socket gave; any split is fine."""
@@ -207,7 +207,7 @@ class RtdeConnection:
         """Replace the output recipe. One that is refused takes no id, and nothing is sent until the next."""
         fields, types = _look_up(request.names, output_fields(self._software), ())
         is_v1 = self.protocol_version == 1
-        self.cycles_per_package = cycles_per_package(request.frequency, control_rate(self._software))
+        self.frequency = request.frequency
         self._encoder = None
         if not fields:
             return SetupOutputsReply(types, None if is_v1 else 0)

@@ -19,9 +19,8 @@ from protocol.rtde.messages import (
     SetupOutputs,
     Start,
 )
-from protocol.ur_types import SoftwareVersion
 
-__all__ = ["TRANSITIONS", "RtdeState", "Verdict", "control_rate", "cycles_per_package"]
+__all__ = ["TRANSITIONS", "RtdeState", "Verdict", "cycles_per_package"]
 
 
 class RtdeState(Enum):
@@ -58,11 +57,6 @@ TRANSITIONS: Mapping[tuple[RtdeState, type[Request]], Verdict] = {
     (_STARTED, Pause): Verdict(True, _PAUSED),
 }
 """Every request in every state. A version that does not exist is refused in both."""
-
-
-def control_rate(version: SoftwareVersion) -> int:
-    """Control cycles a second: 125 for CB3, 500 for e-Series."""
-    return 125 if version.major < 5 else 500
 
 
 def cycles_per_package(frequency: float | None, rate: int) -> int:

@@ -14,7 +14,7 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde import messages as M
 from protocol.rtde.codec import MAX_NAMES_SIZE, encode_message
 from protocol.rtde.connection import MAX_REQUEST_SIZE, DataReceived, RtdeConnection
-from protocol.rtde.states import TRANSITIONS, RtdeState, control_rate, cycles_per_package
+from protocol.rtde.states import TRANSITIONS, RtdeState, cycles_per_package
 from protocol.ur_types import SoftwareVersion
 
 V3_15 = SoftwareVersion(3, 15, 8)
@@ -143,7 +143,7 @@ def test_a_pipelined_version_request_decides_how_the_next_package_is_read():
     assert robot.reply() == bytes.fromhex("00045601")
     assert robot.next_event() == M.SetupOutputs(("timestamp",), 50.0)
     assert robot.reply() == b"\x00\x0aO\x01DOUBLE"
-    assert robot.cycles_per_package == 2
+    assert robot.frequency == 50.0
 
 
 # --- recipes
@@ -223,11 +223,10 @@ def test_a_list_of_names_beyond_the_limit_is_answered_but_not_found(pair):
     ],
 )
 def test_cycles_per_package_of_a_cb3(frequency, cycles):
-    assert cycles_per_package(frequency, control_rate(V3_15)) == cycles
+    assert cycles_per_package(frequency, 125) == cycles
 
 
 def test_an_e_series_has_500_cycles_a_second():
-    assert control_rate(SoftwareVersion(5, 12)) == 500
     assert cycles_per_package(125.0, 500) == 4
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from plant_support import HOME, PERIOD, SpeedRamp, column, hold, target
 
-from ur_emulator.errors import EmulatorError, PlantError
+from ur_emulator.errors import EmulatorError, ModelError, PlantError
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
+from ur_emulator.models.robot_generation import CB3
 from ur_emulator.models.ur3 import UR3
 from ur_emulator.plant.plant import Plant
 
@@ -100,14 +103,19 @@ def test_divergence_is_an_error_in_its_cycle_and_a_reset_heals():
     assert np.abs(plant.q_true - HOME).max() < 1e-4
 
 
-@pytest.mark.parametrize("period", [0.0, 0.003, -0.008])
+@pytest.mark.parametrize("period", [0, 3_000, -8_000])
 def test_a_cycle_that_the_physics_cannot_fill_is_refused(period):
-    with pytest.raises(PlantError, match="whole multiple of 2000"):
-        Plant(UR3, TYPICAL, 0, period)
+    with pytest.raises(ModelError, match="whole multiple of the physics step of 2000"):
+        replace(CB3, period_us=period)
+
+
+def test_a_cycle_that_does_not_divide_a_second_is_refused():
+    with pytest.raises(ModelError, match="whole number of cycles a second"):
+        replace(CB3, period_us=6_000)
 
 
 def test_a_two_millisecond_cycle_works_too():
-    plant = Plant(UR3, TYPICAL, 0, 0.002)
+    plant = Plant(UR3, TYPICAL, 0, replace(CB3, period_us=2_000))
     for _ in range(400):
         plant.step(target(HOME))
         plant.sense()

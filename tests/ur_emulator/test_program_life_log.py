@@ -20,6 +20,7 @@ from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.programs import ResumeProgram
 from ur_emulator.commands.safety import UnlockProtectiveStop
 from ur_emulator.controller import events
+from ur_emulator.models.robot_generation import CB3
 
 
 @pytest.fixture
@@ -157,7 +158,7 @@ def test_a_client_of_ones_own_can_close_popups_and_answer(box):
 
 
 def test_the_log_forgets_the_oldest_and_cuts_long_lines():
-    log = BoxLog()
+    log = BoxLog(CB3)
     for i in range(MAX_ENTRIES + 10):
         log.note(events.TextPrinted(f"line {i}"), i)
     assert len(log.entries) == MAX_ENTRIES
@@ -184,7 +185,7 @@ EVENTS = [
 
 @pytest.mark.parametrize(("event", "line"), EVENTS, ids=[line for _, line in EVENTS])
 def test_lines_of_events(event, line):
-    log = BoxLog()
+    log = BoxLog(CB3)
     heard = []
     log.follow(heard.append)
     log.note(event, 7500)

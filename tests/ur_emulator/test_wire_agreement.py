@@ -12,7 +12,7 @@ from protocol.rtde.fields import output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
-from ur_emulator.controller.cycle import PERIOD_US
+from ur_emulator.models.robot_generation import CB3
 from ur_emulator.servers.robot_state import StateEncoder
 
 V3_15 = SoftwareVersion(3, 15, 8)
@@ -63,7 +63,7 @@ def test_states_and_rtde_say_the_same(moments):
     for rtde, _, state, _ in moments:
         mode, joints = state[L.RobotModeData], state[L.JointData]
         assert mode.timestamp == round(rtde["timestamp"] * 1e6)
-        assert mode.timestamp % PERIOD_US == 0
+        assert mode.timestamp % CB3.period_us == 0
         assert mode.robot_mode == rtde["robot_mode"]
         bits = RobotStatusBits(rtde["robot_status_bits"])
         assert mode.is_robot_power_on == (RobotStatusBits.POWER_ON in bits)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from protocol.primary.messages import RequestedType
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.commands.inputs import DIGITAL_GROUPS
-from ur_emulator.controller.cycle import controller_time
 from ur_emulator.models.robot_model import Vector3, Vector6
 
 if TYPE_CHECKING:
@@ -102,7 +101,7 @@ def take_state(controller: Controller) -> BoxState:
     popups = tuple(r.text for r in operator.requests if r.kind is RequestedType.NONE)
     return BoxState(
         tick=now.tick,
-        time=controller_time(now.tick),
+        time=now.timestamp,
         robot_mode=RobotMode(now.robot_mode).name,
         safety_mode=SafetyMode(now.safety_mode).name,
         program_state=ProgramState(now.runtime_state).name,

@@ -13,7 +13,6 @@ from contextlib import suppress
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.controller.command import Command
-from ur_emulator.controller.cycle import BOOT_TICK, PERIOD_US
 from ur_emulator.controller.events import (
     ErrorReported,
     Event,
@@ -38,6 +37,7 @@ from ur_emulator.errors import RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.robot_generation import CB3, RobotGeneration
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.target import JointTarget
@@ -47,11 +47,11 @@ from ur_emulator.plant.plant_state import PlantState
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.program_slot import ProgramSlot
 
-# After the last activity the arm gets this many cycles to come to rest before time may stand still (0.2 s).
-SETTLE_CYCLES = 25
-# A protective stop can be unlocked after a while; time must not stand still before that. Two cycles more: the
-# one in which it happens counts, and the delay must have passed, not be about to.
-UNLOCK_CYCLES = round(UNLOCK_DELAY * 1_000_000 / PERIOD_US) + 2
+# A box that serves has booted a minute ago [s]: clients distrust a controller clock below 40 s (public client
+# library).
+BOOT_TIME = 60.0
+# After the last activity the arm gets this time to come to rest before time may stand still [s].
+SETTLE_TIME = 0.2
 
 
 class Controller:
@@ -65,6 +65,7 @@ class Controller:
         network: Network,
         *,
         mode: RobotMode = RobotMode.RUNNING,
+        generation: RobotGeneration = CB3,
     ) -> None:
         """Assemble the box.
 
@@ -74,23 +75,29 @@ class Controller:
             seed: of everything random in it: calibration, phases, noise.
             network: opens the sockets of scripts.
             mode: robot mode to start in.
+            generation: of the robot; its control cycle.
         """
-        self.period_s = PERIOD_US * 1e-6
-        self.plant = Plant(robot, fidelity, seed, self.period_s)
+        self.generation = generation
+        self.period_s = generation.period_s
+        self.plant = Plant(robot, fidelity, seed, generation)
         arm = ArmModel(robot, draw_calibration(fidelity, seed))
         q = six(robot.home_q)
         self.plant.reset(q)
         self._mode = mode
         self._saturated_s = 0.0
         self._settle = 0
+        self._settle_cycles = generation.cycles(SETTLE_TIME)
+        # A protective stop can be unlocked after a while; time must not stand still before that. Two cycles
+        # more: the one in which it happens counts, and the delay must have passed, not be about to.
+        self._unlock_cycles = generation.cycles(UNLOCK_DELAY) + 2
         self.state = ControllerState(
             robot=robot,
             arm=arm,
-            period_s=self.period_s,
+            generation=generation,
             seed=seed,
             motion=ArmMotion(q, robot.stop_deceleration),
             mode=RobotModeMachine(mode, self.period_s),
-            tick=BOOT_TICK,
+            tick=generation.cycles(BOOT_TIME),
         )
         self.state.place_arm = self._place_arm
         self._payload = self.state.payload
@@ -119,7 +126,7 @@ class Controller:
             or self.state.motion.is_moving
             or self.state.mode.is_changing
             or self.safety.is_stopping
-            or self._settle > SETTLE_CYCLES
+            or self._settle > self._settle_cycles
             or self.push.will_end
         )
 
@@ -165,7 +172,7 @@ class Controller:
         is_still = not control and not any(target.qd)
         state.steady_cycles = state.steady_cycles + 1 if is_still else 0
         was_active = was_active or (control is _BY_HAND and any(target.qd))
-        self._settle = max(self._settle - 1, SETTLE_CYCLES if was_active else 0)
+        self._settle = max(self._settle - 1, self._settle_cycles if was_active else 0)
         state.snapshot = make_snapshot(state, self.programs, target, sensed)
         state.q_history.appendleft(sensed.actual_q)
         return state.snapshot
@@ -263,7 +270,7 @@ class Controller:
 
     def _stop_for(self, violation: Violation, actual_q: Vector6) -> None:
         state = self.state
-        self._settle = UNLOCK_CYCLES
+        self._settle = self._unlock_cycles
         state.events.append(violation.error)
         self.safety.happen(SafetyEvent.PROTECTIVE_STOP)
         if violation.blocked:

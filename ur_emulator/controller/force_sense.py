@@ -12,19 +12,21 @@ from collections.abc import Sequence
 from itertools import islice
 from math import hypot
 
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.target import ZERO6
 
-# Least and most cycles that are averaged to tell a zero from noise: 0.2 s leave 0.6 N of 3 N, 1 s 0.3 N.
-ZERO_CYCLES = (25, 125)
+# Least and most time that is averaged to tell a zero from noise [s]: 0.2 s leave 0.6 N of 3 N, 1 s 0.3 N.
+# The most is all that is remembered.
+LEAST_TIME, MOST_TIME = 0.2, 1.0
 # What the maker says of the estimate: it is no better than this [N, Nm]. Source: UR3/CB3 manual.
 PRECISION: Vector6 = (10.0, 10.0, 10.0, 5.0, 5.0, 5.0)
 
 # A contact is a force that has risen by this within the time remembered [N]. The friction offset of the
 # estimate turns round with the motion, by 8 N for a poor arm, and noise leaves 2 N of the mean below.
 CONTACT_FORCE = 15.0
-# Cycles that are averaged at the end and, as the force before, at the beginning of what is remembered.
-_RECENT_CYCLES, _EARLY_CYCLES = 5, 25
+# Time that is averaged at the end and, as the force before, at the beginning of what is remembered [s].
+_RECENT_TIME, _EARLY_TIME = 0.04, 0.2
 # It began when the force had risen by this part of what it has come to.
 _ONSET_SHARE = 0.2
 
@@ -36,9 +38,11 @@ class ForceSense:
         zero: what counts as no wrench; None until a program has said so.
     """
 
-    def __init__(self, n_cycles: int) -> None:
-        """Remember so many cycles."""
-        self._history: deque[Vector6] = deque(maxlen=n_cycles)
+    def __init__(self, generation: RobotGeneration) -> None:
+        """Begin with nothing remembered; the generation decides how long a cycle is."""
+        self._n_least, self._n_most = generation.cycles(LEAST_TIME), generation.cycles(MOST_TIME)
+        self._n_recent, self._n_early = generation.cycles(_RECENT_TIME), generation.cycles(_EARLY_TIME)
+        self._history: deque[Vector6] = deque(maxlen=self._n_most)
         self.zero: Vector6 | None = None
 
     def take(self, wrench: Vector6) -> Vector6:
@@ -82,10 +86,10 @@ class ForceSense:
             direction: in which the tool meets something, base axes (3,); zero for any.
         """
         forces = [wrench[:3] for wrench in self._history]
-        if len(forces) < _RECENT_CYCLES + _EARLY_CYCLES:
+        if len(forces) < self._n_recent + self._n_early:
             return 0
-        before = _mean(forces[-_EARLY_CYCLES:])
-        change = [now - then for now, then in zip(_mean(forces[:_RECENT_CYCLES]), before, strict=True)]
+        before = _mean(forces[-self._n_early :])
+        change = [now - then for now, then in zip(_mean(forces[: self._n_recent]), before, strict=True)]
         size = hypot(*direction)
         # What is met pushes back against the direction.
         against = (
@@ -103,7 +107,7 @@ class ForceSense:
         return len(felt) - 1
 
     def _present(self, still_cycles: int) -> Vector6:
-        least, most = ZERO_CYCLES
+        least, most = self._n_least, self._n_most
         # The arm comes to rest a little after its target.
         latest = list(islice(self._history, min(max(still_cycles - least, least), most)))
         return six(_mean(latest)) if latest else ZERO6

@@ -9,7 +9,6 @@ from collections.abc import Callable
 
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import SafetyMode
-from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.io import CONFIGURABLE_SHIFT, N_CONFIGURABLE, N_STANDARD, N_TOOL, TOOL_SHIFT
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety_modes import EMERGENCY_MODES
@@ -150,7 +149,7 @@ def latch_clock(state: ControllerState, offset: int, value: int) -> None:
 
 def clock(state: ControllerState, offset: int) -> int:
     """Read the latched time: ms, s, min, h, days since the controller started."""
-    milliseconds = state.ports.latched_tick * PERIOD_US // 1000
+    milliseconds = state.ports.latched_tick * state.generation.period_us // 1000
     seconds = milliseconds // 1000
     return (milliseconds % 1000, seconds % 60, seconds // 60 % 60, seconds // 3600 % 24, seconds // 86400)[
         offset

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ur_emulator.controller.cycle import controller_time
 from ur_emulator.controller.external_sensor import VARIABLE
 from ur_emulator.controller.force_sense import moved_wrench
 from ur_emulator.controller.robot_mode import JOINT_VECTORS, POWERED
@@ -43,7 +42,7 @@ def make_snapshot(
     powered = mode in POWERED
     return Snapshot(
         tick=state.tick,
-        timestamp=controller_time(state.tick),
+        timestamp=state.time,
         target_q=target.q,
         target_qd=target.qd,
         target_qdd=target.qdd,

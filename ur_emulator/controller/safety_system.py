@@ -6,7 +6,6 @@ The tables are in `safety_modes`. In cycles in which nothing of this goes on nob
 from __future__ import annotations
 
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.controller.cycle import controller_time
 from ur_emulator.controller.events import SafetyModeChanged
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.controller.safety import Violation
@@ -54,7 +53,7 @@ class SafetySystem:
         state, safety = self._state, self._state.safety
         before = safety.mode
         was_stopping = self.is_stopping
-        safety.apply(event, controller_time(state.tick))
+        safety.apply(event, state.time)
         if safety.mode is not before:
             state.events.append(SafetyModeChanged(int(safety.mode)))
             self._react(before)

@@ -28,12 +28,13 @@ from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.speed_limiter import SpeedLimiter
 from ur_emulator.controller.watchdogs import Watchdogs
 from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.target import ZERO6
 
-# How many cycles back a script may ask for joint positions; the real buffer's length is not known.
-HISTORY_CYCLES = 125
+# How far back a script may ask for joint positions [s]; the real buffer's length is not known.
+HISTORY_TIME = 1.0
 
 
 @dataclass(slots=True)
@@ -57,6 +58,7 @@ class ControllerState:
     Attributes:
         robot: numbers of the arm.
         arm: the controller's (calibrated) kinematics.
+        generation: of the robot.
         period_s: duration of a control cycle [s].
         seed: of everything random in the box.
         motion: where the joints are asked to go, and by whom.
@@ -92,10 +94,11 @@ class ControllerState:
 
     robot: RobotModel
     arm: ArmModel
-    period_s: float
+    generation: RobotGeneration
     seed: int
     motion: ArmMotion
     mode: RobotModeMachine
+    period_s: float = field(init=False)
     snapshot: Snapshot = field(init=False)
     safety: SafetyState = field(default_factory=SafetyState)
     limiter: SpeedLimiter | None = None
@@ -114,7 +117,7 @@ class ControllerState:
     stop_requested: bool = False
     wants_script_line: bool = False
     client_inputs: dict[str, Any] = field(default_factory=dict)
-    q_history: deque[Vector6] = field(default_factory=lambda: deque(maxlen=HISTORY_CYCLES))
+    q_history: deque[Vector6] = field(init=False)
     events: list[Event] = field(default_factory=list)
     modbus: ModbusSignals = field(init=False)
     io_configuration: IoConfiguration = field(init=False)
@@ -126,10 +129,18 @@ class ControllerState:
     error_settings: ErrorSettings = field(default_factory=ErrorSettings)
     power_off_requested: bool = False
     compliance: Compliance = field(default_factory=Compliance)
-    force_sense: ForceSense = field(default_factory=lambda: ForceSense(HISTORY_CYCLES))
+    force_sense: ForceSense = field(init=False)
     place_arm: Callable[[Vector6], bool] = field(init=False)
 
     def __post_init__(self) -> None:
+        self.period_s = self.generation.period_s
+        self.q_history = deque(maxlen=self.generation.cycles(HISTORY_TIME))
+        self.force_sense = ForceSense(self.generation)
         self.modbus = ModbusSignals(self.period_s)
         self.io_configuration = IoConfiguration(self.io, self.registers, self.modbus)
         self.watchdogs = Watchdogs(self.period_s)
+
+    @property
+    def time(self) -> float:
+        """Seconds since controller start, at the end of this cycle."""
+        return self.generation.seconds(self.tick)

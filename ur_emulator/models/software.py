@@ -26,8 +26,11 @@ class Software:
         return self.built.strftime("%b %d %Y")
 
 
-# First version, build, date. Software between two rows has the build and the date of the earlier row.
-CB3_BUILDS: tuple[tuple[SoftwareVersion, int, datetime], ...] = (
+# First version, build and date of each row, the oldest first.
+Builds = tuple[tuple[SoftwareVersion, int, datetime], ...]
+
+# Software between two rows has the build and the date of the earlier row.
+CB3_BUILDS: Builds = (
     (SoftwareVersion(3, 0), 15547, datetime(2014, 6, 1)),  # build: public issues name 3.0.15547; date chosen
     (SoftwareVersion(3, 2), 19171, datetime(2016, 1, 1)),  # chosen
     (SoftwareVersion(3, 3), 60, datetime(2016, 7, 8, 16, 7, 20)),  # capture of 3.3.1
@@ -36,9 +39,7 @@ CB3_BUILDS: tuple[tuple[SoftwareVersion, int, datetime], ...] = (
 )
 
 
-def software_of(
-    version: SoftwareVersion, builds: tuple[tuple[SoftwareVersion, int, datetime], ...] = CB3_BUILDS
-) -> Software:
+def software_of(version: SoftwareVersion, builds: Builds = CB3_BUILDS) -> Software:
     """Return what a box with a software version tells.
 
     Args:

@@ -28,6 +28,7 @@ from ur_emulator.models.calibration import calibrated_dh, draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import FLANGE, GRAVITY
 from ur_emulator.models.random_streams import random_stream
+from ur_emulator.models.robot_generation import CB3, RobotGeneration
 from ur_emulator.models.robot_model import RobotModel, Vector3, six
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.contact import contact_wrench
@@ -48,9 +49,6 @@ from ur_emulator.plant.sensors import (
 )
 from ur_emulator.plant.thermometers import Thermometers
 
-SUBSTEP_US = 2000
-"""Physics time step [µs]; must divide the control cycle."""
-
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 
 
@@ -63,30 +61,24 @@ class Plant:
         robot: type of the arm.
         fidelity: how imperfect it is.
         seed: which one of all such arms; fixes calibration, gear phases, delays and noise.
-        period_s: control cycle [s], a whole multiple of 2 ms.
+        generation: control cycle and physics step.
 
     Attributes:
         calibration: the factory calibration of this arm, for the controller's kinematics.
         dead_time: the delay drawn for this box, from the start of a cycle to the drives acting on it [s].
         obstacles: what stands around the arm.
-
-    Raises:
-        PlantError: when the cycle is not a whole multiple of the physics step.
     """
 
-    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int, period_s: float = 0.008) -> None:
-        period_us = round(period_s * 1e6)
-        if period_us <= 0 or period_us % SUBSTEP_US:
-            raise PlantError(
-                f"control cycle of {period_s} s given: a whole multiple of {SUBSTEP_US} µs is needed"
-            )
+    def __init__(
+        self, robot: RobotModel, fidelity: Fidelity, seed: int, generation: RobotGeneration = CB3
+    ) -> None:
         self.robot = robot
         self.fidelity = fidelity
         self.seed = seed
-        self.period_s = period_us * 1e-6
+        self.period_s = generation.period_s
         self.calibration = draw_calibration(fidelity, seed)
-        self._n_substeps = period_us // SUBSTEP_US
-        substep = SUBSTEP_US * 1e-6
+        self._n_substeps = generation.n_substeps
+        substep = generation.substep_us * 1e-6
 
         spread = fidelity.dead_time_spread * float(random_stream(seed, "delay").uniform())
         dead_substeps = int((fidelity.dead_time + spread) / substep + 1e-9)

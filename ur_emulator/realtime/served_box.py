@@ -14,10 +14,6 @@ from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.realtime.pacing import Pacer, RealtimePacer
 
-# While time stands still, every port repeats itself at its own rate, in real seconds: clients take silence
-# for a dead robot.
-HEARTBEAT = 0.008  # s
-
 
 class Publisher(Protocol):
     """A port that wants snapshots and events."""
@@ -51,7 +47,7 @@ class ServedBox:
         """
         self._expect_soon = expect_soon
         self.controller = controller
-        self.log = BoxLog()
+        self.log = BoxLog(controller.generation)
         self._pacer = pacer
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._publishers: list[Publisher] = []
@@ -143,7 +139,9 @@ class ServedBox:
                     return now  # the next cycle may follow at once, after the sockets have had their turn
                 self._expect_soon()
             return self._pacer.next_call(now)
-        if self._repeats and now - self._last_frame >= HEARTBEAT:
+        # While time stands still, every port repeats itself at its own rate, in real seconds: clients take
+        # silence for a dead robot.
+        if self._repeats and now - self._last_frame >= self.controller.period_s:
             self._publish(self.controller.snapshot, now)
         return self._pacer.next_call(now)
 

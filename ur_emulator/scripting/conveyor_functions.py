@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from math import hypot
 from typing import Any
 
-from ur_emulator.controller.cycle import controller_time
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.conveyor import CircularConveyor, Conveyor, LinearConveyor
 from ur_emulator.motion.generators import StopJ
@@ -53,7 +52,7 @@ class ProgramConveyor:
             return lambda: encoder.travel
 
         def clock() -> float:
-            return controller_time(state.tick)
+            return state.time
 
         def track_linear(
             thread: object, direction: Pose, ticks_per_meter: float, encoder_index: float

@@ -14,7 +14,6 @@ from protocol.primary.packages import encode_message_package, encode_safety_tole
 from protocol.script_channel import ScriptChannel
 from protocol.ur_types import RobotMode, SoftwareVersion
 from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.events import Event, ProgramStarted, ProgramStopped
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.models.software import Software
@@ -27,7 +26,6 @@ from ur_emulator.servers.variable_reporter import VariableReporter
 from urscript import RunningProgram
 
 STATE_RATE = 10  # states per second
-_CYCLE_RATE = 1_000_000 // PERIOD_US
 # The first software seen to send the tolerances package. Source: captures of 3.3 (absent) and 3.10 (present).
 _TOLERANCES_SINCE = SoftwareVersion(3, 10)
 
@@ -102,10 +100,11 @@ class PrimaryPort:
             message = self._labels.message(self._now)
             if message is not None:
                 self._send(self._package(message))
+        cycle_rate = self._controller.generation.cycle_rate
         self._phase += STATE_RATE
-        if self._phase < _CYCLE_RATE:
+        if self._phase < cycle_rate:
             return
-        self._phase -= _CYCLE_RATE
+        self._phase -= cycle_rate
         running = snapshot.robot_mode == RobotMode.RUNNING
         has_started, self._was_running = running and not self._was_running, running
         if self._channels:
@@ -129,7 +128,7 @@ class PrimaryPort:
     @property
     def _now(self) -> int:
         """Time stamp of the present cycle."""
-        return self._controller.snapshot.tick * PERIOD_US
+        return round(self._controller.snapshot.timestamp * 1e6)
 
     def _package(self, message: RobotMessage) -> bytes:
         return encode_message_package(message, self._version)

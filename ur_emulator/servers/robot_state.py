@@ -32,7 +32,6 @@ from protocol.ur_types import (
     SafetyMode,
     SoftwareVersion,
 )
-from ur_emulator.controller.cycle import PERIOD_US
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety_modes import EMERGENCY_MODES, MOVING_MODES
 from ur_emulator.controller.snapshot import Snapshot
@@ -80,7 +79,7 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
     domains, analog = snap.analog_domains, snap.analog_values
     return (
         RobotModeData(
-            timestamp=snap.tick * PERIOD_US,
+            timestamp=round(snap.timestamp * 1e6),
             is_real_robot_connected=snap.robot_mode not in _UNCONNECTED,
             is_real_robot_enabled=powered,
             is_robot_power_on=powered,

@@ -11,6 +11,7 @@ from protocol.dashboard.connection import Role
 from protocol.errors import RemoteProtocolError
 from protocol.rtde.connection import DataReceived, RtdeConnection
 from protocol.rtde.messages import SetupInputs, SetupOutputs, TextMessage
+from protocol.rtde.states import cycles_per_package
 from protocol.rtde.types import TextLevel
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.client_writes import WriteInputs
@@ -67,7 +68,9 @@ class RtdePort:
 
     def opened(self, connection: Connection) -> None:
         """The client speaks first."""
-        self._sessions[connection] = _Session(connection, RtdeConnection(Role.ROBOT, self._version))
+        self._sessions[connection] = _Session(
+            connection, RtdeConnection(Role.ROBOT, self._version), self._controller.generation.cycle_rate
+        )
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Answer requests in order, hand inputs on; what is no RTDE ends the connection."""
@@ -169,7 +172,8 @@ class _Session:
         is_lost: what comes from it makes no sense any more; it is told so, then the connection ends.
     """
 
-    def __init__(self, connection: Connection, protocol: RtdeConnection) -> None:
+    def __init__(self, connection: Connection, protocol: RtdeConnection, cycle_rate: int) -> None:
+        self._cycle_rate = cycle_rate
         self.protocol = protocol
         self.encode: Callable[[Snapshot], bytes] | None = None
         self.inbox = bytearray()
@@ -186,7 +190,7 @@ class _Session:
         if encode is not self.encode:
             self.encode = encode
             self._first_tick = self._last_tick = -1
-        self._divisor = self.protocol.cycles_per_package
+        self._divisor = cycles_per_package(self.protocol.frequency, self._cycle_rate)
 
     def due(self, tick: int) -> Callable[[Snapshot], bytes] | None:
         """Return what makes the package that is due now, None if none is.
