@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from ur_emulator.realtime.garbage import collection_put_off
+from ur_emulator.realtime.interpreter import collection_put_off
 
 from bench.script import SYNC_THREADS
 from ur_emulator.commands.programs import StartProgram
