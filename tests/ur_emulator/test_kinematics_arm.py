@@ -74,7 +74,7 @@ def test_state_agrees_with_forward_kinematics_and_jacobian(arm, tcp):
     rows = calibrated_dh(UR3, arm.calibration)
     h = 1e-6
     for q, qd in zip(random_angles(20, seed=2), random_angles(20, seed=3), strict=True):
-        pose, speed, elbow, elbow_velocity = arm.state(q.tolist(), qd.tolist(), tcp)
+        pose, speed, elbow, elbow_velocity, *_ = arm.state(q.tolist(), qd.tolist(), tcp)
         assert pose == pytest.approx(arm.fk(q, tcp), abs=1e-14)
         assert speed == pytest.approx(arm.jacobian(q, tcp) @ qd, abs=1e-12)
         assert elbow == pytest.approx(dh_product(rows[:2], q)[:3, 3], abs=1e-12)

@@ -1,76 +1,187 @@
 """Everything that any port can publish at the end of a cycle, frozen.
 
-The first block carries the names of the realtime columns, lower-cased (`actual_TCP_pose` on the wire is
-`actual_tcp_pose` here), so that a frame is a pure function of a snapshot and a layout table.
+A snapshot is the records of its owners one after the other: the motion's target, what the plant's sensors
+read, the state of the box; and the arm in space, which is computed when somebody reads it. Names are those of
+the realtime columns, lower-cased (`actual_TCP_pose` on the wire is `actual_tcp_pose` here), so that a frame is
+a pure function of a snapshot and a layout table.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ur_emulator.controller import electrics
+from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.registers import RegisterValues
+from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.status_bits import robot_status_bits, safety_status_bits
 from ur_emulator.models.robot_model import Vector3, Vector6
+from ur_emulator.motion.target import ZERO6
+
+# Bus voltage and idle current of the box; modelled, chosen from captures of resting arms (48 V bus).
+BUS_VOLTAGE = 48.0
+IDLE_CURRENT = 0.25
 
 
-class Snapshot(NamedTuple):
-    """State of the box at the end of a control cycle; SI units, base frame, vectors as tuples of floats."""
+class BoxRecord(NamedTuple):
+    """The box without its arm at the end of a cycle: modes, program, lines, settings, registers."""
 
-    tick: int
-    # --- columns of the realtime interface
-    timestamp: float
-    target_q: Vector6
-    target_qd: Vector6
-    target_qdd: Vector6
-    target_current: Vector6
-    target_moment: Vector6
-    actual_q: Vector6
-    actual_qd: Vector6
-    actual_current: Vector6
-    joint_control_output: Vector6
-    actual_tcp_pose: Vector6
-    actual_tcp_speed: Vector6
-    actual_tcp_force: Vector6
-    target_tcp_pose: Vector6
-    target_tcp_speed: Vector6
-    actual_digital_input_bits: int
-    joint_temperatures: Vector6
-    actual_execution_time: float
     robot_mode: int
     joint_mode: tuple[int, ...]
     safety_mode: int
-    actual_tool_accelerometer: Vector3
     speed_scaling: float
-    actual_momentum: float
-    actual_main_voltage: float
-    actual_robot_voltage: float
-    actual_robot_current: float
-    actual_joint_voltage: Vector6
-    actual_digital_output_bits: int
-    runtime_state: int
-    elbow_position: Vector3
-    elbow_velocity: Vector3
-    safety_status: int
-    payload: float
-    payload_cog: Vector3
-    payload_inertia: Vector6
-    # --- what the primary and dashboard ports need beside them
     target_speed_fraction: float
-    tcp_offset: Vector6
+    runtime_state: int
     program_name: str
+    script_control_line: int
     control_mode: int
     is_guided_by_input: bool
     buttons: int
-    # --- what only RTDE needs; lines in the order standard inputs, standard outputs, tool inputs
+    payload: float
+    payload_cog: Vector3
+    payload_inertia: Vector6
+    tcp_offset: Vector6
+    actual_digital_input_bits: int
+    actual_digital_output_bits: int
     analog_values: tuple[float, ...]
     analog_domains: tuple[int, ...]
     tool_output_voltage: int
     euromap_inputs: int
     euromap_outputs: int
     registers: RegisterValues
+
+
+class _Fields(NamedTuple):
+    """The fields of a snapshot."""
+
+    tick: int
+    timestamp: float  # since the start of the controller [s]
+    # --- JointTarget
+    target_q: Vector6
+    target_qd: Vector6
+    target_qdd: Vector6
+    # --- PlantState
+    actual_q: Vector6
+    actual_qd: Vector6
+    actual_current: Vector6
+    joint_voltage: Vector6
+    actual_tool_accelerometer: Vector3
+    estimated_force: Vector6
+    joint_temperatures: Vector6
+    target_current: Vector6
+    target_moment: Vector6
+    joint_control_output: Vector6
+    torque_saturated: bool
+    position_error: Vector6
+    # --- BoxRecord; analogue lines in the order standard inputs, standard outputs, tool inputs
+    robot_mode: int
+    joint_mode: tuple[int, ...]
+    safety_mode: int
+    speed_scaling: float
+    target_speed_fraction: float
+    runtime_state: int
+    program_name: str
     script_control_line: int
+    control_mode: int
+    is_guided_by_input: bool
+    buttons: int
+    payload: float
+    payload_cog: Vector3
+    payload_inertia: Vector6
+    tcp_offset: Vector6
+    actual_digital_input_bits: int
+    actual_digital_output_bits: int
+    analog_values: tuple[float, ...]
+    analog_domains: tuple[int, ...]
+    tool_output_voltage: int
+    euromap_inputs: int
+    euromap_outputs: int
+    registers: RegisterValues
+    # --- computed when it is read
+    space: ArmInSpace
+
+
+class Snapshot(_Fields):
+    """State of the box at the end of a control cycle; SI units, base frame, vectors as tuples of floats."""
+
+    __slots__ = ()
+
+    actual_execution_time = 0.0
+    actual_main_voltage = BUS_VOLTAGE
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all fields by name, those of the arm in space included."""
+        fields = self._asdict()
+        return fields | fields.pop("space").as_dict()
+
+    # --- the arm in space
+
+    @property
+    def actual_tcp_pose(self) -> Vector6:
+        """Pose of the tool centre point [m, rad]."""
+        return self.space.actual.tcp_pose
+
+    @property
+    def actual_tcp_speed(self) -> Vector6:
+        """Twist of the tool centre point [m/s, rad/s]."""
+        return self.space.actual.tcp_speed
+
+    @property
+    def actual_tcp_force(self) -> Vector6:
+        """Wrench at the tool centre point [N, Nm]."""
+        return self.space.tcp_force
+
+    @property
+    def target_tcp_pose(self) -> Vector6:
+        """Pose of the tool centre point at the target [m, rad]."""
+        return self.space.target.tcp_pose
+
+    @property
+    def target_tcp_speed(self) -> Vector6:
+        """Twist of the tool centre point at the target [m/s, rad/s]."""
+        return self.space.target.tcp_speed
+
+    @property
+    def elbow_position(self) -> Vector3:
+        """Of the measured arm [m]."""
+        return self.space.actual.elbow_position
+
+    @property
+    def elbow_velocity(self) -> Vector3:
+        """Of the measured arm [m/s]."""
+        return self.space.actual.elbow_velocity
+
+    @property
+    def actual_momentum(self) -> float:
+        """Norm of the linear momentum of the measured arm [kg m/s]."""
+        return self.space.actual.momentum
+
+    # --- power
+
+    @property
+    def actual_robot_voltage(self) -> float:
+        """Voltage of the arm's bus [V]."""
+        return BUS_VOLTAGE if self.robot_mode in POWERED else 0.0
+
+    @property
+    def actual_robot_current(self) -> float:
+        """Current on the arm's bus [A]: plausible; the drives chop, a tenth of the joints' currents shows."""
+        if self.robot_mode not in POWERED:
+            return 0.0
+        return IDLE_CURRENT + 0.1 * sum(map(abs, self.actual_current))
+
+    @property
+    def actual_joint_voltage(self) -> Vector6:
+        """Supply voltages of the joints [V]."""
+        return self.joint_voltage if self.robot_mode in POWERED else ZERO6
+
+    # --- words and values that follow from others
+
+    @property
+    def safety_status(self) -> int:
+        """The safety mode, under its later name."""
+        return self.safety_mode
 
     @property
     def robot_status_bits(self) -> int:

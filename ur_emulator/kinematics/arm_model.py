@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite, pi, sqrt
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -25,6 +26,26 @@ _POSITION_TOLERANCE = 1e-11  # m and rad; the promise to callers is ten times wi
 _MAX_ITERATIONS = 20
 _NEAR = 0.3  # rad; a Newton result this close to its start cannot belong to another branch
 _LONGEST_STEP = 0.5  # rad; keeps Newton's method from flying off near singularities
+
+
+class CartesianState(NamedTuple):
+    """What a state of the joints is in space; base frame.
+
+    Attributes:
+        tcp_pose: of the tool centre point [m, rad].
+        tcp_speed: its twist in base axes, linear first [m/s, rad/s].
+        elbow_position: origin of the second DH frame, on the axis of joint 3 [m].
+        elbow_velocity: [m/s].
+        flange_position: [m].
+        momentum: norm of the arm's linear momentum, without a payload [kg m/s].
+    """
+
+    tcp_pose: Pose
+    tcp_speed: Vector6
+    elbow_position: Vector3
+    elbow_velocity: Vector3
+    flange_position: Vector3
+    momentum: float
 
 
 class ArmModel:
@@ -72,18 +93,13 @@ class ArmModel:
 
     def state(
         self, q: Sequence[float], qd: Sequence[float], tcp: Sequence[float] | None = None
-    ) -> tuple[Pose, Vector6, Vector3, Vector3]:
-        """Evaluate everything a frame tells about the arm in space.
+    ) -> CartesianState:
+        """Evaluate everything that is published of the arm in space.
 
         Args:
             q: joint angles (6,) [rad].
             qd: joint speeds (6,) [rad/s].
             tcp: tool centre point in the flange frame.
-
-        Returns:
-            tcp_pose, tcp_speed (twist of the tool centre point in base axes, linear first [m/s, rad/s]),
-            elbow_position [m] and elbow_velocity [m/s], both in the base frame. The elbow is the origin of
-            the second DH frame, on the axis of joint 3.
         """
         model, data = self._model, self._data
         self._qpos[:] = q
@@ -91,6 +107,7 @@ class ArmModel:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_comVel(model, data)
+        mujoco.mj_subtreeVel(model, data)
         pose = self._tcp_pose(tcp)
         # MuJoCo's cvel is (angular, linear) of the point of the body that passes the chain's centre of mass.
         cx, cy, cz = self._centre.tolist()
@@ -101,13 +118,10 @@ class ArmModel:
         wx, wy, wz, vx, vy, vz = self._elbow_motion.tolist()
         rx, ry, rz = ex - cx, ey - cy, ez - cz
         elbow_velocity = (vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx)
-        return pose, speed, (ex, ey, ez), elbow_velocity
-
-    def momentum(self) -> float:
-        """Norm of the arm's linear momentum [kg m/s] for what `state` evaluated last; no payload."""
-        mujoco.mj_subtreeVel(self._model, self._data)
+        fx, fy, fz = self._flange_position.tolist()
         vx, vy, vz = self._root_velocity.tolist()
-        return self._mass * sqrt(vx * vx + vy * vy + vz * vz)
+        momentum = self._mass * sqrt(vx * vx + vy * vy + vz * vz)
+        return CartesianState(pose, speed, (ex, ey, ez), elbow_velocity, (fx, fy, fz), momentum)
 
     def jacobian(
         self, q: Sequence[float] | NDArray[np.float64], tcp: Sequence[float] | None = None

@@ -138,7 +138,7 @@ def _contents(facts: BoxFacts) -> dict[str, bytes]:
         LOG_NAME: _log_text(facts).encode("utf-8"),
         "versions.json": _json(facts.versions),
         "programs.json": _json(facts.programs),
-        "state.json": _json(facts.snapshot._asdict()),
+        "state.json": _json(facts.snapshot.as_dict()),
     }
     if facts.script:
         files["program.script"] = facts.script.encode("latin-1", "replace")

@@ -1,0 +1,79 @@
+"""The arm in space at the end of a cycle: computed when somebody reads it, at most once.
+
+Most cycles of a box without clients, and all that a program does in joint space, need none of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ur_emulator.controller.force_sense import moved_wrench
+from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
+from ur_emulator.models.robot_model import Vector6
+
+
+class ArmInSpace:
+    """What follows from the joints of one cycle; it does not depend on when it is asked for.
+
+    Args:
+        arm: the controller's kinematics.
+        target: angles and speeds of the joints' set-point, (6,) each.
+        actual: measured ones.
+        wrench: what the box feels at the flange, base axes [N, Nm].
+        tcp: tool centre point in the flange frame; None for the flange itself.
+    """
+
+    __slots__ = ("_actual", "_actual_joints", "_arm", "_target", "_target_joints", "_tcp", "_wrench")
+
+    def __init__(
+        self,
+        arm: ArmModel,
+        target: tuple[Vector6, Vector6],
+        actual: tuple[Vector6, Vector6],
+        wrench: Vector6,
+        tcp: Sequence[float] | None,
+    ) -> None:
+        self._arm = arm
+        self._target_joints = target
+        self._actual_joints = actual
+        self._wrench = wrench
+        self._tcp = tcp
+        self._target: CartesianState | None = None
+        self._actual: CartesianState | None = None
+
+    @property
+    def target(self) -> CartesianState:
+        """Where the target lies."""
+        if self._target is None:
+            self._target = self._arm.state(*self._target_joints, self._tcp)
+        return self._target
+
+    @property
+    def actual(self) -> CartesianState:
+        """Where the measured joints are."""
+        if self._actual is None:
+            self._actual = self._arm.state(*self._actual_joints, self._tcp)
+        return self._actual
+
+    @property
+    def tcp_force(self) -> Vector6:
+        """The wrench at the tool centre point, base axes [N, Nm]."""
+        if self._tcp is None:
+            return self._wrench
+        actual = self.actual
+        return moved_wrench(self._wrench, actual.flange_position, actual.tcp_pose)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything by the names that a snapshot has for it."""
+        target, actual = self.target, self.actual
+        return {
+            "target_tcp_pose": target.tcp_pose,
+            "target_tcp_speed": target.tcp_speed,
+            "actual_tcp_pose": actual.tcp_pose,
+            "actual_tcp_speed": actual.tcp_speed,
+            "actual_tcp_force": self.tcp_force,
+            "elbow_position": actual.elbow_position,
+            "elbow_velocity": actual.elbow_velocity,
+            "actual_momentum": actual.momentum,
+        }
