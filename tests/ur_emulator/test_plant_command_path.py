@@ -5,10 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.command_path import CommandPath, trace_cycle
 
 N, DT = 4, 0.002
 PERIOD = N * DT
+
+
+LEAD = 0.03
+
+
+def advance(path, target):
+    """A cycle of the path for a target (3, 6) of q, qd and tau."""
+    path.take(JointTarget(*map(tuple, target)))
+    path.advance()
 
 
 def smooth(t):
@@ -20,21 +30,23 @@ def smooth(t):
 @pytest.mark.parametrize("dead_substeps", [0, 1, 4, 5, 11])
 def test_the_matrix_is_the_sub_step_definition(dead_substeps):
     lag = 0.01
-    path = CommandPath(N, DT, dead_substeps, lag)
+    path = CommandPath(N, DT, dead_substeps, lag, LEAD)
     rng = np.random.default_rng(dead_substeps)
     start = rng.standard_normal((3, 6))
     start[1] = 0.0
     path.reset(start[0], start[2])
+    path.trim[:] = trim = rng.standard_normal(6)
     knots = [start] * 6
     filtered = start
     for _ in range(8):
         newest = rng.standard_normal((3, 6))
         knots = [newest, *knots[:5]]
-        path.advance(newest)
+        advance(path, newest)
         for joint in range(6):
             rows = trace_cycle(filtered[:, joint], np.array(knots)[:, :, joint], N, DT, dead_substeps, lag)
-            assert path.q[:, joint] == pytest.approx(rows[:-1, 0], abs=1e-12)
-            assert path.qd[:, joint] == pytest.approx(rows[:-1, 1], abs=1e-12)
+            position = rows[:-1, 0] + LEAD * rows[:-1, 1] + trim[joint]
+            assert path.position[:, joint] == pytest.approx(position, abs=1e-12)
+            assert path.speeds[1:, joint] == pytest.approx([newest[1, joint], rows[-2, 1]], abs=1e-12)
             assert path.tau[:, joint] == pytest.approx(rows[:-1, 2], abs=1e-12)
             assert path.q_final[joint] == pytest.approx(rows[-1, 0], abs=1e-12)
         filtered = np.array(
@@ -54,7 +66,7 @@ def test_a_ramp_comes_late_by_dead_time_plus_lag(dead_substeps, lag):
     speed = 0.7
     path.reset(np.zeros(6), np.zeros(6))
     for k in range(1, 60):
-        path.advance(np.array([np.full(6, speed * k * PERIOD), np.full(6, speed), np.zeros(6)]))
+        advance(path, np.array([np.full(6, speed * k * PERIOD), np.full(6, speed), np.zeros(6)]))
     late = (speed * 59 * PERIOD - path.q_final[0]) / speed
     assert late == pytest.approx(dead_substeps * DT + lag, abs=1e-4)
 
@@ -62,13 +74,13 @@ def test_a_ramp_comes_late_by_dead_time_plus_lag(dead_substeps, lag):
 def test_without_delay_the_set_point_follows_a_smooth_motion_between_targets():
     path = CommandPath(N, DT, 0, 0.0)
     path.reset(smooth(0.0)[0], smooth(0.0)[2])
-    path.advance(smooth(PERIOD))
+    advance(path, smooth(PERIOD))
     for k in range(2, 40):
-        path.advance(smooth(k * PERIOD))
+        advance(path, smooth(k * PERIOD))
         for i in range(1, N):
             q, qd, _ = smooth((k - 1) * PERIOD + i * DT)
-            assert path.q[i] == pytest.approx(q, abs=1e-9)
-            assert path.qd[i] == pytest.approx(qd, abs=1e-4)
+            assert path.position[i] == pytest.approx(q, abs=1e-9)
+        assert path.speeds[2] == pytest.approx(qd, abs=1e-4)
         assert path.q_final == pytest.approx(smooth(k * PERIOD)[0], abs=1e-12)
 
 
@@ -76,9 +88,9 @@ def test_after_reset_it_stands_still():
     path = CommandPath(N, DT, 6, 0.01)
     q, tau = np.arange(6.0), -np.arange(6.0)
     path.reset(np.ones(6), np.ones(6))
-    path.advance(smooth(1.0))
+    advance(path, smooth(1.0))
     path.reset(q, tau)
-    path.advance(np.array([q, np.zeros(6), tau]))
-    assert path.q == pytest.approx(np.tile(q, (N, 1)), abs=1e-12)
-    assert path.qd == pytest.approx(np.zeros((N, 6)), abs=1e-12)
+    advance(path, np.array([q, np.zeros(6), tau]))
+    assert path.position == pytest.approx(np.tile(q, (N, 1)), abs=1e-12)
+    assert path.speeds == pytest.approx(np.zeros((3, 6)), abs=1e-12)
     assert path.tau == pytest.approx(np.tile(tau, (N, 1)), abs=1e-12)

@@ -103,10 +103,10 @@ def test_a_declared_payload_is_in_the_model():
 
 def test_friction_falls_towards_standstill_to_the_robots_share():
     friction = Friction(UR3, IDEAL, 0)
-    friction.evaluate(STILL, STILL, STILL)
+    friction.evaluate(np.array([STILL, STILL, STILL]))
     assert friction.coulomb == pytest.approx(np.array(UR3.coulomb) * UR3.coulomb_standstill)
     assert friction.compensation == pytest.approx(STILL)
-    friction.evaluate(np.ones(6), np.ones(6), -np.ones(6))
+    friction.evaluate(np.array([np.ones(6), np.ones(6), -np.ones(6)]))
     assert friction.coulomb == pytest.approx(UR3.coulomb, rel=1e-4)
     # An ideal controller knows its friction exactly, in both directions.
     full = np.array(UR3.coulomb) + UR3.viscous
@@ -118,7 +118,7 @@ def test_a_typical_controller_is_wrong_about_friction_as_much_as_stated():
     errors = []
     for seed in range(60):
         friction = Friction(UR3, TYPICAL, seed)
-        friction.evaluate(STILL, np.full(6, 10.0), STILL)
+        friction.evaluate(np.array([STILL, np.full(6, 10.0), STILL]))
         errors.append(friction.expected / (np.array(UR3.coulomb) + 10.0 * np.array(UR3.viscous)) - 1)
     assert abs(np.mean(errors)) < 0.03
     assert 0.10 < np.std(errors) < 0.17

@@ -3,9 +3,9 @@
 The controller sends position, speed and the torque of its rigid-body model down the command path. A servo
 adds up
 
-    tau = kp (q_set + trim - q) + kv (qd_set - qd) + tau_set + friction compensation at qd_set
+    tau = kp (q_set + lead qd_set + trim) + tau_set + friction compensation at qd_set - kp q - kv qd
 
-of which the terms in q and qd live in MuJoCo's actuators. `trim` is the slow outer loop: it integrates the
+with lead = kv / kp, of which the terms in q and qd live in MuJoCo's actuators. `trim` is the slow outer loop: it integrates the
 error at the joint's own encoder, so that gear error, wrong masses and left-over friction vanish at rest.
 
 While the arm is guided by hand there is no set-point: see `HandGuiding`.
@@ -43,11 +43,15 @@ class Drives:
         fidelity: its imperfections.
         seed: of the box.
         gains: of the servos, as in the actuators.
-        path: the command path.
+        dead_substeps: dead time of the command path in sub-steps.
+        substep: [s].
         period: control cycle [s].
 
     Attributes:
         table: (n_substeps, 6), what to write to MuJoCo's `ctrl` before each sub-step of this cycle [Nm].
+        rows: of the table.
+        q_final: set-point at the end of this cycle (6,) [rad].
+        coulomb: true size of the Coulomb friction at the speeds last given (6,) [Nm].
         target_moment: rigid-body torque for the present target (6,) [Nm].
         target_current: current for the present target, friction included (6,) [A].
     """
@@ -59,30 +63,31 @@ class Drives:
         fidelity: Fidelity,
         seed: int,
         gains: ServoGains,
-        path: CommandPath,
+        dead_substeps: int,
+        substep: float,
         period: float,
     ) -> None:
         self._dynamics = InverseDynamics(robot, calibration)
         self._friction = Friction(robot, fidelity, seed)
         self._guiding = HandGuiding(robot)
-        self._path = path
+        n_substeps = round(period / substep)
+        self._path = path = CommandPath(n_substeps, substep, dead_substeps, fidelity.drive_lag, gains.lead)
         self._period = period
+        self._kp = gains.kp
         # One row a sub-step: broadcasting costs twice the arithmetic at this size.
-        self._kp, self._kv = np.tile(gains.kp, (len(path.q), 1)), np.tile(gains.kv, (len(path.q), 1))
-        self._torque_per_trim = gains.kp
+        self._kp_rows = np.tile(gains.kp, (n_substeps, 1))
         self._per_torque = 1.0 / np.array(robot.torque_constant)
         # A servo that gives more than this at rest presses against something: more than its joint's friction
         # at rest, and a few parts in a hundred of wrong masses, can ask for.
         self._pressing = 0.5 * np.array(robot.coulomb)
         self._trim_gain = np.full(6, period / _INTEGRAL_TIME)
-        self._trim = np.zeros(6)
-        self._knot = np.zeros((3, 6))
-        self._q, self._qd, self._qdd = self._knot
-        self.table = np.zeros(path.q.shape)
-        self._table_work = np.zeros(path.q.shape)
+        self._q, self._qd, self._qdd_then_tau = path.newest
+        self._actual_speeds = path.speeds[0]
         self._work = np.zeros(6)
+        self.table: NDArray[np.float64] = np.zeros((n_substeps, 6))
+        self.rows = list(self.table)
+        self.q_final = path.q_final
         self.coulomb = self._friction.coulomb
-        """True size of the Coulomb friction at the speeds last given (6,) [Nm]."""
         self.target_moment = self.target_current = NO_LOAD
 
     def set_payload(self, mass: float, cog: Vector3) -> None:
@@ -93,7 +98,7 @@ class Drives:
         """Hold the arm at rest: joints at q, motors at q_motor, (6,) each [rad]."""
         still = np.zeros(6)
         self._path.reset(q, self._dynamics.evaluate(q, still, still))
-        np.subtract(q_motor, q, self._trim)
+        np.subtract(q_motor, q, self._path.trim)
 
     def take_over_moving(self, target: Target, q_motor: NDArray[np.float64]) -> None:
         """Follow a target that begins now, the motors being at q_motor (6,) [rad].
@@ -104,7 +109,7 @@ class Drives:
         q, qd = np.array(target.q), np.array(target.qd)
         path = self._path
         path.reset(q - self._period * qd, self._dynamics.evaluate(q, qd, np.zeros(6)), qd)
-        np.subtract(q_motor, path.q_final, self._trim)
+        np.subtract(q_motor, path.q_final, path.trim)
 
     def release(self) -> None:
         """Carry nothing: the brakes do."""
@@ -118,34 +123,28 @@ class Drives:
         """
         if not hypot(*target.q, *target.qd, *target.qdd) < TARGET_MAX:
             return False
-        knot, q, qd, qdd = self._knot, self._q, self._qd, self._qdd
-        q[:] = target.q
-        qd[:] = target.qd
-        qdd[:] = target.qdd
-        moment = self._dynamics.evaluate(q, qd, qdd)
+        path, friction, moment = self._path, self._friction, self._qdd_then_tau
+        table, work = self.table, self._work
+        path.take(target)
         # The third signal of the command path is torque, in place of the acceleration that it came from.
-        qdd[:] = moment
-        path, friction, table, work = self._path, self._friction, self.table, self._table_work
-        path.advance(knot)
-        friction.evaluate(qd_actual, qd, path.qd[-1])
-        np.multiply(path.q, self._kp, table)
-        np.multiply(path.qd, self._kv, work)
-        np.add(table, work, table)
+        moment[:] = self._dynamics.evaluate(self._q, self._qd, moment)
+        self._actual_speeds[:] = qd_actual
+        path.advance()
+        friction.evaluate(path.speeds)
+        np.multiply(path.position, self._kp_rows, table)
         np.add(table, path.tau, table)
-        np.multiply(self._trim, self._torque_per_trim, self._work)
-        np.add(self._work, friction.compensation, self._work)
-        np.add(table, self._work, table)
+        np.add(table, friction.compensation, table)
         self.target_moment = six(moment.tolist())
-        np.add(moment, friction.expected, self._work)
-        np.multiply(self._work, self._per_torque, self._work)
-        self.target_current = six(self._work.tolist())
+        np.add(moment, friction.expected, work)
+        np.multiply(work, self._per_torque, work)
+        self.target_current = six(work.tolist())
         return True
 
     def guide(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> None:
         """Fill `table` for an arm that is guided by hand, with joints at q (6,) [rad], qd (6,) [rad/s]."""
         still = np.zeros(6)
         gravity = self._dynamics.evaluate(q, still, still)
-        self._friction.evaluate(qd, qd, qd)
+        self._friction.evaluate(np.array([qd, qd, qd]))
         torque = self._guiding.torque(gravity, self._friction.dry_compensation, q, qd)
         self.table[:] = torque
         self.target_moment = six(gravity.tolist())
@@ -153,10 +152,10 @@ class Drives:
 
     def presses(self, q_motor: NDArray[np.float64]) -> bool:
         """True when some servo of a resting arm, motors at q_motor (6,) [rad], pushes against something."""
-        effort = self._torque_per_trim * (self._path.q_final + self._trim - q_motor)
+        effort = self._kp * (self.q_final + self._path.trim - q_motor)
         return bool((np.abs(effort) > self._pressing).any())
 
     def integrate(self, error: NDArray[np.float64]) -> None:
         """Trim the servos by the joints' error (6,) [rad] of this cycle; not to be called in saturation."""
         np.multiply(error, self._trim_gain, self._work)
-        np.add(self._trim, self._work, self._trim)
+        np.add(self._path.trim, self._work, self._path.trim)

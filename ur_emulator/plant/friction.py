@@ -21,6 +21,9 @@ _REVERSAL_SPEED = 0.012  # rad/s; friction changes sign over about this, see `ph
 class Friction:
     """Evaluates true Coulomb friction and the controller's compensation together, once a cycle.
 
+        size(qd) = coulomb - lost exp(-|qd| / coulomb speed)
+        belief(qd) = size(qd) tanh(qd / reversal speed) + viscous qd
+
     Attributes:
         coulomb: true size of the Coulomb friction (6,) [Nm].
         expected: friction that the controller expects at its target (6,) [Nm].
@@ -34,46 +37,36 @@ class Friction:
         viscous = np.array(robot.viscous) * errors[0]
         believed = np.array(robot.coulomb) * errors[1]
         # One row a use: the truth at the actual speed, beliefs at the target's and at the set-point's speed.
+        # Constants have the full shape: broadcasting costs twice the arithmetic at this size.
         self._coulomb = np.array([robot.coulomb, believed, believed])
         self._lost = self._coulomb * (1.0 - robot.coulomb_standstill)
-        # Constants have the full shape: broadcasting costs twice the arithmetic at this size.
         self._believed_viscous = np.array([viscous, viscous])
         self._per_speed = np.full((3, 6), -1.0 / robot.coulomb_speed)
         self._per_reversal = np.full((2, 6), 1.0 / _REVERSAL_SPEED)
-        self._speeds = np.zeros((3, 6))
         self._sizes = np.zeros((3, 6))
         self._beliefs = np.zeros((2, 6))
         self._viscous = np.zeros((2, 6))
-        self._believed_speeds = self._speeds[1:]
         self._believed_sizes = self._sizes[1:]
         self.coulomb: NDArray[np.float64] = self._sizes[0]
         self.expected: NDArray[np.float64] = self._beliefs[0]
         self.compensation: NDArray[np.float64] = self._beliefs[1]
-        self._set_viscous = self._viscous[1]
 
     @property
     def dry_compensation(self) -> NDArray[np.float64]:
         """Return the part of `compensation` that does not grow with the speed (6,) [Nm]."""
-        dry: NDArray[np.float64] = self.compensation - self._set_viscous
+        dry: NDArray[np.float64] = self.compensation - self._viscous[1]
         return dry
 
-    def evaluate(
-        self, qd_actual: NDArray[np.float64], qd_target: NDArray[np.float64], qd_set: NDArray[np.float64]
-    ) -> None:
-        """Set the attributes for actual, target and set-point speeds, (6,) each [rad/s]."""
-        speeds, sizes, beliefs = self._speeds, self._sizes, self._beliefs
-        speeds[0] = qd_actual
-        speeds[1] = qd_target
-        speeds[2] = qd_set
-        # coulomb - lost * exp(-|qd| / coulomb_speed)
+    def evaluate(self, speeds: NDArray[np.float64]) -> None:
+        """Set the attributes for speeds (3, 6) [rad/s]: actual, of the target, of the set-point."""
+        sizes, beliefs, viscous, believed_speeds = self._sizes, self._beliefs, self._viscous, speeds[1:]
         np.abs(speeds, sizes)
         np.multiply(sizes, self._per_speed, sizes)
         np.exp(sizes, sizes)
         np.multiply(sizes, self._lost, sizes)
         np.subtract(self._coulomb, sizes, sizes)
-        # size * tanh(qd / reversal speed) + viscous * qd
-        np.multiply(self._believed_speeds, self._per_reversal, beliefs)
+        np.multiply(believed_speeds, self._per_reversal, beliefs)
         np.tanh(beliefs, beliefs)
         np.multiply(beliefs, self._believed_sizes, beliefs)
-        np.multiply(self._believed_speeds, self._believed_viscous, self._viscous)
-        np.add(beliefs, self._viscous, beliefs)
+        np.multiply(believed_speeds, self._believed_viscous, viscous)
+        np.add(beliefs, viscous, beliefs)

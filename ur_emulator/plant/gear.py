@@ -39,6 +39,7 @@ class GearRipple:
         self._sizes = _rows(slopes[0] / first, slopes[0], slopes[1] / second, slopes[1])
         self._waves = np.zeros((4, 6))
         self._first, self._second = self._waves[:2], self._waves[2:]
+        # What the joint has beyond the motor: error and, after `apply`, speed.
         self._sum = np.zeros((2, 6))
         self.error: NDArray[np.float64] = self._sum[0]
         self.slope: NDArray[np.float64] = self._sum[1]
@@ -46,12 +47,22 @@ class GearRipple:
     def evaluate(self, q_motor: NDArray[np.float64]) -> None:
         """Set `error` e [rad] and `slope` de/dq [1] for motor positions q_motor (6,)."""
         waves = self._waves
-        waves[:] = q_motor
-        np.multiply(waves, self._cycles, waves)
+        np.multiply(q_motor, self._cycles, waves)
         np.add(waves, self._phases, waves)
         np.sin(waves, waves)
         np.multiply(waves, self._sizes, waves)
         np.add(self._first, self._second, self._sum)
+
+    def apply(self, motion: NDArray[np.float64], qd_motor: NDArray[np.float64]) -> None:
+        """Turn `motion` (2, 6), positions and speeds of the motors, into those of the joints; sets `error`.
+
+        Args:
+            motion: [rad, rad/s]; changed in place.
+            qd_motor: its second row.
+        """
+        self.evaluate(motion[0])
+        np.multiply(self.slope, qd_motor, self.slope)
+        np.add(motion, self._sum, motion)
 
     def motor_position(self, q_joint: NDArray[np.float64]) -> NDArray[np.float64]:
         """Invert the gear: motor positions (6,) that put the joints at q_joint (6,) [rad]."""

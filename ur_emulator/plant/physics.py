@@ -40,17 +40,27 @@ _SLIDING_FRICTION = 0.3
 
 @dataclass(frozen=True, slots=True)
 class ServoGains:
-    """Gains of the joint servos, (6,) each: kp [Nm/rad], kv [Nm s/rad]."""
+    """Gains of the joint servos.
+
+    Attributes:
+        kp: (6,) [Nm/rad].
+        lead: kv / kp, the same for all joints since they are equally fast and damped [s].
+    """
 
     kp: NDArray[np.float64]
-    kv: NDArray[np.float64]
+    lead: float
+
+    @property
+    def kv(self) -> NDArray[np.float64]:
+        """Gains in speed (6,) [Nm s/rad]."""
+        return self.kp * self.lead
 
     @classmethod
     def of(cls, robot: RobotModel) -> ServoGains:
         """Gains that give the robot's servo frequency and damping at its layout inertia."""
         omega = 2.0 * pi * robot.servo_frequency
         inertia = np.array(robot.servo_inertia)
-        return cls(kp=omega**2 * inertia, kv=2.0 * robot.servo_damping * omega * inertia)
+        return cls(kp=omega**2 * inertia, lead=2.0 * robot.servo_damping / omega)
 
 
 class JointServos:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from operator import ge, mul
+from operator import ge, truediv
 
 import mujoco
 import numpy as np
@@ -30,7 +30,6 @@ from ur_emulator.models.mjcf import FLANGE, GRAVITY
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_generation import CB3, RobotGeneration
 from ur_emulator.models.robot_model import RobotModel, Vector3, six
-from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.contact import contact_wrench
 from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX, Drives
 from ur_emulator.plant.gear import GearRipple
@@ -38,15 +37,7 @@ from ur_emulator.plant.loads import Loads
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.physics import JointServos, ServoGains, build_physics
 from ur_emulator.plant.plant_state import PlantState, Target
-from ur_emulator.plant.sensors import (
-    N_RECORD,
-    REC_ACCELERATION,
-    REC_Q,
-    REC_QD,
-    REC_SIMULATED,
-    REC_WRENCH,
-    Sensors,
-)
+from ur_emulator.plant.sensors import REC_ACCELERATION, Record, Sensors
 from ur_emulator.plant.thermometers import Thermometers
 
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
@@ -100,8 +91,9 @@ class Plant:
         self._flange_position: NDArray[np.float64] = data.site_xpos[site]
         self._flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
 
-        self._path = CommandPath(self._n_substeps, substep, dead_substeps, fidelity.drive_lag)
-        self._drives = Drives(robot, self.calibration, fidelity, seed, gains, self._path, self.period_s)
+        self._drives = Drives(
+            robot, self.calibration, fidelity, seed, gains, dead_substeps, substep, self.period_s
+        )
         self._gear = GearRipple(robot, fidelity, seed)
         self._sensors = Sensors(robot, fidelity, seed, self.period_s)
         self._thermometers = Thermometers(self.period_s)
@@ -109,10 +101,13 @@ class Plant:
         # The measurement is taken in this sub-step of a cycle and reported so many cycles later.
         age_substeps = max(1, round(fidelity.feedback_age / substep))
         self._capture_at = -age_substeps % self._n_substeps
-        self._cycles_late = (age_substeps - 1) // self._n_substeps
-        self._records: deque[NDArray[np.float64]] = deque(maxlen=1 + self._cycles_late)
+        # The record of this cycle stands last; the oldest one is read.
+        self._records = deque(Record() for _ in range(1 + (age_substeps - 1) // self._n_substeps))
 
-        self._amperes_per_torque = [1.0 / constant for constant in robot.torque_constant]
+        self._per_torque = 1.0 / np.array(robot.torque_constant)
+        self._currents = np.zeros(6)
+        # Below this no joint can be at its torque limit [A].
+        self._unsaturated = min(map(truediv, robot.tau_max, robot.torque_constant))
         self._servos = JointServos(self._model)
         self._mode = ControlMode.POSITION
         # In force mode and after it, until the arm is moved away; see `rest_trim`.
@@ -120,11 +115,10 @@ class Plant:
         self._loads = Loads(self._model, data)
         self.obstacles = Obstacles(self._model, data.qpos)
         self._error = np.zeros(6)
-        self._ripple = np.zeros(6)
         self._braked = True
         self._saturated = self._saturated_now = False
         self._control_current = NO_LOAD
-        self._rest_record = np.zeros(N_RECORD)
+        self._rest = Record()
         self._state: PlantState | None = None
         self.reset(robot.home_q)
 
@@ -171,7 +165,8 @@ class Plant:
         self._qpos[:] = self._gear.motor_position(angles)
         self._sensors.reset()
         self._engage_brakes()
-        self._records.extend([self._rest_record] * (1 + self._cycles_late))
+        for record in self._records:
+            record.values[:] = self._rest.values
         self._state = None
 
     def touches(self, q: Sequence[float]) -> bool:
@@ -247,7 +242,8 @@ class Plant:
         if target is None:
             if not self._braked:
                 self._engage_brakes()
-            self._records.append(self._rest_record)
+            self._records.rotate(-1)
+            self._records[-1].values[:] = self._rest.values
             return
         if self._braked:
             self._release_brakes()
@@ -286,15 +282,16 @@ class Plant:
         return self._state
 
     def _run_substeps(self) -> None:
-        model, data, ctrl, capture_at = self._model, self._data, self._ctrl, self._capture_at
-        record = np.zeros(N_RECORD)
-        for i, torques in enumerate(self._drives.table):
+        model, data, ctrl, step = self._model, self._data, self._ctrl, mujoco.mj_step
+        self._records.rotate(-1)
+        to_capture = self._capture_at
+        for torques in self._drives.rows:
             ctrl[:] = torques
-            mujoco.mj_step(model, data)
-            if i == capture_at:
-                record[REC_SIMULATED] = self._raw
-        self._record = record
-        if not np.dot(self._qvel, self._qvel) < _RUNAWAY**2:
+            step(model, data)
+            if not to_capture:
+                self._records[-1].simulated[:] = self._raw
+            to_capture -= 1
+        if not self._qvel.dot(self._qvel) < _RUNAWAY**2:
             raise PlantError(
                 f"the simulation diverged in cycle {self.cycle}: joint speeds {self._qvel.tolist()} rad/s; "
                 "reset the plant and check the targets",
@@ -303,28 +300,24 @@ class Plant:
 
     def _look_after_saturation(self) -> None:
         saturated_before = self._saturated_now
-        torques: list[float] = self._force.tolist()
-        a, b, c, d, e, f = map(mul, torques, self._amperes_per_torque)
-        self._control_current = (a, b, c, d, e, f)
-        self._saturated_now = any(map(ge, map(abs, torques), self.robot.tau_max))
+        np.multiply(self._force, self._per_torque, self._currents)
+        self._control_current = currents = six(self._currents.tolist())
+        self._saturated_now = not (max(currents) < self._unsaturated > -min(currents)) and any(
+            map(ge, map(abs, self._force.tolist()), self.robot.tau_max)
+        )
         self._saturated = saturated_before and self._saturated_now
 
     def _record_cycle(self) -> None:
         """Finish the record of this cycle for the sensors, and trim the servos by what they left."""
-        gear, record, error, ripple = self._gear, self._record, self._error, self._ripple
-        gear.evaluate(record[REC_Q])
-        np.multiply(gear.slope, record[REC_QD], ripple)
-        record[REC_Q] += gear.error
-        record[REC_QD] += ripple
-        if self._loads.is_felt:
-            record[REC_WRENCH] = self._loads.wrench
+        gear, record, error = self._gear, self._records[-1], self._error
+        gear.apply(record.motion, record.qd)
+        record.wrench[:] = self._loads.wrench if self._loads.is_felt else 0.0
         if self._data.ncon:
-            record[REC_WRENCH] += contact_wrench(self._model, self._data, self._flange_position)
-        self._records.append(record)
+            record.wrench += contact_wrench(self._model, self._data, self._flange_position)
         if self._mode is ControlMode.TEACH:
             error[:] = 0.0
             return
-        np.subtract(self._path.q_final, self._qpos, error)
+        np.subtract(self._drives.q_final, self._qpos, error)
         np.subtract(error, gear.error, error)
         if not (self._saturated_now or (self._trim_rests and self._presses)):
             self._drives.integrate(error)
@@ -359,12 +352,10 @@ class Plant:
         self._control_current = NO_LOAD
         self._drives.release()
         mujoco.mj_kinematics(self._model, self._data)
-        record = np.zeros(N_RECORD)
-        record[REC_Q] = self.q_true
-        record[REC_ACCELERATION] = GRAVITY * self._flange_rotation[2]
-        self._rest_record = record
+        self._rest.q[:] = self.q_true
+        self._rest.values[REC_ACCELERATION] = GRAVITY * self._flange_rotation[2]
 
     def _release_brakes(self) -> None:
         """Hand the load over to the drives, at the pose in which the brakes hold it."""
         self._braked = False
-        self._drives.take_over(self._rest_record[REC_Q], self._qpos)
+        self._drives.take_over(self._rest.q, self._qpos)

@@ -6,6 +6,7 @@ comes in blocks from seeded streams, so equal seeds and equal motions give equal
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from math import exp, pi, sqrt
 from typing import NamedTuple
 
@@ -24,18 +25,43 @@ REC_TORQUE = slice(12, 18)  # motor torques at the joint [Nm]
 REC_ACCELERATION = slice(18, 21)  # specific force at the flange, flange axes [m/s²]
 REC_VELOCITY = slice(21, 24)  # of the flange, base axes [m/s]
 REC_WRENCH = slice(24, 30)  # external, at the flange, base axes [N, Nm]
-N_RECORD = 30
+REC_VOLTAGE = slice(30, 36)  # supply of the joints, beyond what the sensors add themselves: 0 [V]
+N_RECORD = 36
+REC_MOTION = slice(0, 12)  # angles and speeds
 REC_SIMULATED = slice(0, 24)  # the part that MuJoCo's sensors fill, in their order
 
 _BLOCK = 256  # cycles of noise drawn at once
 _SUPPLY = 48.0  # V, robot bus; its drop along the arm's cable is small and left out
 _SLOW = 0.02  # m/s; the direction of motion is smoothed below this
+_NO_SPEED = (0.0,) * 6
 _SMALLEST_SPEED = 1.4e-45  # smallest float32: the joints filter in float32, whose decay ends there
 
-# The noise has the columns of the record, then voltage and sampling moment.
-_N_NOISE = N_RECORD + 7
-_NOISE_VOLTAGE = slice(N_RECORD, N_RECORD + 6)
-_NOISE_MOMENT = N_RECORD + 6
+# The noise has the columns of the record, then the sampling moment.
+_N_NOISE = N_RECORD + 1
+_NOISE_MOMENT = N_RECORD
+
+
+class Record:
+    """True values of some moment, with names for its parts.
+
+    Attributes:
+        values: (N_RECORD,), see the REC slices.
+        simulated: the part that MuJoCo's sensors fill.
+        q: joint angles (6,) [rad].
+        qd: joint speeds (6,) [rad/s].
+        motion: both, (2, 6).
+        wrench: external wrench (6,) [N, Nm].
+    """
+
+    __slots__ = ("motion", "q", "qd", "simulated", "values", "wrench")
+
+    def __init__(self) -> None:
+        self.values: NDArray[np.float64] = np.zeros(N_RECORD)
+        self.simulated: NDArray[np.float64] = self.values[REC_SIMULATED]
+        self.q: NDArray[np.float64] = self.values[REC_Q]
+        self.qd: NDArray[np.float64] = self.values[REC_QD]
+        self.motion: NDArray[np.float64] = self.values[REC_MOTION].reshape(2, 6)
+        self.wrench: NDArray[np.float64] = self.values[REC_WRENCH]
 
 
 class Reading(NamedTuple):
@@ -70,8 +96,8 @@ class Sensors:
         sigmas[REC_TORQUE] = fidelity.current_sigma
         sigmas[REC_ACCELERATION] = fidelity.accelerometer_sigma
         sigmas[REC_WRENCH] = np.repeat([fidelity.force_sigma, fidelity.force_sigma / 10.0], 3)
-        sigmas[_NOISE_VOLTAGE] = fidelity.voltage_sigma
-        sigmas[_NOISE_MOMENT] = fidelity.sample_jitter
+        sigmas[REC_VOLTAGE] = fidelity.voltage_sigma
+        sigmas[_NOISE_MOMENT] = fidelity.sample_jitter / step
         self._sigmas = sigmas
         # From the record's units to those of the sensors: encoder steps and amperes.
         self._scale = np.ones(N_RECORD)
@@ -80,64 +106,57 @@ class Sensors:
         self._keep = [exp(-2.0 * pi * pole * period) for pole in fidelity.speed_filter_hz]
         self._dead_band = fidelity.speed_dead_band
         self._force_friction = fidelity.force_friction
-        self._block = np.empty((0, _N_NOISE))
-        self._next_row = 0
-        self._speeds = [0.0] * 6
+        self._noise: Iterator[tuple[NDArray[np.float64], float]] = iter(())
+        self._speeds: Sequence[float] = _NO_SPEED
         self._values = np.zeros(N_RECORD)
         self._steps = self._values[REC_Q]
         self._work = np.zeros(6)
 
     def reset(self) -> None:
         """Forget the state of the filters; the random stream goes on."""
-        self._speeds = [0.0] * 6
+        self._speeds = _NO_SPEED
 
-    def read(self, record: NDArray[np.float64]) -> Reading:
-        """Read all sensors of an arm whose true values are `record` (N_RECORD,); for one call a cycle."""
-        noise = self._next_noise()
+    def read(self, record: Record) -> Reading:
+        """Read all sensors of an arm whose true values are `record`; for one call a cycle."""
+        noise = next(self._noise, None) or self._next_noise()
         values, steps, work = self._values, self._steps, self._work
-        # Sampled a moment early or late, in the sensors' units, noisy, in whole encoder steps.
-        np.multiply(record[REC_QD], noise[_NOISE_MOMENT], work)
-        np.add(work, record[REC_Q], work)
-        np.multiply(record, self._scale, values)
-        np.divide(work, self._step, steps)
-        np.add(values, noise[:N_RECORD], values)
+        # In the sensors' units and noisy; angles also sampled a moment early or late, in whole encoder steps.
+        np.multiply(record.values, self._scale, values)
+        np.add(values, noise[0], values)
+        np.multiply(record.qd, noise[1], work)
+        np.add(steps, work, steps)
         np.rint(steps, steps)
         np.multiply(steps, self._step, steps)
         reading: list[float] = values.tolist()
-        # Speeds: a one-pole filter y = u + keep (y - u) whose input u is gated to zero at rest.
-        dead_band = self._dead_band
-        speeds = self._speeds
-        true_speeds: list[float] = record[REC_QD].tolist()
-        for i, keep in enumerate(self._keep):
-            if -dead_band < true_speeds[i] < dead_band:
-                speed = keep * speeds[i]
-                speeds[i] = speed if abs(speed) >= _SMALLEST_SPEED else 0.0
-            else:
-                speed = reading[6 + i]
-                speeds[i] = speed + keep * (speeds[i] - speed)
+        true_qd: list[float] = record.qd.tolist()
+        self._speeds = speeds = six(list(map(self._filter, true_qd, reading[REC_QD], self._speeds, self._keep)))
         # The force estimate takes some of the friction for a force against the motion.
-        vx, vy, vz, fx, fy, fz, mx, my, mz = reading[21:30]
+        ax, ay, az, vx, vy, vz, fx, fy, fz, mx, my, mz = reading[18:30]
         if self._force_friction:
             against = -self._force_friction / (sqrt(vx * vx + vy * vy + vz * vz) + _SLOW)
             fx, fy, fz = fx + against * vx, fy + against * vy, fz + against * vz
-        ax, ay, az = reading[REC_ACCELERATION]
         return Reading(
             six(reading[REC_Q]),
-            six(speeds),
+            speeds,
             six(reading[REC_TORQUE]),
-            six(noise[_NOISE_VOLTAGE].tolist()),
+            six(reading[REC_VOLTAGE]),
             (ax, ay, az),
             (fx, fy, fz, mx, my, mz),
         )
 
-    def _next_noise(self) -> NDArray[np.float64]:
-        if self._next_row == len(self._block):
-            block = self._rng.standard_normal((_BLOCK, _N_NOISE))
-            block *= self._sigmas
-            block[:, REC_WRENCH] += self._drift.next_block(_BLOCK)
-            block[:, _NOISE_VOLTAGE] += _SUPPLY
-            self._block = block
-            self._next_row = 0
-        row: NDArray[np.float64] = self._block[self._next_row]
-        self._next_row += 1
-        return row
+    def _filter(self, true_speed: float, measured: float, before: float, keep: float) -> float:
+        """One joint's one-pole filter y = u + keep (y - u), whose input u is gated to zero at rest."""
+        if -self._dead_band < true_speed < self._dead_band:
+            speed = keep * before
+            return speed if abs(speed) >= _SMALLEST_SPEED else 0.0
+        return measured + keep * (before - measured)
+
+    def _next_noise(self) -> tuple[NDArray[np.float64], float]:
+        """Draw a block; return the noise of its first cycle: of the record's columns, and of the moment."""
+        block = self._rng.standard_normal((_BLOCK, _N_NOISE))
+        block *= self._sigmas
+        block[:, REC_WRENCH] += self._drift.next_block(_BLOCK)
+        block[:, REC_VOLTAGE] += _SUPPLY
+        moments: list[float] = block[:, _NOISE_MOMENT].tolist()
+        self._noise = zip(np.ascontiguousarray(block[:, :N_RECORD]), moments, strict=True)
+        return next(self._noise)
