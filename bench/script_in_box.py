@@ -5,13 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from ur_emulator.realtime.interpreter import collection_put_off
-
 from bench.script import SYNC_THREADS
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.realtime.interpreter import collection_put_off
 from urscript import CompiledProgram, compile_program
 from urscript.syntax.parser import prepare
 

@@ -16,7 +16,7 @@ POSE = Pose(0.1, 0.2, 0.3, 0, 3.14, 0)
 
 
 def check(name: str, *args: Any) -> None:
-    CB3_3_15.check(CB3_3_15[name], CB3_3_15.bind(name, args))
+    CB3_3_15.check_of(name)(CB3_3_15.bind(name, args))
 
 
 def refusal(name: str, *args: Any) -> str:

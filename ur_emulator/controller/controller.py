@@ -24,8 +24,8 @@ from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety import (
     UNLOCK_DELAY,
     UNREACHABLE_PATH,
+    SetpointCheck,
     Violation,
-    find_invalid_setpoint,
     find_violation,
 )
 from ur_emulator.controller.safety_modes import SafetyEvent
@@ -83,6 +83,7 @@ class Controller:
         arm = ArmModel(robot, draw_calibration(fidelity, seed))
         q = six(robot.home_q)
         self.plant.reset(q)
+        self._setpoints = SetpointCheck(robot, self.period_s)
         self._mode = mode
         self._saturated_s = 0.0
         self._settle = 0
@@ -259,7 +260,7 @@ class Controller:
             target = state.motion.step(self.period_s, scale)
             if target is before or state.safety.is_stopped:
                 return target
-            violation = find_invalid_setpoint(state.robot, before, target, self.period_s)
+            violation = self._setpoints.find_invalid(before, target)
         except UnreachableError:
             violation = UNREACHABLE_PATH
         if violation is None:

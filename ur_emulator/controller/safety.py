@@ -10,6 +10,8 @@ proposal of the arm's notes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
+from operator import sub
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
@@ -52,13 +54,45 @@ def _stop(code: int, argument: int, text: str, *, blocked: bool = False) -> Viol
     return Violation(ErrorReported(code, argument, ReportLevel.WARNING, text), blocked)
 
 
-def find_invalid_setpoint(
-    robot: RobotModel, before: JointTarget, target: JointTarget, period_s: float
-) -> Violation | None:
-    """Return what is wrong with the next set-point, or None; asked before the joints get it.
+class SetpointCheck:
+    """Looks at each set-point before the joints get it.
 
     Joint ranges are kept with the way that a protective stop needs, so that the arm comes to rest within
     them. A joint that is outside already, because something pushed it, may move back.
+
+    Args:
+        robot: limits of the arm.
+        period_s: control cycle [s].
+    """
+
+    def __init__(self, robot: RobotModel, period_s: float) -> None:
+        self._robot = robot
+        self._period_s = period_s
+        self._braking = 0.5 / robot.stop_deceleration
+        # Below these no joint can be beyond a limit of its own: most set-points need no closer look.
+        self._safe_speed = min(robot.qd_max)
+        self._safe_reach = min(*robot.q_max, *(-low for low in robot.q_min))
+
+    def find_invalid(self, before: JointTarget, target: JointTarget) -> Violation | None:
+        """Return what is wrong with the next set-point, or None.
+
+        Args:
+            before: set-point at the end of the last cycle.
+            target: set-point at the end of this one.
+        """
+        # Norms are at least as large as each joint's value, and not a number where one is not.
+        fastest = hypot(*target.qd)
+        steepest = hypot(*map(sub, target.q, before.q)) / self._period_s
+        reach = max(map(abs, target.q)) + fastest * fastest * self._braking
+        if fastest <= self._safe_speed >= steepest and reach <= self._safe_reach:
+            return None
+        return find_invalid_setpoint(self._robot, before, target, self._period_s)
+
+
+def find_invalid_setpoint(
+    robot: RobotModel, before: JointTarget, target: JointTarget, period_s: float
+) -> Violation | None:
+    """Return what is wrong with a set-point, joint by joint, or None; see `SetpointCheck`.
 
     Args:
         robot: limits of the arm.
@@ -117,11 +151,10 @@ def find_violation(robot: RobotModel, sensed: PlantState, saturated_s: float) ->
         sensed: what the box reads from its arm.
         saturated_s: for how long a drive has been at its torque limit without a break [s].
     """
-    for i, error in enumerate(sensed.position_error):
-        if abs(error) > MAX_POSITION_DEVIATION:
-            return _stop(
-                153, i, f"Protective stop: position deviates from path: {JOINT_NAMES[i]}", blocked=True
-            )
+    errors = sensed.position_error
+    if max(errors) > MAX_POSITION_DEVIATION or min(errors) < -MAX_POSITION_DEVIATION:
+        i = next(i for i, error in enumerate(errors) if abs(error) > MAX_POSITION_DEVIATION)
+        return _stop(153, i, f"Protective stop: position deviates from path: {JOINT_NAMES[i]}", blocked=True)
     if saturated_s > MAX_SATURATION_TIME:
         joint = hardest_joint(robot, sensed.joint_control_output)
         text = f"Protective stop: Collision detected by joint: {JOINT_NAMES[joint]}"

@@ -2,8 +2,8 @@
 
 A snapshot is the records of its owners one after the other: the motion's target, what the plant's sensors
 read, the state of the box; and the arm in space, which is computed when somebody reads it. Names are those of
-the realtime columns, lower-cased (`actual_TCP_pose` on the wire is `actual_tcp_pose` here), so that a frame is
-a pure function of a snapshot and a layout table.
+the realtime columns, lower-cased (`actual_TCP_pose` on the wire is `actual_tcp_pose` here), so that a frame
+is a pure function of a snapshot and a layout table.
 """
 
 from __future__ import annotations
@@ -112,8 +112,9 @@ class Snapshot(_Fields):
 
     def as_dict(self) -> dict[str, Any]:
         """Return all fields by name, those of the arm in space included."""
-        fields = self._asdict()
-        return fields | fields.pop("space").as_dict()
+        fields = dict(zip(self._fields, self, strict=True))
+        del fields["space"]
+        return fields | self.space.as_dict()
 
     # --- the arm in space
 

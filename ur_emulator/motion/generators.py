@@ -9,6 +9,7 @@ A generator is started from the target that holds at that moment and keeps the r
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import sub
 from typing import Protocol
 
 from ur_emulator.models.robot_model import Vector6, six
@@ -55,7 +56,7 @@ def ramp_towards(
         dt: duration of a cycle [s].
     """
     qd = target.qd
-    change = [goal - now for goal, now in zip(qd_goal, qd, strict=True)]
+    change = list(map(sub, qd_goal, qd))
     largest = max(map(abs, change))
     reach = acceleration * dt
     if largest <= reach:

@@ -49,12 +49,13 @@ class CommandPath:
         self._delay = dead_substeps * substep + lag
         self._matrix = _cycle_matrix(path_responses(n_substeps, substep, dead_substeps, lag), lead)
         n_outputs, n_inputs = self._matrix.shape
-        # Rows of six, one a joint: filter (q, qd, tau), trim, then the targets, newest first (q, qd, tau each).
+        # Rows of six, one a joint: filter (q, qd, tau), trim, then targets (q, qd, tau), newest first.
         self._inputs = np.zeros((n_inputs, 6))
         self._filtered = self._inputs[:N_SIGNALS]
         self.trim: NDArray[np.float64] = self._inputs[_TRIM]
         self._targets = self._inputs[_TRIM + 1 :]
         self.newest: NDArray[np.float64] = self._targets[:N_SIGNALS]
+        self._newest_memory = self.newest.data.cast("B")
         self._younger = self._targets[:-N_SIGNALS]
         self._older = self._targets[N_SIGNALS:]
         # The actual speeds stand before the outputs, so that all speeds are one array.
@@ -79,14 +80,16 @@ class CommandPath:
         speed = np.zeros(6) if qd is None else qd
         n_knots = len(self._targets) // N_SIGNALS
         self._filtered[:] = q - self._delay * speed, speed, tau
-        self._targets[:] = np.concatenate([[q - k * self._period * speed, speed, tau] for k in range(n_knots)])
+        self._targets[:] = np.concatenate(
+            [[q - k * self._period * speed, speed, tau] for k in range(n_knots)]
+        )
         self._final[:] = self._filtered
 
     def take(self, target: Target) -> None:
         """Make room and fill `newest`; its third row with qdd, for the caller to replace by the torque."""
         self._older[:] = self._younger
         # One call for three assignments of tuples.
-        _PACK(self.newest, 0, *target.q, *target.qd, *target.qdd)
+        _PACK(self._newest_memory, 0, *target.q, *target.qd, *target.qdd)
 
     def advance(self) -> None:
         """Fill the outputs of this cycle for `newest` and `trim`."""
@@ -97,13 +100,11 @@ class CommandPath:
 _PACK = Struct("18d").pack_into
 
 
-def path_responses(
-    n_substeps: int, substep: float, dead_substeps: int, lag: float
-) -> NDArray[np.float64]:
+def path_responses(n_substeps: int, substep: float, dead_substeps: int, lag: float) -> NDArray[np.float64]:
     """Return what each input of the path of one joint does to its set-point; arguments as `trace_cycle`.
 
     Returns:
-        (3, n_substeps + 1, n): q, qd, tau at the start of each sub-step and at the end of the cycle, by input:
+        (3, n_substeps + 1, n): q, qd, tau at the start of each sub-step and at the end of the cycle by input:
         the filter's q, qd, tau, then those of each target, newest first.
     """
     # A delayed cycle lies between targets that are up to this many cycles old.

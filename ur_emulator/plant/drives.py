@@ -5,8 +5,9 @@ adds up
 
     tau = kp (q_set + lead qd_set + trim) + tau_set + friction compensation at qd_set - kp q - kv qd
 
-with lead = kv / kp, of which the terms in q and qd live in MuJoCo's actuators. `trim` is the slow outer loop: it integrates the
-error at the joint's own encoder, so that gear error, wrong masses and left-over friction vanish at rest.
+with lead = kv / kp. The terms in q and qd live in MuJoCo's actuators. `trim` is the slow outer loop: it
+integrates the error at the joint's own encoder, so that gear error, wrong masses and left-over friction
+vanish at rest.
 
 While the arm is guided by hand there is no set-point: see `HandGuiding`.
 """

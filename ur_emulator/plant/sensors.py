@@ -129,7 +129,9 @@ class Sensors:
         np.multiply(steps, self._step, steps)
         reading: list[float] = values.tolist()
         true_qd: list[float] = record.qd.tolist()
-        self._speeds = speeds = six(list(map(self._filter, true_qd, reading[REC_QD], self._speeds, self._keep)))
+        self._speeds = speeds = six(
+            list(map(self._filter, true_qd, reading[REC_QD], self._speeds, self._keep))
+        )
         # The force estimate takes some of the friction for a force against the motion.
         ax, ay, az, vx, vy, vz, fx, fy, fz, mx, my, mz = reading[18:30]
         if self._force_friction:

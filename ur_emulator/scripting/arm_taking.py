@@ -37,4 +37,4 @@ def require_positive(function: str, **limits: float) -> None:
 
 def floats(values: Sequence[float]) -> Vector6:
     """Return six values as floats; a script may write whole numbers."""
-    return six([float(value) for value in values])
+    return six(list(map(float, values)))

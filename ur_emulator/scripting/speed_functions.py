@@ -38,7 +38,9 @@ def speed_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
             yield NEXT_CYCLE
 
     def speedj(thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
-        return stream(thread, SpeedJ(floats(qd), _limit("speedj", t, a=a)), t)
+        if not a >= LEAST_LIMIT:
+            a = _limit("speedj", t, a=a)
+        return stream(thread, SpeedJ(floats(qd), a), t)
 
     def speedl(thread: object, xd: Any, a: float, t: float | None, aRot: float | None) -> Cycles:
         a_rot = _limit("speedl", t, aRot=a if aRot is None else aRot)

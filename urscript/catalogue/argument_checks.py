@@ -11,7 +11,7 @@ the form p[x,y,z,a,b,c]"); the others are not documented and follow its pattern,
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import isfinite
+from math import hypot, isfinite
 from typing import Any
 
 from urscript.errors import ScriptRuntimeError
@@ -181,7 +181,34 @@ def _accepts(builtin: Builtin, param: Param) -> Predicate | None:
             return False
         return not is_ranged or _is_in_range(param, value)
 
-    return accepts
+    is_plain = _PLAIN.get(param.type) if needs_finite and not is_ranged else None
+    return accepts if is_plain is None else lambda value: is_plain(value) or accepts(value)
+
+
+_NUMBER_TYPES = frozenset({int, float})
+
+
+def _is_plain_number(value: Any) -> bool:
+    return type(value) in _NUMBER_TYPES and bool(-_MOST <= value <= _MOST)
+
+
+def _is_plain_six(value: Any) -> bool:
+    # The norm is not a number, or infinite, where an element is; it is at least as large as each of them.
+    return (
+        type(value) is list
+        and len(value) == 6
+        and _NUMBER_TYPES.issuperset(map(type, value))
+        and hypot(*value) <= _MOST
+    )
+
+
+# What nearly every argument of a motion command is, told in a few steps; others have the whole test.
+_PLAIN: dict[ParamType, Predicate] = {
+    ParamType.NUMBER: _is_plain_number,
+    ParamType.JOINTS: _is_plain_six,
+    ParamType.POSE_OR_JOINTS: _is_plain_six,
+    ParamType.VECTOR6: _is_plain_six,
+}
 
 
 def compile_check(builtin: Builtin) -> Callable[[Sequence[Any]], None]:

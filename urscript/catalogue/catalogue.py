@@ -5,7 +5,7 @@ Everything a compiler asks about builtins goes through `Catalogue`; it holds no 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any
@@ -130,13 +130,12 @@ class Catalogue:
             raise ScriptRuntimeError(error.log_text, hint=error.hint) from None
         return tuple(_value(slot, args, kwargs) for slot in slots)
 
-    def check(self, builtin: Builtin, args: Sequence[Any]) -> None:
-        """Check bound arguments against the types, ranges and finiteness the table asks for.
+    def check_of(self, name: str) -> Callable[[Sequence[Any]], None]:
+        """A function that checks bound arguments against what the table asks for: types, ranges, finiteness.
 
-        Raises:
-            ScriptRuntimeError: with the controller's text where it is known.
+        It raises ScriptRuntimeError with the controller's text where it is known.
         """
-        self._checks[builtin.name](args)
+        return self._checks[name]
 
 
 def _value(slot: Slot, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:

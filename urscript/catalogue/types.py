@@ -61,6 +61,21 @@ class ParamType(Enum):
     NORMED = "a number, a list of numbers or a Pose"
 
 
+SHORT: Final = frozenset(
+    {
+        ParamType.BOOL,
+        ParamType.INT,
+        ParamType.NUMBER,
+        ParamType.POSE,
+        ParamType.JOINTS,
+        ParamType.POSE_OR_JOINTS,
+        ParamType.VECTOR3,
+        ParamType.VECTOR6,
+    }
+)
+"""Types whose values have six numbers at most."""
+
+
 class _Required(Enum):
     REQUIRED = "required"
 

@@ -7,7 +7,7 @@ thread is found to have used too much time. What is too dear for the rest of the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from urscript.errors import ScriptBudgetError
@@ -81,6 +81,19 @@ class Meter:
                     work += _product(argument, argument) if cubic else _cells(argument)
             charge(work)
             return function(*arguments)
+
+        return call
+
+    def checked(self, function: Function, cost: int, check: Callable[[Sequence[Any]], None]) -> Function:
+        """A builtin none of whose arguments can be long, charged for the call, its arguments checked."""
+        namespace = self._namespace
+
+        def call(thread: Any, *arguments: Any) -> Any:
+            namespace["_b"] = left = namespace["_b"] - cost
+            if left < 0:
+                raise ScriptBudgetError
+            check(arguments)
+            return function(thread, *arguments)
 
         return call
 

@@ -20,6 +20,7 @@ from typing import Any, Final
 
 from urscript.builtins import PURE
 from urscript.catalogue import Catalogue
+from urscript.catalogue.types import SHORT
 from urscript.compile.long_blocks import PART
 from urscript.dialect import Dialect
 from urscript.errors import ScriptBudgetError, ScriptRuntimeError, StackEntry
@@ -145,8 +146,7 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, me
     for name in names:
         function = flow.get(name) or offered.get(name)
         if function is not None:
-            checked = _checked(name, function, catalogue)
-            bound[f"b_{name}"] = meter.function(checked, COSTS.get(name, HOST_COST), name)
+            bound[f"b_{name}"] = _checked(name, function, catalogue, meter)
         elif name in PURE:
             pure = _without_thread(PURE[name])
             bound[f"b_{name}"] = meter.function(pure, COSTS.get(name, PURE_COST), name)
@@ -169,17 +169,22 @@ def _flow_builtins(host: Host) -> dict[str, Callable[..., Any]]:
     return {"textmsg": textmsg, "sleep": sleep}
 
 
-def _checked(name: str, function: Callable[..., Any], catalogue: Catalogue) -> Callable[..., Any]:
-    builtin = catalogue.lookup(name)
+def _checked(
+    name: str, function: Callable[..., Any], catalogue: Catalogue, meter: Meter
+) -> Callable[..., Any]:
+    """A builtin of the host, charged for, with the check of its arguments in front."""
+    cost, builtin = COSTS.get(name, HOST_COST), catalogue.lookup(name)
     if builtin is None or not builtin.params:
-        return function
-    check = catalogue.check
+        return meter.function(function, cost, name)
+    check = catalogue.check_of(name)
+    if all(param.type in SHORT for param in builtin.params):
+        return meter.checked(function, cost, check)
 
     def call(thread: ScriptThread, *arguments: Any) -> Any:
-        check(builtin, arguments)
+        check(arguments)
         return function(thread, *arguments)
 
-    return call
+    return meter.function(call, cost, name)
 
 
 def _without_thread(function: Callable[..., Any]) -> Callable[..., Any]:
