@@ -46,7 +46,7 @@ def serve(
     speed: Annotated[float, typer.Option(help="Times as fast as real time (realtime pace only).")] = 1.0,
     seed: Annotated[int, typer.Option(help="Which arm: calibration, gear phases, delays, noise.")] = 0,
     fidelity: Annotated[
-        str, typer.Option(help="How imperfect the arm is: ideal, typical or poor.")
+        str, typer.Option(help="How imperfect the arm is: exact (no physics), ideal, typical or poor.")
     ] = "typical",
     port_base: Annotated[int, typer.Option(help="Offset added to all standard ports.")] = 0,
     boxes: Annotated[

@@ -23,7 +23,7 @@ from pc_client.spelling import check_keys, nearest
 from pc_client.sweep.case import MovementFile, SimulatedArm
 from pc_client.sweep.controller_axes import check_distinct, grid, read_axes, samples
 
-FIDELITIES = ("ideal", "typical", "poor")
+FIDELITIES = ("exact", "ideal", "typical", "poor")
 """What `ur-emulator serve --fidelity` knows."""
 
 MOST_CASES = 100_000
@@ -33,7 +33,7 @@ KEYS = {
     "movements": "names of the library, or movement files beside the configuration",
     "controllers": 'named controllers, the settings that [controller] starts from; ["preview"] by default',
     "robots": 'types of simulated arms: "ur3", "ur5", "ur10"; ["ur3"] by default',
-    "fidelities": 'how imperfect they are: "ideal", "typical", "poor"; ["typical"] by default',
+    "fidelities": 'how imperfect they are: "exact", "ideal", "typical", "poor"; ["typical"] by default',
     "seeds": "which arms of their kind, whole numbers; [0] by default",
     "robot": "host of a control box that is there already, instead of robots, fidelities and seeds",
     "port_base": "offset of the ports of `robot`; 0 by default",

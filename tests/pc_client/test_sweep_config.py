@@ -84,7 +84,7 @@ def test_examples_make_sense(path):
         ('MOVES\nmovment = ["uniform_4_1"]', "did you mean movements?"),
         ("MOVES\nfidelitys = []", "did you mean fidelities?"),
         ("MOVES\ngain_p = 3", "put it under [controller]"),
-        ('MOVES\nfidelities = ["perfect"]', "known are ideal, typical, poor"),
+        ('MOVES\nfidelities = ["flawless"]', "known are exact, ideal, typical, poor"),
         ('MOVES\nfidelities = ["tipical"]', "did you mean typical?"),
         ('MOVES\nrobots = ["ur4"]', "did you mean ur"),
         ('MOVES\ncontrollers = ["pid"]', "'pid' is not known"),

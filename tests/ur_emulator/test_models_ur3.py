@@ -73,7 +73,7 @@ def test_unknown_names_are_refused_with_the_known_ones():
     assert fidelity_by_name("Typical") is TYPICAL
     with pytest.raises(ModelError, match=r"'ur7'.*ur3"):
         robot_by_name("ur7")
-    with pytest.raises(EmulatorError, match=r"'perfect'.*ideal, typical, poor"):
+    with pytest.raises(EmulatorError, match=r"'perfect'.*exact, ideal, typical, poor"):
         fidelity_by_name("perfect")
 
 
@@ -83,10 +83,10 @@ def test_a_table_without_six_rows_makes_no_arm():
 
 
 def test_fidelities_are_ordered():
-    assert set(FIDELITIES) == {"ideal", "typical", "poor"}
+    assert set(FIDELITIES) == {"exact", "ideal", "typical", "poor"}
     for better, worse in ((IDEAL, TYPICAL), (TYPICAL, POOR)):
         for field in fields(TYPICAL):
-            if field.name in ("name", "speed_filter_hz"):
+            if field.name in ("name", "speed_filter_hz", "has_physics"):
                 continue
             assert np.all(np.less_equal(getattr(better, field.name), getattr(worse, field.name))), field.name
     assert POOR.ripple_first == 2 * TYPICAL.ripple_first

@@ -42,6 +42,7 @@ from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import UnreachableError
+from ur_emulator.plant.exact import ExactPlant
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.plant_state import PlantState
 from ur_emulator.scripting.network import Network
@@ -79,7 +80,8 @@ class Controller:
         """
         self.generation = generation
         self.period_s = generation.period_s
-        self.plant = Plant(robot, fidelity, seed, generation)
+        make_plant = Plant if fidelity.has_physics else ExactPlant
+        self.plant = make_plant(robot, fidelity, seed, generation)
         arm = ArmModel(robot, draw_calibration(fidelity, seed))
         q = six(robot.home_q)
         self.plant.reset(q)

@@ -1,6 +1,7 @@
 """Fidelity: how far the emulated arm is from a perfect one, as one frozen set of numbers.
 
-Three sets have names. `ideal` is for debugging clients: hardly a delay, hardly any noise. `typical` is what
+Four sets have names. `exact` has no physics: what is measured is the target, as in the maker's simulator.
+`ideal` is for debugging clients: hardly a delay, hardly any noise. `typical` is what
 logs and reports of real arms show, and the default. `poor` is an arm and a network at the bad end of what
 users report. Every number that spoils the arm is here; every number of the arm itself is in `RobotModel`.
 
@@ -54,6 +55,7 @@ class Fidelity:
         force_friction: offset of the force estimate against the direction of motion [N].
         accelerometer_sigma: sd of each axis of the tool accelerometer [m/s²].
         voltage_sigma: sd of each joint voltage [V].
+        has_physics: False: the arm is where it is asked to be, and nothing else above counts.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Fidelity:
     force_friction: float
     accelerometer_sigma: float
     voltage_sigma: float
+    has_physics: bool = True
 
 
 TYPICAL = Fidelity(
@@ -132,6 +135,8 @@ IDEAL = replace(
     voltage_sigma=0.001,
 )
 
+EXACT = replace(IDEAL, name="exact", has_physics=False, ripple_first=0.0, ripple_second=0.0)
+
 POOR = replace(
     TYPICAL,
     name="poor",
@@ -148,7 +153,7 @@ POOR = replace(
     force_friction=4.0,
 )
 
-FIDELITIES: dict[str, Fidelity] = {fidelity.name: fidelity for fidelity in (IDEAL, TYPICAL, POOR)}
+FIDELITIES: dict[str, Fidelity] = {fidelity.name: fidelity for fidelity in (EXACT, IDEAL, TYPICAL, POOR)}
 
 
 def fidelity_by_name(name: str) -> Fidelity:

@@ -14,6 +14,7 @@ While the arm is guided by hand there is no set-point: see `HandGuiding`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot
 
 import numpy as np
@@ -139,6 +140,21 @@ class Drives:
         np.add(moment, friction.expected, work)
         np.multiply(work, self._per_torque, work)
         self.target_current = six(work.tolist())
+        return True
+
+    def expect(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> bool:
+        """Set `target_moment` and `target_current` for a target, (6,) each, that the arm follows by itself.
+
+        Returns:
+            False when the target is not finite or absurd; nothing has changed then.
+        """
+        if not hypot(*q, *qd, *qdd) < TARGET_MAX:
+            return False
+        speeds = np.array([qd, qd, qd], dtype=np.float64)
+        moment = self._dynamics.evaluate(np.array(q), speeds[0], np.array(qdd))
+        self._friction.evaluate(speeds)
+        self.target_moment = six(moment.tolist())
+        self.target_current = six(((moment + self._friction.expected) * self._per_torque).tolist())
         return True
 
     def guide(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> None:

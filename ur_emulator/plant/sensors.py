@@ -31,7 +31,7 @@ REC_MOTION = slice(0, 12)  # angles and speeds
 REC_SIMULATED = slice(0, 24)  # the part that MuJoCo's sensors fill, in their order
 
 _BLOCK = 256  # cycles of noise drawn at once
-_SUPPLY = 48.0  # V, robot bus; its drop along the arm's cable is small and left out
+SUPPLY_VOLTAGE = 48.0  # V, robot bus; its drop along the arm's cable is small and left out
 _SLOW = 0.02  # m/s; the direction of motion is smoothed below this
 _NO_SPEED = (0.0,) * 6
 _SMALLEST_SPEED = 1.4e-45  # smallest float32: the joints filter in float32, whose decay ends there
@@ -158,7 +158,7 @@ class Sensors:
         block = self._rng.standard_normal((_BLOCK, _N_NOISE))
         block *= self._sigmas
         block[:, REC_WRENCH] += self._drift.next_block(_BLOCK)
-        block[:, REC_VOLTAGE] += _SUPPLY
+        block[:, REC_VOLTAGE] += SUPPLY_VOLTAGE
         moments: list[float] = block[:, _NOISE_MOMENT].tolist()
         self._noise = zip(np.ascontiguousarray(block[:, :N_RECORD]), moments, strict=True)
         return next(self._noise)

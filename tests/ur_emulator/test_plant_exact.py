@@ -1,0 +1,117 @@
+"""Fidelity exact: what is measured is what was asked for, to the last bit; what is not modelled says so."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from box_support import Bench
+
+from ur_emulator.controller.commands import SetSpeedSlider
+from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
+from ur_emulator.controller.obstacles import AddObstacle
+from ur_emulator.errors import PlantError
+from ur_emulator.models.fidelity import EXACT
+from ur_emulator.models.ur3 import UR3
+from ur_emulator.plant.exact import ExactPlant
+
+MOVES = """
+def p():
+  q = get_target_joint_positions()
+  movej([q[0] + 0.5, q[1] + 0.2, q[2], q[3], q[4], q[5]])
+  movel(pose_add(get_target_tcp_pose(), p[0, 0, 0.08, 0, 0, 0]))
+  thread s():
+    while True:
+      speedj([0.3, -0.1, 0.1, 0.4, 0, -1], 2, 0.008)
+    end
+  end
+  t = run s()
+  sleep(0.4)
+  kill t
+  stopl(1)
+  movec(pose_add(get_target_tcp_pose(), p[0.02, 0.01, 0, 0, 0, 0]), pose_add(get_target_tcp_pose(), p[0.03, 0, 0, 0, 0, 0]))
+end
+"""
+
+
+def run(bench, program, n, command=None):
+    bench.start(program)
+    for cycle in range(n):
+        bench.tick(1, *([command] if command is not None and cycle == n // 3 else []))
+        yield bench.now
+
+
+def test_measured_equals_asked_in_every_cycle_of_every_kind_of_motion():
+    bench = Bench(fidelity="exact")
+    seen = set()
+    for now in run(bench, MOVES, 900, SetSpeedSlider(0.6)):
+        assert now.actual_q == now.target_q
+        assert now.actual_qd == now.target_qd
+        assert now.actual_tcp_pose == now.target_tcp_pose
+        assert now.actual_tcp_speed == now.target_tcp_speed
+        assert now.actual_current == now.target_current == now.joint_control_output
+        assert now.actual_tcp_force == (0.0,) * 6
+        seen.add(now.actual_q)
+    assert len(seen) > 200
+    assert not bench.controller.programs.is_running
+
+
+def test_pose_and_force_follow_the_tool_centre_point():
+    bench = Bench(fidelity="exact")
+    *_, now = run(bench, "def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\n  sync()\nend\n", 3)
+    flange = bench.controller.state.arm.fk(now.target_q)
+    assert math.dist(now.actual_tcp_pose[:3], flange[:3]) == pytest.approx(0.1)
+    assert now.actual_tcp_force == (0.0,) * 6
+
+
+def test_moments_are_those_of_the_model_and_know_the_payload():
+    bench, other = Bench(fidelity="exact"), Bench(fidelity="ideal")
+    for one in (bench, other):
+        one.start("def p():\n  set_payload(2.0, [0, 0, 0.05])\n  sleep(0.1)\nend\n")
+        one.tick(5)
+    assert bench.now.target_moment == pytest.approx(other.now.target_moment, abs=1e-9)
+    assert bench.now.actual_tool_accelerometer == pytest.approx(other.now.actual_tool_accelerometer, abs=0.3)
+
+
+def test_nothing_acts_on_the_arm():
+    bench = Bench(fidelity="exact")
+    before = bench.now.actual_q
+    bench.tick(20, Push((50.0, 0.0, 0.0)), HangLoad(3.0))
+    assert bench.now.actual_q == before
+    assert bench.now.actual_tcp_force == (0.0,) * 6
+    bench.tick(20, GuideByHand())
+    assert bench.now.actual_q == bench.now.target_q == before
+
+
+def test_obstacles_are_refused_in_one_line():
+    bench = Bench(fidelity="exact")
+    bench.tick(1, AddObstacle("box", "sphere", (0.1,), (0.4, 0.0, 0.3, 0.0, 0.0, 0.0)))
+    assert any("obstacle box refused" in getattr(event, "text", "") for event in bench.events)
+    assert bench.controller.plant.obstacles == ()
+
+
+def test_two_seeds_are_the_same_arm():
+    def frames(seed):
+        return list(run(Bench(fidelity="exact", seed=seed), MOVES, 150))
+
+    for one, other in zip(frames(1), frames(2), strict=True):
+        assert one.actual_q == other.actual_q
+        assert one.actual_tcp_pose == other.actual_tcp_pose
+        assert one.actual_current == other.actual_current
+
+
+def test_braked_arm_stands_where_it_is_and_takes_no_current():
+    plant = ExactPlant(UR3, EXACT, 0)
+    plant.step(None)
+    state = plant.sense()
+    assert state.actual_q == UR3.home_q
+    assert state.actual_current == (0.0,) * 6
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, 1e7])
+def test_absurd_targets_are_refused(bad):
+    from ur_emulator.motion.target import JointTarget
+
+    plant = ExactPlant(UR3, EXACT, 0)
+    with pytest.raises(PlantError, match="finite numbers"):
+        plant.step(JointTarget((bad, 0.0, 0.0, 0.0, 0.0, 0.0)))

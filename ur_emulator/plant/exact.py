@@ -1,0 +1,100 @@
+"""ExactPlant: an arm without physics, which is where it is asked to be, as in the maker's simulator.
+
+What is measured equals the target to the last bit, in the cycle of the target. Currents and torques are those
+that the controller's model expects. Nothing acts on the arm: no load but the declared payload, no push, no
+contact, no hand. A resting arm reads gravity on its accelerometer, a moving one too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+
+from protocol.ur_types import ControlMode
+from ur_emulator.errors import PlantError
+from ur_emulator.models.mjcf import GRAVITY
+from ur_emulator.models.robot_model import Vector3, Vector6, six
+from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX
+from ur_emulator.plant.plant import Plant
+from ur_emulator.plant.plant_state import PlantState, Target
+from ur_emulator.plant.sensors import SUPPLY_VOLTAGE
+
+_STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class ExactPlant(Plant):
+    """An arm that follows exactly; arguments and the rest of the interface as `Plant`."""
+
+    def reset(self, q: Sequence[float]) -> None:
+        """Put the arm at rest at q (6,) [rad], brakes on.
+
+        Raises:
+            PlantError: when q is not six finite numbers.
+        """
+        super().reset(q)
+        self._q: Vector6 = six([float(angle) for angle in q])
+        self._qd = _STILL
+
+    def step(self, target: Target | None, mode: ControlMode = ControlMode.POSITION) -> None:
+        """Be at the target; see `Plant.step`. Without one, and when guided by hand, the arm stands still.
+
+        Raises:
+            PlantError: the target is not finite.
+        """
+        self._state = None
+        self.cycle += 1
+        if target is None:
+            self._qd = _STILL
+            self._drives.release()
+        elif mode is ControlMode.TEACH:
+            self._qd = _STILL
+            self._drives.expect(self._q, _STILL, _STILL)
+        elif self._drives.expect(target.q, target.qd, target.qdd):
+            self._q, self._qd = six(target.q), six(target.qd)
+        else:
+            raise PlantError(
+                f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
+                cycle=self.cycle,
+            )
+        self._qpos[:] = self._q
+        self._qvel[:] = self._qd
+
+    def sense(self) -> PlantState:
+        """Read the sensors; asking again before the next step gives the same state."""
+        if self._state is None:
+            mujoco.mj_kinematics(self._model, self._data)
+            x, y, z = (GRAVITY * self._flange_rotation[2]).tolist()
+            current, moment = self._drives.target_current, self._drives.target_moment
+            self._thermometers.step(current)
+            self._state = PlantState(
+                actual_q=self._q,
+                actual_qd=self._qd,
+                actual_current=current,
+                joint_voltage=(SUPPLY_VOLTAGE,) * 6,
+                tool_accelerometer=(x, y, z),
+                tcp_force=NO_LOAD,
+                joint_temperatures=self._thermometers.reading,
+                target_current=current,
+                target_moment=moment,
+                joint_control_output=current,
+                torque_saturated=False,
+                position_error=_STILL,
+            )
+        return self._state
+
+    def hang(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
+        """Nothing: no load acts on this arm."""
+
+    def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
+        """Nothing: no force acts on this arm."""
+
+    def put_obstacle(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
+        """Refuse: this arm would go through it.
+
+        Raises:
+            PlantError: always.
+        """
+        raise PlantError(
+            f"obstacle {name} refused: with fidelity exact nothing meets the arm; use ideal, typical or poor"
+        )
