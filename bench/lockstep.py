@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 from bench.box_process import box_process
+from bench.limit import measure_limit
 from pc_client.control.controller_config import CONTROLLERS
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.experiment.prepare import load_movements, prepare_experiment
@@ -14,15 +15,34 @@ from pc_client.movements import library_names
 
 
 def measure_lockstep() -> dict[str, float]:
-    """Run the ten movements once; time the streaming alone, both processes, real sockets, recording on."""
-    with box_process("--pace", "lockstep", "--seed", "7") as box, tempfile.TemporaryDirectory() as folder:
+    """Run the ten movements once; time the streaming alone, both processes, real sockets, recording on.
+
+    The limit is measured before and after; the smaller one counts.
+    """
+    before = measure_limit()
+    cycle_us, period = _measure("typical")
+    exact_us, _ = _measure("exact")
+    after = measure_limit()
+    limit_us = min(before.cycle_us, after.cycle_us)
+    return {
+        "lockstep_x_realtime": 1e6 * period / cycle_us,
+        "lockstep_cycle_us": cycle_us,
+        "lockstep_limit_us": limit_us,
+        "lockstep_cycle_x_limit": cycle_us / limit_us,
+        "lockstep_limit_steps_us": min(before.steps_us, after.steps_us),
+        "lockstep_limit_round_trip_us": min(before.round_trip_us, after.round_trip_us),
+        "lockstep_exact_x_realtime": 1e6 * period / exact_us,
+        "lockstep_exact_cycle_us": exact_us,
+    }
+
+
+def _measure(fidelity: str) -> tuple[float, float]:
+    """Wall time of a cycle [us] with an arm of this fidelity, and the cycle of the robot [s]."""
+    options = ("--pace", "lockstep", "--seed", "7", "--fidelity", fidelity)
+    with box_process(*options) as box, tempfile.TemporaryDirectory() as folder:
         experiment = prepare_experiment(load_movements(library_names()), repeat=1, out=Path(folder))
         with UrDriver("127.0.0.1", box.ports) as driver:
             report = ExperimentRunner(driver, experiment, CONTROLLERS["preview"]).run()
-        robot_time = sum(stream.robot_time for stream in report.streams)
-        wall_time = sum(stream.wall_time for stream in report.streams)
-        cycles = robot_time / driver.info.period
-    return {
-        "lockstep_x_realtime": robot_time / wall_time,
-        "lockstep_cycle_us": 1e6 * wall_time / cycles,
-    }
+        period = driver.info.period
+    cycles = sum(stream.robot_time for stream in report.streams) / period
+    return 1e6 * sum(stream.wall_time for stream in report.streams) / cycles, period

@@ -54,6 +54,7 @@ def measure_realtime(minutes: float) -> dict[str, float]:
         "stream_late_p99_us": float(np.percentile(lateness_us, 99.0)),
         "stream_late_p999_us": float(np.percentile(lateness_us, 99.9)),
         "stream_late_max_us": float(lateness_us.max()),
+        "stream_late_p999_over_timer_us": float(np.percentile(lateness_us, 99.9)) - timer_p999,
         "bare_timer_late_p999_us": timer_p999,
         "bare_timer_late_max_us": timer_max,
         "cpu_percent": cpu,

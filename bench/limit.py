@@ -1,0 +1,96 @@
+"""What no closed loop can be faster than: four steps of the arm's physics and one round trip of its bytes.
+
+Measured beside the loop itself, so that both have the same machine at the same time.
+"""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import mujoco
+
+from ur_emulator.models.fidelity import Fidelity, fidelity_by_name
+from ur_emulator.models.robots import robot_by_name
+from ur_emulator.motion.target import JointTarget
+from ur_emulator.plant.plant import Plant
+
+STEPS = 4  # of 2 ms in a cycle of 8 ms
+FRAME, COMMAND = 1140, 28  # bytes of a realtime frame, and of a velocity command with its mode
+BATCHES, BATCH = 200, 20
+# The other end of the round trip: plain blocking sockets, nothing but the interpreter between the calls.
+_ECHO = """
+import socket, sys
+with socket.create_connection(("127.0.0.1", int(sys.argv[1]))) as sock:
+    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    left, command = int(sys.argv[2]), bytes(int(sys.argv[3]))
+    while data := sock.recv(65536):
+        left -= len(data)
+        if not left:
+            left = int(sys.argv[2])
+            sock.send(command)
+"""
+
+
+class Limit(NamedTuple):
+    """In microseconds: the best of many batches, for whatever disturbs one is not part of it."""
+
+    steps_us: float
+    round_trip_us: float
+
+    @property
+    def cycle_us(self) -> float:
+        """Both, one after the other."""
+        return self.steps_us + self.round_trip_us
+
+
+def measure_limit(fidelity: str = "typical") -> Limit:
+    """Measure both parts, in a second."""
+    return Limit(measure_steps(fidelity_by_name(fidelity)), _measure_round_trip())
+
+
+def measure_steps(fidelity: Fidelity) -> float:
+    """Four steps of the arm's own model, at rest under its servos [us]; 0 where there is no physics."""
+    if not fidelity.has_physics:
+        return 0.0
+    robot = robot_by_name("ur3")
+    plant = Plant(robot, fidelity, 7)
+    for _ in range(100):
+        plant.step(JointTarget(robot.home_q))
+    model, data = plant._model, plant._data
+    return best_of(lambda: mujoco.mj_step(model, data, STEPS))
+
+
+def _measure_round_trip() -> float:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        arguments = (str(server.getsockname()[1]), str(FRAME), str(COMMAND))
+        echo = subprocess.Popen([sys.executable, "-c", _ECHO, *arguments])
+        sock = server.accept()[0]
+    frame = bytes(FRAME)
+    with sock:
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+        def there_and_back() -> None:
+            sock.send(frame)
+            left = COMMAND
+            while left:
+                left -= len(sock.recv(left))
+
+        best = best_of(there_and_back)
+    echo.wait()
+    return best
+
+
+def best_of(action: Callable[[], object]) -> float:
+    """Microseconds that an action takes, over the best of many batches."""
+    best = float("inf")
+    for _ in range(BATCHES):
+        began = time.perf_counter()
+        for _ in range(BATCH):
+            action()
+        best = min(best, time.perf_counter() - began)
+    return 1e6 * best / BATCH

@@ -1,0 +1,52 @@
+"""What a tick of a box without its ports costs while a thread streams `speedj`, beside its own physics steps."""
+
+from __future__ import annotations
+
+import mujoco
+
+from bench.limit import STEPS, best_of
+from ur_emulator.controller.commands import StartProgram
+from ur_emulator.controller.controller import Controller
+from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robots import robot_by_name
+from urscript import compile_program
+from urscript.parser import prepare
+
+ROUNDS = 10
+WARM_UP = 200  # cycles
+# So slow that the arm meets nothing for the length of the measurement.
+_SPEEDJ = """
+def p():
+  thread stream():
+    while True:
+      speedj([0.003, 0.002, 0.002, 0, 0, 0], 1, 0.008)
+    end
+  end
+  run stream()
+  while True:
+    sync()
+  end
+end
+"""
+
+
+def measure_tick() -> dict[str, float]:
+    """Measure the tick and four steps of the same arm in turn; the best of each counts."""
+    prepare()
+    # No network: nothing here opens a socket.
+    controller = Controller(robot_by_name("ur3"), fidelity_by_name("typical"), 7, None)  # type: ignore[arg-type]
+    controller.tick([StartProgram(compile_program(_SPEEDJ))])
+    for _ in range(WARM_UP):
+        controller.tick(())
+    model, data = controller.plant._model, controller.plant._data
+    # A second state of the same arm: the steps must not move the one that ticks.
+    beside = mujoco.MjData(model)
+    mujoco.mj_copyData(beside, model, data)
+
+    def tick() -> None:
+        controller.tick(())
+        controller.take_events()
+
+    pairs = [(best_of(tick), best_of(lambda: mujoco.mj_step(model, beside, STEPS))) for _ in range(ROUNDS)]
+    tick_us, steps_us = (min(times) for times in zip(*pairs, strict=True))
+    return {"tick_us": tick_us, "tick_four_steps_us": steps_us, "tick_x_four_steps": tick_us / steps_us}
