@@ -1,4 +1,4 @@
-"""What a tick of a box without its ports costs while a thread streams `speedj`, beside its own physics steps."""
+"""What a tick of a box without its ports costs while a thread streams `speedj`, beside its physics alone."""
 
 from __future__ import annotations
 

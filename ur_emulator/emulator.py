@@ -33,7 +33,7 @@ from ur_emulator.models.robot_generation import CB3, RobotGeneration
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.software import software_of
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.realtime.event_loop import WAKE_UP, EventLoop
 from ur_emulator.realtime.loop_runner import LoopRunner
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
@@ -144,7 +144,9 @@ class ControlBox(BoxOperations):
         )
         controller.state.ports.version = (asked.major, asked.minor)
         self._box = ServedBox(
-            controller, make_pacer(named_pace, controller.period_s, speed, phase), self._loop.expect_soon
+            controller,
+            make_pacer(named_pace, controller.period_s, speed, phase, WAKE_UP if self._owns_loop else 0.0),
+            self._loop.expect_soon,
         )
         self._intake = ProgramIntake(self._loop, software.version, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)

@@ -76,6 +76,7 @@ class _Pacer:
     """Lets a cycle pass when the test says so."""
 
     ticks = True
+    publish_at = 0.0
 
     def may_tick(self, now, situation):
         return self.ticks

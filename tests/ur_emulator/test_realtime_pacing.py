@@ -1,7 +1,12 @@
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
+from ur_emulator.controller.commands import SetSpeedSlider
+from ur_emulator.controller.controller import Controller
+from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.pacing import (
     HANG_LIMIT,
     MAX_BACKLOG,
@@ -11,6 +16,7 @@ from ur_emulator.realtime.pacing import (
     RealtimePacer,
     make_pacer,
 )
+from ur_emulator.realtime.served_box import ServedBox
 
 PERIOD = 0.008
 
@@ -62,6 +68,42 @@ def test_speed_divides_the_period():
     pacer = RealtimePacer(PERIOD, speed=4.0)
     pacer.may_tick(0.0, Box())
     assert pacer.next_call(0.0) == PERIOD / 4
+
+
+def test_a_cycle_may_be_computed_a_little_before_its_deadline_without_moving_the_next():
+    pacer = RealtimePacer(PERIOD, lead=0.0004)
+    assert pacer.may_tick(10.0, Box())
+    for k in range(1, 50):
+        deadline = 10.0 + k * PERIOD
+        assert pacer.next_call(0.0) == pytest.approx(deadline)
+        assert not pacer.may_tick(deadline - 0.0005, Box())
+        assert pacer.may_tick(deadline - 0.0003, Box())
+        assert pacer.publish_at == pytest.approx(deadline)
+
+
+def test_the_lead_is_at_most_a_quarter_of_a_short_period():
+    pacer = RealtimePacer(PERIOD, speed=100.0, lead=0.0004)
+    pacer.may_tick(0.0, Box())
+    assert not pacer.may_tick(0.70 * PERIOD / 100, Box())
+    assert pacer.may_tick(0.76 * PERIOD / 100, Box())
+
+
+def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count_in_the_next_cycle():
+    controller = Controller(robot_by_name("ur3"), fidelity_by_name("exact"), 0, None)
+    box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None)
+    seen = []
+    box.attach(SimpleNamespace(publish=seen.append, say=lambda event: None))
+    assert box.advance(10.0) == pytest.approx(10.0 + PERIOD)
+    assert len(seen) == 1
+    deadline = box.advance(10.0 + PERIOD - 0.0003)
+    assert deadline == pytest.approx(10.0 + PERIOD)
+    box.submit(SetSpeedSlider(0.25))
+    assert box.advance(deadline - 0.0001) == deadline
+    assert len(seen) == 1
+    assert box.advance(deadline) == pytest.approx(10.0 + 2 * PERIOD)
+    box.advance(10.0 + 2 * PERIOD)
+    assert [snapshot.tick - seen[0].tick for snapshot in seen] == [0, 1, 2]
+    assert [snapshot.target_speed_fraction for snapshot in seen] == [1.0, 1.0, 0.25]
 
 
 def test_boxes_that_share_a_loop_take_turns():

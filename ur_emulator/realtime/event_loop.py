@@ -23,9 +23,10 @@ from ur_emulator.realtime.interpreter import loop_settings
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
 # microseconds.
 _COARSE = 0.050
-# A sleeping process wakes up about this much late [s]; so long before a deadline it stays awake. Services
-# that share a loop share this time, for awake is busy: twenty boxes would leave no time for anything else.
-_WAKE_UP = 250e-6
+# A sleeping process wakes up late, and slow: so long before a deadline the loop is awake [s]. A box uses that
+# time to compute the cycle that it publishes at the deadline. Services that share a loop share it, for awake
+# is busy: twenty boxes would leave no time for anything else.
+WAKE_UP = 400e-6
 # select() takes descriptors below this number only.
 _SELECT_LIMIT = 1024
 # How long to look again and again for what is expected soon [s]: a client in lockstep takes half of it.
@@ -175,8 +176,11 @@ class EventLoop:
             self._calls.popleft()()
 
     def _wait_precisely(self, descriptor: int, deadline: float) -> list[_Ready]:
-        """Wait for a deadline to some microseconds: sleep for most of it, watch the clock for the rest."""
-        sleep = deadline - time.monotonic() - _WAKE_UP / max(1, len(self._services))
+        """Wait for a deadline to some microseconds: sleep for most of it, watch the clock for the rest.
+
+        Between the two it returns, so that services can use the rest.
+        """
+        sleep = deadline - time.monotonic() - WAKE_UP / max(1, len(self._services))
         if sleep > 0.0:
             ready: list[_Ready] = []
             self.guests.fall_asleep()
@@ -185,8 +189,7 @@ class EventLoop:
             else:
                 ready = self._selector.select((int(sleep * 1e3) - 0.5) * 1e-3)
             self.guests.wake_up()
-            if ready:
-                return ready
+            return ready or self._selector.select(0.0)
         while not (ready := self._selector.select(0.0)) and time.monotonic() < deadline:
             pass
         return ready

@@ -63,6 +63,11 @@ class Situation(Protocol):
 class Pacer(Protocol):
     """Decides when a cycle may begin."""
 
+    @property
+    def publish_at(self) -> float:
+        """Not before this time may the cycle that was computed last be published [s]."""
+        ...
+
     def may_tick(self, now: float, situation: Situation) -> bool:
         """True if a cycle may begin at monotonic time `now` [s]; the caller then ticks once."""
         ...
@@ -73,9 +78,16 @@ class Pacer(Protocol):
 
 
 class RealtimePacer:
-    """Cycles at absolute deadlines."""
+    """Cycles at absolute deadlines.
 
-    def __init__(self, period_s: float, speed: float = 1.0, phase: float = 0.0) -> None:
+    A cycle may be computed a little before its deadline; what comes of it leaves at the deadline, whether the
+    processor was slow or fast. What clients send in between counts in the next cycle.
+
+    Attributes:
+        publish_at: deadline of the cycle that was computed last [s].
+    """
+
+    def __init__(self, period_s: float, speed: float = 1.0, phase: float = 0.0, lead: float = 0.0) -> None:
         """Set the rate.
 
         Args:
@@ -83,17 +95,20 @@ class RealtimePacer:
             speed: how many times as fast as real time, > 0.
             phase: which part of a period to wait before the first cycle, 0 to 1: boxes that share a loop take
                 turns instead of all having their cycle at once.
+            lead: how long before the deadline a cycle may be computed [s]; at most a quarter of the period.
         """
         self._period = period_s / speed
         self._phase = phase
+        self._lead = min(lead, 0.25 * self._period)
         self._deadline = math.nan
+        self.publish_at = -math.inf
         self.lost_cycles = 0
 
     def may_tick(self, now: float, situation: Situation) -> bool:
-        """True at and after the deadline; each call that says so uses up one deadline."""
+        """True from the lead before the deadline on; each call that says so uses up one deadline."""
         if math.isnan(self._deadline):
             self._deadline = now + self._phase * self._period
-        if now < self._deadline:
+        if now < self._deadline - self._lead:
             return False
         behind = now - self._deadline
         if behind > MAX_BACKLOG:
@@ -101,6 +116,7 @@ class RealtimePacer:
             self.lost_cycles += skipped
             self._deadline += skipped * self._period
             situation.fell_behind(skipped)
+        self.publish_at = self._deadline
         self._deadline += self._period
         return True
 
@@ -111,6 +127,8 @@ class RealtimePacer:
 
 class LockstepPacer:
     """Cycles as fast as the processor allows, every one caused by a program; time stands still otherwise."""
+
+    publish_at = -math.inf
 
     def __init__(self, period_s: float) -> None:
         self._period = period_s
@@ -142,6 +160,8 @@ class LockstepPacer:
         return now + self._period
 
 
-def make_pacer(pace: Pace, period_s: float, speed: float = 1.0, phase: float = 0.0) -> Pacer:
-    """Return the pacer of that name."""
-    return LockstepPacer(period_s) if pace is Pace.LOCKSTEP else RealtimePacer(period_s, speed, phase)
+def make_pacer(
+    pace: Pace, period_s: float, speed: float = 1.0, phase: float = 0.0, lead: float = 0.0
+) -> Pacer:
+    """Return the pacer of that name; see `RealtimePacer` for the arguments."""
+    return LockstepPacer(period_s) if pace is Pace.LOCKSTEP else RealtimePacer(period_s, speed, phase, lead)

@@ -56,6 +56,8 @@ class ServedBox:
         self.on_failure: Callable[[Exception], None] | None = None
         self._given_up: set[Any] = set()
         self._last_frame = -math.inf
+        # A cycle is computed and waits for its deadline.
+        self._is_held = False
 
     def attach(self, publisher: Publisher) -> None:
         """Let a port hear of every cycle."""
@@ -131,9 +133,18 @@ class ServedBox:
             return math.inf
 
     def _advance(self, now: float) -> float:
-        if self._pacer.may_tick(now, self):
+        if self._is_held:
+            if now < self._pacer.publish_at:
+                return self._pacer.publish_at
+            self._is_held = False
+            self._publish(self.controller.snapshot, now)
+        elif self._pacer.may_tick(now, self):
             commands, self._commands = self._commands, []
-            self._publish(self.controller.tick(commands), now)
+            snapshot = self.controller.tick(commands)
+            if now < self._pacer.publish_at:
+                self._is_held = True
+                return self._pacer.publish_at
+            self._publish(snapshot, now)
             if self._repeats and self.is_active:
                 if not self.waits_outside:
                     return now  # the next cycle may follow at once, after the sockets have had their turn
