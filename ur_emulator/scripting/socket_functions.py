@@ -144,12 +144,34 @@ class ProgramSockets:
         del inbox[:size]
         return data
 
+    def _take_fixed(self, name: str, timeout: float, size: int) -> Generator[Blocked, None, bytes | None]:
+        """As `_take`, for a message of a fixed size: a stream of commands passes here every cycle."""
+        socket, state = self._sockets.get(name), self._state
+        if socket is None:
+            return None
+        inbox = socket.inbox
+        # Nothing to read is nothing that could come: it ends with the time-out.
+        enough = min(size, MAX_INBOX + 1) if size > 0 else MAX_INBOX + 1
+        if len(inbox) < enough and socket.is_open:
+            end = state.program_tick + math.ceil(timeout / state.period_s) if timeout > 0.0 else math.inf
+            yield Blocked(
+                lambda: len(inbox) >= enough or not socket.is_open or state.program_tick >= end, outside=True
+            )
+        else:
+            yield GIVE_WAY
+        if not 0 < size <= len(inbox):
+            if len(inbox) > MAX_INBOX:
+                inbox.clear()
+            return None
+        data = bytes(inbox[:size])
+        del inbox[:size]
+        return data
+
     def _read_binary_integer(
         self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
         number = int(number)
-        size = 4 * number
-        data = yield from self._take(name, timeout, lambda inbox: size if len(inbox) >= size else 0)
+        data = yield from self._take_fixed(name, timeout, 4 * number)
         if data is None:
             return [0] + [-1] * number
         return [number, *struct.unpack(f">{number}i", data)]
@@ -157,8 +179,8 @@ class ProgramSockets:
     def _read_byte_list(
         self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
-        size = number = int(number)
-        data = yield from self._take(name, timeout, lambda inbox: size if len(inbox) >= size else 0)
+        number = int(number)
+        data = yield from self._take_fixed(name, timeout, number)
         return [0] + [-1] * number if data is None else [number, *data]
 
     def _read_ascii_float(
