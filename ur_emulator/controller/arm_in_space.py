@@ -6,7 +6,6 @@ Most cycles of a box without clients, and all that a program does in joint space
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from ur_emulator.controller.force_sense import moved_wrench
 from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
@@ -64,16 +63,11 @@ class ArmInSpace:
         actual = self.actual
         return moved_wrench(self._wrench, actual.flange_position, actual.tcp_pose)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return everything by the names that a snapshot has for it."""
-        target, actual = self.target, self.actual
-        return {
-            "target_tcp_pose": target.tcp_pose,
-            "target_tcp_speed": target.tcp_speed,
-            "actual_tcp_pose": actual.tcp_pose,
-            "actual_tcp_speed": actual.tcp_speed,
-            "actual_tcp_force": self.tcp_force,
-            "elbow_position": actual.elbow_position,
-            "elbow_velocity": actual.elbow_velocity,
-            "actual_momentum": actual.momentum,
-        }
+    def __eq__(self, other: object) -> bool:
+        """True when everything that can be read is the same."""
+        if not isinstance(other, ArmInSpace):
+            return NotImplemented
+        return (self.target, self.actual, self.tcp_force) == (other.target, other.actual, other.tcp_force)
+
+    def __hash__(self) -> int:
+        return hash((self._target_joints, self._actual_joints))

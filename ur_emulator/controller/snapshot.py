@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from protocol.realtime_layout import SNAPSHOT_FIELDS
 from ur_emulator.controller import electrics
 from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.registers import RegisterValues
@@ -111,10 +112,10 @@ class Snapshot(_Fields):
     actual_main_voltage = BUS_VOLTAGE
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all fields by name, those of the arm in space included."""
+        """Return all fields and all columns of the realtime interface by name."""
         fields = dict(zip(self._fields, self, strict=True))
         del fields["space"]
-        return fields | self.space.as_dict()
+        return fields | {name: getattr(self, name) for name in SNAPSHOT_FIELDS}
 
     # --- the arm in space
 
