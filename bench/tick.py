@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 
 from bench.limit import STEPS, best_of
-from ur_emulator.controller.commands import StartProgram
+from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name

@@ -7,12 +7,14 @@ import math
 import pytest
 from box_support import Bench
 
-from ur_emulator.controller.commands import SetSpeedSlider
-from ur_emulator.controller.hands import GuideByHand, HangLoad, Push
-from ur_emulator.controller.obstacles import AddObstacle
-from ur_emulator.errors import PlantError
+from protocol.ur_types import ControlMode
+from ur_emulator.commands.power import StartFreedrive
+from ur_emulator.commands.programs import SetSpeedSlider
+from ur_emulator.commands.push import Push
+from ur_emulator.errors import PlantError, RefusedError
 from ur_emulator.models.fidelity import EXACT
 from ur_emulator.models.ur3 import UR3
+from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.exact import ExactPlant
 
 MOVES = """
@@ -73,21 +75,35 @@ def test_moments_are_those_of_the_model_and_know_the_payload():
     assert bench.now.actual_tool_accelerometer == pytest.approx(other.now.actual_tool_accelerometer, abs=0.3)
 
 
-def test_nothing_acts_on_the_arm():
+@pytest.mark.parametrize(
+    "act",
+    [
+        lambda plant: plant.push((50.0, 0.0, 0.0)),
+        lambda plant: plant.hang(3.0),
+        lambda plant: plant.obstacles.put("box", "sphere", (0.1,), (0.4, 0.0, 0.3, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_what_would_act_on_the_arm_is_refused_in_one_line(act):
+    plant = ExactPlant(UR3, EXACT, 0)
+    with pytest.raises(RefusedError, match="nothing acts on an arm of fidelity exact"):
+        act(plant)
+    plant.push((0.0, 0.0, 0.0))  # no push is no force
+
+
+def test_a_refused_push_takes_no_time():
     bench = Bench(fidelity="exact")
     before = bench.now.actual_q
-    bench.tick(20, Push((50.0, 0.0, 0.0)), HangLoad(3.0))
+    bench.tick(20, Push((50.0, 0.0, 0.0), duration=1.0))
     assert bench.now.actual_q == before
-    assert bench.now.actual_tcp_force == (0.0,) * 6
-    bench.tick(20, GuideByHand())
-    assert bench.now.actual_q == bench.now.target_q == before
+    assert not bench.controller.push.will_end
 
 
-def test_obstacles_are_refused_in_one_line():
+def test_an_arm_in_freedrive_stands_still():
     bench = Bench(fidelity="exact")
-    bench.tick(1, AddObstacle("box", "sphere", (0.1,), (0.4, 0.0, 0.3, 0.0, 0.0, 0.0)))
-    assert any("obstacle box refused" in getattr(event, "text", "") for event in bench.events)
-    assert bench.controller.plant.obstacles == ()
+    before = bench.now.actual_q
+    bench.tick(20, StartFreedrive())
+    assert bench.now.control_mode == ControlMode.TEACH
+    assert bench.now.actual_q == bench.now.target_q == before
 
 
 def test_two_seeds_are_the_same_arm():
@@ -110,8 +126,6 @@ def test_braked_arm_stands_where_it_is_and_takes_no_current():
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 1e7])
 def test_absurd_targets_are_refused(bad):
-    from ur_emulator.motion.target import JointTarget
-
     plant = ExactPlant(UR3, EXACT, 0)
     with pytest.raises(PlantError, match="finite numbers"):
         plant.step(JointTarget((bad, 0.0, 0.0, 0.0, 0.0, 0.0)))

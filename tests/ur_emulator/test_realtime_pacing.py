@@ -3,7 +3,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ur_emulator.controller.commands import SetSpeedSlider
+from ur_emulator.commands.programs import SetSpeedSlider
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name

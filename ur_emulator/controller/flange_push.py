@@ -36,8 +36,9 @@ class FlangePush:
             point: where it acts, in the flange frame [m].
             duration: for so long [s]; None until the next push.
         """
-        self._cycles_left = 0 if duration is None else round(duration / self._period_s)
-        self._plant.push(force if duration is None or self._cycles_left else _NOTHING, point)
+        n_cycles = 0 if duration is None else round(duration / self._period_s)
+        self._plant.push(force if duration is None or n_cycles else _NOTHING, point)
+        self._cycles_left = n_cycles
 
     def step(self) -> None:
         """Count a cycle of a push that lasts for a while; end it after the last."""

@@ -12,10 +12,12 @@ from collections.abc import Sequence
 import mujoco
 
 from protocol.ur_types import ControlMode
-from ur_emulator.errors import PlantError
+from ur_emulator.errors import PlantError, RefusedError
+from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
-from ur_emulator.models.robot_model import Vector3, Vector6, six
+from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX
+from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.plant_state import PlantState, Target
 from ur_emulator.plant.sensors import SUPPLY_VOLTAGE
@@ -25,6 +27,10 @@ _STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 class ExactPlant(Plant):
     """An arm that follows exactly; arguments and the rest of the interface as `Plant`."""
+
+    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int, period_s: float = 0.008) -> None:
+        super().__init__(robot, fidelity, seed, period_s)
+        self.obstacles = _NoObstacles(self._model, self._qpos)
 
     def reset(self, q: Sequence[float]) -> None:
         """Put the arm at rest at q (6,) [rad], brakes on.
@@ -84,17 +90,34 @@ class ExactPlant(Plant):
         return self._state
 
     def hang(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
-        """Nothing: no load acts on this arm."""
-
-    def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
-        """Nothing: no force acts on this arm."""
-
-    def put_obstacle(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
-        """Refuse: this arm would go through it.
+        """Refuse: no load acts on this arm.
 
         Raises:
-            PlantError: always.
+            RefusedError: always.
         """
-        raise PlantError(
-            f"obstacle {name} refused: with fidelity exact nothing meets the arm; use ideal, typical or poor"
-        )
+        raise _refusal("payload")
+
+    def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
+        """Refuse, unless the push is to end: no force acts on this arm.
+
+        Raises:
+            RefusedError: the force is not zero.
+        """
+        if any(force):
+            raise _refusal("push")
+
+
+class _NoObstacles(Obstacles):
+    """None stands around this arm: it would go through them."""
+
+    def put(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
+        """Refuse.
+
+        Raises:
+            RefusedError: always.
+        """
+        raise _refusal(f"obstacle {name}")
+
+
+def _refusal(what: str) -> RefusedError:
+    return RefusedError(f"{what}: nothing acts on an arm of fidelity exact, use ideal, typical or poor")
