@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from protocol.realtime_layout import SNAPSHOT_FIELDS
+from protocol.realtime.layout import SNAPSHOT_FIELDS
 from ur_emulator.controller import electrics
 from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.registers import RegisterValues
