@@ -15,6 +15,7 @@ from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError, RefusedError
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
+from ur_emulator.models.robot_generation import CB3, RobotGeneration
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
@@ -28,8 +29,10 @@ _STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 class ExactPlant(Plant):
     """An arm that follows exactly; arguments and the rest of the interface as `Plant`."""
 
-    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int, period_s: float = 0.008) -> None:
-        super().__init__(robot, fidelity, seed, period_s)
+    def __init__(
+        self, robot: RobotModel, fidelity: Fidelity, seed: int, generation: RobotGeneration = CB3
+    ) -> None:
+        super().__init__(robot, fidelity, seed, generation)
         self.obstacles = _NoObstacles(self._model, self._qpos)
 
     def reset(self, q: Sequence[float]) -> None:
