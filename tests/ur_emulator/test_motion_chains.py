@@ -297,6 +297,11 @@ FOUND = {
         joints((0.0, -1.269, -2.008, -1.422, 1.57, 0.796), a=0.5, r=0.03),
         straight(at(-0.04, 0.068, 0.08, 0.327, 0.173, 0.6), r=0.01, v=0.05, process=True),
     ],
+    "an arc through the point where the arm has just stopped": [
+        straight(at(0, 0, 0, 0, 0.014798705392518471, 0.359375), r=0.002, v=0.05),
+        straight(at(0, 0, 0), v=0.05, a=0.3),
+        arc(at(0, 0, 0), at(0.03125, 0.0625, 0.0), v=0.05, a=0.3),
+    ],
     "an arc that nearly stretches the elbow": [
         arc(at(0.0515, 0.0515, 0.0662), at(0, -0.0244, -0.0533, -0.0522, -0.2713, -0.5921), r=0.03, v=0.05),
         joints((-0.39, -1.9, -1.9, -1.9, 1.094, 0.301)),

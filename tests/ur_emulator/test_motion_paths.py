@@ -82,6 +82,15 @@ def test_three_points_on_a_line_give_a_line():
     assert path.at(path.length)[0] == (0.3, 0, 0, 0, 0, 1)
 
 
+@pytest.mark.parametrize("twin", [(0, 1), (1, 2), (0, 2)])
+def test_points_that_differ_by_rounding_only_give_a_line(twin):
+    points = [(0, 0, 0, 0, 0, 0), (0.1, 0.1, 0, 0, 0, 0), (0.2, 0, 0, 0, 0, 1)]
+    points[twin[1]] = (points[twin[0]][0], points[twin[0]][1] + 1e-12, *points[twin[1]][2:])
+    path = arc_through(*points, fixed=False)
+    assert isinstance(path, PoseLine)
+    assert path.at(path.length)[0] == points[2]
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.4, 0.4)] * 3),

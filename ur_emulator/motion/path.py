@@ -19,6 +19,9 @@ from ur_emulator.models.robot_model import Vector3, Vector6
 TURN_LEVER = 0.1
 # Three points closer to a line than this make no arc: sine of the angle between the chords.
 _FLAT = 1e-6
+# Two points closer than this are one [m], for the place of the arm is known up to rounding only. Chosen: far
+# below what an arm can repeat.
+_COINCIDENT = 1e-6
 
 
 class PosePath(Protocol):
@@ -132,7 +135,8 @@ def arc_through(
 ) -> PosePath:
     """Return the arc from `start` through the position of `via` to `goal`.
 
-    Points on one line have no circle; the tool then goes straight to the goal (chosen: not documented).
+    Points on one line, or two that coincide, have no circle; the tool then goes straight to the goal (chosen:
+    not documented).
 
     Args:
         start: first pose.
@@ -144,7 +148,8 @@ def arc_through(
     ab, ac = _minus(b, a), _minus(c, a)
     normal = _cross(ab, ac)
     size = _norm(normal)
-    if size <= _FLAT * _norm(ab) * _norm(ac) or size == 0.0:
+    nearest = min(_norm(ab), _norm(ac), _norm(_minus(c, b)))
+    if nearest < _COINCIDENT or size <= _FLAT * _norm(ab) * _norm(ac):
         return PoseLine(start, (*goal[:3], *start[3:]) if fixed else goal)
     axis = (normal[0] / size, normal[1] / size, normal[2] / size)
     # Centre of the circle through three points, seen from the first.
