@@ -114,8 +114,7 @@ class Move:
             elif not self._join(left_out):
                 return Follow.REFUSED
         if leg.r > 0.0 and self._leg.r + leg.r > dist(self._leg.goal_pose[:3], leg.goal_pose[:3]):
-            if leg.goal is not None and leg.path.length > 0.0:
-                self.left_out = leg
+            self.left_out = leg if leg.goal is not None and leg.path.length > 0.0 else None
             return Follow.SKIPPED
         return Follow.BLENDED if self._join(leg) else Follow.REFUSED
 
