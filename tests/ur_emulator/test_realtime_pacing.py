@@ -161,14 +161,14 @@ def test_the_limits_count_from_the_beginning_of_each_wait():
 @pytest.mark.parametrize("waiting", [{"waits_outside": True}, {"readers_full": True}])
 def test_a_box_that_was_stopped_does_not_lose_patience_with_its_clients(waiting):
     pacer, box = LockstepPacer(PERIOD), Box(**waiting)
-    for hour in range(10):
+    for hour in range(4):
         assert wait(pacer, box, 1.0, 3600.0 * hour) is None
     assert box.given_up == 0
 
 
-@pytest.mark.parametrize("waiting", [{"waits_outside": True}, {"readers_full": True}])
-def test_a_client_that_is_stopped_for_half_a_minute_loses_nothing(waiting):
-    box = Box(**waiting)
+@pytest.mark.parametrize("readers_full", [False, True])
+def test_a_client_that_is_stopped_for_half_a_minute_while_a_script_waits_for_it_loses_nothing(readers_full):
+    box = Box(waits_outside=True, readers_full=readers_full)
     assert wait(LockstepPacer(PERIOD), box, 40.0) is None
     assert box.given_up == 0
 

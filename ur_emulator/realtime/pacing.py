@@ -17,13 +17,14 @@ from protocol.patience import Patience
 # A box that could not tick for this long (a suspended laptop, a debugger) starts a new time base instead of
 # racing after the old one.
 MAX_BACKLOG = 0.5  # s
-# Both limits below count the time in which this process ran; a client may be stopped for half a minute, by
-# SIGSTOP or in a debugger, and lose nothing.
+# Both limits below count the time in which this process ran. A client whose bytes a script waits for may be
+# stopped for half a minute, by SIGSTOP or in a debugger, and lose nothing.
 # In lockstep, a script that has waited this long in real seconds for bytes gets time anyway, at real pace,
 # so that its own time-out can end the hang.
 HANG_LIMIT = 60.0  # s
-# In lockstep, a client that has not read for this long in real seconds is not waited for any more.
-READER_LIMIT = 60.0  # s
+# In lockstep, a client that has not read for this long in real seconds is not waited for any more, unless a
+# script waits for its bytes: many clients send programs and never read.
+READER_LIMIT = 5.0  # s
 
 
 class Pace(Enum):
