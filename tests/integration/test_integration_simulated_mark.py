@@ -1,6 +1,7 @@
 """Data of a box are marked as simulated with every software, from the connection to the page."""
 
 import json
+import re
 
 import pytest
 from integration_support import at, free_port_base
@@ -9,12 +10,15 @@ from pc_client.recording.loader import load_recording
 from ur_emulator import ControlBox
 
 
-@pytest.mark.parametrize("version", ["3.2.0", "3.11.0"])  # no serial number before 3.12
-def test_a_box_that_tells_no_serial_number_is_simulated_and_may_be_run_again(ur_client, tmp_path, version):
+# No serial number before 3.12; up to 3.2 the build number stands in the place of the third number.
+@pytest.mark.parametrize(("version", "told"), [("3.2.0", r"3\.2\.\d+"), ("3.11.0", r"3\.11\.0")])
+def test_a_box_that_tells_no_serial_number_is_simulated_and_may_be_run_again(
+    ur_client, tmp_path, version, told
+):
     out = tmp_path / "out"
     with ControlBox(pace="lockstep", port_base=free_port_base(), seed=7, version=version) as box:
         doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
-        assert f"UR3, software {version}, serial number unknown, SIMULATED" in doctor.out
+        assert re.search(f"UR3, software {told}, serial number unknown, SIMULATED", doctor.out)
         for _ in range(2):
             done = ur_client("run", "uniform_4_1", *at(box), "--out", out)
             assert done.code == 0, done.err
