@@ -38,19 +38,19 @@ from ur_emulator.realtime.loop_runner import LoopRunner
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
-from ur_emulator.servers.box_reports import BoxReports
-from ur_emulator.servers.dashboard_answers import DashboardAnswers
-from ur_emulator.servers.dashboard_port import DashboardPort
-from ur_emulator.servers.modbus_loading import CodecLoader
-from ur_emulator.servers.modbus_server import ModbusPort
+from ur_emulator.servers.dashboard.answers import DashboardAnswers
+from ur_emulator.servers.dashboard.port import DashboardPort
+from ur_emulator.servers.dashboard.reports import BoxReports
+from ur_emulator.servers.modbus.loading import CodecLoader
+from ur_emulator.servers.modbus.server import ModbusPort
 from ur_emulator.servers.port_set import CONTROL, MODBUS, PortSet, ServedPort
-from ur_emulator.servers.primary_port import PrimaryPort
-from ur_emulator.servers.program_intake import ProgramIntake
-from ur_emulator.servers.program_player import ProgramPlayer
+from ur_emulator.servers.primary.port import PrimaryPort
+from ur_emulator.servers.primary.robot_state import StateEncoder
+from ur_emulator.servers.programs.intake import ProgramIntake
+from ur_emulator.servers.programs.player import ProgramPlayer
 from ur_emulator.servers.realtime_port import RealtimePort
-from ur_emulator.servers.robot_state import StateEncoder
 from ur_emulator.servers.rtde_port import RtdePort
-from ur_emulator.servers.script_sockets import LoopNetwork
+from ur_emulator.servers.scripts.sockets import LoopNetwork
 
 if TYPE_CHECKING:
     from ur_emulator.rack import BoxOptions, BoxRack

@@ -22,7 +22,7 @@ from ur_emulator.errors import ArgumentError
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers.script_sockets import LoopNetwork
+from ur_emulator.servers.scripts.sockets import LoopNetwork
 from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 
 if TYPE_CHECKING:

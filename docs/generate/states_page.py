@@ -9,8 +9,8 @@ from typing import NamedTuple
 from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.controller.robot_mode import JOINT_MODES, PASSING_TIME, TRANSITIONS
-from ur_emulator.controller.safety_modes import EVENTS, MODES, after, mode_of
-from ur_emulator.controller.status_bits import safety_status_bits
+from ur_emulator.controller.safety.modes import EVENTS, MODES, after, mode_of
+from ur_emulator.controller.safety.status_bits import safety_status_bits
 
 
 class ProgramWay(NamedTuple):
@@ -48,7 +48,7 @@ PROGRAM_WAYS: tuple[ProgramWay, ...] = (
 _HEAD = """\
 # States of the box
 
-Made from `ur_emulator/controller/safety_modes.py`, `robot_mode.py` and
+Made from `ur_emulator/controller/safety/modes.py`, `robot_mode.py` and
 `docs/generate/states_page.py` by `make docs`.
 Letters: D documented, O observed, I inferred, C chosen; see [fidelity.md](fidelity.md).
 

@@ -33,10 +33,10 @@ from ur_emulator.commands.safety import (
     SafeguardStop,
     UnlockProtectiveStop,
 )
-from ur_emulator.servers.connection import OUTBOX_LIMIT
-from ur_emulator.servers.modbus_codec import ModbusCodec
-from ur_emulator.servers.modbus_server import MAX_INBOX
+from ur_emulator.servers.modbus.codec import ModbusCodec
+from ur_emulator.servers.modbus.server import MAX_INBOX
 from ur_emulator.servers.rtde_port import MAX_WAITING as MAX_RTDE_WAITING
+from ur_emulator.servers.tcp.connection import OUTBOX_LIMIT
 from urscript import compile_program
 
 # Hostile clients of one port at a time.

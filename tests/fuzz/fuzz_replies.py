@@ -13,7 +13,7 @@ from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotS
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.codec import decode_message
 from protocol.rtde.messages import PackageType as RtdeType
-from ur_emulator.servers.modbus_codec import ModbusCodec
+from ur_emulator.servers.modbus.codec import ModbusCodec
 
 REALTIME = layout_for_version(VERSION)
 CODEC = ModbusCodec()

@@ -2,7 +2,7 @@
 
 import selectors
 
-from ur_emulator.servers.connection import Connection
+from ur_emulator.servers.tcp.connection import Connection
 
 
 class FakeSocket:

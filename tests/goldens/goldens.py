@@ -31,9 +31,9 @@ from protocol.rtde.fields import output_fields  # noqa: E402
 from protocol.rtde.recipe import snapshot_encoder  # noqa: E402
 from protocol.ur_types import SoftwareVersion  # noqa: E402
 from ur_emulator import ControlBox  # noqa: E402
-from ur_emulator.controller.port_map import read_register  # noqa: E402
-from ur_emulator.servers.event_messages import message_for  # noqa: E402
-from ur_emulator.servers.robot_state import StateEncoder  # noqa: E402
+from ur_emulator.controller.modbus.robot_map import read_register  # noqa: E402
+from ur_emulator.servers.primary.event_messages import message_for  # noqa: E402
+from ur_emulator.servers.primary.robot_state import StateEncoder  # noqa: E402
 from urscript.program import check_program  # noqa: E402
 
 VERSION = SoftwareVersion(3, 15, 8)

@@ -12,7 +12,7 @@ from dashboard_support import Dashboard, external_control, urp, write_programs
 
 from protocol.dashboard.commands import COMMANDS
 from ur_emulator.emulator import ControlBox
-from ur_emulator.servers.dashboard_port import LINES_PER_TURN
+from ur_emulator.servers.dashboard.port import LINES_PER_TURN
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from box_support import Bench
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ur_emulator.controller.encoders import RANGES, Decoder, Encoder
+from ur_emulator.controller.io.encoders import RANGES, Decoder, Encoder
 
 QUADRATURE = ((0, 0), (1, 0), (1, 1), (0, 1))
 

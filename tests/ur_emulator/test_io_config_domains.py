@@ -3,7 +3,7 @@
 import pytest
 from box_support import Bench
 
-from ur_emulator.controller.io import CURRENT, VOLTAGE
+from ur_emulator.controller.io.lines import CURRENT, VOLTAGE
 
 
 def run(line):

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ur_emulator.commands.safety import TriggerProtectiveStop
-from ur_emulator.controller import port_map
-from ur_emulator.controller.port_map import COILS, REGISTERS, PortAddressError
+from ur_emulator.controller.modbus import robot_map as port_map
+from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, PortAddressError
 
 BENCH = Bench()
 

@@ -10,9 +10,9 @@ from box_support import TIMEOUT
 
 from ur_emulator.errors import PortError
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers import listener
-from ur_emulator.servers.listener import DEAF_TIME, MAX_AT_ONCE, Listener
-from ur_emulator.servers.reserve import Reserve
+from ur_emulator.servers.tcp import listener
+from ur_emulator.servers.tcp.listener import DEAF_TIME, MAX_AT_ONCE, Listener
+from ur_emulator.servers.tcp.reserve import Reserve
 
 
 class Clients:

@@ -22,7 +22,7 @@ from modbus_support import (
 
 from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
 from ur_emulator.emulator import ControlBox
-from ur_emulator.servers import modbus_link
+from ur_emulator.servers.modbus import link as modbus_link
 
 
 @pytest.fixture(scope="module", params=["lockstep", "realtime"])

@@ -5,9 +5,9 @@ from box_support import FakeSocket
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ur_emulator.controller.modbus_signals import ModbusSignal, SignalType, UnitAddress
-from ur_emulator.servers.modbus_codec import ModbusCodec
-from ur_emulator.servers.modbus_link import (
+from ur_emulator.controller.modbus.signals import ModbusSignal, SignalType, UnitAddress
+from ur_emulator.servers.modbus.codec import ModbusCodec
+from ur_emulator.servers.modbus.link import (
     ANSWER_TIMEOUT,
     CONNECT_TIMEOUT,
     FIRST_RETRY,

@@ -12,13 +12,13 @@ from typer.testing import CliRunner
 
 from protocol.primary.messages import TextMessage
 from ur_emulator import ControlBox, cli, rack
-from ur_emulator.controller.port_map import COILS, REGISTERS, read_coil, read_register
+from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, read_coil, read_register
 from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers import listener
-from ur_emulator.servers.listener import Listener
-from ur_emulator.servers.modbus_codec import ModbusCodec
-from ur_emulator.servers.modbus_server import MAX_AT_ONCE, MAX_INBOX, ModbusPort
+from ur_emulator.servers.modbus.codec import ModbusCodec
+from ur_emulator.servers.modbus.server import MAX_AT_ONCE, MAX_INBOX, ModbusPort
+from ur_emulator.servers.tcp import listener
+from ur_emulator.servers.tcp.listener import Listener
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 

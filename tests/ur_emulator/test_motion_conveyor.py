@@ -11,8 +11,8 @@ from motion_support import DT, HOME, START, TOOL, at, line
 
 from protocol.pose import pose_inv, pose_trans
 from ur_emulator.commands.programs import StopProgram
-from ur_emulator.controller.encoders import RANGES, Encoder
 from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.controller.io.encoders import RANGES, Encoder
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.conveyor import CATCH_UP_ACCELERATION, BeltEstimate, CircularConveyor, LinearConveyor
 from ur_emulator.motion.move import Move

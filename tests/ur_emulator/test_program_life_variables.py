@@ -18,10 +18,10 @@ from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.commands.programs import StopProgram
 from ur_emulator.models.software import software_of
-from ur_emulator.servers.label_reporter import LabelReporter, parse_label
-from ur_emulator.servers.primary_port import PrimaryPort
-from ur_emulator.servers.robot_state import StateEncoder
-from ur_emulator.servers.variable_reporter import MAX_BODY, MAX_VALUE, PER_UPDATE, typed_value
+from ur_emulator.servers.primary.label_reporter import LabelReporter, parse_label
+from ur_emulator.servers.primary.port import PrimaryPort
+from ur_emulator.servers.primary.robot_state import StateEncoder
+from ur_emulator.servers.primary.variable_reporter import MAX_BODY, MAX_VALUE, PER_UPDATE, typed_value
 from urscript import Matrix, Pose
 
 FOREVER = "  while True:\n    sync()\n  end\nend\n"

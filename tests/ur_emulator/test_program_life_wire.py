@@ -10,7 +10,7 @@ from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
 from ur_emulator.commands.safety import TriggerProtectiveStop
-from ur_emulator.servers.robot_state import state_records
+from ur_emulator.servers.primary.robot_state import state_records
 
 MOVE = 'def m():\n  movej([0.9,-1.6,-1.9,-0.2,1.2,1.6], a=1.4, v=0.5)\n  textmsg("there")\nend\n'
 COUNT = "def count():\n  n = 0\n  while True:\n    n = n + 1\n    write_output_integer_register(0, n)\n    sync()\n  end\nend\n"

@@ -17,7 +17,7 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
 )
 from ur_emulator.controller.robot_mode import TRANSITIONS
-from ur_emulator.controller.safety_modes import EVENTS, MODES
+from ur_emulator.controller.safety.modes import EVENTS, MODES
 from urscript import compile_program
 
 P = ProgramState

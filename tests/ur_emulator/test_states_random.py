@@ -30,8 +30,8 @@ from ur_emulator.commands.safety import (
     SafeguardStop,
     UnlockProtectiveStop,
 )
-from ur_emulator.controller.safety_inputs import SafetyInput
-from ur_emulator.controller.safety_modes import MOVING_MODES, ROW
+from ur_emulator.controller.safety.inputs import SafetyInput
+from ur_emulator.controller.safety.modes import MOVING_MODES, ROW
 from urscript import compile_program
 
 STREAM = "def s():\n  while True:\n    speedj([0, 0, 0, 0, 0, 0.8], 4, 0.008)\n  end\nend\n"

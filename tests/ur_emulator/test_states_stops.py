@@ -30,8 +30,13 @@ from ur_emulator.commands.safety import (
 )
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
-from ur_emulator.controller.safety_inputs import SafetyInput
-from ur_emulator.controller.speed_limiter import RECOVERY_SPEED, REDUCED_SHARE, TOLERANCE, joint_limits
+from ur_emulator.controller.safety.inputs import SafetyInput
+from ur_emulator.controller.safety.speed_limiter import (
+    RECOVERY_SPEED,
+    REDUCED_SHARE,
+    TOLERANCE,
+    joint_limits,
+)
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name

@@ -6,7 +6,7 @@ from states_support import BRAKING, COMMANDS, WAY_IN, infos, moving
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.commands.power import PowerOn, ReleaseBrakes
 from ur_emulator.controller.robot_mode import JOINT_MODES, POWERED, TRANSITIONS, ModeCommand, RobotModeMachine
-from ur_emulator.controller.safety_modes import (
+from ur_emulator.controller.safety.modes import (
     EVENTS,
     MODES,
     MOVING_MODES,

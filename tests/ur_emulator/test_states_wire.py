@@ -17,7 +17,7 @@ from ur_emulator.commands.safety import (
     TriggerFault,
     TriggerViolation,
 )
-from ur_emulator.controller.safety_modes import SafetyEvent
+from ur_emulator.controller.safety.modes import SafetyEvent
 
 MODES = [mode for mode in WAY_IN if mode is not SafetyMode.RECOVERY]
 

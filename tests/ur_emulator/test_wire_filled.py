@@ -12,7 +12,7 @@ from protocol.rtde.fields import OUTPUTS, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import wire_fields
-from ur_emulator.servers.robot_state import StateEncoder
+from ur_emulator.servers.primary.robot_state import StateEncoder
 
 V3_15 = SoftwareVersion(3, 15, 8)
 ALIVE = (Filled.MEASURED, Filled.MODELLED)

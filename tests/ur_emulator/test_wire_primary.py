@@ -30,14 +30,14 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
 )
 from ur_emulator.controller import events
-from ur_emulator.controller.safety import hardest_joint
+from ur_emulator.controller.safety.limit_checks import hardest_joint
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.software import software_of
-from ur_emulator.servers.event_messages import message_for
-from ur_emulator.servers.primary_port import PrimaryPort
-from ur_emulator.servers.program_intake import SPEED_WORD, WORDS
-from ur_emulator.servers.robot_state import StateEncoder, dexterity, setup_records
+from ur_emulator.servers.primary.event_messages import message_for
+from ur_emulator.servers.primary.port import PrimaryPort
+from ur_emulator.servers.primary.robot_state import StateEncoder, dexterity, setup_records
+from ur_emulator.servers.programs.intake import SPEED_WORD, WORDS
 
 V3_15 = SoftwareVersion(3, 15, 8)
 VERSIONS = [SoftwareVersion(3, minor) for minor in range(16)]

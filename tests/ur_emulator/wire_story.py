@@ -28,7 +28,7 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
-from ur_emulator.controller.port_map import read_register
+from ur_emulator.controller.modbus.robot_map import read_register
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from protocol.rtde.types import RtdeValue
-from ur_emulator.controller.client_inputs import write_inputs
 from ur_emulator.controller.command import Box
-from ur_emulator.controller.port_map import write_range
+from ur_emulator.controller.io.client_inputs import write_inputs
+from ur_emulator.controller.modbus.robot_map import write_range
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from typing import Literal
 from ur_emulator.commands.operation import CommandOperation
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box
-from ur_emulator.controller.io import (
+from ur_emulator.controller.io.lines import (
     ANALOG_RANGE,
     CONFIGURABLE_SHIFT,
     N_CONFIGURABLE,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ur_emulator.commands.operation import CommandOperation
 from ur_emulator.controller.command import Box, inform
 from ur_emulator.controller.robot_mode import ModeCommand
-from ur_emulator.controller.safety_modes import ROW
+from ur_emulator.controller.safety.modes import ROW
 
 
 class PowerOn(CommandOperation):

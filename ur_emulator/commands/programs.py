@@ -10,7 +10,7 @@ from ur_emulator.commands.operation import CommandOperation
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box, inform
 from ur_emulator.controller.events import ScriptFailed
-from ur_emulator.controller.safety_modes import ROW
+from ur_emulator.controller.safety.modes import ROW
 from ur_emulator.errors import RefusedError
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.robot_mode import ModeCommand
-from ur_emulator.controller.safety_inputs import N_INPUT_PAIRS, SafetyInput
-from ur_emulator.controller.safety_modes import SafetyEvent
+from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, SafetyInput
+from ur_emulator.controller.safety.modes import SafetyEvent
 from ur_emulator.errors import ArgumentError, RefusedError
 
 

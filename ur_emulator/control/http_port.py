@@ -25,7 +25,7 @@ from ur_emulator.control.runner import Job, OperationRunner
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError
-from ur_emulator.servers.connection import Connection
+from ur_emulator.servers.tcp.connection import Connection
 
 MAX_HEADER = 16 * 1024
 MAX_BODY = 1024 * 1024

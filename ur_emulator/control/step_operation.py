@@ -11,7 +11,7 @@ from ur_emulator.commands.operation import Operation, R_co
 
 if TYPE_CHECKING:
     from ur_emulator.servers.box_access import BoxAccess
-    from ur_emulator.servers.program_player import ProgramPlayer
+    from ur_emulator.servers.programs.player import ProgramPlayer
 
 Steps = Generator[None, None, Any]
 

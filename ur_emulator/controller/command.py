@@ -15,8 +15,8 @@ from ur_emulator.controller.events import ErrorReported
 from ur_emulator.errors import RefusedError
 
 if TYPE_CHECKING:
-    from ur_emulator.controller.flange_push import FlangePush
-    from ur_emulator.controller.safety_system import SafetySystem
+    from ur_emulator.controller.compliance.flange_push import FlangePush
+    from ur_emulator.controller.safety.system import SafetySystem
     from ur_emulator.controller.state import ControllerState
     from ur_emulator.plant.plant import Plant
     from ur_emulator.scripting.program_slot import ProgramSlot

@@ -13,26 +13,26 @@ from contextlib import suppress
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.controller.command import Command
+from ur_emulator.controller.compliance.flange_push import FlangePush
 from ur_emulator.controller.events import (
     ErrorReported,
     Event,
     RobotModeChanged,
 )
-from ur_emulator.controller.flange_push import FlangePush
+from ur_emulator.controller.io.watchdogs import WatchdogAction
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
-from ur_emulator.controller.safety import (
-    UNLOCK_DELAY,
+from ur_emulator.controller.safety.limit_checks import (
     UNREACHABLE_PATH,
     SetpointCheck,
     Violation,
     find_violation,
 )
-from ur_emulator.controller.safety_modes import SafetyEvent
-from ur_emulator.controller.safety_system import SafetySystem
+from ur_emulator.controller.safety.modes import SafetyEvent
+from ur_emulator.controller.safety.safety_state import UNLOCK_DELAY
+from ur_emulator.controller.safety.system import SafetySystem
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.controller.watchdogs import WatchdogAction
 from ur_emulator.errors import RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import exp
 
 from protocol.ur_types import JointMode
-from ur_emulator.controller.io import N_TOOL, TOOL_SHIFT
+from ur_emulator.controller.io.lines import N_TOOL, TOOL_SHIFT
 
 # What one high output of the box or one switched output of the tool carries [A]: a PLC's input.
 OUTPUT_CURRENT = 0.006

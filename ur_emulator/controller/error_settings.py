@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES
 from ur_emulator.controller.events import ErrorReported, Event
-from ur_emulator.controller.safety import MAX_POSITION_DEVIATION
+from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION
 from ur_emulator.models.robot_model import Vector6
 
 # Code of the log entry; the real one is not known.

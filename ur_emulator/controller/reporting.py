@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ur_emulator.controller.arm_in_space import ArmInSpace
-from ur_emulator.controller.external_sensor import VARIABLE
+from ur_emulator.controller.compliance.external_sensor import VARIABLE
 from ur_emulator.controller.robot_mode import JOINT_VECTORS
 from ur_emulator.controller.snapshot import BoxRecord, Snapshot
 from ur_emulator.controller.state import ControllerState

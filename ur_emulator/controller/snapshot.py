@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 from protocol.realtime.layout import SNAPSHOT_FIELDS
 from ur_emulator.controller import electrics
 from ur_emulator.controller.arm_in_space import ArmInSpace
-from ur_emulator.controller.registers import RegisterValues
+from ur_emulator.controller.io.registers import RegisterValues
 from ur_emulator.controller.robot_mode import POWERED
-from ur_emulator.controller.status_bits import robot_status_bits, safety_status_bits
+from ur_emulator.controller.safety.status_bits import robot_status_bits, safety_status_bits
 from ur_emulator.models.robot_model import Vector3, Vector6
 from ur_emulator.motion.target import ZERO6
 

@@ -10,23 +10,23 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ur_emulator.controller.compliance import Compliance
-from ur_emulator.controller.encoders import Encoders
+from ur_emulator.controller.compliance.compliance import Compliance
+from ur_emulator.controller.compliance.external_sensor import ExternalSensor
+from ur_emulator.controller.compliance.force_sense import ForceSense
 from ur_emulator.controller.error_settings import ErrorSettings
 from ur_emulator.controller.events import Event
-from ur_emulator.controller.external_sensor import ExternalSensor
-from ur_emulator.controller.force_sense import ForceSense
-from ur_emulator.controller.io import InputOutput
-from ur_emulator.controller.io_configuration import IoConfiguration
-from ur_emulator.controller.modbus_signals import ModbusSignals
+from ur_emulator.controller.io.configuration import IoConfiguration
+from ur_emulator.controller.io.encoders import Encoders
+from ur_emulator.controller.io.lines import InputOutput
+from ur_emulator.controller.io.registers import Registers
+from ur_emulator.controller.io.watchdogs import Watchdogs
+from ur_emulator.controller.modbus.map_memory import PortMemory
+from ur_emulator.controller.modbus.signals import ModbusSignals
 from ur_emulator.controller.operator import Operator
-from ur_emulator.controller.port_memory import PortMemory
-from ur_emulator.controller.registers import Registers
 from ur_emulator.controller.robot_mode import RobotModeMachine
-from ur_emulator.controller.safety import SafetyState
+from ur_emulator.controller.safety.safety_state import SafetyState
+from ur_emulator.controller.safety.speed_limiter import SpeedLimiter
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.controller.speed_limiter import SpeedLimiter
-from ur_emulator.controller.watchdogs import Watchdogs
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6

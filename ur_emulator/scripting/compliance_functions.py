@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.force_sense import moved_wrench
+from ur_emulator.controller.compliance.force_sense import moved_wrench
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.force_mode import Felt, ForceMode, ForceSettings

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.encoders import PULSE_INPUTS, RANGES, Decoder
+from ur_emulator.controller.io.encoders import PULSE_INPUTS, RANGES, Decoder
 from ur_emulator.controller.state import ControllerState
 from urscript.errors import ScriptRuntimeError
 

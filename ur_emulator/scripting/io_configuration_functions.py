@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ur_emulator.controller.euromap import N_EUROMAP
-from ur_emulator.controller.io import CURRENT, N_STANDARD, N_TOOL, VOLTAGE, AnalogLine
-from ur_emulator.controller.io_configuration import OutputKind
-from ur_emulator.controller.run_states import RunState
+from ur_emulator.controller.io.configuration import OutputKind
+from ur_emulator.controller.io.euromap import N_EUROMAP
+from ur_emulator.controller.io.lines import CURRENT, N_STANDARD, N_TOOL, VOLTAGE, AnalogLine
+from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.controller.state import ControllerState
 from urscript.errors import ScriptRuntimeError
 

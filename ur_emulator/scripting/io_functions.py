@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, MutableSequence
 from typing import Any
 
-from ur_emulator.controller.io import (
+from ur_emulator.controller.io.lines import (
     CONFIGURABLE_SHIFT,
     N_CONFIGURABLE,
     N_STANDARD,

@@ -11,7 +11,8 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.modbus_signals import (
+from ur_emulator.controller.io.run_states import RunState
+from ur_emulator.controller.modbus.signals import (
     DEFAULT_ACTION,
     DEFAULT_PORT,
     MAX_SIGNALS,
@@ -19,7 +20,6 @@ from ur_emulator.controller.modbus_signals import (
     SignalType,
     UnitAddress,
 )
-from ur_emulator.controller.run_states import RunState
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.network import Network
 from urscript.errors import ScriptRuntimeError

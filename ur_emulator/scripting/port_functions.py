@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from ur_emulator.controller import port_map
-from ur_emulator.controller.port_map import PortAddressError
+from ur_emulator.controller.modbus import robot_map as port_map
+from ur_emulator.controller.modbus.robot_map import PortAddressError
 from ur_emulator.controller.state import ControllerState
 from urscript.errors import ScriptRuntimeError
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from protocol.rtde.fields import INPUTS
-from ur_emulator.controller.external_sensor import VARIABLE, ExternalSensor
+from ur_emulator.controller.compliance.external_sensor import VARIABLE, ExternalSensor
+from ur_emulator.controller.io.watchdogs import WatchdogAction
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.controller.watchdogs import WatchdogAction
 from ur_emulator.models.robot_model import Vector3
 from urscript.errors import ScriptRuntimeError
 

@@ -8,9 +8,9 @@ from typing import Protocol
 from ur_emulator.errors import PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import Publisher, ServedBox
-from ur_emulator.servers.connection import Connection
-from ur_emulator.servers.listener import Listener, Port
-from ur_emulator.servers.reserve import Reserve
+from ur_emulator.servers.tcp.connection import Connection
+from ur_emulator.servers.tcp.listener import Listener, Port
+from ur_emulator.servers.tcp.reserve import Reserve
 
 CONTROL, MODBUS = "control", "modbus"
 

@@ -7,8 +7,8 @@ from protocol.script_channel import ScriptChannel
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.servers.connection import Connection
-from ur_emulator.servers.program_intake import ProgramIntake
+from ur_emulator.servers.programs.intake import ProgramIntake
+from ur_emulator.servers.tcp.connection import Connection
 
 
 class RealtimePort:

@@ -19,7 +19,7 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.servers.connection import Connection
+from ur_emulator.servers.tcp.connection import Connection
 
 # Sender of text messages.
 SOURCE = "RTDE"

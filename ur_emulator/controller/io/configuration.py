@@ -1,0 +1,124 @@
+"""How lines and registers are set up: what an input does, what an output does when programs start and stop.
+
+Source: URScript manual CB3 3.15, module ioconfiguration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from ur_emulator.controller.io.lines import CONFIGURABLE_SHIFT, TOOL_SHIFT, InputOutput
+from ur_emulator.controller.io.registers import Registers
+from ur_emulator.controller.io.run_states import RunState, level
+from ur_emulator.controller.modbus.signals import ModbusSignals
+
+DEFAULT_ACTION, FREEDRIVE_ACTION = "default", "freedrive"
+
+
+class OutputKind(IntEnum):
+    """The groups of outputs that may follow the program."""
+
+    STANDARD = 0
+    CONFIGURABLE = 1
+    TOOL = 2
+    ANALOG = 3
+    GP_BOOLEAN = 4
+    GP_INTEGER = 5
+    GP_FLOAT = 6
+    EUROMAP = 7
+
+
+# First bit of the digital word for the groups in it.
+_SHIFT = {OutputKind.STANDARD: 0, OutputKind.CONFIGURABLE: CONFIGURABLE_SHIFT, OutputKind.TOOL: TOOL_SHIFT}
+
+
+_INPUT_SHIFT = {
+    "standard_digital": 0,
+    "configurable_digital": CONFIGURABLE_SHIFT,
+    "tool_digital": TOOL_SHIFT,
+}
+
+
+@dataclass(slots=True)
+class IoConfiguration:
+    """What programs have set up; it stays when they end.
+
+    Attributes:
+        io: the lines.
+        registers: the general purpose registers.
+        modbus: signals of other units, which have their actions and rules with them.
+        input_actions: (group, index) to the action, where it is not the default.
+        program_runs: a primary program runs.
+    """
+
+    io: InputOutput
+    registers: Registers
+    modbus: ModbusSignals
+    input_actions: dict[tuple[str, int], str] = field(default_factory=dict)
+    program_runs: bool = False
+    _rules: dict[tuple[OutputKind, int], RunState] = field(default_factory=dict)
+
+    def set_input_action(self, group: str, index: int, action: str) -> None:
+        """Remember what an input does beside being read."""
+        if action == DEFAULT_ACTION:
+            self.input_actions.pop((group, index), None)
+        else:
+            self.input_actions[group, index] = action
+
+    def asks_for_freedrive(self) -> bool:
+        """True while a line that is set up for it, or a signal of another unit, is high."""
+        for (group, index), action in self.input_actions.items():
+            if action == FREEDRIVE_ACTION and self._is_high(group, index):
+                return True
+        return self.modbus.wants_freedrive
+
+    def _is_high(self, group: str, index: int) -> bool:
+        if group == "gp_boolean":
+            return self.registers.inputs.booleans[index]
+        return self.io.read_digital_in(_INPUT_SHIFT[group] + index)
+
+    def rule(self, kind: OutputKind, index: int) -> RunState:
+        """What an output does when programs start and stop."""
+        return self._rules.get((kind, index), RunState.KEEP)
+
+    def set_rule(self, kind: OutputKind, index: int, rule: RunState) -> None:
+        """Let an output follow the program; it takes its value for the present state at once."""
+        if rule is RunState.KEEP:
+            self._rules.pop((kind, index), None)
+        else:
+            self._rules[kind, index] = rule
+            self._apply(kind, index, rule)
+
+    def program_started(self) -> None:
+        """Set the outputs that follow the program."""
+        self.program_runs = True
+        self._apply_all()
+
+    def program_stopped(self) -> None:
+        """Set the outputs that follow the program."""
+        self.program_runs = False
+        self._apply_all()
+
+    def _apply_all(self) -> None:
+        self.modbus.follow(self.program_runs)
+        for (kind, index), rule in self._rules.items():
+            self._apply(kind, index, rule)
+
+    def _apply(self, kind: OutputKind, index: int, rule: RunState) -> None:
+        is_high = level(rule, self.program_runs)
+        if is_high is None:
+            return
+        match kind:
+            case OutputKind.ANALOG:
+                self.io.analog_out[index].set_ratio(float(is_high))
+            case OutputKind.GP_BOOLEAN:
+                self.registers.outputs.booleans[index] = is_high
+            case OutputKind.GP_INTEGER:
+                self.registers.outputs.integers[index] = int(is_high)
+            case OutputKind.GP_FLOAT:
+                self.registers.outputs.floats[index] = float(is_high)
+            case OutputKind.EUROMAP:
+                self.io.euromap.write_output(index, is_high)
+            case _:
+                self.io.write_digital_out(_SHIFT[kind] + index, is_high)

@@ -1,0 +1,126 @@
+"""Digital and analogue lines of the box and the tool.
+
+Digital words carry bits 0-7 standard, 8-15 configurable, 16-17 tool (UR realtime sheet; RTDE guide).
+Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (0-10 V).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ur_emulator.controller.io.euromap import Euromap
+
+N_STANDARD = 8
+N_CONFIGURABLE = 8
+N_TOOL = 2
+CONFIGURABLE_SHIFT = 8
+TOOL_SHIFT = 16
+
+CURRENT, VOLTAGE = 0, 1
+# Full range of an analogue line by domain: (lowest, highest) value.
+ANALOG_RANGE = {CURRENT: (0.004, 0.020), VOLTAGE: (0.0, 10.0)}
+
+
+@dataclass(slots=True)
+class AnalogLines:
+    """All analogue lines of a box: standard inputs, standard outputs, tool inputs, two each.
+
+    They are kept as what is published every cycle: a write makes new tuples, a cycle without one nothing.
+
+    Attributes:
+        domains: CURRENT or VOLTAGE of each line.
+        values: of each line [A or V].
+    """
+
+    domains: tuple[int, ...] = (VOLTAGE, VOLTAGE, CURRENT, CURRENT, VOLTAGE, VOLTAGE)
+    values: tuple[float, ...] = (0.0, 0.0, 0.004, 0.004, 0.0, 0.0)
+
+
+class AnalogLine:
+    """One analogue line: its domain and its value in A or V."""
+
+    __slots__ = ("_index", "_lines")
+
+    def __init__(self, lines: AnalogLines, index: int) -> None:
+        self._lines = lines
+        self._index = index
+
+    @property
+    def domain(self) -> int:
+        """CURRENT or VOLTAGE."""
+        return self._lines.domains[self._index]
+
+    @domain.setter
+    def domain(self, domain: int) -> None:
+        domains = self._lines.domains
+        self._lines.domains = (*domains[: self._index], domain, *domains[self._index + 1 :])
+
+    @property
+    def value(self) -> float:
+        """Present value [A or V]."""
+        return self._lines.values[self._index]
+
+    @value.setter
+    def value(self, value: float) -> None:
+        values = self._lines.values
+        self._lines.values = (*values[: self._index], value, *values[self._index + 1 :])
+
+    @property
+    def ratio(self) -> float:
+        """Present value as a ratio 0..1 of the range of the domain, clipped."""
+        low, high = ANALOG_RANGE[self.domain]
+        return min(1.0, max(0.0, (self.value - low) / (high - low)))
+
+    def set_domain(self, domain: int) -> None:
+        """Change the domain; the value stays at the same ratio of the range."""
+        if domain != self.domain:
+            ratio = self.ratio
+            self.domain = domain
+            self.set_ratio(ratio)
+
+    def set_ratio(self, ratio: float) -> None:
+        """Set the value to a ratio 0..1 of the range of the domain, clipped."""
+        low, high = ANALOG_RANGE[self.domain]
+        self.value = low + min(1.0, max(0.0, ratio)) * (high - low)
+
+
+@dataclass(slots=True)
+class InputOutput:
+    """The lines of one box.
+
+    Attributes:
+        digital_in: word of the digital inputs.
+        digital_out: word of the digital outputs.
+        analog: all analogue lines; the three lists below are its parts.
+        tool_voltage: supply of the tool: 0, 12 or 24 V.
+        flags: of the scripts.
+        euromap: signals to and from a moulding machine.
+    """
+
+    digital_in: int = 0
+    digital_out: int = 0
+    analog: AnalogLines = field(default_factory=AnalogLines)
+    analog_in: list[AnalogLine] = field(init=False)
+    analog_out: list[AnalogLine] = field(init=False)
+    tool_analog_in: list[AnalogLine] = field(init=False)
+    tool_voltage: int = 0
+    flags: list[bool] = field(default_factory=lambda: [False] * 32)
+    euromap: Euromap = field(default_factory=Euromap)
+
+    def __post_init__(self) -> None:
+        self.analog_in = [AnalogLine(self.analog, i) for i in (0, 1)]
+        self.analog_out = [AnalogLine(self.analog, i) for i in (2, 3)]
+        self.tool_analog_in = [AnalogLine(self.analog, i) for i in (4, 5)]
+
+    def read_digital_in(self, bit: int) -> bool:
+        """Return the state of input `bit` of the digital word."""
+        return bool(self.digital_in >> bit & 1)
+
+    def read_digital_out(self, bit: int) -> bool:
+        """Return the state of output `bit` of the digital word."""
+        return bool(self.digital_out >> bit & 1)
+
+    def write_digital_out(self, bit: int, value: bool) -> None:
+        """Set output `bit` of the digital word."""
+        mask = 1 << bit
+        self.digital_out = self.digital_out | mask if value else self.digital_out & ~mask

@@ -1,0 +1,213 @@
+"""The Modbus signals that programs have added: what each stands for, its value, and when it is due.
+
+A signal lives until it is deleted, replaced by one of the same name, or the controller ends. It is refreshed
+at its frequency in robot time; the connection to its unit is somebody else's (`ModbusUnit`), takes its own
+time and never holds a cycle up. An output is read until a program sets it and is written from then on: at
+once when its value changes, and at its frequency.
+Source: URScript manual CB3 3.15, module interfaces; UR3 user manual CB3, section "MODBUS client I/O setup".
+That a changed output goes out at once: chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple, Protocol
+
+from ur_emulator.controller.io.run_states import RunState, level
+
+DEFAULT_PORT = 502
+DEFAULT_FREQUENCY = 10.0
+"""How often a signal is refreshed unless a program says otherwise [Hz]."""
+MAX_SIGNALS = 256
+"""Chosen: a program that adds signals in an endless loop must end at some point."""
+
+DEFAULT_ACTION = "default"
+FREEDRIVE_ACTION = "freedrive"
+
+
+class SignalType(IntEnum):
+    """What a signal stands for in its unit."""
+
+    DIGITAL_INPUT = 0
+    DIGITAL_OUTPUT = 1
+    REGISTER_INPUT = 2
+    REGISTER_OUTPUT = 3
+
+    @property
+    def is_output(self) -> bool:
+        """Whether it can be written."""
+        return self in (SignalType.DIGITAL_OUTPUT, SignalType.REGISTER_OUTPUT)
+
+    @property
+    def is_digital(self) -> bool:
+        """Whether it is one bit; the others are words of 16."""
+        return self in (SignalType.DIGITAL_INPUT, SignalType.DIGITAL_OUTPUT)
+
+    @property
+    def title(self) -> str:
+        """In words."""
+        return self.name.lower().replace("_", " ")
+
+
+class UnitAddress(NamedTuple):
+    """Where a Modbus unit listens."""
+
+    host: str
+    port: int = DEFAULT_PORT
+
+    def __str__(self) -> str:
+        return f"{self.host}:{self.port}"
+
+
+@dataclass(slots=True, eq=False)
+class ModbusSignal:
+    """One signal.
+
+    Attributes:
+        name: as programs call it.
+        unit: where its unit listens.
+        slave: number of the unit behind that address, 0 to 255.
+        address: of the coil or register, 0 to 65535.
+        type: what stands there.
+        sequential: the unit takes one request at a time.
+        frequency: how often it is refreshed [Hz]; 0 only on demand.
+        action: what a digital input does beside being read.
+        rule: what an output does when programs start and stop.
+        value: last one known: of the unit, or what a program has set; 0 before.
+        output: what a program has set, to be written; None while the signal is only read.
+        trouble: why there has been no valid answer for too long; empty while all is well. The unit's to set.
+        due: tick of the next refresh; broken, so that any frequency is kept on average.
+    """
+
+    name: str
+    unit: UnitAddress
+    slave: int
+    address: int
+    type: SignalType
+    sequential: bool = False
+    frequency: float = DEFAULT_FREQUENCY
+    action: str = DEFAULT_ACTION
+    rule: RunState = RunState.KEEP
+    value: int = 0
+    output: int | None = None
+    trouble: str = ""
+    due: float = 0.0
+
+    def is_same_place(self, other: ModbusSignal) -> bool:
+        """Whether both stand for the same thing."""
+        return (self.unit, self.slave, self.address, self.type) == (
+            other.unit,
+            other.slave,
+            other.address,
+            other.type,
+        )
+
+
+class ModbusUnit(Protocol):
+    """The connection to a unit, shared by its signals. All calls return at once."""
+
+    def want(self, signal: ModbusSignal) -> None:
+        """Write the signal's output, or read its value if it has none, as soon as that is possible."""
+        ...
+
+    def forget(self, signal: ModbusSignal) -> None:
+        """Do nothing more for a signal."""
+        ...
+
+    def send(self, slave: int, function_code: int, data: bytes) -> None:
+        """Send a request whose answer nobody reads; it is lost if the unit cannot be reached."""
+        ...
+
+    def release(self) -> None:
+        """Close the connection once what was sent is answered; a later call may open it again."""
+        ...
+
+
+class ModbusSignals:
+    """All signals of one controller, by name."""
+
+    def __init__(self, period_s: float) -> None:
+        self._rate = 1.0 / period_s
+        self._units: dict[UnitAddress, ModbusUnit] = {}
+        self.signals: dict[str, ModbusSignal] = {}
+
+    def add(self, signal: ModbusSignal, open_unit: Callable[[UnitAddress], ModbusUnit]) -> None:
+        """Add a signal; one of the same name is replaced, its value stays if it stands for the same thing."""
+        # The new one first: a unit that both share stays connected.
+        if signal.unit not in self._units:
+            self._units[signal.unit] = open_unit(signal.unit)
+        old = self.signals.pop(signal.name, None)
+        if old is not None and old.is_same_place(signal):
+            signal.value = old.value
+        self.signals[signal.name] = signal
+        if old is not None:
+            self._drop(old)
+
+    def delete(self, name: str) -> None:
+        """Delete a signal; harmless if there is none."""
+        signal = self.signals.pop(name, None)
+        if signal is not None:
+            self._drop(signal)
+
+    def step(self, tick: int) -> None:
+        """Ask for what is due in this cycle."""
+        for signal in self.signals.values():
+            if signal.frequency and tick >= signal.due:
+                interval = self._rate / signal.frequency
+                # Of requests that were missed one is owed at most.
+                signal.due = (signal.due if tick - signal.due < interval else tick) + interval
+                self.refresh(signal)
+
+    def refresh(self, signal: ModbusSignal) -> None:
+        """Ask for a signal now."""
+        self._units[signal.unit].want(signal)
+
+    def set_output(self, signal: ModbusSignal, value: int) -> None:
+        """Set an output: it is written from now on."""
+        is_news = signal.output != value or not signal.frequency
+        signal.output = signal.value = value
+        if is_news:
+            self.refresh(signal)
+
+    def set_rule(self, signal: ModbusSignal, rule: RunState, program_runs: bool) -> None:
+        """Let an output follow the program; it takes its value for the present state at once."""
+        signal.rule = rule
+        self._follow(signal, program_runs)
+
+    def follow(self, program_runs: bool) -> None:
+        """A program has started or ended: set the outputs that follow it."""
+        for signal in self.signals.values():
+            self._follow(signal, program_runs)
+
+    def send(
+        self,
+        unit: UnitAddress,
+        open_unit: Callable[[UnitAddress], ModbusUnit],
+        slave: int,
+        function_code: int,
+        data: bytes,
+    ) -> None:
+        """Send a request of the program's own making."""
+        if unit in self._units:
+            self._units[unit].send(slave, function_code, data)
+        else:
+            passing = open_unit(unit)
+            passing.send(slave, function_code, data)
+            passing.release()
+
+    @property
+    def wants_freedrive(self) -> bool:
+        """True while a digital input with the action "freedrive" is high, and its unit answers."""
+        return any(s.action == FREEDRIVE_ACTION and s.value and not s.trouble for s in self.signals.values())
+
+    def _follow(self, signal: ModbusSignal, program_runs: bool) -> None:
+        is_high = level(signal.rule, program_runs)
+        if is_high is not None:
+            self.set_output(signal, int(is_high))
+
+    def _drop(self, signal: ModbusSignal) -> None:
+        self._units[signal.unit].forget(signal)
+        if all(other.unit != signal.unit for other in self.signals.values()):
+            self._units.pop(signal.unit).release()

@@ -1,0 +1,1 @@
+"""Safety: its modes as tables, checks of limits, inputs and buttons, and what each event leads to."""

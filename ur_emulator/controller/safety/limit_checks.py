@@ -1,0 +1,152 @@
+"""What stops the arm by itself: limit checks, and the protective stop they lead to.
+
+Pure: `find_invalid_setpoint` looks at what the joints are asked next, `find_violation` at what they did.
+Sources: joint limits and torque limits of the robot model; C153 "position deviates from path" and C204
+"invalid setpoints" from user reports. The thresholds of the deviation are not published; those here are the
+proposal of the arm's notes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+from operator import sub
+
+from protocol.primary.messages import ReportLevel
+from protocol.ur_types import JOINT_NAMES
+from ur_emulator.controller.events import ErrorReported
+from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.motion.target import JointTarget
+from ur_emulator.plant.plant_state import PlantState
+
+# A joint this far from its (delayed) target is blocked or pushed [rad].
+MAX_POSITION_DEVIATION = 0.15
+# A joint whose drive gives all it has for this long cannot follow [s].
+MAX_SATURATION_TIME = 0.1
+# A target above the rated joint speed by more than rounding is an invalid set-point.
+SPEED_TOLERANCE = 1.0 + 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """Why a protective stop begins.
+
+    Attributes:
+        error: the error code to report.
+        blocked: the arm is away from its target, which must be dropped.
+    """
+
+    error: ErrorReported
+    blocked: bool = False
+
+
+def _stop(code: int, argument: int, text: str, *, blocked: bool = False) -> Violation:
+    return Violation(ErrorReported(code, argument, ReportLevel.WARNING, text), blocked)
+
+
+class SetpointCheck:
+    """Looks at each set-point before the joints get it.
+
+    Joint ranges are kept with the way that a protective stop needs, so that the arm comes to rest within
+    them. A joint that is outside already, because something pushed it, may move back.
+
+    Args:
+        robot: limits of the arm.
+        period_s: control cycle [s].
+    """
+
+    def __init__(self, robot: RobotModel, period_s: float) -> None:
+        self._robot = robot
+        self._period_s = period_s
+        self._braking = 0.5 / robot.stop_deceleration
+        # Below these no joint can be beyond a limit of its own: most set-points need no closer look.
+        self._safe_speed = min(robot.qd_max)
+        self._safe_reach = min(*robot.q_max, *(-low for low in robot.q_min))
+
+    def find_invalid(self, before: JointTarget, target: JointTarget) -> Violation | None:
+        """Return what is wrong with the next set-point, or None.
+
+        Args:
+            before: set-point at the end of the last cycle.
+            target: set-point at the end of this one.
+        """
+        # Norms are at least as large as each joint's value, and not a number where one is not.
+        fastest = hypot(*target.qd)
+        steepest = hypot(*map(sub, target.q, before.q)) / self._period_s
+        reach = max(map(abs, target.q)) + fastest * fastest * self._braking
+        if fastest <= self._safe_speed >= steepest and reach <= self._safe_reach:
+            return None
+        return find_invalid_setpoint(self._robot, before, target, self._period_s)
+
+
+def find_invalid_setpoint(
+    robot: RobotModel, before: JointTarget, target: JointTarget, period_s: float
+) -> Violation | None:
+    """Return what is wrong with a set-point, joint by joint, or None; see `SetpointCheck`.
+
+    Args:
+        robot: limits of the arm.
+        before: set-point at the end of the last cycle.
+        target: set-point at the end of this one.
+        period_s: control cycle [s].
+    """
+    braking_time = max(map(abs, target.qd)) / (2.0 * robot.stop_deceleration)
+    for i, (q_before, q, qd, limit, low, high) in enumerate(
+        zip(before.q, target.q, target.qd, robot.qd_max, robot.q_min, robot.q_max, strict=True)
+    ):
+        speed = max(abs(qd), abs(q - q_before) / period_s)
+        if not speed <= limit * SPEED_TOLERANCE:
+            return _stop(
+                204,
+                i,
+                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {speed:.4g} rad/s, "
+                f"limit {limit:.3f}",
+            )
+        reach = q + qd * braking_time
+        if (reach > high and q > q_before) or (reach < low and q < q_before):
+            return _stop(
+                204,
+                i,
+                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {q:.3f} rad, "
+                f"limits {low:.3f} to {high:.3f}",
+            )
+    return None
+
+
+# The arm cannot go where a tool path leads. The real code is not known: 204 is that of other set-points.
+UNREACHABLE_PATH = _stop(
+    204, 0, "Protective Stop: Invalid setpoints: the path leads to a pose that the robot cannot reach"
+)
+
+
+def hardest_joint(robot: RobotModel, currents: tuple[float, ...]) -> int:
+    """Return the number of the joint whose drive asks for most of its torque.
+
+    Args:
+        robot: torque constants and limits of the arm.
+        currents: that the drives ask for [A], (6,).
+    """
+    efforts = [
+        abs(current) * constant / limit
+        for current, constant, limit in zip(currents, robot.torque_constant, robot.tau_max, strict=True)
+    ]
+    return efforts.index(max(efforts))
+
+
+def find_violation(robot: RobotModel, sensed: PlantState, saturated_s: float) -> Violation | None:
+    """Return what the arm has done wrong in this cycle, or None.
+
+    Args:
+        robot: torque constants and limits of the arm.
+        sensed: what the box reads from its arm.
+        saturated_s: for how long a drive has been at its torque limit without a break [s].
+    """
+    errors = sensed.position_error
+    if max(errors) > MAX_POSITION_DEVIATION or min(errors) < -MAX_POSITION_DEVIATION:
+        i = next(i for i, error in enumerate(errors) if abs(error) > MAX_POSITION_DEVIATION)
+        return _stop(153, i, f"Protective stop: position deviates from path: {JOINT_NAMES[i]}", blocked=True)
+    if saturated_s > MAX_SATURATION_TIME:
+        joint = hardest_joint(robot, sensed.joint_control_output)
+        text = f"Protective stop: Collision detected by joint: {JOINT_NAMES[joint]}"
+        return _stop(157, joint, text, blocked=True)
+    return None

@@ -1,0 +1,45 @@
+"""SafetyState: the causes that stand, and the safety mode that they lead to."""
+
+from __future__ import annotations
+
+from protocol.ur_types import SafetyMode
+from ur_emulator.controller.safety.modes import MOVING_MODES, WATCHED_MODES, SafetyEvent, after, mode_of
+
+# The dashboard refuses to unlock a protective stop sooner than this [s]. Source: UR dashboard documents.
+UNLOCK_DELAY = 5.0
+
+
+class SafetyState:
+    """Which causes stand, and the safety mode that follows from them; see `modes`.
+
+    Attributes:
+        mode: the safety mode.
+        is_stopped: the safety system does not let programs move the arm.
+        is_watched: a protective stop would be something new.
+    """
+
+    def __init__(self) -> None:
+        self._causes: frozenset[SafetyMode] = frozenset()
+        self._stopped_since = 0.0
+        self._enter(SafetyMode.NORMAL)
+
+    def apply(self, event: SafetyEvent, now: float) -> None:
+        """Apply an event at controller time `now` [s]."""
+        had_stop = SafetyMode.PROTECTIVE_STOP in self._causes
+        self._causes = after(self._causes, event)
+        if not had_stop and SafetyMode.PROTECTIVE_STOP in self._causes:
+            self._stopped_since = now
+        self._enter(mode_of(self._causes))
+
+    def has(self, cause: SafetyMode) -> bool:
+        """True while the cause of a mode stands, also under a mode of higher rank."""
+        return cause in self._causes
+
+    def may_unlock(self, now: float) -> bool:
+        """True when the dashboard's `unlock protective stop` is allowed."""
+        return self.mode is SafetyMode.PROTECTIVE_STOP and now - self._stopped_since >= UNLOCK_DELAY
+
+    def _enter(self, mode: SafetyMode) -> None:
+        self.mode = mode
+        self.is_stopped = mode not in MOVING_MODES
+        self.is_watched = mode in WATCHED_MODES

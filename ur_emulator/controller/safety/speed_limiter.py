@@ -1,0 +1,95 @@
+"""Reduced and recovery mode: the time on the path runs slower, so that no joint exceeds a limit.
+
+Sources: recovery mode 30 deg/s, tolerance 1.15 deg/s and 0.5 s until the limits of reduced mode hold: UR3 and
+UR5/CB3 user manuals. The defaults of the joint speeds in reduced mode were not at hand: half the rated ones
+are chosen, and that the controller slows down instead of stopping.
+"""
+
+from __future__ import annotations
+
+from math import radians
+
+from protocol.primary.messages import ReportLevel
+from protocol.ur_types import JOINT_NAMES, SafetyMode
+from ur_emulator.controller.events import ErrorReported
+from ur_emulator.controller.safety.limit_checks import Violation
+from ur_emulator.models.robot_model import RobotModel, Vector6, six
+from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.path_motion import SCALING_RATE
+
+REDUCED_SHARE = 0.5
+RECOVERY_SPEED = radians(30.0)
+TOLERANCE = radians(1.15)
+# A joint above its limit for longer than this is a protective stop [s].
+PATIENCE = 0.5
+# The controller stays below the limit by this share, so that noise and lag do not cross it.
+AIM = 0.95
+
+
+def joint_limits(mode: SafetyMode, robot: RobotModel) -> Vector6 | None:
+    """Return the joint speeds allowed in a mode [rad/s]; None for the rated ones."""
+    if mode is SafetyMode.REDUCED:
+        return six([REDUCED_SHARE * limit for limit in robot.qd_max])
+    return (RECOVERY_SPEED,) * 6 if mode is SafetyMode.RECOVERY else None
+
+
+class SpeedLimiter:
+    """Keeps joint speeds below limits.
+
+    Attributes:
+        scale: speed scaling asked for in this cycle, 0..1.
+    """
+
+    def __init__(self, limits: Vector6, scale: float, hard: bool) -> None:
+        """Begin.
+
+        Args:
+            limits: of the joints [rad/s].
+            scale: in force until now.
+            hard: slow down as fast as a stop would, else as gently as after a touch of the speed slider.
+        """
+        self.scale = scale
+        self._limits = limits
+        self._hard = hard
+        self._exceeded_s = 0.0
+
+    def step(self, motion: ArmMotion, slider: float, dt: float) -> float:
+        """Return the scale for the next cycle; the path is slowed down as the limits need it.
+
+        Args:
+            motion: of the arm; the rate of its scaling is set.
+            slider: what the speed slider asks for, 0..1.
+            dt: duration of a cycle [s].
+        """
+        target = motion.target
+        load = max(
+            abs(qd + qdd * dt) / limit
+            for qd, qdd, limit in zip(target.qd, target.qdd, self._limits, strict=True)
+        )
+        scale = slider if load <= 0.0 else min(slider, motion.scale * AIM / load)
+        rate = SCALING_RATE
+        if self._hard and (speed := max(map(abs, target.qd))) > 0.0:
+            rate = max(rate, motion.stop_deceleration * motion.scale / speed)
+        motion.scaling_rate = rate if scale < motion.scale else SCALING_RATE
+        self.scale = scale
+        return scale
+
+    def share(self, slider: float) -> float:
+        """Return what the limits leave of the speed that the slider asks for, 0..1."""
+        return min(1.0, self.scale / slider) if slider > 0.0 else 1.0
+
+    def find_violation(self, actual_qd: Vector6, dt: float) -> Violation | None:
+        """Return the protective stop for a joint that has been too fast for too long, or None."""
+        excess = [abs(qd) - limit for qd, limit in zip(actual_qd, self._limits, strict=True)]
+        worst = max(range(6), key=excess.__getitem__)
+        if excess[worst] <= TOLERANCE:
+            self._exceeded_s = 0.0
+            return None
+        self._exceeded_s += dt
+        if self._exceeded_s <= PATIENCE:
+            return None
+        text = (
+            f"Protective Stop: Joint speed limit violated: {JOINT_NAMES[worst]} at "
+            f"{abs(actual_qd[worst]):.3f} rad/s, limit {self._limits[worst]:.3f}"
+        )
+        return Violation(ErrorReported(191, 32 + worst, ReportLevel.WARNING, text))

@@ -1,0 +1,170 @@
+"""What safety events come to: the mode changes as the tables say, and arm, program and power follow.
+
+The tables are in `modes`. In cycles in which nothing of this goes on nobody asks here: `is_busy`.
+"""
+
+from __future__ import annotations
+
+from protocol.ur_types import RobotMode, SafetyMode
+from ur_emulator.controller.events import SafetyModeChanged
+from ur_emulator.controller.robot_mode import POWERED, ModeCommand
+from ur_emulator.controller.safety.inputs import SafetyInput, SafetyInputs
+from ur_emulator.controller.safety.limit_checks import Violation
+from ur_emulator.controller.safety.modes import (
+    EVENTS,
+    ROW,
+    ArmEffect,
+    ProgramEffect,
+    SafetyEvent,
+)
+from ur_emulator.controller.safety.speed_limiter import SpeedLimiter, joint_limits
+from ur_emulator.controller.state import ControllerState
+from ur_emulator.motion.path_motion import SCALING_RATE
+from ur_emulator.plant.plant_state import PlantState
+from ur_emulator.scripting.program_slot import ProgramSlot
+
+# The drives follow their targets by 30 to 50 ms; the brakes wait for them, but no longer than the second [s].
+BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
+
+
+class SafetySystem:
+    """Acts on the safety state, and on everything that has to follow.
+
+    Attributes:
+        inputs: buttons and inputs, which are pressed and set here.
+        is_busy: `step` and `find_violation` want their turn in every cycle.
+    """
+
+    def __init__(self, state: ControllerState, programs: ProgramSlot) -> None:
+        self._state = state
+        self._programs = programs
+        self.inputs = SafetyInputs(self.happen)
+        self._cut_after: int | None = None
+        self._rests_since: int | None = None
+        self._is_waiting = False
+        self.is_busy = False
+
+    @property
+    def is_stopping(self) -> bool:
+        """True until the power is cut after an emergency stop."""
+        return self._cut_after is not None
+
+    def assign_input(self, pair: int, function: SafetyInput | None) -> None:
+        """Set up a pair of configurable inputs as a safety input; None frees them."""
+        self.inputs.assign(pair, function)
+        self._update()
+
+    def happen(self, event: SafetyEvent) -> None:
+        """Let an event take place."""
+        state, safety = self._state, self._state.safety
+        before = safety.mode
+        was_stopping = self.is_stopping
+        safety.apply(event, state.time)
+        if safety.mode is not before:
+            state.events.append(SafetyModeChanged(int(safety.mode)))
+            self._react(before)
+        if EVENTS[event].cuts_power or (was_stopping and ROW[safety.mode].may_have_power):
+            self.cut_power()  # an emergency stop ends without power, however soon it is released
+        self._update()
+
+    def cut_power(self) -> None:
+        """End the program, apply the brakes and cut the power at once."""
+        state = self._state
+        self._cut_after = self._rests_since = None
+        self._is_waiting = False
+        self._programs.stop()
+        state.mode.command(ModeCommand.POWER_OFF)
+        state.motion.stop(state.robot.stop_deceleration)
+        state.motion.place(state.snapshot.actual_q)
+        self.happen(SafetyEvent.POWERED_OFF)
+
+    def check_range(self) -> None:
+        """Look at the joints when the brakes have opened."""
+        if not self._is_in_range():
+            self.happen(SafetyEvent.RANGE_LEFT)
+
+    # --- cycle
+
+    def step(self) -> None:
+        """Do at the start of a cycle what is due."""
+        state = self._state
+        if self.inputs.assigned:
+            self.inputs.step(state.io.digital_in)
+        if state.safety.has(SafetyMode.RECOVERY) and self._is_in_range():
+            self.happen(SafetyEvent.RANGE_KEPT)
+        if self._cut_after is not None:
+            if any(state.motion.target.qd):
+                self._rests_since = None
+            elif self._rests_since is None:
+                self._rests_since = state.tick
+            if state.tick >= self._cut_after or (
+                self._rests_since is not None
+                and (state.tick - self._rests_since) * state.period_s >= BRAKE_DELAY
+            ):
+                self.cut_power()
+        self._update()
+
+    def find_violation(self, sensed: PlantState) -> Violation | None:
+        """Return what the arm has done wrong beside what is always looked at, or None."""
+        limiter = self._state.limiter
+        return None if limiter is None else limiter.find_violation(sensed.actual_qd, self._state.period_s)
+
+    # --- what follows
+
+    def _react(self, before: SafetyMode) -> None:
+        state, mode = self._state, self._state.safety.mode
+        row, row_before = ROW[mode], ROW[before]
+        self._set_limits(mode)
+        robot_mode = state.mode.mode
+        if row.arm is ArmEffect.POWER_OFF:
+            if row_before.arm is not ArmEffect.POWER_OFF:
+                self._is_waiting = False
+                self._programs.stop()
+                if robot_mode is RobotMode.RUNNING:
+                    self._cut_after = state.tick + round(LONGEST_BRAKING / state.period_s)
+                elif robot_mode in POWERED:
+                    self.cut_power()
+        elif row.arm is ArmEffect.STOP:
+            self._is_waiting = False
+            self._programs.interrupt(state.robot.stop_deceleration)
+        elif row.arm is ArmEffect.PATH_STOP:
+            if row.program is ProgramEffect.PAUSE_FOR_A_WHILE and row_before.may_move:
+                self._wait()
+        elif self._is_waiting:
+            self._is_waiting = False
+            if robot_mode is RobotMode.RUNNING:
+                self._programs.resume()
+
+    def _wait(self) -> None:
+        """Let program and arm stand still until the mode ends; what was paused before stays so."""
+        state, programs = self._state, self._programs
+        hard = 0.0 if state.error_settings.transition_hardness else state.robot.stop_deceleration
+        if not programs.is_running:
+            state.motion.stop(state.robot.stop_deceleration)
+        elif not programs.is_paused:
+            self._is_waiting = True
+            programs.pause(hard)
+
+    def _set_limits(self, mode: SafetyMode) -> None:
+        state = self._state
+        limits = joint_limits(mode, state.robot)
+        state.motion.scaling_rate = SCALING_RATE
+        state.limiter = None
+        if limits is not None:
+            hard = not state.error_settings.transition_hardness
+            state.limiter = SpeedLimiter(limits, state.motion.scale, hard)
+
+    def _is_in_range(self) -> bool:
+        robot = self._state.robot
+        return all(
+            low <= q <= high
+            for low, q, high in zip(robot.q_min, self._state.snapshot.actual_q, robot.q_max, strict=True)
+        )
+
+    def _update(self) -> None:
+        self.is_busy = (
+            self._cut_after is not None
+            or bool(self.inputs.assigned)
+            or self._state.limiter is not None
+            or self._state.safety.has(SafetyMode.RECOVERY)
+        )

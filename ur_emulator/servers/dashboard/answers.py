@@ -1,0 +1,234 @@
+"""What the commands of the dashboard do, each in a method; how they are spelt stands in `protocol`.
+
+An answer is a reply, or steps that end in one (see `box_access`). Steps may yield a reply earlier and go on.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Generator
+from contextlib import suppress
+from importlib.metadata import version as package_version
+from typing import TypeVar
+
+from protocol.dashboard.commands import USER_ROLES, DashboardCommand
+from protocol.dashboard.connection import CommandReceived
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
+from ur_emulator.commands.operator import ClosePopup, ShowPopup
+from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
+from ur_emulator.controller.command import Command
+from ur_emulator.controller.events import LogAdded
+from ur_emulator.errors import EmulatorError, RefusedError
+from ur_emulator.servers.box_access import BoxAccess
+from ur_emulator.servers.dashboard.reports import BoxFacts, BoxReports
+from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer
+
+# Name that a simulator gives when nothing is loaded. Source: replies of URSim 3.14 as the public client
+# library expects them.
+UNNAMED = "<unnamed>"
+
+Steps = Generator[str | None, None, str]
+Answer = str | Steps
+Action = Generator[None, None, None]
+T = TypeVar("T")
+
+
+class DashboardAnswers:
+    """Finds the answer to a command."""
+
+    def __init__(
+        self, access: BoxAccess, player: ProgramPlayer, reports: BoxReports, shut_down: Callable[[], None]
+    ) -> None:
+        """Bind the commands to a box.
+
+        Args:
+            access: of the box.
+            player: holds the loaded program.
+            reports: writes the log and reports.
+            shut_down: closes the box.
+        """
+        self._access = access
+        self._player = player
+        self._shut_down = shut_down
+        self._reports = reports
+        self._user_role = "NONE"
+        self._methods: dict[str, Callable[[DashboardCommand, str, str], Answer]] = {
+            "load": self._load,
+            "play": lambda row, _, client: self._done(row, player.play(client)),
+            "stop": lambda row, *_: self._done(row, player.stop()),
+            "pause": lambda row, *_: self._done(row, player.pause()),
+            "quit": lambda row, *_: row.reply(),
+            "shutdown": self._shutdown,
+            "running": lambda row, *_: row.reply(running=str(player.is_running).lower()),
+            "robotmode": lambda row, *_: row.reply(mode=RobotMode(access.snapshot.robot_mode).name),
+            "get loaded program": self._loaded_program,
+            "popup": lambda row, text, _: self._applied(row, ShowPopup(text)),
+            "close popup": lambda row, *_: self._applied(row, ClosePopup()),
+            "addToLog": self._add_to_log,
+            "isProgramSaved": lambda row, *_: row.reply(saved="true", program=self._file_name),
+            "programState": lambda row, *_: row.reply(state=self._state_word(), program=self._file_name),
+            "PolyscopeVersion": lambda row, *_: row.reply(
+                version=str(access.identity.software.version), date=access.identity.software.day
+            ),
+            "setUserRole": self._set_user_role,
+            "getUserRole": lambda row, *_: row.reply(role=self._user_role),
+            "power on": lambda row, *_: self._applied(row, PowerOn()),
+            "power off": lambda row, *_: self._applied(row, PowerOff()),
+            "brake release": lambda row, *_: self._applied(row, ReleaseBrakes()),
+            "safetymode": lambda row, *_: row.reply(mode=SafetyMode(access.snapshot.safety_mode).name),
+            "safetystatus": lambda row, *_: row.reply(
+                status=SafetyStatus(access.snapshot.safety_status).name
+            ),
+            "unlock protective stop": self._unlock,
+            "close safety popup": lambda row, *_: row.reply(),
+            "load installation": self._load_installation,
+            "restart safety": lambda row, *_: self._applied(row, RestartSafety()),
+            "get serial number": lambda row, *_: row.reply(serial=access.identity.serial_number),
+            "get robot model": lambda row, *_: row.reply(model=access.identity.model),
+            "generate flight report": self._flight_report,
+            "generate support file": self._support_file,
+            "saveLog": self._save_log,
+        }
+
+    def answer(self, event: CommandReceived, client: str) -> Answer:
+        """Return the answer to a command; `client` is the address of who asks."""
+        return self._methods[event.command.name](event.command, event.argument, client)
+
+    # --- programs
+
+    @property
+    def _file_name(self) -> str:
+        return self._player.loaded.file_name if self._player.loaded else UNNAMED
+
+    def _state_word(self) -> str:
+        if self._access.snapshot.runtime_state == ProgramState.PAUSED:
+            return "PAUSED"
+        return "PLAYING" if self._player.is_running else "STOPPED"
+
+    def _loaded_program(self, row: DashboardCommand, *_: str) -> str:
+        loaded = self._player.loaded
+        return row.reply(path=loaded.wire_path) if loaded else row.reply("none")
+
+    def _load(self, row: DashboardCommand, name: str, _: str) -> Steps:
+        if not row.replies_when_done(self._access.identity.software.version):
+            if not self._player.folder.has(name):
+                return row.reply("not_found", name=name)
+            yield row.reply(path=self._player.folder.find(name).wire_path)
+        loading = self._player.load(name)
+        return (yield from self._loaded(row, loading, name, lambda: _path_of(self._player.loaded)))
+
+    def _load_installation(self, row: DashboardCommand, name: str, _: str) -> Steps:
+        loading = self._player.load_installation(name)
+        return (yield from self._loaded(row, loading, name, lambda: _path_of(self._player.installation)))
+
+    @staticmethod
+    def _loaded(row: DashboardCommand, loading: Action, name: str, path: Callable[[], str]) -> Steps:
+        """Answer when a file is loaded, or is not."""
+        try:
+            yield from loading
+        except RefusedError as refusal:
+            return row.reply("not_found" if isinstance(refusal, MissingFileRefusal) else "failed", name=name)
+        return row.reply(path=path())
+
+    def _done(self, row: DashboardCommand, action: Action) -> Steps:
+        """Answer when an action has come to its end, or, in older software, when it has begun."""
+        waits = row.replies_when_done(self._access.identity.software.version)
+        try:
+            for _ in action:
+                if not waits:
+                    break
+                yield None
+            else:
+                return row.reply("ok")
+        except RefusedError:
+            return row.reply("failed")
+        yield row.reply()
+        with suppress(RefusedError):
+            yield from action
+        return ""
+
+    # --- the box
+
+    def _applied(self, row: DashboardCommand, command: Command) -> Steps:
+        with suppress(RefusedError):
+            yield from self._access.apply(command)
+        return row.reply()
+
+    def _unlock(self, row: DashboardCommand, *_: str) -> Answer:
+        safety = self._access.controller.state.safety
+        if safety.mode is SafetyMode.PROTECTIVE_STOP and not safety.may_unlock(
+            self._access.snapshot.timestamp
+        ):
+            return row.reply("too_early")
+        return self._applied(row, UnlockProtectiveStop())
+
+    def _shutdown(self, row: DashboardCommand, _: str, client: str) -> Steps:
+        self._access.note(f"Shut down by {client}")
+        yield from self._access.apply(PowerOff())
+        yield row.reply()
+        self._shut_down()
+        return ""
+
+    def _add_to_log(self, row: DashboardCommand, text: str, _: str) -> str:
+        if not text:
+            return row.reply("empty")
+        self._access.announce(LogAdded("Dashboard", text))
+        return row.reply()
+
+    def _set_user_role(self, row: DashboardCommand, role: str, _: str) -> str:
+        if role.upper() not in USER_ROLES:
+            return row.reply("failed", role=role)
+        self._user_role = role.upper()
+        return row.reply(role=role)
+
+    # --- files
+
+    def _flight_report(self, row: DashboardCommand, kind: str, _: str) -> Steps:
+        facts = self._facts()
+        try:
+            number = yield from self._access.in_worker(lambda: self._reports.flight_report(kind, facts))
+        except (EmulatorError, OSError) as error:
+            return row.reply("failed", reason=error)
+        return row.reply(id=number)
+
+    def _support_file(self, row: DashboardCommand, directory: str, _: str) -> Steps:
+        facts = self._facts()
+        try:
+            name = yield from self._access.in_worker(lambda: self._reports.support_file(directory, facts))
+        except (EmulatorError, OSError) as error:
+            return row.reply("failed", reason=error)
+        return row.reply(file=name)
+
+    def _save_log(self, row: DashboardCommand, *_: str) -> Steps:
+        facts = self._facts()
+        try:
+            path = yield from self._access.in_worker(lambda: self._reports.save_log(facts))
+        except OSError as error:
+            self._access.note(f"saveLog failed: {error}")
+            return row.reply("failed")
+        self._access.note(f"Log saved to {path}")
+        return row.reply()
+
+    def _facts(self) -> BoxFacts:
+        access, player = self._access, self._player
+        return BoxFacts(
+            serial_number=access.identity.serial_number,
+            versions={
+                "software": str(access.identity.software.version),
+                "robot": access.identity.model,
+                "emulator": package_version("ur-hil"),
+                "python": platform.python_version(),
+            },
+            snapshot=access.snapshot,
+            log=access.log,
+            programs={
+                "program": _path_of(player.loaded),
+                "installation": _path_of(player.installation),
+            },
+            script=player.script,
+        )
+
+
+def _path_of(thing: object) -> str:
+    return getattr(thing, "wire_path", "")

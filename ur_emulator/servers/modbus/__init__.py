@@ -1,0 +1,1 @@
+"""Modbus TCP: port 502, and the units that programs talk to."""

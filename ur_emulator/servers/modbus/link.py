@@ -1,0 +1,277 @@
+"""The connection to one Modbus unit: connects, asks for what its signals want, connects anew when it breaks.
+
+Everything here takes real time, told by the caller. Nothing that a unit sends or does not send can stop it:
+what is no Modbus, what was not asked for, and silence end the connection; an exception or a wrong answer
+spoils one answer. A signal that has waited too long for a valid answer is in trouble; programs will notice.
+Source of the 2 s: later script manual, modbus_set_signal_watchdog. All other times and limits: chosen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from protocol.errors import RemoteProtocolError
+from ur_emulator.controller.modbus.signals import ModbusSignal
+from ur_emulator.scripting.network import ScriptSocket
+from ur_emulator.servers.modbus.messages import Frame
+from ur_emulator.servers.modbus.requests import Request, complaint, request_for, value_of_answer
+
+if TYPE_CHECKING:
+    from ur_emulator.servers.modbus.codec import ModbusCodec
+
+# A signal may be without a valid answer for this long [s].
+TOLERANCE = 2.0
+# A connection that is not made, or a request that is not answered, after this long is given up [s].
+CONNECT_TIMEOUT = 2.0
+ANSWER_TIMEOUT = 1.0
+# Wait before the next attempt to connect [s]: doubled each time until one has answered.
+FIRST_RETRY = 0.1
+LAST_RETRY = 2.0
+# A unit that has not answered after one cycle gets the next request all the same [s], up to a number of them,
+# unless it is in sequential mode.
+NEXT_REQUEST = 0.008
+MAX_UNDER_WAY = 16
+# Answers in a row that nobody waits for, before the connection is given up.
+MAX_STRAYS = 16
+# Own requests of programs that may wait for the connection; further ones are lost.
+MAX_OWN_REQUESTS = 64
+
+_SILENT = "does not answer"
+
+
+@dataclass(slots=True)
+class _Waiting:
+    """Since when a signal waits for a valid answer [s], and what was wrong last."""
+
+    since: float
+    why: str = ""
+
+
+class ModbusLink:
+    """One unit's connection (see controller.modbus_signals.ModbusUnit)."""
+
+    def __init__(self, name: str, connect: Callable[[], ScriptSocket]) -> None:
+        """Prepare; nothing is connected before something is wanted.
+
+        Args:
+            name: address for messages.
+            connect: begins to connect.
+        """
+        self._name = name
+        self._connect = connect
+        self._socket: ScriptSocket | None = None
+        self._connect_by = math.inf
+        self._retry_at = -math.inf
+        self._pause = FIRST_RETRY
+        self._why = "is being connected"
+        self._wanted: dict[ModbusSignal, None] = {}
+        self._waiting: dict[ModbusSignal, _Waiting] = {}
+        self._signals: set[ModbusSignal] = set()
+        self._own_requests: list[tuple[int, int, bytes]] = []
+        self._under_way: dict[int, Request] = {}
+        self._transaction = 0
+        self._heard_at = -math.inf
+        self._strays = 0
+        self.is_released = False
+
+    # --- what the controller asks
+
+    def want(self, signal: ModbusSignal) -> None:
+        """Write or read a signal as soon as possible."""
+        self.is_released = False
+        self._signals.add(signal)
+        self._wanted[signal] = None
+
+    def forget(self, signal: ModbusSignal) -> None:
+        """Do nothing more for a signal; an answer under way is dropped."""
+        self._signals.discard(signal)
+        self._wanted.pop(signal, None)
+        self._waiting.pop(signal, None)
+        for request in self._under_way.values():
+            if request.signal is signal:
+                request.signal = None
+
+    def send(self, slave: int, function_code: int, data: bytes) -> None:
+        """Send a request whose answer nobody reads."""
+        self.is_released = False
+        if len(self._own_requests) < MAX_OWN_REQUESTS:
+            self._own_requests.append((slave, function_code, data))
+
+    def release(self) -> None:
+        """Close once what was sent is answered."""
+        self.is_released = True
+
+    @property
+    def is_idle(self) -> bool:
+        """True when nothing is left to do."""
+        return not (self._wanted or self._own_requests or self._under_way)
+
+    def close(self) -> None:
+        """Close at once."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+        self._under_way.clear()
+
+    # --- the loop
+
+    def advance(self, now: float, codec: ModbusCodec | None, problem: str = "") -> float:
+        """Do what can be done at `now` [s]; return when to be called next, if nothing comes before.
+
+        Args:
+            now: monotonic time.
+            codec: None while it is not loaded.
+            problem: why it will never be.
+        """
+        for signal in self._wanted:
+            if signal not in self._waiting:
+                self._waiting[signal] = _Waiting(now)
+        if codec is None:
+            self._why = problem or self._why
+            self._look_for_trouble(now)
+            return math.inf
+        if self._socket is not None:
+            self._receive(codec, self._socket.inbox, now)
+        if self._is_connected(now):
+            self._give_up_silent(now)
+            self._ask(codec, now)
+        self._look_for_trouble(now)
+        return self._next_time(now)
+
+    def _is_connected(self, now: float) -> bool:
+        """Connect if there is a reason and time to; True while the connection stands."""
+        sock = self._socket
+        if sock is None:
+            if now < self._retry_at or self.is_idle:
+                return False
+            sock = self._socket = self._connect()
+            self._connect_by = now + CONNECT_TIMEOUT
+        if sock.is_connecting:
+            if now >= self._connect_by:
+                self._fail(now, f"cannot be connected within {CONNECT_TIMEOUT:g} s")
+            return False
+        if not sock.is_open:
+            has_stood = self._connect_by == math.inf
+            self._fail(now, "has closed the connection" if has_stood else "refuses the connection")
+            return False
+        if self._connect_by != math.inf:
+            self._connect_by = math.inf
+            self._heard_at = now
+            self._strays = 0
+            self._why = _SILENT
+        return True
+
+    def _fail(self, now: float, why: str) -> None:
+        """Give the connection up; signals keep waiting, a program's own requests are lost."""
+        self._why = why
+        for request in self._under_way.values():
+            if request.signal is not None:
+                self._wanted[request.signal] = None
+        for waiting in self._waiting.values():
+            waiting.why = ""
+        self.close()
+        self._own_requests.clear()
+        self._retry_at = now + self._pause
+        self._pause = min(2.0 * self._pause, LAST_RETRY)
+
+    # --- answers
+
+    def _receive(self, codec: ModbusCodec, inbox: bytearray, now: float) -> None:
+        try:
+            while self._socket is not None and (frame := codec.take_frame(inbox)) is not None:
+                self._take(codec, frame, now)
+        except RemoteProtocolError:
+            self._fail(now, "sends what is no Modbus")
+
+    def _take(self, codec: ModbusCodec, frame: Frame, now: float) -> None:
+        request = self._under_way.pop(frame.transaction, None)
+        if request is None:
+            self._strays += 1
+            if self._strays > MAX_STRAYS:
+                self._fail(now, "sends answers that were not asked for")
+            return
+        self._heard_at = now
+        self._strays = 0
+        self._pause = FIRST_RETRY
+        signal = request.signal
+        if signal is None:
+            return
+        value = value_of_answer(codec, frame.pdu, signal, request)
+        if value is None:
+            self._waiting[signal].why = complaint(frame.pdu, request.function)
+            return
+        signal.trouble = ""
+        if signal in self._wanted:
+            self._waiting[signal] = _Waiting(now)
+        else:
+            self._waiting.pop(signal, None)
+        if signal.output is None:
+            signal.value = value
+
+    def _give_up_silent(self, now: float) -> None:
+        """End what has waited too long: one request if the unit has been heard since, else the connection."""
+        for transaction, request in tuple(self._under_way.items()):
+            if now < request.sent_at + ANSWER_TIMEOUT:
+                continue
+            if self._heard_at <= request.sent_at:
+                self._fail(now, _SILENT)
+                return
+            del self._under_way[transaction]
+            if request.signal is not None:
+                self._wanted[request.signal] = None
+                self._waiting[request.signal].why = "gives no answer"
+
+    # --- requests
+
+    def _ask(self, codec: ModbusCodec, now: float) -> None:
+        """Send the next request, if the unit is to get one."""
+        sock = self._socket
+        while sock is not None and self._may_ask(now):
+            if self._own_requests:
+                transaction = self._next()
+                slave, function, data = self._own_requests.pop(0)
+                request = Request(None, function, None, now)
+                frame = codec.own_request(function, slave, data, transaction)
+            else:
+                busy = {request.signal for request in self._under_way.values()}
+                signal = next((s for s in self._wanted if s not in busy), None)
+                if signal is None:
+                    return
+                del self._wanted[signal]
+                transaction = self._next()
+                request, frame = request_for(codec, signal, transaction, now)
+            self._under_way[transaction] = request
+            sock.send(frame)  # a connection that breaks here is seen in the next round
+
+    def _may_ask(self, now: float) -> bool:
+        if not self._under_way:
+            return True
+        if len(self._under_way) >= MAX_UNDER_WAY or any(signal.sequential for signal in self._signals):
+            return False
+        return now >= max(request.sent_at for request in self._under_way.values()) + NEXT_REQUEST
+
+    def _next(self) -> int:
+        """Return a transaction number that is not under way."""
+        self._transaction = self._transaction % 0xFFFF + 1
+        while self._transaction in self._under_way:
+            self._transaction = self._transaction % 0xFFFF + 1
+        return self._transaction
+
+    # --- time
+
+    def _look_for_trouble(self, now: float) -> None:
+        for signal, waiting in self._waiting.items():
+            if now - waiting.since > TOLERANCE:
+                signal.trouble = f"{self._name} {waiting.why or self._why}"
+
+    def _next_time(self, now: float) -> float:
+        if self._socket is None:
+            return self._retry_at if not self.is_idle else math.inf
+        times = [self._connect_by]
+        times += [request.sent_at + ANSWER_TIMEOUT for request in self._under_way.values()]
+        if self._wanted or self._own_requests:
+            times.append(now + NEXT_REQUEST)
+        return min(times)

@@ -1,0 +1,157 @@
+"""Port 502: the robot's Modbus map for Modbus TCP clients.
+
+Reads are answered at once, from the state at the end of the last cycle. Writes are commands: a client gets
+its answer, and its next request is looked at, once the cycle in which they act is over, so that it reads what
+it has written. The unit number is not looked at. A request that names an address that does not exist, or
+writes one that can only be read, is refused as a whole with exception 2.
+Source: UR "Modbus server" article (protocol notes, section 9); exceptions: Modbus application protocol.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from protocol.errors import RemoteProtocolError
+from ur_emulator.commands.client_writes import WriteModbus
+from ur_emulator.controller.command import Command
+from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.events import Event
+from ur_emulator.controller.modbus.robot_map import PortAddressError, can_write, read_coil, read_register
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.servers.modbus.loading import CodecLoader
+from ur_emulator.servers.modbus.messages import ILLEGAL_ADDRESS, Frame, MapRequest, RefusedError
+from ur_emulator.servers.tcp.connection import Connection
+
+if TYPE_CHECKING:
+    from ur_emulator.servers.modbus.codec import ModbusCodec
+
+# Requests of one client that are answered in one go; the rest waits for the next cycle.
+MAX_AT_ONCE = 32
+# Bytes of requests that may wait; a client that sends more without reading answers is cut off.
+MAX_INBOX = 16 * 1024
+
+
+class ModbusPort:
+    """Answers Modbus requests."""
+
+    def __init__(
+        self, controller: Controller, submit: Callable[[Command], None], loader: CodecLoader
+    ) -> None:
+        """Prepare for clients.
+
+        Args:
+            controller: whose state is read.
+            submit: takes a command for the next cycle.
+            loader: of the Modbus library; asked for it when the first client comes.
+        """
+        self._controller = controller
+        self._submit = submit
+        self._loader = loader
+        self._sessions: dict[Connection, _Session] = {}
+        self._unfinished: dict[_Session, None] = {}
+
+    @property
+    def clients(self) -> tuple[Connection, ...]:
+        """Connected clients."""
+        return tuple(self._sessions)
+
+    def opened(self, connection: Connection) -> None:
+        """The client speaks first."""
+        self._loader.start(self._serve_all)
+        self._sessions[connection] = _Session(connection)
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """Answer requests in order."""
+        session = self._sessions[connection]
+        session.inbox += data
+        if len(session.inbox) > MAX_INBOX:
+            connection.close()
+        else:
+            self._serve(session)
+
+    def closed(self, connection: Connection) -> None:
+        """Forget the client."""
+        session = self._sessions.pop(connection, None)
+        if session is not None:
+            self._unfinished.pop(session, None)
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """A cycle is over: answer the writes that acted in it, and go on with what waited."""
+        if self._unfinished:
+            for session in tuple(self._unfinished):
+                if session.answer is not None and snapshot.tick > session.written_at:
+                    answer, session.answer = session.answer, None
+                    self._send(session, answer)
+                self._serve(session)
+
+    def say(self, event: Event) -> None:
+        """Nothing is said unasked."""
+
+    # --- requests
+
+    def _serve_all(self) -> None:
+        for session in tuple(self._sessions.values()):
+            self._serve(session)
+
+    def _serve(self, session: _Session) -> None:
+        """Answer what can be answered now."""
+        codec = self._loader.codec
+        if codec is None:
+            if self._loader.problem:
+                session.connection.close()
+            return
+        self._unfinished.pop(session, None)
+        try:
+            for _ in range(MAX_AT_ONCE):
+                if session.answer is not None or not session.connection.is_open:
+                    break
+                frame = codec.take_frame(session.inbox)
+                if frame is None:
+                    return
+                self._answer(codec, session, frame)
+        except RemoteProtocolError:
+            session.connection.close()
+        if session.connection.is_open:
+            self._unfinished[session] = None
+
+    def _answer(self, codec: ModbusCodec, session: _Session, frame: Frame) -> None:
+        try:
+            request = codec.request(frame.pdu)
+            if not request.values:
+                self._send(session, codec.values(frame, self._read(request)))
+                return
+            if not all(can_write(request.is_coils, address) for address in request.addresses):
+                raise RefusedError(ILLEGAL_ADDRESS)
+        except PortAddressError:
+            self._send(session, codec.refusal(frame, ILLEGAL_ADDRESS))
+        except RefusedError as refusal:
+            self._send(session, codec.refusal(frame, refusal.code))
+        else:
+            self._submit(WriteModbus(request.is_coils, request.first, request.values))
+            session.answer = codec.confirmation(frame, request)
+            session.written_at = self._controller.snapshot.tick
+
+    def _read(self, request: MapRequest) -> list[int]:
+        state, read = self._controller.state, read_coil if request.is_coils else read_register
+        return [int(read(state, address)) for address in request.addresses]
+
+    def _send(self, session: _Session, answer: bytes) -> None:
+        if not session.connection.send(answer):
+            session.connection.close()  # without its answer, a client takes the next one for it
+
+
+class _Session:
+    """One client.
+
+    Attributes:
+        inbox: requests that were not looked at yet.
+        answer: to a write that has not acted yet; nothing else is answered before.
+        written_at: tick of the last cycle before that write.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self.connection = connection
+        self.inbox = bytearray()
+        self.answer: bytes | None = None
+        self.written_at = -1

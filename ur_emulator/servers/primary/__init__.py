@@ -1,0 +1,1 @@
+"""Ports 30001 and 30002: robot states and messages."""

@@ -1,0 +1,148 @@
+"""Ports 30001, 30002 and their read-only twins: greeting, states at 10 Hz, messages; script text comes in.
+
+The first state to a new client, and the first after the brakes have opened, also tell of kinematics and
+configuration.
+
+The primary port also tells of the running program: its global variables at the rate of the states, and where
+its threads stand in PolyScope's tree.
+"""
+
+from __future__ import annotations
+
+from protocol.primary.messages import RobotMessage, StartupMessage, version_message
+from protocol.primary.packages import encode_message_package, encode_safety_tolerances
+from protocol.script_channel import ScriptChannel
+from protocol.ur_types import RobotMode, SoftwareVersion
+from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.events import Event, ProgramStarted, ProgramStopped
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.models.software import Software
+from ur_emulator.servers.primary.event_messages import message_for
+from ur_emulator.servers.primary.label_reporter import LabelReporter
+from ur_emulator.servers.primary.robot_state import StateEncoder
+from ur_emulator.servers.primary.variable_reporter import VariableReporter
+from ur_emulator.servers.programs.intake import ProgramIntake
+from ur_emulator.servers.tcp.connection import Connection
+from urscript import RunningProgram
+
+STATE_RATE = 10  # states per second
+# The first software seen to send the tolerances package. Source: captures of 3.3 (absent) and 3.10 (present).
+_TOLERANCES_SINCE = SoftwareVersion(3, 10)
+
+
+class PrimaryPort:
+    """Publishes robot states and, on the primary port, messages."""
+
+    def __init__(
+        self,
+        software: Software,
+        controller: Controller,
+        intake: ProgramIntake | None,
+        states: StateEncoder,
+        *,
+        all_messages: bool,
+    ) -> None:
+        """Prepare the greeting.
+
+        Args:
+            software: decides sizes and contents, and is told in the greeting.
+            controller: its snapshot greets new clients.
+            intake: takes script text; None makes the port read-only.
+            states: encodes the states, shared by the ports of a box.
+            all_messages: True on the primary port; the secondary one only sends the greeting.
+        """
+        version = self._version = software.version
+        self._controller = controller
+        self._intake = intake
+        self._states = states
+        self._all_messages = all_messages
+        self._channels: dict[Connection, ScriptChannel] = {}
+        self._phase = 0
+        self._variables = VariableReporter(version)
+        self._labels = LabelReporter(version)
+        self._was_running = controller.snapshot.robot_mode == RobotMode.RUNNING
+        self._greeting = encode_message_package(version_message(version, software.built), version)
+        self._second_greeting = encode_message_package(StartupMessage(), version)
+        if version >= _TOLERANCES_SINCE:
+            self._second_greeting += encode_safety_tolerances()
+
+    @property
+    def clients(self) -> tuple[Connection, ...]:
+        """Connected clients."""
+        return tuple(self._channels)
+
+    def opened(self, connection: Connection) -> None:
+        """Greet: the version message in a segment of its own, the first, long state, then variables."""
+        connection.send(self._greeting)
+        connection.send(self._second_greeting)
+        connection.send(self._states.encode_first(self._controller.snapshot))
+        if self._all_messages:
+            programs = self._controller.programs
+            if not self._channels:  # nobody has listened: what was told before is of no use
+                self._begin_report(programs.latest if programs.is_running else None)
+                self._variables.changes(self._now, at_once=True)
+            for package in (*self._variables.names(self._now), *self._variables.values(self._now)):
+                connection.send(package)
+        self._channels[connection] = ScriptChannel()
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """Take script text."""
+        if self._intake is not None:
+            self._intake.take(connection, self._channels[connection].feed(data))
+
+    def closed(self, connection: Connection) -> None:
+        """Forget the client; a program it sent goes on."""
+        self._channels.pop(connection, None)
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Send a state and what has changed of the variables if they are due in this cycle."""
+        if self._channels and self._labels.is_watching:
+            message = self._labels.message(self._now)
+            if message is not None:
+                self._send(self._package(message))
+        cycle_rate = self._controller.generation.cycle_rate
+        self._phase += STATE_RATE
+        if self._phase < cycle_rate:
+            return
+        self._phase -= cycle_rate
+        running = snapshot.robot_mode == RobotMode.RUNNING
+        has_started, self._was_running = running and not self._was_running, running
+        if self._channels:
+            encode = self._states.encode_first if has_started else self._states.encode
+            self._send(encode(snapshot), *self._variables.changes(self._now))
+
+    def say(self, event: Event) -> None:
+        """Send a message for an event."""
+        if not (self._all_messages and self._channels):
+            return
+        if isinstance(event, ProgramStopped):
+            self._send(*self._variables.changes(self._now, at_once=True))
+            self._begin_report(None)
+        message = message_for(event, self._now)
+        if message is not None:
+            self._send(self._package(message))
+        if isinstance(event, ProgramStarted):
+            self._begin_report(event.run)
+            self._send(*self._variables.names(self._now))
+
+    @property
+    def _now(self) -> int:
+        """Time stamp of the present cycle."""
+        return round(self._controller.snapshot.timestamp * 1e6)
+
+    def _package(self, message: RobotMessage) -> bytes:
+        return encode_message_package(message, self._version)
+
+    def _send(self, *packages: bytes) -> None:
+        for connection in tuple(self._channels):
+            for package in packages:
+                connection.send(package)
+
+    def _begin_report(self, run: RunningProgram | None) -> None:
+        """Turn to the variables and labels of a run, or to none."""
+        if run is None:
+            self._variables.end()
+            self._labels.end()
+        else:
+            self._variables.begin(run)
+            self._labels.begin(run)

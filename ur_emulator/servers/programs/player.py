@@ -1,0 +1,212 @@
+"""The program that is loaded, and what the buttons of PolyScope do with it: load, play, pause, stop.
+
+Every action is a step function (see `box_access`). What cannot be done is refused, and the log says why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING, NoReturn
+
+from protocol.ur_types import ProgramState, RobotMode
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
+from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.controller.safety.modes import MOVING_MODES
+from ur_emulator.controller.safety.status_bits import RUNNING_STATES
+from ur_emulator.errors import FileMissingError, ProgramFileError, RefusedError
+from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.programs.installation import ExternalControlPc, Installation, load_installation
+from ur_emulator.servers.box_access import BoxAccess
+from ur_emulator.servers.programs.external_control import request_program
+from urscript import CompiledProgram, compile_program
+from urscript.catalogue import Catalogue, catalogue_for
+from urscript.errors import ScriptError
+
+if TYPE_CHECKING:
+    from ur_emulator.programs.loading import LoadedProgram
+
+# Port of a PC's script sender when nothing names another. Source: the source text of the URCap.
+SCRIPT_SENDER_PORT = 50002
+# Modes in which the controller does not take programs yet.
+_NOT_UP = frozenset(
+    {RobotMode.NO_CONTROLLER, RobotMode.DISCONNECTED, RobotMode.CONFIRM_SAFETY, RobotMode.BOOTING}
+)
+_PAUSED = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
+
+Steps = Generator[None, None, None]
+# A program that can be started, or why it cannot.
+Outcome = CompiledProgram | ScriptFailed
+
+
+class MissingFileRefusal(RefusedError):
+    """A file is not loaded because there is none of that name."""
+
+
+class ProgramPlayer:
+    """Holds the loaded program and its installation, and plays it.
+
+    Every action raises `RefusedError` when it cannot be done.
+
+    Attributes:
+        folder: of all programs.
+        loaded: the program, as it was in its file when it was loaded.
+        installation: the one that was loaded last; None is that of a new box.
+    """
+
+    def __init__(self, access: BoxAccess, folder: ProgramFolder) -> None:
+        self._access = access
+        self.folder = folder
+        self.loaded: LoadedProgram | None = None
+        self.installation: Installation | None = None
+        self._ready: Outcome | None = None
+        self._catalogue: Catalogue = catalogue_for(access.identity.software.version)
+
+    # --- state
+
+    @property
+    def is_running(self) -> bool:
+        """True while a program plays, also one that a client has sent."""
+        return self._access.snapshot.runtime_state in RUNNING_STATES
+
+    @property
+    def is_paused(self) -> bool:
+        """True while a program is paused, or about to be."""
+        return self._access.snapshot.runtime_state in _PAUSED
+
+    @property
+    def script(self) -> str:
+        """Script of the loaded program, with a comment where a PC's part belongs; "" without one."""
+        return self.loaded.script(lambda pc: "# External Control") if self.loaded else ""
+
+    # --- actions
+
+    def load(self, name: str) -> Steps:
+        """Load a program and its installation; what was loaded stays if that fails."""
+        what = f"load {name}"
+        self._must_be_stopped(what)
+        try:
+            loaded, ready = yield from self._access.in_worker(lambda: self._read(name))
+        except Exception as error:  # a defect of ours must not end the box
+            self._refuse(what, error)
+        self.loaded, self._ready = loaded, ready
+        self.installation = loaded.installation or self.installation
+        self._access.note(f"Loaded program: {loaded.wire_path}")
+        if isinstance(ready, ScriptFailed):
+            self._access.note(f"{loaded.file_name} will not start: {ready.log_text or ready.text}")
+
+    def load_installation(self, name: str) -> Steps:
+        """Load an installation; the one before stays if that fails."""
+        what = f"load installation {name}"
+        self._must_be_stopped(what)
+        try:
+            self.installation = yield from self._access.in_worker(
+                lambda: load_installation(self.folder, name)
+            )
+        except Exception as error:  # as above
+            self._refuse(what, error)
+        self._access.note(f"Loaded installation: {self.installation.wire_path}")
+
+    def play(self, client: str) -> Steps:
+        """Let a paused program go on, or start the loaded one from the top.
+
+        Args:
+            client: address of who wants it; External Control asks there if no PC is named.
+        """
+        self._must_be_able_to_play()
+        if self.is_paused:
+            try:
+                yield from self._access.apply(ResumeProgram())
+            except RefusedError:
+                if self.is_paused:  # otherwise somebody else was quicker
+                    raise
+            return
+        program = yield from self._prepare(client)
+        if isinstance(program, ScriptFailed):
+            self._access.announce(program)
+            self._refuse("play", "the program does not compile")
+        self._must_be_able_to_play()  # it took a while to get here
+        if self.is_paused:
+            self._refuse("play", "a program is paused")
+        yield from self._access.apply(StartProgram(program))
+
+    def pause(self) -> Steps:
+        """Pause the program that plays, and end when the arm rests."""
+        if not self.is_running or self.is_paused:
+            self._refuse("pause", "no program plays")
+        with suppress(RefusedError):  # it has ended meanwhile
+            yield from self._access.apply(PauseProgram())
+        while self._access.snapshot.runtime_state == ProgramState.PAUSING:
+            yield
+        if not self._access.controller.programs.is_running:
+            self._refuse("pause", "the program has ended")
+
+    def stop(self) -> Steps:
+        """Stop the program, if one is running or paused, and end when the arm rests."""
+        if self._access.snapshot.robot_mode in _NOT_UP:
+            self._refuse("stop", "the controller is not up")
+        stopped = self._access.controller.programs.latest
+        yield from self._access.apply(StopProgram())
+        while (
+            self._access.snapshot.runtime_state == ProgramState.STOPPING
+            and self._access.controller.programs.latest is stopped
+        ):
+            yield
+
+    # --- how
+
+    def _must_be_stopped(self, what: str) -> None:
+        if self._access.controller.programs.is_running:
+            self._refuse(what, "a program runs, stop it first")
+
+    def _must_be_able_to_play(self) -> None:
+        """Refuse to play while something stands against it."""
+        snapshot = self._access.snapshot
+        if snapshot.safety_mode not in MOVING_MODES:
+            self._refuse("play", "the robot is stopped for safety")
+        if snapshot.robot_mode != RobotMode.RUNNING:
+            mode = RobotMode(snapshot.robot_mode).name
+            self._refuse("play", f"the robot is in {mode}, it must be RUNNING")
+        if self.is_running and not self.is_paused:
+            self._refuse("play", "a program plays already")
+        if self._access.controller.state.operator.requests:
+            self._refuse("play", "a popup waits to be closed, or a question for its answer")
+        if self.loaded is None and not self.is_paused:
+            self._refuse("play", "no program is loaded")
+
+    def _read(self, name: str) -> tuple[LoadedProgram, Outcome | None]:
+        """Read and compile a program; in the worker."""
+        from ur_emulator.programs.loading import load_program  # few boxes need it, none at once
+
+        loaded = load_program(self.folder, name)
+        return loaded, None if loaded.pcs else self._compile(loaded, {})
+
+    def _prepare(self, client: str) -> Generator[None, None, Outcome]:
+        """Return the loaded program ready to start; parts that PCs have are fetched now."""
+        loaded = self.loaded
+        assert loaded is not None
+        if self._ready is not None:
+            return self._ready
+        received: dict[ExternalControlPc, str] = {}
+        default = ExternalControlPc(client, SCRIPT_SENDER_PORT)
+        if self.installation is not None:
+            default = self.installation.pc.over(default)
+        for pc in loaded.pcs:
+            received[pc] = yield from request_program(self._access.network, pc.over(default))
+        return (yield from self._access.in_worker(lambda: self._compile(loaded, received)))
+
+    def _compile(self, loaded: LoadedProgram, received: Mapping[ExternalControlPc, str]) -> Outcome:
+        """Compile a program; in the worker."""
+        try:
+            text = loaded.script(received.__getitem__)
+            return compile_program(text, catalogue=self._catalogue, name=loaded.file_name)
+        except ScriptError as error:
+            return ScriptFailed(error.line, error.column, error.wire_text, False, error.log_text)
+        except Exception as error:  # a defect of ours must not end the box
+            return ScriptFailed(1, 1, f"{loaded.file_name} cannot be compiled: {error!r}")
+
+    def _refuse(self, what: str, why: str | Exception) -> NoReturn:
+        """Refuse an action, and write into the log why."""
+        text = f"{what} failed: {why if isinstance(why, str | ProgramFileError) else repr(why)}"
+        self._access.note(text)
+        raise MissingFileRefusal(text) if isinstance(why, FileMissingError) else RefusedError(text)

@@ -1,0 +1,1 @@
+"""What running scripts reach outside the box: TCP sockets and XML-RPC servers."""

@@ -1,0 +1,221 @@
+"""Sockets that scripts open: the network that `scripting` asks for, made of non-blocking sockets."""
+
+from __future__ import annotations
+
+import errno
+import selectors
+import socket
+import threading
+from weakref import WeakSet
+
+from ur_emulator.controller.modbus.signals import UnitAddress
+from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.servers.modbus.client import ModbusClient
+from ur_emulator.servers.modbus.link import ModbusLink
+from ur_emulator.servers.modbus.loading import CodecLoader
+from ur_emulator.servers.scripts.xmlrpc_client import XmlRpcServer
+
+_READ_SIZE = 64 * 1024
+# Bytes a script may have in flight to a peer that does not read; further sends fail.
+_SEND_LIMIT = 256 * 1024
+# Bytes that may wait for a script that does not read; beyond, the peer is held back. Above the longest text
+# that a read waits for (socket_functions.MAX_INBOX).
+_INBOX_LIMIT = 2 << 20
+_IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOULDBLOCK", errno.EINPROGRESS)}
+
+
+class LoopSocket:
+    """One client connection of a script."""
+
+    def __init__(self, loop: EventLoop, host: str, port: int, own_address: str = "") -> None:
+        """Begin to connect; a name is looked up in a thread of its own, the loop never waits for it.
+
+        Args:
+            loop: watches the socket.
+            host: name or address of the peer.
+            port: of the peer.
+            own_address: where to call from, if the peer can be reached from there; "" leaves it open.
+        """
+        self._loop = loop
+        self._own_address = own_address
+        self._inbox = bytearray()
+        self._held_back = False
+        self.is_open = False
+        self.is_connecting = True
+        self._outbox = bytearray()
+        self._sock: socket.socket | None = None
+        if _is_numeric(host):
+            self._connect(host, port)
+        else:
+            threading.Thread(
+                target=self._look_up, args=(host, port), name="script-lookup", daemon=True
+            ).start()
+
+    @property
+    def inbox(self) -> bytearray:
+        """Bytes that have come and were not read yet; asking lets a peer that was held back go on."""
+        if self._held_back and self._sock is not None:
+            self._held_back = False
+            self._watch()
+        return self._inbox
+
+    def send(self, data: bytes) -> bool:
+        """Send now what the kernel takes, queue the rest."""
+        sock = self._sock
+        if sock is None or not self.is_open or len(self._outbox) > _SEND_LIMIT:
+            return False
+        sent = 0
+        if not self._outbox:
+            try:
+                sent = sock.send(data)
+            except BlockingIOError:
+                pass
+            except OSError:
+                self.close()
+                return False
+        if sent < len(data):
+            self._outbox += data[sent:]
+            self._watch()
+        return True
+
+    def close(self) -> None:
+        """Close; what the kernel has taken is still delivered."""
+        if self._sock is not None:
+            self._loop.unwatch(self._sock)
+            self._sock.close()
+            self._sock = None
+        self.is_open = self.is_connecting = False
+
+    # --- connecting
+
+    def _look_up(self, host: str, port: int) -> None:
+        """Find the address of a name; in its own thread, touching nothing but the loop's call queue."""
+        try:
+            address = str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
+        except (OSError, ValueError, OverflowError):
+            self._loop.call_soon_threadsafe(self.close)
+        else:
+            self._loop.call_soon_threadsafe(lambda: self._connect(address, port))
+
+    def _connect(self, address: str, port: int) -> None:
+        if not self.is_connecting:
+            return  # closed while the name was looked up
+        try:
+            self._sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+            self._sock.setblocking(False)
+            if _can_call_from(self._own_address, address):
+                self._sock.bind((self._own_address, 0))
+            code = self._sock.connect_ex((address, port))
+        except (OSError, OverflowError):  # descriptors are out, or that is no address
+            code = errno.EINVAL
+        if self._sock is not None and code in _IN_PROGRESS:
+            self._loop.watch(self._sock, selectors.EVENT_WRITE, self._on_connected)
+        else:
+            self.close()
+
+    def _on_connected(self, events: int) -> None:
+        assert self._sock is not None
+        if self._sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
+            self.close()
+            return
+        self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.is_connecting = False
+        self.is_open = True
+        self._watch()
+
+    # --- bytes
+
+    def _watch(self) -> None:
+        """Tell the loop what this socket waits for at present."""
+        assert self._sock is not None
+        events = 0 if self._held_back else selectors.EVENT_READ
+        if self._outbox:
+            events |= selectors.EVENT_WRITE
+        if events:
+            self._loop.watch(self._sock, events, self._on_ready)
+        else:
+            self._loop.unwatch(self._sock)
+
+    def _on_ready(self, events: int) -> None:
+        if events & selectors.EVENT_WRITE:
+            self._flush()
+        if events & selectors.EVENT_READ and self._sock is not None:
+            try:
+                data = self._sock.recv(_READ_SIZE)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            if data:
+                self._inbox += data
+                if len(self._inbox) > _INBOX_LIMIT:
+                    self._held_back = True
+                    self._watch()
+            else:
+                self.close()
+
+    def _flush(self) -> None:
+        assert self._sock is not None
+        try:
+            sent = self._sock.send(self._outbox)
+        except BlockingIOError:
+            return
+        except OSError:
+            self.close()
+            return
+        del self._outbox[:sent]
+        if not self._outbox:
+            self._watch()
+
+
+def _is_numeric(host: str) -> bool:
+    try:
+        socket.inet_aton(host)
+    except (OSError, ValueError):  # no address, or no text that could be one
+        return False
+    return True
+
+
+def _can_call_from(own: str, address: str) -> bool:
+    """Whether a call from our own address can reach an address: none leads out of the loopback network."""
+    if not _is_numeric(own) or own == "0.0.0.0":
+        return False
+    return own.startswith("127.") == address.startswith("127.")
+
+
+class LoopNetwork:
+    """Opens script sockets in a loop."""
+
+    def __init__(self, loop: EventLoop, loader: CodecLoader | None = None, own_address: str = "") -> None:
+        """Prepare; nothing is opened or loaded.
+
+        Args:
+            loop: watches the sockets.
+            loader: of the Modbus library, if it is shared with others.
+            own_address: of the box. A robot calls from the address at which it is called, and clients that
+                listen for it check that.
+        """
+        self._loop = loop
+        self._own_address = own_address
+        self._sockets: WeakSet[LoopSocket] = WeakSet()
+        self._modbus = ModbusClient(loop, loader or CodecLoader(loop), self.open)
+
+    def open(self, host: str, port: int) -> LoopSocket:
+        """Begin to connect to `host`:`port`."""
+        opened = LoopSocket(self._loop, host, port, self._own_address)
+        self._sockets.add(opened)
+        return opened
+
+    def remote_server(self, url: str) -> XmlRpcServer:
+        """Return an XML-RPC server; nothing is connected before its first call."""
+        return XmlRpcServer(self._loop, url)
+
+    def modbus_unit(self, address: UnitAddress) -> ModbusLink:
+        """Return the connection to a Modbus unit."""
+        return self._modbus.unit(address)
+
+    def close(self) -> None:
+        """Close everything, whatever the programs are doing."""
+        self._modbus.close()
+        for opened in tuple(self._sockets):
+            opened.close()

@@ -1,0 +1,167 @@
+"""A listening port: accepts clients and hands each to the port that it belongs to.
+
+There is no limit on clients: none of a real controller is known. What bounds them is the number of
+descriptors that the operating system gives this process. Once they are out, further clients are accepted and
+closed at once, so that they see why nothing comes; who is connected is not disturbed.
+"""
+
+from __future__ import annotations
+
+import errno
+import selectors
+import socket
+from collections.abc import Callable
+from typing import Protocol
+
+from ur_emulator.errors import PortError, PortPermissionError
+from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.servers.tcp.connection import Connection
+from ur_emulator.servers.tcp.reserve import Reserve
+
+# Clients accepted in one go; the rest waits for the next turn of the loop, so that a crowd at one port does
+# not hold up a cycle: a client costs up to 0.3 ms.
+MAX_AT_ONCE = 4
+# How long not to listen when a client can be neither served nor turned away [s].
+DEAF_TIME = 0.1
+# What accept() says when the client is not to blame.
+_OUT_OF_MEANS = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
+
+
+class Port(Protocol):
+    """What a port does with its clients."""
+
+    def opened(self, connection: Connection) -> None:
+        """A client has connected."""
+        ...
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """A client has sent something."""
+        ...
+
+    def closed(self, connection: Connection) -> None:
+        """A client is gone."""
+        ...
+
+
+class Listener:
+    """Accepts the clients of one port."""
+
+    def __init__(
+        self,
+        loop: EventLoop,
+        host: str,
+        number: int,
+        port: Port,
+        backlog: set[Connection],
+        notice: Callable[[str], None],
+        name: str,
+        reserve: Reserve | None = None,
+    ) -> None:
+        """Listen.
+
+        Args:
+            loop: watches the sockets.
+            host: address to bind to.
+            number: TCP port; 0 takes a free one.
+            port: gets the clients.
+            backlog: shared by all connections of a box, see Connection.
+            notice: told who comes and goes.
+            name: of the port, for notices.
+            reserve: what turns clients away when descriptors are out; without one they wait.
+
+        Raises:
+            PortPermissionError: this user may not open ports below 1024.
+            PortError: the address cannot be bound.
+        """
+        self._loop = loop
+        self._port = port
+        self._backlog = backlog
+        self._notice = notice
+        self._name = name
+        self._reserve = reserve
+        self._is_out_of_means = False
+        self._deaf_until: float | None = None
+        self._sock = _listening_socket(host, number)
+        self.number: int = self._sock.getsockname()[1]
+        loop.watch(self._sock, selectors.EVENT_READ, self._accept)
+
+    def close(self) -> None:
+        """Stop listening; connected clients stay."""
+        self._loop.remove(self)
+        self._loop.unwatch(self._sock)
+        self._sock.close()
+
+    def advance(self, now: float) -> float:
+        """Listen again when the time has come; called by the loop only while this port is deaf."""
+        if self._deaf_until is None:
+            self._deaf_until = now + DEAF_TIME
+        if now >= self._deaf_until:
+            self._deaf_until = None
+            self._loop.remove(self)
+            self._loop.watch(self._sock, selectors.EVENT_READ, self._accept)
+            return now
+        return self._deaf_until
+
+    def _accept(self, events: int) -> None:
+        for _ in range(MAX_AT_ONCE):
+            try:
+                client, _ = self._sock.accept()
+            except BlockingIOError:
+                return
+            except OSError as error:
+                if error.errno not in _OUT_OF_MEANS:
+                    continue  # this client has gone again
+                self._turn_away(error)
+                return
+            self._is_out_of_means = False
+            try:
+                connection = Connection(self._loop, client, self._port.received, self._closed, self._backlog)
+            except OSError:
+                client.close()  # gone again; some systems say so only now
+                continue
+            self._notice(f"{connection.peer} connected to {self._name} port {self.number}")
+            self._port.opened(connection)
+
+    def _turn_away(self, error: OSError) -> None:
+        """Close the next client, or be deaf for a while: the port stays readable, the loop would spin."""
+        try:
+            if self._reserve is None:
+                raise error
+            is_refused = self._reserve.turn_away(self._sock)
+        except OSError:
+            self._loop.unwatch(self._sock)
+            self._loop.add(self)
+            is_refused = True
+        if is_refused and not self._is_out_of_means:
+            self._is_out_of_means = True
+            self._notice(f"clients are turned away from {self._name} port {self.number}: {error.strerror}")
+
+    def _closed(self, connection: Connection) -> None:
+        self._port.closed(connection)
+        self._notice(f"{connection.peer} disconnected from {self._name} port {self.number}")
+
+
+def _listening_socket(host: str, number: int) -> socket.socket:
+    """Return a socket that listens."""
+    sock = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind((host, number))
+        sock.listen(socket.SOMAXCONN)
+    except OSError as error:
+        sock.close()
+        if isinstance(error, PermissionError):
+            raise PortPermissionError(
+                f"port {number} on {host} needs privileges; move all ports with --port-base N if you need it"
+            ) from None
+        if error.errno == errno.EADDRNOTAVAIL:
+            raise PortError(
+                f"cannot listen on {host}:{number}: {host} is no address of this machine; "
+                "take one of its own, or add it (on macOS: sudo ifconfig lo0 alias ADDRESS)"
+            ) from None
+        raise PortError(
+            f"cannot listen on {host}:{number} ({error.strerror or error}); "
+            "stop what uses it, or move all ports with --port-base N"
+        ) from None
+    sock.setblocking(False)
+    return sock
