@@ -12,7 +12,7 @@ OURS = {"protocol", "urscript", "ur_emulator", "pc_client"}
 MAY_IMPORT = {
     "protocol": {"numpy"},
     "urscript": {"protocol", "lark", "numpy", "typer", "rich"},
-    "ur_emulator": {"urscript", "protocol", "mujoco", "numpy", "pymodbus", "h11", "typer", "rich", "pytest"},
+    "ur_emulator": {"urscript", "protocol", "mujoco", "numpy", "h11", "typer", "rich", "pytest"},
     "pc_client": {
         "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "pyarrow", "mpl_toolkits", "distributed",
     },
@@ -59,7 +59,7 @@ LANGUAGE_ORDER = (
 )
 PROTOCOL_ORDER = (
     {"errors", "filled", "frame_buffer", "patience", "pose", "ur_types", "wire_codec", "wire_record"},
-    {"controller_words", "script_channel", "velocity_stream"},
+    {"controller_words", "modbus", "script_channel", "velocity_stream"},
     {"realtime"},
     {"dashboard"},
     {"primary"},
@@ -151,7 +151,6 @@ def test_effects_stay_at_the_rim(package):
                 "pinocchio",
                 "matplotlib",
                 "mcap",
-                "pymodbus",
                 "asyncio",
                 "h11",
                 "ur_emulator.control.http_port",

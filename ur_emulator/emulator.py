@@ -41,7 +41,6 @@ from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from ur_emulator.servers.dashboard.answers import DashboardAnswers
 from ur_emulator.servers.dashboard.port import DashboardPort
 from ur_emulator.servers.dashboard.reports import BoxReports
-from ur_emulator.servers.modbus.loading import CodecLoader
 from ur_emulator.servers.modbus.server import ModbusPort
 from ur_emulator.servers.port_set import CONTROL, MODBUS, PortSet, ServedPort
 from ur_emulator.servers.primary.port import PrimaryPort
@@ -137,8 +136,7 @@ class ControlBox(BoxOperations):
         self._owns_loop = loop is None
         self._loop = loop or EventLoop(precise=named_pace is Pace.REALTIME)
         self._runner = LoopRunner(self._loop, self.close)
-        modbus = CodecLoader(self._loop)
-        self._network = LoopNetwork(self._loop, modbus, host)
+        self._network = LoopNetwork(self._loop, generation.period_s, host)
         controller = Controller(
             model, imperfections, seed, self._network, mode=RobotMode.RUNNING, generation=generation
         )
@@ -164,7 +162,7 @@ class ControlBox(BoxOperations):
                 self._access,
                 DashboardAnswers(self._access, player, self._reports, self._shut_down),
             ),
-            "modbus": ModbusPort(controller, self._box.submit, modbus),
+            "modbus": ModbusPort(controller, self._box.submit),
             "realtime_ro": RealtimePort(software.version, None),
             "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
             "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),

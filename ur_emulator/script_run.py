@@ -20,6 +20,7 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import ArgumentError
 from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.robot_generation import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.scripts.sockets import LoopNetwork
@@ -66,7 +67,9 @@ class ScriptBox:
         """
         model = robot_by_name(robot)
         self._loop = EventLoop()
-        self._controller = Controller(model, fidelity_by_name(fidelity), seed, LoopNetwork(self._loop))
+        self._controller = Controller(
+            model, fidelity_by_name(fidelity), seed, LoopNetwork(self._loop, CB3.period_s)
+        )
         self._controller.state.ports.version = (software[0], software[1])
         self._answers = deque(answers)
         self._start_tick = self._controller.snapshot.tick

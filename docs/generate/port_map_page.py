@@ -44,7 +44,7 @@ Signals are refreshed at their frequency (10 Hz, or as `modbus_set_signal_update
 time and keep their last value meanwhile. One connection a unit; it is made anew when it breaks. When no valid
 answer has come for 2 s, the next use of the signal is a run-time error that says why. In lockstep nothing
 waits for a unit: a value comes in the cycle in which it comes. Choices are listed in
-[fidelity.md](../fidelity.md). pymodbus, which knows the frames, is loaded with the first signal or client.
+[fidelity.md](../fidelity.md).
 """
 
 

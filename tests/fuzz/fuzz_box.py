@@ -33,7 +33,6 @@ from ur_emulator.commands.safety import (
     SafeguardStop,
     UnlockProtectiveStop,
 )
-from ur_emulator.servers.modbus.codec import ModbusCodec
 from ur_emulator.servers.modbus.server import MAX_INBOX
 from ur_emulator.servers.rtde_port import MAX_WAITING as MAX_RTDE_WAITING
 from ur_emulator.servers.tcp.connection import OUTBOX_LIMIT
@@ -137,7 +136,6 @@ class FuzzBox:
         self.controller = self.served.controller
         self.controller.programs._network = FakeNetwork()
         self.ports = box._port_set._ports
-        self.ports["modbus"]._loader.codec = ModbusCodec()
         for port in self.ports.values():
             self.served.attach(port)
         self.served.attach(box._operations)

@@ -4,19 +4,21 @@ import json
 import re
 
 from box_support import VERSION
+from pymodbus.pdu import DecodePDU
 
 from protocol.dashboard.commands import GREETING
 from protocol.dashboard.connection import MAX_LINE, Role
 from protocol.frame_buffer import FrameBuffer
+from protocol.modbus import take_frame
 from protocol.primary.framing import PackageType
 from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.codec import decode_message
 from protocol.rtde.messages import PackageType as RtdeType
-from ur_emulator.servers.modbus.codec import ModbusCodec
 
 REALTIME = layout_for_version(VERSION)
-CODEC = ModbusCodec()
+# pymodbus's decoder of answers.
+_MODBUS = DecodePDU(is_server=False)
 
 
 class RealtimeReader:
@@ -126,10 +128,10 @@ class ModbusReader:
 
     def feed(self, data):
         self.buffer += data
-        while (frame := CODEC.take_frame(self.buffer)) is not None:
+        while (frame := take_frame(self.buffer)) is not None:
             function = frame.pdu[0]
             assert function & 0x80 or function in (1, 2, 3, 4, 5, 6, 15, 16), frame
-            assert len(frame.pdu) == 2 if function & 0x80 else CODEC.answer(frame.pdu) is not None, frame
+            assert len(frame.pdu) == 2 if function & 0x80 else _MODBUS.decode(frame.pdu) is not None, frame
             self.answers.append(frame)
             del self.answers[:-50]
 

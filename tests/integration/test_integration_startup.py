@@ -12,7 +12,7 @@ from ur_emulator.descriptor_limit import WANTED
 
 # Each costs time or memory that no box needs before somebody asks for it.
 LATE = {
-    "pymodbus": "the first Modbus client or signal",
+    "pymodbus": "tests",
     "xmlrpc": "the first XML-RPC call",
     "http": "the first XML-RPC call",
     "ssl": "nothing at all",

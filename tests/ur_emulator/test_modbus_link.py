@@ -5,8 +5,8 @@ from box_support import FakeSocket
 from hypothesis import given
 from hypothesis import strategies as st
 
+from protocol.modbus import take_frame
 from ur_emulator.controller.modbus.signals import ModbusSignal, SignalType, UnitAddress
-from ur_emulator.servers.modbus.codec import ModbusCodec
 from ur_emulator.servers.modbus.link import (
     ANSWER_TIMEOUT,
     CONNECT_TIMEOUT,
@@ -15,24 +15,23 @@ from ur_emulator.servers.modbus.link import (
     MAX_OWN_REQUESTS,
     MAX_STRAYS,
     MAX_UNDER_WAY,
-    NEXT_REQUEST,
     TOLERANCE,
     ModbusLink,
 )
 
 UNIT = UnitAddress("10.0.0.2")
+PERIOD = 0.008
 
 
 class Wire:
     """A link, the sockets that it has opened, and the time."""
 
     def __init__(self, *, refuse=False, connecting=False):
-        self.link = ModbusLink(str(UNIT), self._connect)
+        self.link = ModbusLink(str(UNIT), self._connect, PERIOD)
         self.sockets = []
         self.refuse = refuse
         self.connecting = connecting
         self.now = 100.0
-        self.codec = ModbusCodec()
         self.next_call = None
 
     def _connect(self):
@@ -48,7 +47,7 @@ class Wire:
 
     def advance(self, seconds=0.0):
         self.now += seconds
-        self.next_call = self.link.advance(self.now, self.codec)
+        self.next_call = self.link.advance(self.now)
 
     def want(self, *signals):
         for signal in signals:
@@ -141,7 +140,7 @@ def test_a_signal_is_asked_for_once_while_its_answer_is_awaited(wire):
     s = signal()
     wire.want(s)
     wire.want(s)
-    wire.advance(3 * NEXT_REQUEST)
+    wire.advance(3 * PERIOD)
     [(transaction, _)] = wire.asked()
     wire.answer(transaction, bytes.fromhex("04020001"))
     assert len(wire.asked()) == 1  # the second wish
@@ -180,7 +179,7 @@ def test_signals_of_a_unit_share_one_connection_and_are_served_in_order(wire):
 def test_a_slow_unit_gets_the_next_request_after_a_cycle_and_may_answer_in_any_order(wire):
     a, b = signal(address=1, name="a"), signal(address=2, name="b")
     wire.want(a, b)
-    wire.advance(NEXT_REQUEST)
+    wire.advance(PERIOD)
     first, second = (transaction for transaction, _ in wire.asked())
     wire.answer(second, bytes([4, 2, 0, 22]))
     wire.answer(first, bytes([4, 2, 0, 11]))
@@ -197,7 +196,7 @@ def test_in_sequential_mode_it_gets_one_request_at_a_time(wire):
 def test_a_unit_that_is_not_in_a_hurry_never_has_more_than_a_few_requests(wire):
     wire.want(*(signal(address=i, name=str(i)) for i in range(100)))
     for _ in range(40):
-        wire.advance(NEXT_REQUEST)
+        wire.advance(PERIOD)
     assert len(wire.asked()) == MAX_UNDER_WAY
 
 
@@ -250,11 +249,12 @@ def test_own_requests_are_lost_when_nobody_is_there_and_bounded_before():
 
 
 @given(function=st.integers(0, 255), data=st.binary(max_size=252), slave=st.integers(0, 255))
-def test_any_own_request_is_a_frame_that_can_be_read_back(function, data, slave):
-    codec = ModbusCodec()
-    inbox = bytearray(codec.own_request(function, slave, data, 7))
-    frame = codec.take_frame(inbox)
-    assert (frame.slave, frame.pdu, bytes(inbox)) == (slave, bytes([function]) + data, b"")
+def test_any_own_request_is_sent_as_one_frame(function, data, slave):
+    wire = Wire()
+    wire.link.send(slave, function, data)
+    wire.advance()
+    frame = take_frame(wire.sock.sent)
+    assert (frame.unit, frame.pdu, bytes(wire.sock.sent)) == (slave, bytes([function]) + data, b"")
 
 
 # --- units that are not there, break off, or are silent
@@ -369,7 +369,7 @@ def test_an_answer_may_come_in_pieces(wire):
 def test_one_lost_answer_does_not_cost_the_connection(wire):
     a, b = signal(address=1, name="a"), signal(address=2, name="b")
     wire.want(a, b)
-    wire.advance(NEXT_REQUEST)
+    wire.advance(PERIOD)
     (lost, _), (second, _) = wire.asked()
     wire.answer(second, bytes([4, 2, 0, 22]))
     wire.advance(ANSWER_TIMEOUT)
@@ -505,16 +505,3 @@ def test_no_bytes_break_it_and_a_good_unit_is_heard_afterwards(pieces):
         for transaction, _ in wire.asked():
             wire.answer(transaction, bytes.fromhex("040204d2"))
     assert (s.value, s.trouble) == (1234, "")
-
-
-# --- without the library
-
-
-def test_without_the_library_signals_say_so():
-    wire = Wire()
-    s = signal()
-    wire.link.want(s)
-    assert wire.link.advance(0.0, None) == float("inf")
-    wire.link.advance(TOLERANCE + 0.1, None, "pymodbus cannot be loaded: pip install pymodbus")
-    assert not wire.sockets
-    assert s.trouble == "10.0.0.2:502 pymodbus cannot be loaded: pip install pymodbus"

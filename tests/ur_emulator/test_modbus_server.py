@@ -15,7 +15,6 @@ from ur_emulator import ControlBox, cli, rack
 from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, read_coil, read_register
 from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers.modbus.codec import ModbusCodec
 from ur_emulator.servers.modbus.server import MAX_AT_ONCE, MAX_INBOX, ModbusPort
 from ur_emulator.servers.tcp import listener
 from ur_emulator.servers.tcp.listener import Listener
@@ -356,18 +355,10 @@ class FakeConnection:
         self.is_open = False
 
 
-class LoadedLibrary:
-    codec = ModbusCodec()
-    problem = ""
-
-    def start(self, then=None):
-        pass
-
-
 def bare_port():
     bench = Bench()
     commands = []
-    return bench, ModbusPort(bench.controller, commands.append, LoadedLibrary()), commands
+    return bench, ModbusPort(bench.controller, commands.append), commands
 
 
 def test_a_write_is_answered_after_a_cycle_and_not_when_the_last_one_is_shown_again():

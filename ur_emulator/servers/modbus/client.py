@@ -1,6 +1,6 @@
 """The Modbus units that the programs of one box talk to: one connection each, advanced in the loop.
 
-The loop hears of them only while there are any; the library is loaded with the first.
+The loop calls them only while there are any.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from ur_emulator.controller.modbus.signals import UnitAddress
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.network import ScriptSocket
 from ur_emulator.servers.modbus.link import ModbusLink
-from ur_emulator.servers.modbus.loading import CodecLoader
 
 # Connections of which nobody wants anything any more may end in their own time, up to so many of all kinds.
 MAX_LINKS = 320
@@ -22,19 +21,17 @@ MAX_LINKS = 320
 class ModbusClient:
     """All connections to Modbus units of one box."""
 
-    def __init__(
-        self, loop: EventLoop, loader: CodecLoader, connect: Callable[[str, int], ScriptSocket]
-    ) -> None:
-        """Prepare; nothing is connected or loaded before there is a unit.
+    def __init__(self, loop: EventLoop, connect: Callable[[str, int], ScriptSocket], period_s: float) -> None:
+        """Prepare; nothing is connected before there is a unit.
 
         Args:
             loop: advances the connections.
-            loader: of the Modbus library.
             connect: begins to connect to a host and port.
+            period_s: control cycle [s].
         """
         self._loop = loop
-        self._loader = loader
         self._connect = connect
+        self._period = period_s
         self._links: dict[UnitAddress, ModbusLink] = {}
 
     def unit(self, address: UnitAddress) -> ModbusLink:
@@ -42,11 +39,12 @@ class ModbusClient:
         link = self._links.get(address)
         if link is None:
             if not self._links:
-                self._loader.start()
                 self._loop.add(self)
             elif len(self._links) >= MAX_LINKS:
                 self._end_oldest_released()
-            link = self._links[address] = ModbusLink(str(address), partial(self._connect, *address))
+            link = self._links[address] = ModbusLink(
+                str(address), partial(self._connect, *address), self._period
+            )
         link.is_released = False
         return link
 
@@ -54,8 +52,8 @@ class ModbusClient:
         """Advance all connections; end those that nobody needs."""
         next_time = math.inf
         for address, link in tuple(self._links.items()):
-            next_time = min(next_time, link.advance(now, self._loader.codec, self._loader.problem))
-            if link.is_released and (link.is_idle or self._loader.problem):
+            next_time = min(next_time, link.advance(now))
+            if link.is_released and link.is_idle:
                 self._end(address)
         return next_time
 

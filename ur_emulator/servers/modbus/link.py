@@ -11,16 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from protocol.errors import RemoteProtocolError
+from protocol.modbus import ModbusFrame, decode_value, encode_frame, take_frame
 from ur_emulator.controller.modbus.signals import ModbusSignal
 from ur_emulator.scripting.network import ScriptSocket
-from ur_emulator.servers.modbus.messages import Frame
-from ur_emulator.servers.modbus.requests import Request, complaint, request_for, value_of_answer
-
-if TYPE_CHECKING:
-    from ur_emulator.servers.modbus.codec import ModbusCodec
+from ur_emulator.servers.modbus.requests import SentRequest, complaint, request_for
 
 # A signal may be without a valid answer for this long [s].
 TOLERANCE = 2.0
@@ -30,9 +26,7 @@ ANSWER_TIMEOUT = 1.0
 # Wait before the next attempt to connect [s]: doubled each time until one has answered.
 FIRST_RETRY = 0.1
 LAST_RETRY = 2.0
-# A unit that has not answered after one cycle gets the next request all the same [s], up to a number of them,
-# unless it is in sequential mode.
-NEXT_REQUEST = 0.008
+# Requests that a unit may have without an answer, unless it is in sequential mode.
 MAX_UNDER_WAY = 16
 # Answers in a row that nobody waits for, before the connection is given up.
 MAX_STRAYS = 16
@@ -53,15 +47,17 @@ class _Waiting:
 class ModbusLink:
     """One unit's connection (see controller.modbus_signals.ModbusUnit)."""
 
-    def __init__(self, name: str, connect: Callable[[], ScriptSocket]) -> None:
+    def __init__(self, name: str, connect: Callable[[], ScriptSocket], period_s: float) -> None:
         """Prepare; nothing is connected before something is wanted.
 
         Args:
             name: address for messages.
             connect: begins to connect.
+            period_s: control cycle [s]; a unit that does not answer gets the next request after one.
         """
         self._name = name
         self._connect = connect
+        self._period = period_s
         self._socket: ScriptSocket | None = None
         self._connect_by = math.inf
         self._retry_at = -math.inf
@@ -70,8 +66,8 @@ class ModbusLink:
         self._wanted: dict[ModbusSignal, None] = {}
         self._waiting: dict[ModbusSignal, _Waiting] = {}
         self._signals: set[ModbusSignal] = set()
-        self._own_requests: list[tuple[int, int, bytes]] = []
-        self._under_way: dict[int, Request] = {}
+        self._own_requests: list[tuple[int, bytes]] = []
+        self._under_way: dict[int, SentRequest] = {}
         self._transaction = 0
         self._heard_at = -math.inf
         self._strays = 0
@@ -98,7 +94,7 @@ class ModbusLink:
         """Send a request whose answer nobody reads."""
         self.is_released = False
         if len(self._own_requests) < MAX_OWN_REQUESTS:
-            self._own_requests.append((slave, function_code, data))
+            self._own_requests.append((slave, bytes((function_code,)) + data))
 
     def release(self) -> None:
         """Close once what was sent is answered."""
@@ -118,7 +114,7 @@ class ModbusLink:
 
     # --- the loop
 
-    def advance(self, now: float, codec: ModbusCodec | None, problem: str = "") -> float:
+    def advance(self, now: float) -> float:
         """Do what can be done at `now` [s]; return when to be called next, if nothing comes before.
 
         Args:
@@ -129,15 +125,11 @@ class ModbusLink:
         for signal in self._wanted:
             if signal not in self._waiting:
                 self._waiting[signal] = _Waiting(now)
-        if codec is None:
-            self._why = problem or self._why
-            self._look_for_trouble(now)
-            return math.inf
         if self._socket is not None:
-            self._receive(codec, self._socket.inbox, now)
+            self._receive(self._socket.inbox, now)
         if self._is_connected(now):
             self._give_up_silent(now)
-            self._ask(codec, now)
+            self._ask(now)
         self._look_for_trouble(now)
         return self._next_time(now)
 
@@ -179,14 +171,14 @@ class ModbusLink:
 
     # --- answers
 
-    def _receive(self, codec: ModbusCodec, inbox: bytearray, now: float) -> None:
+    def _receive(self, inbox: bytearray, now: float) -> None:
         try:
-            while self._socket is not None and (frame := codec.take_frame(inbox)) is not None:
-                self._take(codec, frame, now)
+            while self._socket is not None and (frame := take_frame(inbox)) is not None:
+                self._take(frame, now)
         except RemoteProtocolError:
             self._fail(now, "sends what is no Modbus")
 
-    def _take(self, codec: ModbusCodec, frame: Frame, now: float) -> None:
+    def _take(self, frame: ModbusFrame, now: float) -> None:
         request = self._under_way.pop(frame.transaction, None)
         if request is None:
             self._strays += 1
@@ -199,9 +191,9 @@ class ModbusLink:
         signal = request.signal
         if signal is None:
             return
-        value = value_of_answer(codec, frame.pdu, signal, request)
+        value = decode_value(request.pdu, frame.pdu)
         if value is None:
-            self._waiting[signal].why = complaint(frame.pdu, request.function)
+            self._waiting[signal].why = complaint(frame.pdu, request.pdu)
             return
         signal.trouble = ""
         if signal in self._wanted:
@@ -226,32 +218,31 @@ class ModbusLink:
 
     # --- requests
 
-    def _ask(self, codec: ModbusCodec, now: float) -> None:
+    def _ask(self, now: float) -> None:
         """Send the next request, if the unit is to get one."""
         sock = self._socket
         while sock is not None and self._may_ask(now):
             if self._own_requests:
-                transaction = self._next()
-                slave, function, data = self._own_requests.pop(0)
-                request = Request(None, function, None, now)
-                frame = codec.own_request(function, slave, data, transaction)
+                unit, pdu = self._own_requests.pop(0)
+                request = SentRequest(None, pdu, now)
             else:
                 busy = {request.signal for request in self._under_way.values()}
                 signal = next((s for s in self._wanted if s not in busy), None)
                 if signal is None:
                     return
                 del self._wanted[signal]
-                transaction = self._next()
-                request, frame = request_for(codec, signal, transaction, now)
+                unit, request = signal.slave, SentRequest(signal, request_for(signal), now)
+            transaction = self._next()
             self._under_way[transaction] = request
-            sock.send(frame)  # a connection that breaks here is seen in the next round
+            # A connection that breaks here is noticed in the next round.
+            sock.send(encode_frame(transaction, unit, request.pdu))
 
     def _may_ask(self, now: float) -> bool:
         if not self._under_way:
             return True
         if len(self._under_way) >= MAX_UNDER_WAY or any(signal.sequential for signal in self._signals):
             return False
-        return now >= max(request.sent_at for request in self._under_way.values()) + NEXT_REQUEST
+        return now >= max(request.sent_at for request in self._under_way.values()) + self._period
 
     def _next(self) -> int:
         """Return a transaction number that is not under way."""
@@ -273,5 +264,5 @@ class ModbusLink:
         times = [self._connect_by]
         times += [request.sent_at + ANSWER_TIMEOUT for request in self._under_way.values()]
         if self._wanted or self._own_requests:
-            times.append(now + NEXT_REQUEST)
+            times.append(now + self._period)
         return min(times)

@@ -10,21 +10,26 @@ Source: UR "Modbus server" article (protocol notes, section 9); exceptions: Modb
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from protocol.errors import RemoteProtocolError
+from protocol.modbus import (
+    ExceptionCode,
+    ModbusFrame,
+    ModbusRequest,
+    ModbusRequestError,
+    decode_request,
+    encode_answer,
+    encode_exception,
+    encode_frame,
+    take_frame,
+)
 from ur_emulator.commands.client_writes import WriteModbus
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.modbus.robot_map import PortAddressError, can_write, read_coil, read_register
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.servers.modbus.loading import CodecLoader
-from ur_emulator.servers.modbus.messages import ILLEGAL_ADDRESS, Frame, MapRequest, RefusedError
 from ur_emulator.servers.tcp.connection import Connection
-
-if TYPE_CHECKING:
-    from ur_emulator.servers.modbus.codec import ModbusCodec
 
 # Requests of one client that are answered in one go; the rest waits for the next cycle.
 MAX_AT_ONCE = 32
@@ -35,19 +40,15 @@ MAX_INBOX = 16 * 1024
 class ModbusPort:
     """Answers Modbus requests."""
 
-    def __init__(
-        self, controller: Controller, submit: Callable[[Command], None], loader: CodecLoader
-    ) -> None:
+    def __init__(self, controller: Controller, submit: Callable[[Command], None]) -> None:
         """Prepare for clients.
 
         Args:
             controller: whose state is read.
             submit: takes a command for the next cycle.
-            loader: of the Modbus library; asked for it when the first client comes.
         """
         self._controller = controller
         self._submit = submit
-        self._loader = loader
         self._sessions: dict[Connection, _Session] = {}
         self._unfinished: dict[_Session, None] = {}
 
@@ -58,7 +59,6 @@ class ModbusPort:
 
     def opened(self, connection: Connection) -> None:
         """The client speaks first."""
-        self._loader.start(self._serve_all)
         self._sessions[connection] = _Session(connection)
 
     def received(self, connection: Connection, data: bytes) -> None:
@@ -90,51 +90,47 @@ class ModbusPort:
 
     # --- requests
 
-    def _serve_all(self) -> None:
-        for session in tuple(self._sessions.values()):
-            self._serve(session)
-
     def _serve(self, session: _Session) -> None:
         """Answer what can be answered now."""
-        codec = self._loader.codec
-        if codec is None:
-            if self._loader.problem:
-                session.connection.close()
-            return
         self._unfinished.pop(session, None)
         try:
             for _ in range(MAX_AT_ONCE):
                 if session.answer is not None or not session.connection.is_open:
                     break
-                frame = codec.take_frame(session.inbox)
+                frame = take_frame(session.inbox)
                 if frame is None:
                     return
-                self._answer(codec, session, frame)
+                self._answer(session, frame)
         except RemoteProtocolError:
             session.connection.close()
         if session.connection.is_open:
             self._unfinished[session] = None
 
-    def _answer(self, codec: ModbusCodec, session: _Session, frame: Frame) -> None:
+    def _answer(self, session: _Session, frame: ModbusFrame) -> None:
         try:
-            request = codec.request(frame.pdu)
-            if not request.values:
-                self._send(session, codec.values(frame, self._read(request)))
+            request = decode_request(frame.pdu)
+            if request.function.is_read:
+                pdu = encode_answer(request, self._read(request))
+            else:
+                self._write(request)
+                session.answer = encode_frame(frame.transaction, frame.unit, encode_answer(request))
+                session.written_at = self._controller.snapshot.tick
                 return
-            if not all(can_write(request.is_coils, address) for address in request.addresses):
-                raise RefusedError(ILLEGAL_ADDRESS)
         except PortAddressError:
-            self._send(session, codec.refusal(frame, ILLEGAL_ADDRESS))
-        except RefusedError as refusal:
-            self._send(session, codec.refusal(frame, refusal.code))
-        else:
-            self._submit(WriteModbus(request.is_coils, request.first, request.values))
-            session.answer = codec.confirmation(frame, request)
-            session.written_at = self._controller.snapshot.tick
+            pdu = encode_exception(frame.pdu[0], ExceptionCode.ILLEGAL_DATA_ADDRESS)
+        except ModbusRequestError as error:
+            pdu = encode_exception(frame.pdu[0], error.code)
+        self._send(session, encode_frame(frame.transaction, frame.unit, pdu))
 
-    def _read(self, request: MapRequest) -> list[int]:
-        state, read = self._controller.state, read_coil if request.is_coils else read_register
-        return [int(read(state, address)) for address in request.addresses]
+    def _read(self, request: ModbusRequest) -> list[int]:
+        state, read = self._controller.state, read_coil if request.function.is_bits else read_register
+        return [int(read(state, request.address + i)) for i in range(request.count)]
+
+    def _write(self, request: ModbusRequest) -> None:
+        is_bits, first = request.function.is_bits, request.address
+        if not all(can_write(is_bits, first + i) for i in range(request.count)):
+            raise ModbusRequestError(ExceptionCode.ILLEGAL_DATA_ADDRESS)
+        self._submit(WriteModbus(is_bits, first, request.values))
 
     def _send(self, session: _Session, answer: bytes) -> None:
         if not session.connection.send(answer):

@@ -12,7 +12,6 @@ from ur_emulator.controller.modbus.signals import UnitAddress
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.modbus.client import ModbusClient
 from ur_emulator.servers.modbus.link import ModbusLink
-from ur_emulator.servers.modbus.loading import CodecLoader
 from ur_emulator.servers.scripts.xmlrpc_client import XmlRpcServer
 
 _READ_SIZE = 64 * 1024
@@ -186,19 +185,19 @@ def _can_call_from(own: str, address: str) -> bool:
 class LoopNetwork:
     """Opens script sockets in a loop."""
 
-    def __init__(self, loop: EventLoop, loader: CodecLoader | None = None, own_address: str = "") -> None:
-        """Prepare; nothing is opened or loaded.
+    def __init__(self, loop: EventLoop, period_s: float, own_address: str = "") -> None:
+        """Prepare; nothing is opened.
 
         Args:
             loop: watches the sockets.
-            loader: of the Modbus library, if it is shared with others.
+            period_s: control cycle [s].
             own_address: of the box. A robot calls from the address at which it is called, and clients that
                 listen for it check that.
         """
         self._loop = loop
         self._own_address = own_address
         self._sockets: WeakSet[LoopSocket] = WeakSet()
-        self._modbus = ModbusClient(loop, loader or CodecLoader(loop), self.open)
+        self._modbus = ModbusClient(loop, self.open, period_s)
 
     def open(self, host: str, port: int) -> LoopSocket:
         """Begin to connect to `host`:`port`."""

@@ -1,0 +1,281 @@
+"""Modbus TCP: frames, the requests of functions 1 to 6, 15 and 16, their answers, and exceptions.
+
+    frame: u16 transaction | u16 protocol = 0 | u16 length of what follows | u8 unit | PDU       big-endian
+    PDU:   u8 function code | data, at most 253 bytes together
+
+| function              | request                          | answer                   |
+|-----------------------|----------------------------------|--------------------------|
+| 1, 2 read bits        | u16 address, u16 count           | u8 size, 8 bits a byte   |
+| 3, 4 read registers   | u16 address, u16 count           | u8 size, u16 values      |
+| 5 write a bit         | u16 address, u16 0xFF00 or 0     | the request              |
+| 6 write a register    | u16 address, u16 value           | the request              |
+| 15, 16 write several  | u16 address, u16 count, u8 size, values | u16 address, u16 count |
+| an exception          |                                  | code of the function + 0x80, u8 exception code |
+
+Sources: Modbus application protocol V1.1b3, sections 4.1, 6 and 7; Modbus messaging on TCP/IP V1.0b,
+section 3.1.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+from protocol.errors import RemoteProtocolError
+
+__all__ = [
+    "EXCEPTION_BIT",
+    "ExceptionCode",
+    "ModbusFrame",
+    "ModbusFunction",
+    "ModbusRequest",
+    "ModbusRequestError",
+    "decode_request",
+    "decode_value",
+    "encode_answer",
+    "encode_exception",
+    "encode_frame",
+    "encode_read",
+    "encode_write",
+    "take_frame",
+]
+
+EXCEPTION_BIT = 0x80
+"""Set in the function code of an answer that is an exception."""
+
+_HEADER = struct.Struct(">HHH")
+_MIN_LENGTH, _MAX_LENGTH = 2, 254
+"""What the length field may say: unit and function code at least."""
+_SHORT = struct.Struct(">BHH")
+_ON = 0xFF00
+_ADDRESSES = 0x10000
+
+
+class ModbusFunction(IntEnum):
+    """Function codes."""
+
+    READ_COILS = 1
+    READ_DISCRETE_INPUTS = 2
+    READ_HOLDING_REGISTERS = 3
+    READ_INPUT_REGISTERS = 4
+    WRITE_COIL = 5
+    WRITE_REGISTER = 6
+    WRITE_COILS = 15
+    WRITE_REGISTERS = 16
+
+    @property
+    def is_bits(self) -> bool:
+        """Whether it is about bits; otherwise about registers."""
+        return self in _BIT_FUNCTIONS
+
+    @property
+    def is_read(self) -> bool:
+        """Whether it reads."""
+        return self <= ModbusFunction.READ_INPUT_REGISTERS
+
+    @property
+    def is_single_write(self) -> bool:
+        """Whether it writes one address; the answer repeats the request."""
+        return self in (ModbusFunction.WRITE_COIL, ModbusFunction.WRITE_REGISTER)
+
+    @property
+    def max_count(self) -> int:
+        """Most addresses of one request."""
+        return _MAX_COUNTS[self]
+
+    def size(self, count: int) -> int:
+        """Return the number of bytes of `count` values."""
+        return (count + 7) // 8 if self.is_bits else 2 * count
+
+
+_BIT_FUNCTIONS = frozenset({1, 2, 5, 15})
+_MAX_COUNTS = {1: 2000, 2: 2000, 3: 125, 4: 125, 5: 1, 6: 1, 15: 0x7B0, 16: 0x7B}
+
+
+class ExceptionCode(IntEnum):
+    """Why a request is refused."""
+
+    ILLEGAL_FUNCTION = 1
+    ILLEGAL_DATA_ADDRESS = 2
+    ILLEGAL_DATA_VALUE = 3
+    SLAVE_DEVICE_FAILURE = 4
+    ACKNOWLEDGE = 5
+    SLAVE_DEVICE_BUSY = 6
+
+
+class ModbusRequestError(Exception):
+    """A request that is answered with an exception.
+
+    Attributes:
+        code: of the exception.
+    """
+
+    def __init__(self, code: ExceptionCode) -> None:
+        super().__init__(f"Modbus exception {code.value}: {code.name}")
+        self.code = code
+
+
+class ModbusFrame(NamedTuple):
+    """One frame.
+
+    Attributes:
+        transaction: number by which request and answer find each other, 0 to 65535.
+        unit: number of the unit behind the address, 0 to 255.
+        pdu: function code and data, 1 to 253 bytes.
+    """
+
+    transaction: int
+    unit: int
+    pdu: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class ModbusRequest:
+    """A request to read or write neighbouring addresses.
+
+    Attributes:
+        function: what to do.
+        address: the lowest one.
+        count: how many addresses, at least one; none is above 65535.
+        values: what to write, 0 or 1 for a bit; empty for a read.
+    """
+
+    function: ModbusFunction
+    address: int
+    count: int
+    values: tuple[int, ...] = ()
+
+
+def encode_frame(transaction: int, unit: int, pdu: bytes) -> bytes:
+    """Return the bytes of a frame."""
+    return _HEADER.pack(transaction, 0, 1 + len(pdu)) + bytes((unit,)) + pdu
+
+
+def take_frame(inbox: bytearray) -> ModbusFrame | None:
+    """Take the first frame out of received bytes; None while it is not complete.
+
+    Raises:
+        RemoteProtocolError: the bytes are not Modbus TCP; the next frame cannot be found.
+    """
+    if len(inbox) < _HEADER.size:
+        return None
+    transaction, protocol, length = _HEADER.unpack_from(inbox)
+    if protocol or not _MIN_LENGTH <= length <= _MAX_LENGTH:
+        raise RemoteProtocolError(
+            f"Modbus header with protocol {protocol} and length {length}: allowed are protocol 0 and "
+            f"lengths from {_MIN_LENGTH} to {_MAX_LENGTH}"
+        )
+    end = _HEADER.size + length
+    if len(inbox) < end:
+        return None
+    unit, pdu = inbox[_HEADER.size], bytes(inbox[_HEADER.size + 1 : end])
+    del inbox[:end]
+    return ModbusFrame(transaction, unit, pdu)
+
+
+# --- PDUs of a client
+
+
+def encode_read(function: ModbusFunction, address: int) -> bytes:
+    """Return the request that reads one address."""
+    return _SHORT.pack(function, address, 1)
+
+
+def encode_write(function: ModbusFunction, address: int, value: int) -> bytes:
+    """Return the request that writes one bit (function 5) or register (function 6)."""
+    return _SHORT.pack(function, address, _ON * bool(value) if function.is_bits else value)
+
+
+def decode_value(request: bytes, answer: bytes) -> int | None:
+    """Return the value that an answer reads or confirms; None if it does not answer the request.
+
+    Args:
+        request: made by `encode_read` or `encode_write`.
+        answer: PDU of the frame with the same transaction.
+    """
+    function = ModbusFunction(request[0])
+    if not function.is_read:
+        if answer != request:
+            return None
+        word = int.from_bytes(answer[3:], "big")
+        return int(word == _ON) if function.is_bits else word
+    size = function.size(1)
+    if answer[:2] != bytes((function, size)) or len(answer) != 2 + size:
+        return None
+    word = int.from_bytes(answer[2:], "big")
+    return word & 1 if function.is_bits else word
+
+
+# --- PDUs of a server
+
+
+def decode_request(pdu: bytes) -> ModbusRequest:
+    """Return a request decoded.
+
+    Raises:
+        ModbusRequestError: the function is unknown, or count, sizes, values or addresses are not allowed.
+    """
+    try:
+        function = ModbusFunction(pdu[0])
+    except ValueError:
+        raise ModbusRequestError(ExceptionCode.ILLEGAL_FUNCTION) from None
+    if len(pdu) < _SHORT.size:
+        raise ModbusRequestError(ExceptionCode.ILLEGAL_DATA_VALUE)
+    _, address, word = _SHORT.unpack_from(pdu)
+    data = pdu[_SHORT.size :]
+    count = 1 if function.is_single_write else word
+    size = 0 if function.is_read or function.is_single_write else 1 + function.size(count)
+    if (
+        not 1 <= count <= function.max_count
+        or len(data) != size
+        or (size and data[0] != size - 1)
+        or (function is ModbusFunction.WRITE_COIL and word not in (0, _ON))
+    ):
+        raise ModbusRequestError(ExceptionCode.ILLEGAL_DATA_VALUE)
+    if address + count > _ADDRESSES:
+        raise ModbusRequestError(ExceptionCode.ILLEGAL_DATA_ADDRESS)
+    return ModbusRequest(function, address, count, _written(function, word, count, data[1:]))
+
+
+def _written(function: ModbusFunction, word: int, count: int, data: bytes) -> tuple[int, ...]:
+    """Return the values that a request writes."""
+    match function:
+        case ModbusFunction.WRITE_COIL:
+            return (int(word == _ON),)
+        case ModbusFunction.WRITE_REGISTER:
+            return (word,)
+        case ModbusFunction.WRITE_COILS:
+            bits = int.from_bytes(data, "little")
+            return tuple(bits >> i & 1 for i in range(count))
+        case ModbusFunction.WRITE_REGISTERS:
+            return struct.unpack(f">{count}H", data)
+        case _:
+            return ()
+
+
+def encode_answer(request: ModbusRequest, values: Sequence[int] = ()) -> bytes:
+    """Return the answer to a request that was done.
+
+    Args:
+        request: what was asked.
+        values: what was read, one for each address; unused for a write.
+    """
+    function = request.function
+    if function.is_single_write:
+        return encode_write(function, request.address, request.values[0])
+    if not function.is_read:
+        return _SHORT.pack(function, request.address, request.count)
+    size = function.size(request.count)
+    if function.is_bits:
+        data = sum(bool(value) << i for i, value in enumerate(values)).to_bytes(size, "little")
+    else:
+        data = struct.pack(f">{request.count}H", *values)
+    return bytes((function, size)) + data
+
+
+def encode_exception(function: int, code: ExceptionCode) -> bytes:
+    """Return the answer that refuses a request; `function` is the code as it came."""
+    return bytes((function | EXCEPTION_BIT, code))
