@@ -18,8 +18,7 @@ from array import array
 
 import numpy as np
 
-from protocol.dashboard.connection import Role
-from protocol.rtde.connection import RtdeConnection
+from protocol.rtde.client_connection import RtdeClientConnection
 from protocol.rtde.messages import Request, RequestProtocolVersion, SetupOutputs, Start
 
 PERIOD = 0.008  # s
@@ -49,7 +48,7 @@ class Stream:
         """Connect; an RTDE client sets itself up."""
         self.sock = socket.create_connection((host, port), timeout=10.0)
         if kind == "rtde":
-            connection = RtdeConnection(Role.PC)
+            connection = RtdeClientConnection()
             for request in (RequestProtocolVersion(2), SetupOutputs(RECIPE, 125.0), Start()):
                 self._ask(connection, request)
         self.sock.setblocking(False)
@@ -75,7 +74,7 @@ class Stream:
             buffer[: filled - at] = buffer[at:filled]
         self._filled = filled - at
 
-    def _ask(self, connection: RtdeConnection, request: Request) -> None:
+    def _ask(self, connection: RtdeClientConnection, request: Request) -> None:
         self.sock.sendall(connection.send(request))
         while connection.next_event() is None:
             connection.receive_data(self.sock.recv(4096))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import mujoco
-from urscript.parser import prepare
 
 from bench.limit import STEPS, best_of
 from ur_emulator.commands.programs import StartProgram
@@ -11,6 +10,7 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from urscript import compile_program
+from urscript.syntax.parser import prepare
 
 ROUNDS = 10
 WARM_UP = 200  # cycles

@@ -10,7 +10,6 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from protocol.dashboard.connection import Role
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.layout import NO_TIME
@@ -24,8 +23,8 @@ from protocol.primary.packages import (
 )
 from protocol.primary.values import TypedValue
 from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
-from protocol.rtde.codec import HEADER_SIZE, decode_message
-from protocol.rtde.messages import DataPackage, RequestProtocolVersionReply, SetupOutputsReply
+from protocol.rtde.codec import HEADER_SIZE, MAX_SIZE, decode_message, take_package
+from protocol.rtde.messages import DataPackage, RequestProtocolVersionReply, Role, SetupOutputsReply
 from protocol.rtde.recipe import Recipe
 from protocol.rtde.types import REFUSALS, RtdeType
 from protocol.ur_types import SoftwareVersion
@@ -133,16 +132,9 @@ class RtdeDecoder:
             RemoteProtocolError: the bytes are not those of a robot's RTDE port.
         """
         self._buffer += data
-        while len(self._buffer) >= HEADER_SIZE:
-            size, kind = int.from_bytes(self._buffer[:2], "big"), self._buffer[2]
-            if size < HEADER_SIZE:
-                raise RemoteProtocolError(
-                    f"an RTDE package of {size} bytes: at least {HEADER_SIZE} are possible"
-                )
-            if len(self._buffer) < size:
-                return
-            payload = bytes(self._buffer[HEADER_SIZE:size])
-            del self._buffer[:size]
+        while (package := take_package(self._buffer, MAX_SIZE)) is not None:
+            kind, payload = package
+            size = HEADER_SIZE + len(payload)
             self.count += 1
             yield from self._package(kind, payload, size)
             self._position += size

@@ -9,10 +9,9 @@ import socket
 from collections.abc import Iterator
 
 from protocol.capture import RtdeDecoder, StreamDecoder
-from protocol.dashboard.connection import Role
 from protocol.errors import LocalProtocolError
 from protocol.rtde.codec import encode_message
-from protocol.rtde.messages import Request, RequestProtocolVersion, SetupOutputs, Start
+from protocol.rtde.messages import Request, RequestProtocolVersion, Role, SetupOutputs, Start
 from protocol.ur_types import Ports
 
 __all__ = ["INTERFACES", "watch"]

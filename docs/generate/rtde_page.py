@@ -5,16 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from itertools import groupby
+from types import SimpleNamespace
 
 from docs.generate.page_parts import MARKS, example, table
 from protocol.capture import RtdeDecoder
-from protocol.dashboard.connection import Role
-from protocol.rtde.codec import MAX_NAMES_SIZE, data_header
-from protocol.rtde.connection import MAX_REQUEST_SIZE, RtdeConnection
+from protocol.rtde.client_connection import RtdeClientConnection
+from protocol.rtde.codec import MAX_NAMES_SIZE
 from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField
-from protocol.rtde.messages import PackageType, Request, RequestProtocolVersion, SetupOutputs, Start
-from protocol.rtde.recipe import Recipe
-from protocol.rtde.types import RobotStatusBits, RtdeType, SafetyStatusBits
+from protocol.rtde.messages import Request, RequestProtocolVersion, RtdePackageType, SetupOutputs, Start
+from protocol.rtde.server_connection import MAX_REQUEST_SIZE, RtdeServerConnection
+from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import SoftwareVersion
 
 _INTRODUCTION = f"""\
@@ -52,7 +52,7 @@ begins in protocol version 1; `V` asks for version 2, which every client of toda
 * A program may watch that an input is written often enough (`rtde_set_watchdog`), and may take
   `external_force_torque` in place of the estimated force (`enable_external_ft_sensor`).
 """
-assert {chr(kind) for kind in PackageType} == set("VvOISPUM")
+assert {chr(kind) for kind in RtdePackageType} == set("VvOISPUM")
 
 _OUTPUTS = """\
 ## Outputs
@@ -125,8 +125,7 @@ def _bits(name: str, bits: type[RobotStatusBits] | type[SafetyStatusBits]) -> It
 def _example() -> str:
     """A session as `decode` prints it; the robot's side is our own."""
     names = ("timestamp", "actual_q", "safety_status")
-    recipe = Recipe(names, (RtdeType.DOUBLE, RtdeType.VECTOR6D, RtdeType.INT32))
-    pc, robot = RtdeConnection(Role.PC), RtdeConnection(Role.ROBOT, SoftwareVersion(3, 15, 8))
+    pc, robot = RtdeClientConnection(), RtdeServerConnection(SoftwareVersion(3, 15, 8))
     requests: tuple[Request, ...] = (RequestProtocolVersion(2), SetupOutputs(names, 10.0), Start())
     sent = b""
     for request in requests:
@@ -136,7 +135,8 @@ def _example() -> str:
         pc.receive_data(reply)
         pc.next_event()
         sent += reply
-    sent += data_header(recipe.size, 1)
-    sent += recipe.encode((63.536, (0.3944052, -1.7645076, -2.0996064, -0.1029924, 1.295028, 1.857006), 1))
+    assert robot.encoder is not None
+    actual_q = (0.3944052, -1.7645076, -2.0996064, -0.1029924, 1.295028, 1.857006)
+    sent += robot.encoder(SimpleNamespace(timestamp=63.536, actual_q=actual_q, safety_status=1))
     command = f"python -m protocol decode rtde --live 127.0.0.1 --names {','.join(names)}"
     return example(command, RtdeDecoder(names).feed(sent))

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError
-from protocol.dashboard.connection import Role
 from protocol.errors import RemoteProtocolError
-from protocol.rtde.connection import DataReceived, RtdeConnection, RtdeEvent
+from protocol.rtde.client_connection import ClientEvent, DataReceived, RtdeClientConnection
 from protocol.rtde.messages import (
     RequestProtocolVersion,
     RequestProtocolVersionReply,
+    RtdeTextMessage,
     SetupOutputs,
     SetupOutputsReply,
     Start,
     StartReply,
-    TextMessage,
 )
 from protocol.rtde.types import REFUSALS, RtdeValue
 
@@ -68,14 +67,14 @@ class _Events:
     def __init__(self, connection: Transport, network: Network) -> None:
         self._connection = connection
         self._network = network
-        self._rtde = RtdeConnection(Role.PC)
+        self._rtde = RtdeClientConnection()
 
-    def reply(self, request: RequestProtocolVersion | SetupOutputs | Start) -> RtdeEvent:
+    def reply(self, request: RequestProtocolVersion | SetupOutputs | Start) -> ClientEvent:
         """Ask, and wait for the answer."""
         self._connection.send(self._rtde.send(request))
         return self.next()
 
-    def next(self) -> RtdeEvent:
+    def next(self) -> ClientEvent:
         """The next package; texts for the log are passed over.
 
         Raises:
@@ -85,7 +84,7 @@ class _Events:
         deadline = self._network.now() + REPLY_TIMEOUT
         while True:
             event = self._rtde.next_event()
-            if event is not None and not isinstance(event, TextMessage):
+            if event is not None and not isinstance(event, RtdeTextMessage):
                 return event
             if event is None:
                 data = self._connection.receive(REPLY_TIMEOUT)

@@ -1,1 +1,1 @@
-"""Port 29999: the dashboard server's commands, both ends of its line protocol, its replies."""
+"""Port 29999: the dashboard server's commands, the robot's side of its line protocol."""

@@ -14,32 +14,43 @@ import struct
 from collections.abc import Callable
 from typing import TypeAlias
 
-from protocol.dashboard.connection import Role
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde.messages import (
     DataPackage,
     GetControllerVersion,
     GetControllerVersionReply,
     Message,
-    PackageType,
     Pause,
     PauseReply,
     RequestProtocolVersion,
     RequestProtocolVersionReply,
+    Role,
+    RtdePackageType,
+    RtdeTextMessage,
     SetupInputs,
     SetupInputsReply,
     SetupOutputs,
     SetupOutputsReply,
     Start,
     StartReply,
-    TextMessage,
 )
 from protocol.ur_types import SoftwareVersion
 
-__all__ = ["HEADER_SIZE", "MAX_NAMES_SIZE", "data_header", "decode_message", "encode_message"]
+__all__ = [
+    "HEADER_SIZE",
+    "MAX_NAMES_SIZE",
+    "MAX_SIZE",
+    "data_header",
+    "decode_message",
+    "encode_message",
+    "take_package",
+]
 
 _HEADER = struct.Struct(">HB")
 HEADER_SIZE = _HEADER.size
+
+MAX_SIZE = 0xFFFF
+"""Largest package in bytes that the header can announce."""
 
 MAX_NAMES_SIZE = 2048
 """Longest list of names in bytes. Source: UR RTDE guide."""
@@ -69,53 +80,53 @@ def encode_message(message: Message, sender: Role, version: int) -> bytes:
 def data_header(size: int, recipe_id: int | None) -> bytes:
     """What stands before `size` bytes of values in a data package."""
     tail = b"" if recipe_id is None else bytes((recipe_id,))
-    return _HEADER.pack(HEADER_SIZE + len(tail) + size, PackageType.DATA_PACKAGE) + tail
+    return _HEADER.pack(HEADER_SIZE + len(tail) + size, RtdePackageType.DATA_PACKAGE) + tail
 
 
-def _encode_payload(message: Message, sender: Role, version: int) -> tuple[PackageType, bytes]:
+def _encode_payload(message: Message, sender: Role, version: int) -> tuple[RtdePackageType, bytes]:
     match message:
         case RequestProtocolVersion(wanted):
-            return PackageType.REQUEST_PROTOCOL_VERSION, struct.pack(">H", wanted)
+            return RtdePackageType.REQUEST_PROTOCOL_VERSION, struct.pack(">H", wanted)
         case RequestProtocolVersionReply(accepted):
-            return PackageType.REQUEST_PROTOCOL_VERSION, bytes((accepted,))
+            return RtdePackageType.REQUEST_PROTOCOL_VERSION, bytes((accepted,))
         case GetControllerVersion():
-            return PackageType.GET_CONTROLLER_VERSION, b""
+            return RtdePackageType.GET_CONTROLLER_VERSION, b""
         case GetControllerVersionReply(software):
-            return PackageType.GET_CONTROLLER_VERSION, struct.pack(">4I", *software)
+            return RtdePackageType.GET_CONTROLLER_VERSION, struct.pack(">4I", *software)
         case SetupOutputs(names, frequency):
             if (frequency is None) is not (version == 1):
                 raise LocalProtocolError(
                     f"frequency {frequency} given: version 1 takes none, version 2 needs one"
                 )
             head = b"" if frequency is None else struct.pack(">d", frequency)
-            return PackageType.SETUP_OUTPUTS, head + _encode_names(names)
+            return RtdePackageType.SETUP_OUTPUTS, head + _encode_names(names)
         case SetupOutputsReply(types, recipe_id):
             if (recipe_id is None) is not (version == 1):
                 raise LocalProtocolError(
                     f"recipe id {recipe_id} given: version 1 takes none, version 2 needs one"
                 )
             head = b"" if recipe_id is None else struct.pack(">B", recipe_id)
-            return PackageType.SETUP_OUTPUTS, head + _encode_words(types)
+            return RtdePackageType.SETUP_OUTPUTS, head + _encode_words(types)
         case SetupInputs(names):
-            return PackageType.SETUP_INPUTS, _encode_names(names)
+            return RtdePackageType.SETUP_INPUTS, _encode_names(names)
         case SetupInputsReply(types, recipe_id):
-            return PackageType.SETUP_INPUTS, struct.pack(">B", recipe_id) + _encode_words(types)
+            return RtdePackageType.SETUP_INPUTS, struct.pack(">B", recipe_id) + _encode_words(types)
         case Start():
-            return PackageType.START, b""
+            return RtdePackageType.START, b""
         case StartReply(accepted):
-            return PackageType.START, bytes((accepted,))
+            return RtdePackageType.START, bytes((accepted,))
         case Pause():
-            return PackageType.PAUSE, b""
+            return RtdePackageType.PAUSE, b""
         case PauseReply(accepted):
-            return PackageType.PAUSE, bytes((accepted,))
+            return RtdePackageType.PAUSE, bytes((accepted,))
         case DataPackage(values, recipe_id):
             head = b"" if recipe_id is None else struct.pack(">B", recipe_id)
-            return PackageType.DATA_PACKAGE, head + values
-        case TextMessage():
-            return PackageType.TEXT_MESSAGE, _encode_text(message, sender, version)
+            return RtdePackageType.DATA_PACKAGE, head + values
+        case RtdeTextMessage():
+            return RtdePackageType.TEXT_MESSAGE, _encode_text(message, sender, version)
 
 
-def _encode_text(message: TextMessage, sender: Role, version: int) -> bytes:
+def _encode_text(message: RtdeTextMessage, sender: Role, version: int) -> bytes:
     text = message.message.encode("latin-1", "replace")
     level = struct.pack(">B", message.level)
     if version == 1:
@@ -142,6 +153,27 @@ def _encode_names(names: tuple[str, ...]) -> bytes:
 
 
 # --- decoding
+
+
+def take_package(buffer: bytearray, max_size: int) -> tuple[int, bytes] | None:
+    """Remove the first package from received bytes: its type byte and payload, or None if it is not whole.
+
+    Raises:
+        RemoteProtocolError: the header announces less than itself or more than `max_size` bytes.
+    """
+    if len(buffer) < 2:
+        return None
+    size = int.from_bytes(buffer[:2], "big")
+    if not HEADER_SIZE <= size <= max_size:
+        raise RemoteProtocolError(
+            f"an RTDE package of {size} bytes: at least {HEADER_SIZE}, at most {max_size}, are possible; "
+            "not RTDE, or the package boundary is lost"
+        )
+    if len(buffer) < size:
+        return None
+    package = buffer[2], bytes(buffer[HEADER_SIZE:size])
+    del buffer[:size]
+    return package
 
 
 def decode_message(kind: int, payload: bytes, sender: Role, version: int) -> Message | None:
@@ -194,20 +226,20 @@ def _decode_robot_data(payload: bytes, version: int) -> DataPackage:
     return DataPackage(payload) if version == 1 else DataPackage(payload[1:], payload[0])
 
 
-def _decode_pc_text(payload: bytes, version: int) -> TextMessage:
-    return TextMessage(payload.decode("latin-1")) if version == 1 else _decode_text(payload)
+def _decode_pc_text(payload: bytes, version: int) -> RtdeTextMessage:
+    return RtdeTextMessage(payload.decode("latin-1")) if version == 1 else _decode_text(payload)
 
 
-def _decode_robot_text(payload: bytes, version: int) -> TextMessage:
+def _decode_robot_text(payload: bytes, version: int) -> RtdeTextMessage:
     if version == 1:
-        return TextMessage(payload[1:].decode("latin-1"), level=payload[0])
+        return RtdeTextMessage(payload[1:].decode("latin-1"), level=payload[0])
     return _decode_text(payload)
 
 
-def _decode_text(payload: bytes) -> TextMessage:
+def _decode_text(payload: bytes) -> RtdeTextMessage:
     end = 1 + payload[0]
     source_end = end + 1 + payload[end]
-    return TextMessage(
+    return RtdeTextMessage(
         payload[1:end].decode("latin-1"), payload[end + 1 : source_end].decode("latin-1"), payload[source_end]
     )
 
@@ -215,26 +247,26 @@ def _decode_text(payload: bytes) -> TextMessage:
 _Decoder: TypeAlias = Callable[[bytes, int], Message]
 
 _FROM_PC: dict[int, _Decoder] = {
-    PackageType.REQUEST_PROTOCOL_VERSION: lambda data, _: RequestProtocolVersion(
+    RtdePackageType.REQUEST_PROTOCOL_VERSION: lambda data, _: RequestProtocolVersion(
         *struct.unpack_from(">H", data)
     ),
-    PackageType.GET_CONTROLLER_VERSION: lambda data, _: GetControllerVersion(),
-    PackageType.SETUP_OUTPUTS: _decode_setup_outputs,
-    PackageType.SETUP_INPUTS: lambda data, _: SetupInputs(_decode_words(data)),
-    PackageType.START: lambda data, _: Start(),
-    PackageType.PAUSE: lambda data, _: Pause(),
-    PackageType.TEXT_MESSAGE: _decode_pc_text,
-    PackageType.DATA_PACKAGE: lambda data, _: DataPackage(data[1:], data[0]),
+    RtdePackageType.GET_CONTROLLER_VERSION: lambda data, _: GetControllerVersion(),
+    RtdePackageType.SETUP_OUTPUTS: _decode_setup_outputs,
+    RtdePackageType.SETUP_INPUTS: lambda data, _: SetupInputs(_decode_words(data)),
+    RtdePackageType.START: lambda data, _: Start(),
+    RtdePackageType.PAUSE: lambda data, _: Pause(),
+    RtdePackageType.TEXT_MESSAGE: _decode_pc_text,
+    RtdePackageType.DATA_PACKAGE: lambda data, _: DataPackage(data[1:], data[0]),
 }
 _FROM_ROBOT: dict[int, _Decoder] = {
-    PackageType.REQUEST_PROTOCOL_VERSION: lambda data, _: RequestProtocolVersionReply(data[0] != 0),
-    PackageType.GET_CONTROLLER_VERSION: lambda data, _: GetControllerVersionReply(
+    RtdePackageType.REQUEST_PROTOCOL_VERSION: lambda data, _: RequestProtocolVersionReply(data[0] != 0),
+    RtdePackageType.GET_CONTROLLER_VERSION: lambda data, _: GetControllerVersionReply(
         SoftwareVersion(*struct.unpack_from(">4I", data))
     ),
-    PackageType.SETUP_OUTPUTS: _decode_setup_outputs_reply,
-    PackageType.SETUP_INPUTS: lambda data, _: SetupInputsReply(_decode_words(data[1:]), data[0]),
-    PackageType.START: lambda data, _: StartReply(data[0] != 0),
-    PackageType.PAUSE: lambda data, _: PauseReply(data[0] != 0),
-    PackageType.TEXT_MESSAGE: _decode_robot_text,
-    PackageType.DATA_PACKAGE: _decode_robot_data,
+    RtdePackageType.SETUP_OUTPUTS: _decode_setup_outputs_reply,
+    RtdePackageType.SETUP_INPUTS: lambda data, _: SetupInputsReply(_decode_words(data[1:]), data[0]),
+    RtdePackageType.START: lambda data, _: StartReply(data[0] != 0),
+    RtdePackageType.PAUSE: lambda data, _: PauseReply(data[0] != 0),
+    RtdePackageType.TEXT_MESSAGE: _decode_robot_text,
+    RtdePackageType.DATA_PACKAGE: _decode_robot_data,
 }

@@ -1,7 +1,7 @@
 """RTDE's packages as values: one frozen class each. Their bytes are in `rtde.codec`.
 
-A request is named after what it asks, its answer is the same name with `Reply`. No package knows what was
-sent before it: that is `rtde.connection`.
+A request is named after what it asks, its answer is the same name with `Reply`. The order of packages is in
+`rtde.server_connection` and `rtde.client_connection`.
 
 Source: UR RTDE guide.
 """
@@ -9,7 +9,7 @@ Source: UR RTDE guide.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum
 from typing import TypeAlias
 
 from protocol.rtde.types import TextLevel
@@ -22,27 +22,35 @@ __all__ = [
     "GetControllerVersion",
     "GetControllerVersionReply",
     "Message",
-    "PackageType",
     "Pause",
     "PauseReply",
     "Reply",
     "Request",
     "RequestProtocolVersion",
     "RequestProtocolVersionReply",
+    "Role",
+    "RtdePackageType",
+    "RtdeTextMessage",
     "SetupInputs",
     "SetupInputsReply",
     "SetupOutputs",
     "SetupOutputsReply",
     "Start",
     "StartReply",
-    "TextMessage",
 ]
 
 VERSIONS = (1, 2)
 """Protocol versions that exist; a connection begins in the first."""
 
 
-class PackageType(IntEnum):
+class Role(Enum):
+    """Which end sends a package."""
+
+    ROBOT = "robot"
+    PC = "pc"
+
+
+class RtdePackageType(IntEnum):
     """Type byte, the same in both directions."""
 
     REQUEST_PROTOCOL_VERSION = ord("V")
@@ -146,7 +154,7 @@ class PauseReply:
 
 
 @dataclass(frozen=True, slots=True)
-class TextMessage:
+class RtdeTextMessage:
     """A line for the log. Version 1 carries no source, and no level from client to robot."""
 
     message: str
@@ -173,7 +181,7 @@ Reply: TypeAlias = (
     | StartReply
     | PauseReply
 )
-Message: TypeAlias = Request | Reply | TextMessage | DataPackage
+Message: TypeAlias = Request | Reply | RtdeTextMessage | DataPackage
 
 REQUESTS: dict[type[Request], type[Reply]] = {
     RequestProtocolVersion: RequestProtocolVersionReply,

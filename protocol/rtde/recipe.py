@@ -40,33 +40,6 @@ class Recipe:
     def __repr__(self) -> str:
         return f"<Recipe {','.join(self.names)}: {self.size} bytes>"
 
-    def encode(self, values: Sequence[RtdeValue]) -> bytes:
-        """Bytes of values in the recipe's order.
-
-        Raises:
-            LocalProtocolError: a value is missing, is one too many or does not fit its type.
-        """
-        if len(values) != len(self.names):
-            raise LocalProtocolError(f"this recipe takes {len(self.names)} values, {len(values)} were given")
-        flat: list[Any] = []
-        for value, count in zip(values, self._counts, strict=True):
-            numbers = value if isinstance(value, Sequence) else (value,)
-            if len(numbers) != count:
-                raise self._explain(values)
-            flat.extend(numbers)
-        try:
-            return self._struct.pack(*flat)
-        except (struct.error, OverflowError):
-            raise self._explain(values) from None
-
-    def _explain(self, values: Sequence[RtdeValue]) -> LocalProtocolError:
-        for name, kind, value in zip(self.names, self.types, values, strict=True):
-            try:
-                struct.pack(">" + kind.letters, *(value if isinstance(value, Sequence) else (value,)))
-            except (struct.error, OverflowError):
-                return LocalProtocolError(f"{name} is {value!r}, which is no {kind.value}")
-        return LocalProtocolError(f"{values!r} does not fit the recipe")
-
     def decode(self, data: bytes) -> tuple[RtdeValue, ...]:
         """Values from bytes of exactly the recipe's size.
 

@@ -1,6 +1,6 @@
 """When RTDE data flows: the answer to every request in both states of a connection, and the rate.
 
-Only tables and sums stand here; `rtde.connection` obeys them.
+Only tables and formulas; `rtde.server_connection` applies them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from protocol.rtde.messages import (
     Start,
 )
 
-__all__ = ["TRANSITIONS", "RtdeState", "Verdict", "cycles_per_package"]
+__all__ = ["TRANSITIONS", "RtdeState", "Transition", "cycles_per_package"]
 
 
 class RtdeState(Enum):
@@ -30,8 +30,8 @@ class RtdeState(Enum):
     STARTED = "started"
 
 
-class Verdict(NamedTuple):
-    """What the robot makes of a request: accepted or not, and the state after it."""
+class Transition(NamedTuple):
+    """The robot's answer to a request: accepted or not, and the state after it."""
 
     accepted: bool
     state: RtdeState
@@ -39,22 +39,22 @@ class Verdict(NamedTuple):
 
 _PAUSED, _STARTED = RtdeState
 
-TRANSITIONS: Mapping[tuple[RtdeState, type[Request]], Verdict] = {
-    (_PAUSED, RequestProtocolVersion): Verdict(True, _PAUSED),
-    (_PAUSED, GetControllerVersion): Verdict(True, _PAUSED),
-    (_PAUSED, SetupOutputs): Verdict(True, _PAUSED),
-    (_PAUSED, SetupInputs): Verdict(True, _PAUSED),
-    (_PAUSED, Start): Verdict(True, _STARTED),
+TRANSITIONS: Mapping[tuple[RtdeState, type[Request]], Transition] = {
+    (_PAUSED, RequestProtocolVersion): Transition(True, _PAUSED),
+    (_PAUSED, GetControllerVersion): Transition(True, _PAUSED),
+    (_PAUSED, SetupOutputs): Transition(True, _PAUSED),
+    (_PAUSED, SetupInputs): Transition(True, _PAUSED),
+    (_PAUSED, Start): Transition(True, _STARTED),
     # ur_rtde's I/O interface never starts, but waits for this reply when it ends.
-    (_PAUSED, Pause): Verdict(True, _PAUSED),
+    (_PAUSED, Pause): Transition(True, _PAUSED),
     # The layout of what flows cannot change under it.
-    (_STARTED, RequestProtocolVersion): Verdict(False, _STARTED),
-    (_STARTED, GetControllerVersion): Verdict(True, _STARTED),
+    (_STARTED, RequestProtocolVersion): Transition(False, _STARTED),
+    (_STARTED, GetControllerVersion): Transition(True, _STARTED),
     # Assumed: the guide has set-ups before S or after P only, and does not say that others fail.
-    (_STARTED, SetupOutputs): Verdict(True, _STARTED),
-    (_STARTED, SetupInputs): Verdict(True, _STARTED),
-    (_STARTED, Start): Verdict(True, _STARTED),
-    (_STARTED, Pause): Verdict(True, _PAUSED),
+    (_STARTED, SetupOutputs): Transition(True, _STARTED),
+    (_STARTED, SetupInputs): Transition(True, _STARTED),
+    (_STARTED, Start): Transition(True, _STARTED),
+    (_STARTED, Pause): Transition(True, _PAUSED),
 }
 """Every request in every state. A version that does not exist is refused in both."""
 

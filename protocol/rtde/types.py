@@ -1,7 +1,6 @@
-"""Words and data types of RTDE: what a variable looks like in bytes, and what a reply says instead of a type.
+"""Data types of RTDE variables, and the words that a reply has instead of a type.
 
-Everything is big-endian. Only declarations stand here: the variables are in `rtde.fields`, the packages in
-`rtde.messages`.
+Everything is big-endian. The variables are in `rtde.fields`, the packages in `rtde.messages`.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ __all__ = [
     "IN_USE",
     "NOT_FOUND",
     "REFUSALS",
-    "VECTOR_TYPES",
     "RobotStatusBits",
     "RtdeType",
     "RtdeValue",
@@ -71,9 +69,6 @@ _LETTERS = {
     RtdeType.VECTOR6INT32: "iiiiii",
     RtdeType.VECTOR6UINT32: "IIIIII",
 }
-
-VECTOR_TYPES = frozenset(kind for kind in RtdeType if kind.count > 1)
-"""Types whose values are tuples."""
 
 NOT_FOUND = "NOT_FOUND"
 """Stands for a type in a reply: this software has no such variable."""

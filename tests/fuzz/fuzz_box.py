@@ -18,9 +18,10 @@ from fuzz_wire import FakeLoop, Wire
 from states_support import check_wires
 
 from protocol.dashboard.connection import MAX_LINE as DASHBOARD_LINE
-from protocol.dashboard.connection import MAX_WAITING, Role
-from protocol.rtde.connection import MAX_REQUEST_SIZE, DataReceived, RtdeConnection
+from protocol.dashboard.connection import MAX_WAITING
+from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.messages import RequestProtocolVersion, SetupOutputs, Start
+from protocol.rtde.server_connection import MAX_REQUEST_SIZE
 from protocol.script_channel import MAX_LINE, MAX_PROGRAM
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator import ControlBox
@@ -88,7 +89,7 @@ class RtdeWitness:
     """An honest RTDE client: every value comes, every cycle."""
 
     def __init__(self, wire):
-        self.protocol, self.n_packages = RtdeConnection(Role.PC), 0
+        self.protocol, self.n_packages = RtdeClientConnection(), 0
         self.wire = wire
         for request in (RequestProtocolVersion(2), SetupOutputs(("timestamp", "robot_mode"), 125.0), Start()):
             wire.send(self.protocol.send(request))
@@ -397,7 +398,6 @@ class FuzzBox:
             assert session.is_lost or len(session.protocol._buffer) <= 2 * MAX_REQUEST_SIZE
             assert len(session.inbox) <= MAX_RTDE_WAITING
             assert len(session.protocol.input_recipes) <= 255
-            assert len(session.protocol._outputs) <= 255
         assert set(self.ports["rtde"]._owners.values()) <= set(self.ports["rtde"].clients)
         for session in self.ports["modbus"]._sessions.values():
             assert len(session.inbox) <= MAX_INBOX

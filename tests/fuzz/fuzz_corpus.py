@@ -5,17 +5,17 @@ import struct
 
 from protocol.controller_words import CONTROLLER_WORDS
 from protocol.dashboard.commands import COMMANDS
-from protocol.dashboard.connection import Role
 from protocol.rtde.codec import encode_message
 from protocol.rtde.fields import input_fields, output_fields
 from protocol.rtde.messages import (
     GetControllerVersion,
     Pause,
     RequestProtocolVersion,
+    Role,
+    RtdeTextMessage,
     SetupInputs,
     SetupOutputs,
     Start,
-    TextMessage,
 )
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.parameters import Kind
@@ -91,7 +91,7 @@ def rtde_message(rng, lively):
     elif kind == 8:
         message = GetControllerVersion()
     elif kind == 9 and rng.random() < 0.2:
-        message = TextMessage("text", "fuzz" if version == 2 else "", 1)
+        message = RtdeTextMessage("text", "fuzz" if version == 2 else "", 1)
     else:
         values = bytes([rng.choice((1, 1, 2, 3, 0, 255))]) + b"".join(
             rng.choice(_NASTY) + rng.randbytes(rng.choice((2, 6))) for _ in range(rng.randrange(6))

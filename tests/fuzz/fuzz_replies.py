@@ -7,14 +7,15 @@ from box_support import VERSION
 from pymodbus.pdu import DecodePDU
 
 from protocol.dashboard.commands import GREETING
-from protocol.dashboard.connection import MAX_LINE, Role
+from protocol.dashboard.connection import MAX_LINE
 from protocol.frame_buffer import FrameBuffer
 from protocol.modbus import take_frame
 from protocol.primary.framing import PackageType
 from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.codec import decode_message
-from protocol.rtde.messages import PackageType as RtdeType
+from protocol.rtde.messages import Role
+from protocol.rtde.messages import RtdePackageType as RtdeType
 
 REALTIME = layout_for_version(VERSION)
 # pymodbus's decoder of answers.

@@ -14,7 +14,6 @@ from pc_client.driver.transport import PortTakenError
 from pc_client.errors import DriverError
 from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
-from protocol.dashboard.connection import Role
 from protocol.pose import T_to_pose, pose_trans
 from protocol.primary.layout import CartesianInfo, ConfigurationData, RobotModeData
 from protocol.primary.messages import (
@@ -25,7 +24,7 @@ from protocol.primary.messages import (
 )
 from protocol.primary.state import encode_state
 from protocol.realtime.layout import SNAPSHOT_FIELDS, layout_for_version
-from protocol.rtde.connection import RtdeConnection
+from protocol.rtde.server_connection import RtdeServerConnection
 from protocol.ur_types import Ports, RobotType, SoftwareVersion
 from protocol.velocity_stream import VelocityMode, decode_velocity, encode_hello
 
@@ -148,7 +147,7 @@ class FakeRobot:
         elif kind == "rtde":
             if self.payload is None:
                 raise DriverError(f"{host}:{port} refuses the connection")
-            pipe.rtde = RtdeConnection(Role.ROBOT, self.version)
+            pipe.rtde = RtdeServerConnection(self.version)
         elif kind == "dashboard":
             pipe.incoming.append(b"Connected: Universal Robots Dashboard Server\n")
         return pipe

@@ -1,4 +1,4 @@
-"""Port 29999: table, both ends wired together, and what neither end may do."""
+"""Port 29999: the table of commands, and the robot's side of a session."""
 
 from __future__ import annotations
 
@@ -6,20 +6,16 @@ import re
 
 import pytest
 
-from protocol.dashboard import replies as R
 from protocol.dashboard.commands import COMMANDS, find, match_command, unknown_command_reply
 from protocol.dashboard.connection import (
     MAX_LINE,
     MAX_WAITING,
     CommandReceived,
     DashboardConnection,
-    Greeting,
-    Reply,
-    Role,
     UnknownCommand,
 )
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
+from protocol.ur_types import SoftwareVersion
 
 V3_15 = SoftwareVersion(3, 15, 8)
 
@@ -34,12 +30,11 @@ def events(connection, data, step=None):
 
 
 @pytest.mark.parametrize("step", [1, None])
-def test_a_session_with_both_ends(step):
-    robot, pc = DashboardConnection(Role.ROBOT, V3_15), DashboardConnection(Role.PC)
-    assert events(pc, robot.greet(), step) == [Greeting("Connected: Universal Robots Dashboard Server")]
+def test_a_session(step):
+    robot = DashboardConnection(V3_15)
+    assert robot.greet() == b"Connected: Universal Robots Dashboard Server\n"
 
-    asked = pc.command("robotmode") + pc.command("load", "my program.urp") + pc.command("quit")
-    received = events(robot, asked, step)
+    received = events(robot, b"robotmode\nload my program.urp\nquit\n", step)
     assert received == [
         CommandReceived(find("robotmode"), ""),
         CommandReceived(find("load"), "my program.urp"),
@@ -52,14 +47,6 @@ def test_a_session_with_both_ends(step):
     assert robot.is_closed
     assert events(robot, b"robotmode\n") == []
     assert answers == b"Robotmode: RUNNING\nFile not found: my program.urp\nDisconnected\n"
-    assert events(pc, answers, step) == [
-        Reply("robotmode", "Robotmode: RUNNING"),
-        Reply("load my program.urp", "File not found: my program.urp"),
-        Reply("quit", "Disconnected"),
-    ]
-    assert pc.is_closed
-    with pytest.raises(LocalProtocolError, match="quit"):
-        pc.command("robotmode")
 
 
 @pytest.mark.parametrize(
@@ -79,7 +66,7 @@ def test_a_session_with_both_ends(step):
     ],
 )
 def test_lines_that_are_commands(line, name, argument):
-    (event,) = events(DashboardConnection(Role.ROBOT, V3_15), line.encode() + b"\n")
+    (event,) = events(DashboardConnection(V3_15), line.encode() + b"\n")
     assert event == CommandReceived(find(name), argument)
 
 
@@ -88,7 +75,7 @@ def test_lines_that_are_commands(line, name, argument):
     ["brake_release", "PLAY", "play now", "get", "power", "", "is in remote control", "\x00\xff", "loadx"],
 )
 def test_lines_that_are_not(line):
-    robot = DashboardConnection(Role.ROBOT, V3_15)
+    robot = DashboardConnection(V3_15)
     (event,) = events(robot, line.encode("latin-1") + b"\n")
     assert event == UnknownCommand(line, f"could not understand: '{line}'")
     assert robot.reply(event.answer) == unknown_command_reply(line).encode("latin-1") + b"\n"
@@ -162,7 +149,7 @@ def test_a_reply_needs_a_known_key_and_its_values():
 
 
 def test_one_reply_a_command_one_line_a_reply():
-    robot = DashboardConnection(Role.ROBOT, V3_15)
+    robot = DashboardConnection(V3_15)
     with pytest.raises(LocalProtocolError, match="answers nothing"):
         robot.reply("Stopped")
     robot.receive_data(b"stop\n")
@@ -170,50 +157,21 @@ def test_one_reply_a_command_one_line_a_reply():
     with pytest.raises(LocalProtocolError, match="line break"):
         robot.reply("Stopped\nreally")
     assert robot.reply("Stopped") == b"Stopped\n"  # the refused one changed nothing
-    robot.greet()
-    with pytest.raises(LocalProtocolError, match="once"):
-        robot.greet()
-
-
-def test_a_pc_hears_only_answers():
-    pc = DashboardConnection(Role.PC)
-    pc.receive_data(b"Connected: x\nPowering on\n")
-    assert pc.next_event() == Greeting("Connected: x")
-    with pytest.raises(RemoteProtocolError, match="'Powering on' although nothing was asked"):
-        pc.next_event()
-
-
-@pytest.mark.parametrize(
-    ("name", "argument", "problem"),
-    [
-        ("power_on", "", "no dashboard command"),
-        ("play", "x", "no argument"),
-        ("popup", "a\nstop", "line break"),
-    ],
-)
-def test_a_pc_asks_only_for_what_there_is(name, argument, problem):
-    pc = DashboardConnection(Role.PC)
-    with pytest.raises(LocalProtocolError, match=problem):
-        pc.command(name, argument)
-
-
-def test_roles_do_not_mix():
-    with pytest.raises(LocalProtocolError, match="robot's end"):
-        DashboardConnection(Role.PC).greet()
-    with pytest.raises(LocalProtocolError, match="pc's end"):
-        DashboardConnection(Role.ROBOT).command("play")
 
 
 @pytest.mark.parametrize("data", [b"x" * (MAX_LINE + 1), b"x" * (MAX_LINE + 1) + b"\nplay\n"])
 def test_endless_lines_are_refused(data):
     with pytest.raises(RemoteProtocolError, match="more than"):
-        DashboardConnection(Role.ROBOT, V3_15).receive_data(data)
+        DashboardConnection(V3_15).receive_data(data)
+    robot = DashboardConnection(V3_15)
+    robot.receive_data(b"play\n")
+    robot.next_event()
     with pytest.raises(LocalProtocolError, match="longer than"):
-        DashboardConnection(Role.PC).command("popup", "x" * MAX_LINE)
+        robot.reply("x" * MAX_LINE)
 
 
 def test_lines_that_wait_are_bounded_and_count_no_more_when_they_are_answered():
-    robot = DashboardConnection(Role.ROBOT, V3_15)
+    robot = DashboardConnection(V3_15)
     lines = b"robotmode\n" * (MAX_WAITING // 10)
     for _ in range(3):
         for start in range(0, len(lines), 65_536):
@@ -231,31 +189,3 @@ def test_which_software_answers_when_it_is_done():
         assert row.replies_when_done(SoftwareVersion(*since))
         assert not row.replies_when_done(SoftwareVersion(3, 2, 9))
     assert not find("power on").replies_when_done(V3_15)
-
-
-def test_what_a_pc_reads_out_of_replies():
-    assert R.parse_polyscope_version("URSoftware 3.15.8.106339 (Nov 10 2021)") == (3, 15, 8, 106339)
-    assert R.parse_robot_mode("Robotmode: RUNNING") is RobotMode.RUNNING
-    assert R.parse_safety_mode("Safetymode: PROTECTIVE_STOP") is SafetyMode.PROTECTIVE_STOP
-    assert R.parse_running("Program running: true") is True
-    assert R.parse_running("Robot running: False") is False
-    assert R.parse_program_state("PLAYING my program.urp") == ("PLAYING", "my program.urp")
-    assert R.parse_program_state("STOPPED") == ("STOPPED", "")
-
-
-@pytest.mark.parametrize(
-    "parse",
-    [
-        R.parse_polyscope_version,
-        R.parse_robot_mode,
-        R.parse_safety_mode,
-        R.parse_running,
-        R.parse_program_state,
-    ],
-)
-@pytest.mark.parametrize(
-    "reply", ["could not understand: 'x'", "", "Robotmode: ASLEEP", "Program running: maybe"]
-)
-def test_other_replies_are_refused_with_their_text(parse, reply):
-    with pytest.raises(RemoteProtocolError, match=re.escape(repr(reply))):
-        parse(reply)

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.dashboard.connection import Role
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde import messages as M
+from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.codec import MAX_NAMES_SIZE, encode_message
-from protocol.rtde.connection import MAX_REQUEST_SIZE, DataReceived, RtdeConnection
+from protocol.rtde.server_connection import MAX_REQUEST_SIZE, InputReceived, RtdeServerConnection
 from protocol.rtde.states import TRANSITIONS, RtdeState, cycles_per_package
 from protocol.ur_types import SoftwareVersion
 
@@ -25,7 +25,7 @@ class Pair:
     """Both ends without a network."""
 
     def __init__(self, version=2):
-        self.robot, self.pc = RtdeConnection(Role.ROBOT, V3_15), RtdeConnection(Role.PC)
+        self.robot, self.pc = RtdeServerConnection(V3_15), RtdeClientConnection()
         if version == 2:
             assert self.ask(M.RequestProtocolVersion(2)) == M.RequestProtocolVersionReply(True)
 
@@ -66,12 +66,11 @@ def test_a_session_with_both_ends(version):
     assert pair.robot.encoder is None
     assert pair.ask(M.Start()) == M.StartReply(True)
     assert pair.to_pc(pair.robot.encoder(SNAPSHOT) * 2) == 2 * [
-        DataReceived(number, ("timestamp", "actual_q"), (1.5, SNAPSHOT.actual_q))
+        DataReceived(("timestamp", "actual_q"), (1.5, SNAPSHOT.actual_q))
     ]
     values = (-5, (0.0, 1.0, 2.0, 3.0, 4.0, 5.0))
-    received = pair.to_robot(pair.pc.send_values(1, values))
-    assert received == DataReceived(1, inputs.names, values)
-    assert received.as_dict() == dict(zip(inputs.names, values, strict=True))
+    data = M.DataPackage(struct.pack(">i6d", -5, *values[1]), 1)
+    assert pair.to_robot(encode_message(data, M.Role.PC, version)) == InputReceived(inputs.names, values)
     assert pair.ask(M.Pause()) == M.PauseReply(True)
     assert pair.robot.encoder is None
     assert pair.ask(M.Start()) == M.StartReply(True)
@@ -117,8 +116,9 @@ def test_data_and_text_are_taken_in_every_state_and_never_answered(pair, state):
     pair.ask(M.SetupInputs(("input_int_register_0",)))
     if state is RtdeState.STARTED:
         pair.ask(M.Start())
-    assert pair.to_robot(pair.pc.send_values(1, (3,))) == DataReceived(1, ("input_int_register_0",), (3,))
-    assert pair.to_robot(pair.pc.say(M.TextMessage("hello", "test"))) == M.TextMessage("hello", "test")
+    data, text = M.DataPackage(struct.pack(">i", 3), 1), M.RtdeTextMessage("hello", "test")
+    assert pair.to_robot(encode_message(data, M.Role.PC, 2)) == InputReceived(("input_int_register_0",), (3,))
+    assert pair.to_robot(encode_message(text, M.Role.PC, 2)) == text
     with pytest.raises(LocalProtocolError, match="nothing has been asked"):
         pair.robot.reply()
 
@@ -134,10 +134,10 @@ def test_a_request_must_be_answered_before_the_next_event(pair):
 
 
 def test_a_pipelined_version_request_decides_how_the_next_package_is_read():
-    robot = RtdeConnection(Role.ROBOT, V3_15)
+    robot = RtdeServerConnection(V3_15)
     robot.receive_data(
-        encode_message(M.RequestProtocolVersion(2), Role.PC, 1)
-        + encode_message(M.SetupOutputs(("timestamp",), 50.0), Role.PC, 2)
+        encode_message(M.RequestProtocolVersion(2), M.Role.PC, 1)
+        + encode_message(M.SetupOutputs(("timestamp",), 50.0), M.Role.PC, 2)
     )
     assert robot.next_event() == M.RequestProtocolVersion(2)
     assert robot.reply() == bytes.fromhex("00045601")
@@ -160,7 +160,7 @@ def test_the_second_output_recipe_replaces_the_first(pair):
     pair.ask(M.SetupOutputs(("timestamp",), 125.0))
     pair.ask(M.Start())
     pair.ask(M.SetupOutputs(("robot_mode",), 125.0))
-    assert pair.to_pc(pair.robot.encoder(SNAPSHOT)) == [DataReceived(2, ("robot_mode",), (7,))]
+    assert pair.to_pc(pair.robot.encoder(SNAPSHOT)) == [DataReceived(("robot_mode",), (7,))]
 
 
 def test_an_unknown_output_makes_the_recipe_invalid_as_a_whole(pair):
@@ -177,7 +177,6 @@ def test_an_input_in_use_makes_the_recipe_invalid_and_takes_no_id(pair):
     reply = pair.ask(M.SetupInputs(names), {"input_int_register_1"})
     assert reply == M.SetupInputsReply(("INT32", "IN_USE", "NOT_FOUND"), 0)
     assert not pair.robot.input_recipes
-    assert not pair.pc.input_recipes
     assert pair.ask(M.SetupInputs(names[:2])).recipe_id == 1
 
 
@@ -239,8 +238,8 @@ def test_absurd_sizes_end_the_connection_for_good(pair, data):
     for _ in range(2):
         with pytest.raises(RemoteProtocolError, match="RTDE package of"):
             pair.robot.next_event()
-    (text,) = pair.to_pc(pair.robot.say(M.TextMessage("not RTDE", "test", 1)))
-    assert text == M.TextMessage("not RTDE", "test", 1)
+    (text,) = pair.to_pc(pair.robot.text(M.RtdeTextMessage("not RTDE", "test", 1)))
+    assert text == M.RtdeTextMessage("not RTDE", "test", 1)
 
 
 @pytest.mark.parametrize("data", [b"\0\3V", b"\0\4V\0", b"\0\x0aO1234567"])
@@ -274,9 +273,9 @@ def test_data_of_the_wrong_size_as_ur_rtde_sends_it(pair):
     assert pair.ask(M.SetupInputs(("input_int_register_0", *doubles))).recipe_id == 1
     assert pair.ask(M.SetupInputs(("input_int_register_0", *doubles, "input_int_register_1"))).recipe_id == 2
     command = struct.pack(">i12d", 44, *range(12))
-    too_long = encode_message(M.DataPackage(command, 1), Role.PC, 2)
+    too_long = encode_message(M.DataPackage(command, 1), M.Role.PC, 2)
     assert pair.to_robot(too_long).values == (44, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
-    too_short = encode_message(M.DataPackage(command[:52], 2), Role.PC, 2)
+    too_short = encode_message(M.DataPackage(command[:52], 2), M.Role.PC, 2)
     received = pair.to_robot(too_short)
     assert received.values == (44, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
     assert received.names == ("input_int_register_0", *doubles)
@@ -284,7 +283,7 @@ def test_data_of_the_wrong_size_as_ur_rtde_sends_it(pair):
 
 @given(st.binary(max_size=200), st.integers(1, 50))
 def test_no_bytes_do_more_than_end_the_connection(data, step):
-    robot = RtdeConnection(Role.ROBOT, V3_15)
+    robot = RtdeServerConnection(V3_15)
     robot.receive_data(b"\0\5V\0\2\0\x17Iinput_int_register_0")
     for start in range(0, len(data), step):
         robot.receive_data(data[start : start + step])
@@ -322,21 +321,21 @@ def test_a_robot_that_breaks_the_rules_is_named(pair, before, package, match):
     for request in before:
         pair.ask(request)
     with pytest.raises(RemoteProtocolError, match=match):
-        pair.to_pc(encode_message(package, Role.ROBOT, 2))
+        pair.to_pc(encode_message(package, M.Role.ROBOT, 2))
 
 
 @pytest.mark.parametrize(
     ("request_", "reply", "match"),
     [
         (M.Start(), M.PauseReply(True), "Start.. was asked"),
-        (M.SetupInputs(("a", "b")), M.SetupInputsReply(("INT32",), 1), "1 types for 2 names"),
-        (M.SetupInputs(("a",)), M.SetupInputsReply(("FLOAT",), 1), "unknown type"),
+        (M.SetupOutputs(("a", "b"), 1.0), M.SetupOutputsReply(("INT32",), 1), "1 types for 2 names"),
+        (M.SetupOutputs(("a",), 1.0), M.SetupOutputsReply(("FLOAT",), 1), "unknown type"),
     ],
 )
 def test_a_wrong_reply_is_named(pair, request_, reply, match):
     pair.pc.send(request_)
     with pytest.raises(RemoteProtocolError, match=match):
-        pair.to_pc(encode_message(reply, Role.ROBOT, 2))
+        pair.to_pc(encode_message(reply, M.Role.ROBOT, 2))
 
 
 def test_a_robot_with_unknown_packages_is_named(pair):
@@ -347,8 +346,8 @@ def test_a_robot_with_unknown_packages_is_named(pair):
 def test_text_may_come_between_request_and_reply(pair):
     """Source: newer software warns before its version reply, see the public client library."""
     pair.pc.send(M.Start())
-    warning = M.TextMessage("SafetySetup has not been confirmed yet", "", 2)
-    data = encode_message(warning, Role.ROBOT, 2) + encode_message(M.StartReply(True), Role.ROBOT, 2)
+    warning = M.RtdeTextMessage("SafetySetup has not been confirmed yet", "", 2)
+    data = encode_message(warning, M.Role.ROBOT, 2) + encode_message(M.StartReply(True), M.Role.ROBOT, 2)
     assert pair.to_pc(data) == [warning, M.StartReply(True)]
 
 
@@ -362,22 +361,8 @@ def test_data_on_its_way_when_we_paused_is_skipped(pair):
 
 def test_refused_requests_change_nothing_at_the_pc(pair):
     pair.pc.send(M.Start())
-    assert pair.to_pc(encode_message(M.StartReply(False), Role.ROBOT, 2)) == [M.StartReply(False)]
+    assert pair.to_pc(encode_message(M.StartReply(False), M.Role.ROBOT, 2)) == [M.StartReply(False)]
     assert pair.pc.state is RtdeState.PAUSED
-
-
-def test_each_end_has_its_own_methods(pair):
-    with pytest.raises(LocalProtocolError, match="robot's end"):
-        pair.pc.reply()
-    with pytest.raises(LocalProtocolError, match="pc's end"):
-        pair.robot.send(M.Start())
-    with pytest.raises(LocalProtocolError, match="pc's end"):
-        pair.robot.send_values(1, ())
-
-
-def test_the_pc_writes_only_recipes_that_exist(pair):
-    with pytest.raises(LocalProtocolError, match="no input recipe 1"):
-        pair.pc.send_values(1, (1,))
 
 
 def test_what_cannot_be_sent_is_not_waited_for(pair):

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import math
 import struct
+from itertools import chain
 from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.dashboard.connection import Role
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde import messages as M
 from protocol.rtde.codec import HEADER_SIZE, MAX_NAMES_SIZE, data_header, decode_message, encode_message
-from protocol.rtde.connection import RtdeConnection
 from protocol.rtde.fields import OUTPUTS
 from protocol.rtde.recipe import Recipe, snapshot_encoder
+from protocol.rtde.server_connection import RtdeServerConnection
 from protocol.rtde.types import RtdeType
 from protocol.ur_types import SoftwareVersion
 
-ROBOT, PC = Role.ROBOT, Role.PC
+ROBOT, PC = M.Role.ROBOT, M.Role.PC
 DOUBLE = struct.pack(">d", 1.5)
 
 # (sender, protocol version, package, bytes); 40 5f 40 .. is 125.0
@@ -57,10 +57,10 @@ PACKAGES = [
     (ROBOT, 2, M.StartReply(True), "00 04 53 01"),
     (PC, 1, M.Pause(), "00 03 50"),
     (ROBOT, 1, M.PauseReply(True), "00 04 50 01"),
-    (PC, 1, M.TextMessage("hi"), "00 05 4d 6869"),
-    (ROBOT, 1, M.TextMessage("hi", level=1), "00 06 4d 01 6869"),
-    (PC, 2, M.TextMessage("hi", "me", 2), "00 0a 4d 02 6869 02 6d65 02"),
-    (ROBOT, 2, M.TextMessage("", "", 0), "00 06 4d 00 00 00"),
+    (PC, 1, M.RtdeTextMessage("hi"), "00 05 4d 6869"),
+    (ROBOT, 1, M.RtdeTextMessage("hi", level=1), "00 06 4d 01 6869"),
+    (PC, 2, M.RtdeTextMessage("hi", "me", 2), "00 0a 4d 02 6869 02 6d65 02"),
+    (ROBOT, 2, M.RtdeTextMessage("", "", 0), "00 06 4d 00 00 00"),
     (PC, 2, M.DataPackage(DOUBLE, 1), "00 0c 55 01 3ff8000000000000"),
     (PC, 1, M.DataPackage(DOUBLE, 1), "00 0c 55 01 3ff8000000000000"),
     (ROBOT, 2, M.DataPackage(DOUBLE, 1), "00 0c 55 01 3ff8000000000000"),
@@ -88,7 +88,7 @@ REQUESTS = [row for row in PACKAGES if row[0] is PC and type(row[2]) in M.REQUES
 @pytest.mark.parametrize("trailing", [b"", b"\0", b"\0\3S"])
 @pytest.mark.parametrize(("sender", "version", "message", "golden"), REQUESTS)
 def test_read_from_a_stream_bytewise_and_with_trailing_data(sender, version, message, golden, step, trailing):
-    connection = RtdeConnection(ROBOT)
+    connection = RtdeServerConnection(SoftwareVersion(3, 15))
     connection.protocol_version = version
     data = bytes.fromhex(golden) + trailing
     found = []
@@ -140,9 +140,9 @@ def test_what_cannot_be_sent_is_refused(bad):
 
 
 def test_long_texts_lose_their_end():
-    data = encode_message(M.TextMessage("m" * 300, "s" * 300), ROBOT, 2)
+    data = encode_message(M.RtdeTextMessage("m" * 300, "s" * 300), ROBOT, 2)
     message = decode_message(data[2], data[3:], ROBOT, 2)
-    assert message == M.TextMessage("m" * 255, "s" * 255)
+    assert message == M.RtdeTextMessage("m" * 255, "s" * 255)
 
 
 # --- values
@@ -167,11 +167,16 @@ typed_values = st.lists(
 )
 
 
+def encoded(pairs):
+    numbers = (value if kind.count > 1 else (value,) for kind, value in pairs)
+    return struct.pack(">" + "".join(kind.letters for kind, _ in pairs), *chain.from_iterable(numbers))
+
+
 @given(typed_values)
 def test_values_round_trip(pairs):
     recipe = Recipe([f"v{i}" for i in range(len(pairs))], [kind for kind, _ in pairs])
     values = tuple(value for _, value in pairs)
-    data = recipe.encode(values)
+    data = encoded(pairs)
     assert len(data) == recipe.size
     assert recipe.decode(data) == recipe.decode_leading(data) == values
 
@@ -180,7 +185,7 @@ def test_values_round_trip(pairs):
 def test_wrong_sizes_give_what_fits(pairs, size):
     recipe = Recipe([f"v{i}" for i in range(len(pairs))], [kind for kind, _ in pairs])
     values = tuple(value for _, value in pairs)
-    data = (recipe.encode(values) + b"\x7f" * 400)[:size]
+    data = (encoded(pairs) + b"\x7f" * 400)[:size]
     leading = recipe.decode_leading(data)
     assert leading == values[: len(leading)]
     whole = sum(kind.size for kind in recipe.types[: len(leading)])
@@ -189,15 +194,6 @@ def test_wrong_sizes_give_what_fits(pairs, size):
     if size != recipe.size:
         with pytest.raises(RemoteProtocolError, match="bytes of values"):
             recipe.decode(data)
-
-
-@pytest.mark.parametrize(
-    "values", [(1, 2.0), (1, 2.0, 3, 4), (2**31, 2.0, (0.0,) * 3), (1, "x", (0.0,) * 3), (1, 2.0, (0.0,) * 2)]
-)
-def test_values_that_do_not_fit_are_refused(values):
-    recipe = Recipe("abc", [RtdeType.INT32, RtdeType.DOUBLE, RtdeType.VECTOR3D])
-    with pytest.raises(LocalProtocolError):
-        recipe.encode(values)
 
 
 class Numbered:

@@ -1,30 +1,29 @@
 """Captures in pieces, RTDE captures, and a look at a box that runs."""
 
+import struct
+
 import pytest
 
 from protocol.__main__ import main
 from protocol.capture import RtdeDecoder, StreamDecoder
-from protocol.dashboard.connection import Role
 from protocol.errors import RemoteProtocolError
 from protocol.primary.layout import RobotModeData
 from protocol.primary.messages import version_message
 from protocol.primary.packages import encode_message_package, encode_state
 from protocol.rtde import messages as R
+from protocol.rtde.client_connection import RtdeClientConnection
 from protocol.rtde.codec import data_header, encode_message
-from protocol.rtde.connection import RtdeConnection
-from protocol.rtde.recipe import Recipe
-from protocol.rtde.types import RtdeType
+from protocol.rtde.server_connection import RtdeServerConnection
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 
 VERSION = SoftwareVersion(3, 15, 8)
 NAMES = ("timestamp", "actual_q")
-RECIPE = Recipe(NAMES, (RtdeType.DOUBLE, RtdeType.VECTOR6D))
 
 
 def robot_says(*requests, version=2):
     """Everything a robot answers, and one data package."""
-    pc, robot = RtdeConnection(Role.PC), RtdeConnection(Role.ROBOT, VERSION)
+    pc, robot = RtdeClientConnection(), RtdeServerConnection(VERSION)
     data = b""
     for request in requests:
         robot.receive_data(pc.send(request))
@@ -32,7 +31,7 @@ def robot_says(*requests, version=2):
         data += (reply := robot.reply())
         pc.receive_data(reply)
         pc.next_event()
-    values = RECIPE.encode((60.0, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)))
+    values = struct.pack(">7d", 60.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
     return data + data_header(len(values), 1 if version == 2 else None) + values
 
 
@@ -79,14 +78,14 @@ def test_a_session_in_version_1_without_names():
 
 
 def test_refused_variables_are_noted_and_what_follows_has_no_names():
-    reply = encode_message(R.SetupOutputsReply(("DOUBLE", "NOT_FOUND")), Role.ROBOT, 1)
+    reply = encode_message(R.SetupOutputsReply(("DOUBLE", "NOT_FOUND")), R.Role.ROBOT, 1)
     decoder = RtdeDecoder(("timestamp", "nonsense"))
     list(decoder.feed(reply))
     assert decoder.refused == {"nonsense": "NOT_FOUND"}
 
 
 @pytest.mark.parametrize("data", [b"\0\2S", b"\0\3?", b"GE", encode_message(
-    R.SetupOutputsReply(("DUOBLE",)), Role.ROBOT, 1)], ids=["size", "type", "half", "word"])  # fmt: skip
+    R.SetupOutputsReply(("DUOBLE",)), R.Role.ROBOT, 1)], ids=["size", "type", "half", "word"])  # fmt: skip
 def test_what_is_no_rtde_is_refused_or_waited_for(data):
     decoder = RtdeDecoder()
     if data == b"GE":

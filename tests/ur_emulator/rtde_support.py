@@ -1,8 +1,20 @@
 """An RTDE client without a library, for the tests of the box."""
 
-from protocol.dashboard.connection import Role
+import struct
+from itertools import chain
+
 from protocol.rtde import messages as M
-from protocol.rtde.connection import DataReceived, RtdeConnection
+from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
+from protocol.rtde.codec import encode_message
+from protocol.rtde.types import RtdeType
+
+
+def input_package(recipe_id, types, *values):
+    """The bytes that write the inputs of a recipe."""
+    letters = "".join(RtdeType(word).letters for word in types)
+    numbers = chain.from_iterable(value if isinstance(value, tuple) else (value,) for value in values)
+    data = M.DataPackage(struct.pack(">" + letters, *numbers), recipe_id)
+    return encode_message(data, M.Role.PC, 2)
 
 
 class RtdeClient:
@@ -10,7 +22,8 @@ class RtdeClient:
 
     def __init__(self, sock, version=2):
         self.sock = sock
-        self.protocol = RtdeConnection(Role.PC)
+        self.protocol = RtdeClientConnection()
+        self.input_types = {}
         if version == 2:
             assert self.ask(M.RequestProtocolVersion(2)) == M.RequestProtocolVersionReply(True)
 
@@ -35,16 +48,18 @@ class RtdeClient:
 
     def own(self, *names):
         """Set up an input recipe; its id, 0 if it was refused."""
-        return self.ask(M.SetupInputs(names)).recipe_id
+        reply = self.ask(M.SetupInputs(names))
+        self.input_types[reply.recipe_id] = reply.types
+        return reply.recipe_id
 
     def write(self, recipe_id, *values):
-        self.sock.sendall(self.protocol.send_values(recipe_id, values))
+        self.sock.sendall(input_package(recipe_id, self.input_types[recipe_id], *values))
 
     def data(self):
         """The next data package, as a dictionary."""
         event = self.next()
         assert isinstance(event, DataReceived), event
-        return event.as_dict()
+        return dict(zip(event.names, event.values, strict=True))
 
     def until(self, condition, limit=50_000):
         for _ in range(limit):

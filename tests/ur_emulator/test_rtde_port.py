@@ -2,10 +2,10 @@
 
 import pytest
 from box_support import Bench
+from rtde_support import input_package
 
-from protocol.dashboard.connection import Role
 from protocol.rtde import messages as M
-from protocol.rtde.connection import DataReceived, RtdeConnection
+from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.servers.rtde_port import RtdePort
 
@@ -20,7 +20,7 @@ class FakeConnection:
         self.is_open = True
         self.full = full
         self.sent = []
-        self.pc = RtdeConnection(Role.PC)
+        self.pc = RtdeClientConnection()
         port.opened(self)
 
     def send(self, package):
@@ -51,7 +51,7 @@ class FakeConnection:
         return list(iter(self.pc.next_event, None))
 
     def stamps(self):
-        return [round(event.as_dict()["timestamp"] / 0.008) for event in self.events()]
+        return [round(event.values[event.names.index("timestamp")] / 0.008) for event in self.events()]
 
 
 class PortBench(Bench):
@@ -186,8 +186,8 @@ def test_several_clients_have_recipes_and_rates_of_their_own(bench):
 def test_inputs_are_taken_before_start_and_act_in_the_next_cycle(bench):
     client = bench.client()
     assert client.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 1
-    client.say(client.pc.send_values(1, (5,)))
-    client.say(client.pc.send_values(1, (6,)))
+    client.say(input_package(1, ["INT32"], 5))
+    client.say(input_package(1, ["INT32"], 6))
     assert client.events() == []
     assert bench.tick().registers.input_integers[0] == 6
     assert bench.tick().registers.input_integers[0] == 6
@@ -197,8 +197,8 @@ def test_the_last_client_wins_in_a_cycle(bench):
     first, second = bench.client(), bench.client()
     assert first.ask(M.SetupInputs(("input_int_register_0", "speed_slider_mask"))).recipe_id == 1
     assert second.ask(M.SetupInputs(("input_int_register_1",))).recipe_id == 1
-    second.say(second.pc.send_values(1, (2,)))
-    first.say(first.pc.send_values(1, (1, 0)))
+    second.say(input_package(1, ["INT32"], 2))
+    first.say(input_package(1, ["INT32", "UINT32"], 1, 0))
     assert bench.tick().registers.input_integers[:2] == (1, 2)
 
 
@@ -240,7 +240,7 @@ def test_an_absurd_size_is_answered_with_a_text_and_the_end(bench):
     client = bench.client("timestamp")
     client.say(b"\0\0")
     (text,) = client.events()
-    assert isinstance(text, M.TextMessage)
+    assert isinstance(text, M.RtdeTextMessage)
     assert text.level == 1
     assert not client.is_open
     assert bench.port.clients == ()
@@ -258,7 +258,7 @@ def test_after_the_text_nothing_more_is_read(bench):
     client.close_when_sent = lambda: None  # the text still waits in the outbox
     client.say(b"\0\0")
     client.say(b"\0\3S")
-    assert [type(event) for event in client.events()] == [M.TextMessage]
+    assert [type(event) for event in client.events()] == [M.RtdeTextMessage]
 
 
 def test_a_reply_that_cannot_be_sent_ends_the_connection(bench):

@@ -1,16 +1,15 @@
 """Port 30004: RTDE. Every client gets the variables it asked for at its own rate, and writes inputs.
 
-What may be said when is `protocol.rtde.connection`'s; here are rates, owners of inputs, and sockets.
+The order of packages is in `protocol.rtde.server_connection`; here are rates, owners of inputs, and sockets.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from protocol.dashboard.connection import Role
 from protocol.errors import RemoteProtocolError
-from protocol.rtde.connection import DataReceived, RtdeConnection
-from protocol.rtde.messages import SetupInputs, SetupOutputs, TextMessage
+from protocol.rtde.messages import RtdeTextMessage, SetupInputs, SetupOutputs
+from protocol.rtde.server_connection import InputReceived, RtdeServerConnection
 from protocol.rtde.states import cycles_per_package
 from protocol.rtde.types import TextLevel
 from protocol.ur_types import SoftwareVersion
@@ -69,7 +68,7 @@ class RtdePort:
     def opened(self, connection: Connection) -> None:
         """The client speaks first."""
         self._sessions[connection] = _Session(
-            connection, RtdeConnection(Role.ROBOT, self._version), self._controller.generation.cycle_rate
+            connection, RtdeServerConnection(self._version), self._controller.generation.cycle_rate
         )
 
     def received(self, connection: Connection, data: bytes) -> None:
@@ -102,9 +101,9 @@ class RtdePort:
                     continue
                 budget -= 1
                 match event:
-                    case DataReceived(_, names, values):
+                    case InputReceived(names, values):
                         self._submit(WriteInputs(tuple(zip(names, values, strict=True))))
-                    case TextMessage(text, source):
+                    case RtdeTextMessage(text, source):
                         self._announce(LogAdded(" ".join(source.split()) or SOURCE, " ".join(text.split())))
                         budget -= _REQUEST_COST
                     case _:
@@ -115,7 +114,7 @@ class RtdePort:
         except RemoteProtocolError as problem:
             session.is_lost = True
             session.inbox.clear()
-            connection.send(protocol.say(TextMessage(str(problem), SOURCE, TextLevel.ERROR)))
+            connection.send(protocol.text(RtdeTextMessage(str(problem), SOURCE, TextLevel.ERROR)))
             connection.close_when_sent()
 
     def closed(self, connection: Connection) -> None:
@@ -172,7 +171,7 @@ class _Session:
         is_lost: what comes from it makes no sense any more; it is told so, then the connection ends.
     """
 
-    def __init__(self, connection: Connection, protocol: RtdeConnection, cycle_rate: int) -> None:
+    def __init__(self, connection: Connection, protocol: RtdeServerConnection, cycle_rate: int) -> None:
         self._cycle_rate = cycle_rate
         self.protocol = protocol
         self.encode: Callable[[Snapshot], bytes] | None = None

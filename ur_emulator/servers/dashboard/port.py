@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from protocol.dashboard.connection import MAX_LINE, CommandReceived, DashboardConnection, Role, UnknownCommand
+from protocol.dashboard.connection import MAX_LINE, CommandReceived, DashboardConnection, UnknownCommand
 from protocol.errors import ProtocolError
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
@@ -51,7 +51,7 @@ class DashboardPort:
     def opened(self, connection: Connection) -> None:
         """Send the greeting line; a client that says no more may still hear."""
         connection.hear_out(self.ended)
-        session = _Session(DashboardConnection(Role.ROBOT, self._access.identity.software.version))
+        session = _Session(DashboardConnection(self._access.identity.software.version))
         self._sessions[connection] = session
         connection.send(session.lines.greet())
 

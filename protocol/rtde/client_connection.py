@@ -1,0 +1,141 @@
+"""The PC's side of RTDE, port 30004, without I/O; `rtde.server_connection` shows the packages.
+
+`send` a request and wait for its reply, then for `DataReceived` events. Send the bytes that a method returns.
+After a LocalProtocolError nothing has changed; after a RemoteProtocolError close the connection.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from protocol.errors import RemoteProtocolError
+from protocol.rtde.codec import MAX_SIZE, decode_message, encode_message, take_package
+from protocol.rtde.messages import (
+    REQUESTS,
+    VERSIONS,
+    DataPackage,
+    Pause,
+    PauseReply,
+    Reply,
+    Request,
+    RequestProtocolVersion,
+    RequestProtocolVersionReply,
+    Role,
+    RtdeTextMessage,
+    SetupOutputs,
+    SetupOutputsReply,
+    Start,
+    StartReply,
+)
+from protocol.rtde.recipe import Recipe
+from protocol.rtde.states import RtdeState
+from protocol.rtde.types import REFUSALS, RtdeType, RtdeValue
+
+__all__ = ["ClientEvent", "DataReceived", "RtdeClientConnection"]
+
+
+@dataclass(frozen=True, slots=True)
+class DataReceived:
+    """Values of the output recipe, in the order of its names."""
+
+    names: tuple[str, ...]
+    values: tuple[RtdeValue, ...]
+
+
+ClientEvent: TypeAlias = Reply | RtdeTextMessage | DataReceived
+
+
+class RtdeClientConnection:
+    """One connection, as the PC sees it.
+
+    Attributes:
+        protocol_version: 1 until another one is agreed on.
+        state: whether data packages flow.
+    """
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self._unanswered: deque[Request] = deque()
+        self._outputs: dict[int | None, Recipe] = {}
+        self._was_started = False
+        self.protocol_version = VERSIONS[0]
+        self.state = RtdeState.PAUSED
+
+    def receive_data(self, data: bytes) -> None:
+        """Take what the socket gave; any split is fine."""
+        self._buffer += data
+
+    def send(self, request: Request) -> bytes:
+        """Ask for something; its reply comes as an event."""
+        data = encode_message(request, Role.PC, self.protocol_version)
+        self._unanswered.append(request)
+        return data
+
+    def next_event(self) -> ClientEvent | None:
+        """The next package as an event, or None when more bytes are needed.
+
+        Raises:
+            RemoteProtocolError: the stream cannot be trusted any more.
+        """
+        while (package := take_package(self._buffer, MAX_SIZE)) is not None:
+            event = self._read(*package)
+            if event is not None:
+                return event
+        return None
+
+    def _read(self, kind: int, payload: bytes) -> ClientEvent | None:
+        message = decode_message(kind, payload, Role.ROBOT, self.protocol_version)
+        if message is None:
+            raise RemoteProtocolError(f"the robot sent an RTDE package of the unknown type {kind}")
+        if isinstance(message, RtdeTextMessage):
+            return message
+        if isinstance(message, DataPackage):
+            return self._read_data(message.values, message.recipe_id)
+        asked = self._unanswered[0] if self._unanswered else None
+        if asked is None or not isinstance(message, REQUESTS[type(asked)]):
+            raise RemoteProtocolError(f"the robot answered {message!r}, but {asked or 'nothing'} was asked")
+        self._take_reply(self._unanswered.popleft(), message)
+        return message
+
+    def _read_data(self, values: bytes, recipe_id: int | None) -> DataReceived | None:
+        if not self._was_started:
+            raise RemoteProtocolError("the robot sent data before it had answered a start request")
+        if self.state is not RtdeState.STARTED:
+            return None  # assumed harmless: on its way when we paused
+        recipe = self._outputs.get(recipe_id)
+        if recipe is None:
+            raise RemoteProtocolError(f"the robot sent data of recipe {recipe_id}, which was not set up")
+        return DataReceived(recipe.names, recipe.decode(values))
+
+    def _take_reply(self, request: Request, reply: Reply) -> None:
+        match request, reply:
+            case RequestProtocolVersion(version), RequestProtocolVersionReply(True):
+                self.protocol_version = version
+            case SetupOutputs(names), SetupOutputsReply(types, recipe_id):
+                self._outputs.clear()
+                recipe = _recipe_of(names, types)
+                if recipe is not None:
+                    self._outputs[recipe_id] = recipe
+            case Start(), StartReply(True):
+                self.state = RtdeState.STARTED
+                self._was_started = True
+            case Pause(), PauseReply(True):
+                self.state = RtdeState.PAUSED
+
+
+def _recipe_of(names: tuple[str, ...], words: tuple[str, ...]) -> Recipe | None:
+    """The recipe of a reply, or None if the robot refused it.
+
+    Raises:
+        RemoteProtocolError: not one word for each name, or a word that is no type.
+    """
+    if len(words) != len(names):
+        raise RemoteProtocolError(f"the robot answered {len(words)} types for {len(names)} names")
+    if not REFUSALS.isdisjoint(words):
+        return None
+    try:
+        return Recipe(names, map(RtdeType, words))
+    except ValueError as problem:
+        raise RemoteProtocolError(f"the robot answered with an unknown type: {problem}") from None

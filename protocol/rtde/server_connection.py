@@ -1,0 +1,214 @@
+"""The robot's side of RTDE, port 30004, without I/O.
+
+    PC -> robot   V, v, O, I, S, P        every one gets exactly one reply, in order
+    PC -> robot   U (input data)          at any time, never a reply
+    robot -> PC   U (output data)         after the reply to S, until the reply to P
+    both          M (text)                the robot sends one only to end a connection
+
+Call `receive_data`, then `next_event` until it returns None; call `reply` after each `Request`, before the
+next event, because it decides how later bytes are read. `encoder` makes the data packages. Send the bytes
+that a method returns. After a LocalProtocolError nothing has changed; after a RemoteProtocolError send `text`
+and close the connection.
+
+Source: UR RTDE guide; where it says nothing, what public clients need, as noted at the place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.rtde.codec import MAX_NAMES_SIZE, data_header, decode_message, encode_message, take_package
+from protocol.rtde.fields import RtdeField, input_fields, output_fields
+from protocol.rtde.messages import (
+    VERSIONS,
+    DataPackage,
+    GetControllerVersion,
+    GetControllerVersionReply,
+    Pause,
+    PauseReply,
+    Reply,
+    Request,
+    RequestProtocolVersion,
+    RequestProtocolVersionReply,
+    Role,
+    RtdePackageType,
+    RtdeTextMessage,
+    SetupInputs,
+    SetupInputsReply,
+    SetupOutputs,
+    SetupOutputsReply,
+    Start,
+    StartReply,
+)
+from protocol.rtde.recipe import Recipe, snapshot_encoder
+from protocol.rtde.states import TRANSITIONS, RtdeState
+from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeValue
+from protocol.ur_types import SoftwareVersion
+
+__all__ = ["MAX_REQUEST_SIZE", "InputReceived", "RtdeServerConnection", "ServerEvent"]
+
+MAX_REQUEST_SIZE = 0x1FFF
+"""Largest package in bytes that the robot accepts: four times the longest list of names, and less than the
+number that the first two characters of any printable text make, such as an HTTP request on the wrong port."""
+
+_LAST_ID = 255
+
+
+@dataclass(frozen=True, slots=True)
+class InputReceived:
+    """Values of an input recipe; they may be fewer than the recipe's: see `Recipe.decode_leading`."""
+
+    names: tuple[str, ...]
+    values: tuple[RtdeValue, ...]
+
+
+ServerEvent: TypeAlias = Request | RtdeTextMessage | InputReceived
+
+
+class RtdeServerConnection:
+    """One connection, as the robot sees it.
+
+    Args:
+        version: software of the robot; it decides which variables there are.
+
+    Attributes:
+        protocol_version: 1 until another one is agreed on.
+        state: whether data packages flow.
+        input_recipes: what the client may write, by recipe id.
+        frequency: data packages a second that were asked for last [Hz]; None for the full rate.
+    """
+
+    def __init__(self, version: SoftwareVersion) -> None:
+        self._software = version
+        self._buffer = bytearray()
+        self._unanswered: Request | None = None
+        self._output_ids = 0
+        self._encoder: Callable[[Any], bytes] | None = None
+        self.protocol_version = VERSIONS[0]
+        self.state = RtdeState.PAUSED
+        self.input_recipes: dict[int, Recipe] = {}
+        self.frequency: float | None = None
+
+    def receive_data(self, data: bytes) -> None:
+        """Take what the socket gave; any split is fine."""
+        self._buffer += data
+
+    def next_event(self) -> ServerEvent | None:
+        """The next package as an event, or None when more bytes are needed.
+
+        Data and text that cannot be read are skipped.
+
+        Raises:
+            RemoteProtocolError: the stream cannot be trusted any more; every further call raises again.
+            LocalProtocolError: the last request has no reply yet.
+        """
+        if self._unanswered is not None:
+            raise LocalProtocolError(f"{self._unanswered!r} has no reply yet: one for each, in order")
+        while (package := take_package(self._buffer, MAX_REQUEST_SIZE)) is not None:
+            event = self._read(*package)
+            if event is not None:
+                return event
+        return None
+
+    def text(self, message: RtdeTextMessage) -> bytes:
+        """A text message to the client."""
+        return encode_message(message, Role.ROBOT, self.protocol_version)
+
+    @property
+    def encoder(self) -> Callable[[Any], bytes] | None:
+        """Makes a data package of a snapshot; None while none is to be sent."""
+        return self._encoder if self.state is RtdeState.STARTED else None
+
+    def reply(self, in_use: Collection[str] = ()) -> bytes:
+        """Answer the request that `next_event` gave, and do what it asks.
+
+        Args:
+            in_use: names of input variables that belong to other clients.
+        """
+        request, self._unanswered = self._unanswered, None
+        if request is None:
+            raise LocalProtocolError("nothing has been asked: one reply for each request")
+        accepted, self.state = TRANSITIONS[self.state, type(request)]
+        version = self.protocol_version
+        reply: Reply
+        match request:
+            case RequestProtocolVersion(wanted):
+                accepted = accepted and wanted in VERSIONS
+                reply = RequestProtocolVersionReply(accepted)
+                self.protocol_version = wanted if accepted else version
+            case GetControllerVersion():
+                reply = GetControllerVersionReply(self._software)
+            case SetupOutputs():
+                reply = self._set_up_outputs(request)
+            case SetupInputs():
+                reply = self._set_up_inputs(request, in_use)
+            case Start():
+                reply = StartReply(accepted)
+            case Pause():
+                reply = PauseReply(accepted)
+        return encode_message(reply, Role.ROBOT, version)
+
+    def _read(self, kind: int, payload: bytes) -> ServerEvent | None:
+        try:
+            message = decode_message(kind, payload, Role.PC, self.protocol_version)
+        except RemoteProtocolError:
+            if kind in (RtdePackageType.DATA_PACKAGE, RtdePackageType.TEXT_MESSAGE):
+                return None  # nobody waits for an answer: no reason to end the connection
+            raise
+        if isinstance(message, DataPackage):
+            recipe = self.input_recipes.get(message.recipe_id or 0)
+            if recipe is None:
+                return None
+            values = recipe.decode_leading(message.values)
+            return InputReceived(recipe.names[: len(values)], values) if values else None
+        if isinstance(message, Request):
+            self._unanswered = message
+            return message
+        return message if isinstance(message, RtdeTextMessage) else None
+
+    def _set_up_outputs(self, request: SetupOutputs) -> SetupOutputsReply:
+        """Replace the output recipe. One that is refused takes no id, and nothing is sent until the next."""
+        fields, types = _look_up(request.names, output_fields(self._software), ())
+        is_v1 = self.protocol_version == 1
+        self.frequency = request.frequency
+        self._encoder = None
+        if not fields:
+            return SetupOutputsReply(types, None if is_v1 else 0)
+        self._output_ids = self._output_ids % _LAST_ID + 1
+        recipe_id = None if is_v1 else self._output_ids
+        size = sum(field.type.size for field in fields)
+        self._encoder = snapshot_encoder(fields, data_header(size, recipe_id))
+        return SetupOutputsReply(types, recipe_id)
+
+    def _set_up_inputs(self, request: SetupInputs, in_use: Collection[str]) -> SetupInputsReply:
+        """Add an input recipe. One that is refused takes no id."""
+        fields, types = _look_up(request.names, input_fields(self._software), in_use)
+        recipe_id = len(self.input_recipes) + 1
+        if not fields or recipe_id > _LAST_ID:
+            return SetupInputsReply(types, 0)
+        self.input_recipes[recipe_id] = Recipe(request.names, (field.type for field in fields))
+        return SetupInputsReply(types, recipe_id)
+
+
+def _look_up(
+    names: tuple[str, ...], known: Mapping[str, RtdeField], in_use: Collection[str]
+) -> tuple[tuple[RtdeField, ...], tuple[str, ...]]:
+    """The fields of a recipe, and a word for each name; one refusal leaves no fields at all."""
+    fields: list[RtdeField] = []
+    words: list[str] = []
+    end = -1
+    for name in names:
+        end += 1 + len(name)
+        # The guide limits the list; we answer what lies beyond as if it had not been read.
+        field = known.get(name) if end <= MAX_NAMES_SIZE else None
+        if field is None:
+            words.append(NOT_FOUND)
+        elif name in in_use:
+            words.append(IN_USE)
+        else:
+            fields.append(field)
+            words.append(field.type.value)
+    return (tuple(fields) if len(fields) == len(names) else ()), tuple(words)
