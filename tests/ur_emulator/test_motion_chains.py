@@ -34,6 +34,8 @@ from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import UnreachableError
 
 V, A = 0.25, 1.2
+# Moves close to a singularity at the least speed take longer [s]; they are not tested.
+LONGEST = 60.0
 
 
 def straight(goal, **limits):
@@ -252,7 +254,10 @@ def can_be_ridden_one_by_one(makers):
     q = HOME
     try:
         for make in makers:
-            alone = ride(Move(make(q, TOOL.pose(q))), q)
+            move = Move(make(q, TOOL.pose(q)))
+            if move.duration > LONGEST:
+                return False
+            alone = ride(move, q, limit=2 * round(LONGEST / DT))
             if not is_accepted(alone):
                 return False
             q = alone[-1].q
@@ -262,7 +267,7 @@ def can_be_ridden_one_by_one(makers):
 
 
 def check_chain(makers):
-    targets, legs, outcomes = run_chain(makers)
+    targets, legs, outcomes = run_chain(makers, limit=100_000)
     assert is_accepted(targets)
     at_q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
     assert np.abs(np.diff(qd, axis=0)).max(initial=0.0) / DT <= 1.6 * JOINT_ACCELERATION
@@ -308,6 +313,11 @@ FOUND = {
         joints_to(at(0.0625, 0, 0, 0, 0.5, 0), r=0.002, v=0.3, a=0.5),
         arc(at(0, 0, 0), at(0, 0.046875, 0.0625), fixed=True, v=0.05, a=0.3),
     ],
+    "a turn of less than rounding behind a blend": [
+        joints((0.0, -1.4, -1.9, -1.4, 1.57, 0.77), r=0.01, a=0.5),
+        joints((1e-238, -1.4, -1.9, -1.4, 1.57, 0.77), r=0.01, a=10.0),
+        arc(at(0.02, 0.04, 0.0), at(0.05, 0.04, 0.0), fixed=True),
+    ],
     "an arc that nearly stretches the elbow": [
         arc(at(0.0515, 0.0515, 0.0662), at(0, -0.0244, -0.0533, -0.0522, -0.2713, -0.5921), r=0.03, v=0.05),
         joints((-0.39, -1.9, -1.9, -1.9, 1.094, 0.301)),
@@ -332,7 +342,7 @@ def test_chains_of_the_tool_keep_to_their_path_and_limits(waypoints, v, process)
     assume(can_be_ridden_one_by_one(makers))
     targets, legs, _ = run_chain(makers)
     assert speeds(targets).max() <= v * (1 + 1e-6)
-    assert tool_accelerations(targets).max() <= A * (1 + 5e-3) + 1e-6
+    assert tool_accelerations(targets).max(initial=0.0) <= A * (1 + 5e-3) + 1e-6
     points = positions(targets)
     off_path = distance_to_polyline(points, [START[:3], *(leg.goal_pose[:3] for leg in legs)]) > 1e-4
     for point in points[off_path]:

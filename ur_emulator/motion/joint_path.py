@@ -1,4 +1,4 @@
-"""What a move follows, told in joints: a line of joint angles, or a path of the tool through the inverse.
+"""Paths in joint space: a straight line, a cubic, or a path of the tool through the inverse kinematics.
 
 `at(s, near)` gives the joint angles and their derivative with respect to s.
 """
@@ -10,7 +10,7 @@ from typing import Protocol
 
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.cubic import Cubic
-from ur_emulator.motion.path import PosePath
+from ur_emulator.motion.path import LEAST_LENGTH, PosePath
 from ur_emulator.motion.tool import Tool, UnreachableError
 
 
@@ -37,10 +37,10 @@ class JointPath(Protocol):
 
         Args:
             s: way travelled.
-            near: joint angles a little earlier on the path [rad].
+            near: joint angles close to those at s, for the inverse kinematics [rad].
 
         Raises:
-            UnreachableError: the arm cannot be there.
+            UnreachableError: the arm cannot reach that point.
         """
         ...
 
@@ -55,18 +55,19 @@ class JointLine:
         self._start = six(start)
         self._goal = six(goal)
         way = [b - a for a, b in zip(start, goal, strict=True)]
-        self.length = max(map(abs, way))
+        length = max(map(abs, way))
+        self.length = length if length > LEAST_LENGTH else 0.0
         self._share = six([w / self.length if self.length > 0.0 else 0.0 for w in way])
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
-        """See JointPath; the end is the goal to the last bit."""
+        """See JointPath; the end is exactly the goal."""
         if s >= self.length:
             return self._goal, self._share
         return six([p + s * k for p, k in zip(self._start, self._share, strict=True)]), self._share
 
 
 class JointCurve:
-    """A cubic in joint space, in the units of the move that it leaves.
+    """A cubic in joint space, in the units of the first move of a blend.
 
     Attributes:
         speeds: greatest speed of each joint when s moves at 1, (6,).

@@ -14,14 +14,16 @@ from typing import Protocol
 from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.models.robot_model import Vector3, Vector6
 
-# A turn without way needs a speed too; nothing is published. Chosen: a turn counts like the way of a point
-# this far from the tool centre point, if that is longer than the tool's own way [m/rad].
+# A rotation without way needs a speed too; nothing is published. Chosen: a rotation counts as the way of a
+# point at this distance from the tool centre point, if that is longer than the tool's own way [m/rad].
 TURN_LEVER = 0.1
-# Three points closer to a line than this make no arc: sine of the angle between the chords.
+# Three points are on a line if the sine of the angle between their chords is below this.
 _FLAT = 1e-6
-# Two points closer than this are one [m], for the place of the arm is known up to rounding only. Chosen: far
-# below what an arm can repeat.
+# Points closer than this coincide [m]: the position of the arm is known up to rounding. Chosen: far below the
+# repeatability of an arm.
 _COINCIDENT = 1e-6
+# A shorter way than this is rounding of the kinematics and counts as none [m or rad].
+LEAST_LENGTH = 1e-9
 
 
 class PosePath(Protocol):
@@ -51,7 +53,7 @@ class PosePath(Protocol):
 
 
 def measure(twist: Sequence[float]) -> float:
-    """Return how much a twist counts, linear first: the way, or the turn of the lever if that is longer."""
+    """Return the size of a twist, linear first: that of its linear part, or TURN_LEVER times its rotation."""
     x, y, z, rx, ry, rz = twist
     return max(sqrt(x * x + y * y + z * z), TURN_LEVER * sqrt(rx * rx + ry * ry + rz * rz))
 
@@ -66,16 +68,17 @@ class PoseLine:
         self._start = start
         self._goal = _pose(goal)
         self._change = pose_sub(goal, start)
-        self.length = measure(self._change)
+        length = measure(self._change)
+        self.length = length if length > LEAST_LENGTH else 0.0
         self._twist = _scaled(self._change, 1.0 / self.length if self.length > 0.0 else 0.0)
 
     @property
     def way_rate(self) -> float:
-        """Way of the tool for s moved by 1; below 1 where the line is rather a turn."""
+        """Way of the tool per unit of s; below 1 where the line is mainly a rotation."""
         return _norm(self._twist)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """See PosePath; the end is the goal to the last bit."""
+        """See PosePath; the end is exactly the goal."""
         if s >= self.length:
             return self._goal, self._twist
         return pose_add(_scaled(self._change, s / self.length), self._start), self._twist
@@ -94,10 +97,10 @@ class PoseArc:
         Args:
             start: first pose.
             centre: of the circle [m].
-            axis: unit vector that the motion turns about.
+            axis: unit vector of the rotation.
             angle: turned in all, above 0 [rad].
             goal: pose at the end.
-            fixed: the orientation turns with the tangent, the one of `goal` does not count.
+            fixed: the orientation turns with the tangent; that of `goal` is ignored.
         """
         self._start = start
         self._centre = centre
@@ -135,8 +138,8 @@ def arc_through(
 ) -> PosePath:
     """Return the arc from `start` through the position of `via` to `goal`.
 
-    Points on one line, or two that coincide, have no circle; the tool then goes straight to the goal (chosen:
-    not documented).
+    If the points are on a line, or two coincide, there is no circle: the tool moves in a straight line to the
+    goal (chosen, not documented).
 
     Args:
         start: first pose.
