@@ -107,13 +107,18 @@ def run_chain(makers, q=HOME, limit=20000):
         refused = first is not None
         while not move.done:
             while (
-                makers and not refused and not move.done and move.open and move.leg.r > 0 and move.taken < 4
+                makers
+                and not refused
+                and not move.done
+                and move.open
+                and move.leg.r > 0
+                and move.n_joined < 4
             ):
                 outcomes.append(move.follow(makers[0](move.leg.goal, move.leg.goal_pose)))
                 refused = outcomes[-1] is Follow.REFUSED
                 if not refused:
                     makers.pop(0)
-                    move.taken += outcomes[-1] is Follow.SKIPPED
+                    move.n_joined += outcomes[-1] is Follow.SKIPPED
             targets.append(move.step(targets[-1], DT, 1.0))
             assert len(targets) < limit
         first = move.left_out if refused else None

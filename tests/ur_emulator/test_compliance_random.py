@@ -19,7 +19,7 @@ from ur_emulator.commands.programs import (
 )
 from ur_emulator.commands.push import AttachPayload, Push
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
-from ur_emulator.motion.overlay import Frozen
+from ur_emulator.motion.overlay import LastDisplacement
 from urscript import compile_program
 
 number = st.floats(-1.0, 1.0).map(lambda x: round(x, 3))
@@ -105,4 +105,4 @@ def test_nothing_breaks_a_compliant_arm(events, seed):
     assert state.mode.mode is RobotMode.RUNNING
     assert not any(bench.now.target_qd)
     assert np.abs(bench.controller.plant.qd_true).max() < 0.02
-    assert not any(not isinstance(overlay, Frozen) for overlay in state.motion._overlays)
+    assert not any(not isinstance(overlay, LastDisplacement) for overlay in state.motion._overlays)

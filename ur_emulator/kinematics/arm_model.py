@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from protocol.pose import Pose, pose_inv, pose_trans, rotvec_from_flat, rotvec_to_flat
 from ur_emulator.errors import KinematicsError
 from ur_emulator.kinematics.closed_form import closed_form_inverse
+from ur_emulator.kinematics.damped_inverse import joint_speeds
 from ur_emulator.models.calibration import NOMINAL, Calibration, calibrated_dh
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
@@ -225,8 +226,7 @@ class ArmModel:
             size = sqrt(float(error @ error))
             if size < _POSITION_TOLERANCE:
                 return six(q.tolist())
-            # A whiff of damping: no effect on convergence away from singularities, finite steps at them.
-            step = np.linalg.solve(jacobian.T @ jacobian + 1e-12 * np.eye(6), jacobian.T @ error)
+            step = joint_speeds(jacobian, error)
             longest = float(np.abs(step).max())
             q += step if longest < _LONGEST_STEP else step * (_LONGEST_STEP / longest)
         return None

@@ -128,15 +128,15 @@ class ArmMotion(PathMotion):
         A move under way, or another overlay, goes on displaced by what there is of this one.
         """
         if overlay in self._overlays:
-            self._chain.freeze(overlay)
-            if self._chain.only_frozen and self._move is None:
+            self._chain.keep_last(overlay)
+            if self._chain.all_ended and self._move is None:
                 self._take_over_target()
                 if self._generator is HOLD and any(self.path.qd):
                     self._generator = StopJ(self.stop_deceleration)
 
     def _may_settle(self) -> bool:
         """True when no overlay acts any more, no move is on a displaced path nor has only just ended."""
-        if not self._chain.only_frozen or self._move is not None:
+        if not self._chain.all_ended or self._move is not None:
             return False
         return self._generator is not HOLD or not any(self.target.qd)
 

@@ -1,8 +1,9 @@
 """The blend between two moves: a curve from r before the waypoint to r behind it, tangent to both.
 
-Three shapes. Two moves of the tool: a cubic in position and orientation relative to the waypoint; between
-straight lines that is the parabola of a constant acceleration. Two straight process moves (movep): a circular
-arc, so that the speed may stay. As soon as a joint move takes part: the same cubic in joint space.
+There are three shapes. Between two moves of the tool it is a cubic in position and orientation relative to
+the waypoint; between straight lines that is a parabola, the path of a constant acceleration. Between two
+straight process moves (movep) it is a circular arc, on which the speed stays constant. If one of the moves is
+a joint move, it is a cubic in joint space.
 Source: URScript manual CB3 3.15, `r` of the moves, "circular blends" of movep; the other shapes are chosen.
 """
 
@@ -21,25 +22,26 @@ from ur_emulator.motion.path import PoseLine, PosePath, measure
 from ur_emulator.motion.path_samples import Sample, reaches_end, sample_path
 from ur_emulator.motion.tool import UnreachableError
 
-# Beyond this turn the circular blend of a movep gets so narrow that the cubic takes its place.
-SHARPEST_ARC = 0.9 * pi
+# Above this angle the arc of a movep would be too narrow: the cubic is used [rad].
+_SHARPEST_ARC = 0.9 * pi
 _STRAIGHT = 1e-6  # m/m
-_SAMPLES = 8  # points of a blend at which its speed is looked at
-# Ways of the joints before and behind the waypoint that differ by more make a curve with a bulge.
-_LOPSIDED = 3.0
+_SAMPLES = 8  # intervals of a blend, for its greatest speed
+# Where the ways before and behind the waypoint differ by a greater factor, a blend of two joint moves is
+# shaped as if they differed by this one: else the curve overshoots.
+_GREATEST_RATIO = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class Blend:
-    """A blend; it begins and ends with the speeds of the moves that it joins.
+    """A blend; it begins and ends with the velocities of the two moves.
 
     Attributes:
-        path: the curve, in units of the move that it leaves.
+        path: the curve, in units of the first move.
         leave: where on the first move it begins.
         enter: where on the second move it ends.
-        scale: units of the first move that one unit of the second counts [unit 1 / unit 2].
+        scale: units of the first move per unit of the second.
         v: greatest speed, in units of the first move.
-        a: what `path.rate` and `path.bend` may not exceed in acceleration.
+        a: greatest acceleration of what `path.rate` and `path.bend` measure.
         samples: of a path of the tool.
     """
 
@@ -58,11 +60,11 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     Args:
         first: the move that leads to the waypoint.
         second: the move that begins there.
-        r: radius [m]; cut where it covers more than half of the second move.
-        most: how much of the first move may be cut off at its end.
+        r: radius [m]; reduced where it covers more than half of the second move.
+        most: how much of the end of the first move it may replace.
 
     Returns:
-        None when there is nothing to blend.
+        None when there is no way to blend, or the arm cannot follow the curve.
     """
     before = first.last_part(r, most)
     after = second.first_part(r, 0.5 * second.path.length)
@@ -70,7 +72,7 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
         return None
     a, b = first.path, second.path
     if isinstance(a, ToolPath) and isinstance(b, ToolPath):
-        # As far before the waypoint as behind it: the speed stays the same through the curve.
+        # As long before the waypoint as behind it, so the speed is the same at both ends of the curve.
         before = after = min(before, after)
     leave = first.path.length - before
     if isinstance(a, ToolPath) and isinstance(b, ToolPath):
@@ -92,7 +94,7 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     if isinstance(a, ToolPath) or isinstance(b, ToolPath):
         scale, length, end_length = before / after, 2.0 * before, 2.0 * after
     else:
-        scale, length = 1.0, min(before + after, _LOPSIDED * min(before, after))
+        scale, length = 1.0, min(before + after, _GREATEST_RATIO * min(before, after))
         end_length = length
     cubic = Cubic.between(start_q, _times(length, slope), end_q, _times(end_length, end_slope))
     joint_curve = JointCurve(cubic, length)
@@ -122,7 +124,7 @@ def _tool_curve(
 
 
 class PoseCurve:
-    """A cubic in position and rotation vector relative to a waypoint; travelled at constant rate."""
+    """A cubic in position and rotation vector relative to a waypoint; s is proportional to its parameter."""
 
     def __init__(self, cubic: Cubic, waypoint: Pose, length: float) -> None:
         self._cubic = cubic
@@ -139,13 +141,13 @@ class PoseCurve:
 
 
 class PoseCorner:
-    """A circular arc between two lines; the orientation turns smoothly from one rate to the other."""
+    """A circular arc between two lines; the orientation follows a cubic."""
 
     def __init__(
         self, start: Pose, u: Vector, w: Vector, radius: float, angle: float, turn: Cubic, waypoint: Pose
     ) -> None:
         self._start = start
-        self._u, self._w = u, w  # unit vectors: direction of the first line, and into the turn
+        self._u, self._w = u, w  # unit vectors: along the first line, and towards the centre
         self._radius, self._angle = radius, angle
         self._turn = turn
         self._waypoint = waypoint
@@ -172,20 +174,20 @@ def _fastest(path: PosePath) -> float:
 
 
 def _corner(first: PosePath, second: PosePath, leg: Leg, leave: float, enter: float) -> PoseCorner | None:
-    """Return the arc tangent to two lines; None where it would be too narrow, or the lines are turns only."""
+    """Return the arc tangent to two lines; None if it would be too narrow, or a line is mainly a rotation."""
     start, slope = first.at(leave)
     end, end_slope = second.at(enter)
     waypoint = leg.goal_pose
     d1, d2 = slope[:3], end_slope[:3]
     r = min(hypot(*_minus(start[:3], waypoint[:3])), hypot(*_minus(end[:3], waypoint[:3])))
-    # Only lines whose s is the tool's own way keep one speed through an arc.
+    # The speed is constant only where s is the way of the tool on both lines.
     if abs(hypot(*d1) - 1.0) > _STRAIGHT or abs(hypot(*d2) - 1.0) > _STRAIGHT or r <= 0.0:
         return None
     if abs(hypot(*_minus(start[:3], waypoint[:3])) - hypot(*_minus(end[:3], waypoint[:3]))) > 1e-6 * r:
         return None
     cosine = sum(x * y for x, y in zip(d1, d2, strict=True))
     angle = acos(max(-1.0, min(1.0, cosine)))
-    if angle < 1e-4 or angle > SHARPEST_ARC:
+    if angle < 1e-4 or angle > _SHARPEST_ARC:
         return None
     w = tuple((y - cosine * x) / sin(angle) for x, y in zip(d1, d2, strict=True))
     radius = r / tan(0.5 * angle)

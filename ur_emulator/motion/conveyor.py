@@ -1,8 +1,8 @@
-"""A conveyor under the tool: an overlay that carries the path along as far as the belt has gone.
+"""Conveyor tracking: an overlay that displaces the tool by the way of the belt.
 
-Where the belt is comes in ticks of an encoder, whole numbers once a cycle. An estimate of position and speed
-smooths them without lag at constant speed; the tool follows the estimate with bounded acceleration, so that
-an arm at rest catches up with a belt that runs already.
+The belt's position comes as counts of an encoder, whole numbers once a cycle. An estimate of position and
+speed smooths them, without lag at constant speed. The tool follows the estimate with bounded acceleration, so
+an arm at rest catches up with a running belt.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import Tool
 
 # Nothing of this is published; all chosen.
-# How quickly the estimate forgets old counts [1/s]: a quarter of a second smooths encoders of 1000 ticks/m.
+# Bandwidth of the estimate [1/s]: smooths encoders of 1000 ticks/m within a quarter of a second.
 _BANDWIDTH = 10.0
-# Acceleration of the tool relative to its path [m/s^2], and its speed above the belt's [m/s] in catching up.
+# Acceleration of the tool relative to its path [m/s^2], and its speed relative to the belt, while it catches
+# up [m/s].
 CATCH_UP_ACCELERATION, CATCH_UP_SPEED = 1.2, 0.25
-# Share of the acceleration that the approach of the belt's position counts on, and its stiffness [1/s].
+# Share of the acceleration that is planned for the approach to the belt's position; its gain close by [1/s].
 _APPROACH, _STIFFNESS = 0.5, 8.0
-# A tool nearer to the axis of a turning conveyor than this turns as if it were so far away [m].
+# Least radius that counts for the speed of a tool on a circular conveyor [m].
 _LEAST_RADIUS = 0.1
 
 
@@ -30,37 +31,37 @@ class BeltEstimate:
     """Position and speed of a belt from counts: a critically damped alpha-beta filter."""
 
     def __init__(self, count: float, time: float) -> None:
-        """Begin with the first count [ticks] at a time [s], at rest: the speed shows soon enough."""
+        """Begin at rest with the first count [ticks] at a time [s]."""
         self.position = count
         self.speed = 0.0
         self._time = time
 
     def update(self, count: float, time: float) -> None:
-        """Take the count at a later time; the gaps of a pause are bridged at the last speed."""
+        """Update with the count at a later time; over a pause the last speed is extrapolated."""
         dt = time - self._time
         if dt <= 0.0:
             return
         self._time = time
-        memory = exp(-_BANDWIDTH * dt)
+        decay = exp(-_BANDWIDTH * dt)
         self.position += self.speed * dt
-        surprise = count - self.position
-        self.position += (1.0 - memory * memory) * surprise
-        self.speed += (1.0 - memory) ** 2 / dt * surprise
+        innovation = count - self.position
+        self.position += (1.0 - decay * decay) * innovation
+        self.speed += (1.0 - decay) ** 2 / dt * innovation
 
 
 class Conveyor:
-    """What linear and turning conveyors share: how far the tool has been carried, in ticks.
+    """What linear and circular conveyors share: the way of the tool with the belt, in ticks.
 
     Attributes:
-        tool: the one that held when tracking began.
+        tool: in force when tracking began.
     """
 
     def __init__(self, tool: Tool, count: Callable[[], float], clock: Callable[[], float]) -> None:
         """Begin to track.
 
         Args:
-            tool: that is carried.
-            count: gives the ticks that the belt has gone so far, without wraps.
+            tool: that moves with the belt.
+            count: gives the ticks of the belt so far, without overflows.
             clock: gives the time [s].
         """
         self.tool = tool
@@ -78,32 +79,32 @@ class Conveyor:
         return self._carry(tool_pose, self._carried)
 
     def _follow(self, ticks_per_metre: float, dt: float) -> None:
-        """Draw what the tool has been carried to where the belt is."""
+        """Move the tool's way towards the belt's."""
         belt = self._estimate
         a = CATCH_UP_ACCELERATION * ticks_per_metre
-        gentle = _APPROACH * a
-        behind = belt.position - self._carried
-        # The speed that can still be taken off on the way left; linear close to the goal.
-        corner = gentle / _STIFFNESS
-        closing = min(
-            sqrt(2.0 * gentle * abs(behind) + corner * corner) - corner, CATCH_UP_SPEED * ticks_per_metre
+        deceleration = _APPROACH * a
+        error = belt.position - self._carried
+        # The speed from which the tool can still stop at the belt's position; linear close to it.
+        corner = deceleration / _STIFFNESS
+        approach = min(
+            sqrt(2.0 * deceleration * abs(error) + corner * corner) - corner, CATCH_UP_SPEED * ticks_per_metre
         )
-        wanted = belt.speed + copysign(closing, behind)
+        wanted = belt.speed + copysign(approach, error)
         before = self._speed
         self._speed += min(max(wanted - before, -a * dt), a * dt)
         self._carried += 0.5 * dt * (before + self._speed)
 
     def _ticks_per_metre(self, tool_pose: Pose) -> float:
-        """Return the ticks in which the tool is carried by a metre, above 0."""
+        """Return the ticks that move the tool by a metre, above 0."""
         raise NotImplementedError
 
     def _carry(self, tool_pose: Pose, ticks: float) -> Pose:
-        """Return the tool's pose carried along."""
+        """Return the tool's pose after so many ticks of the belt."""
         raise NotImplementedError
 
 
 class LinearConveyor(Conveyor):
-    """A belt that moves the tool straight on."""
+    """A belt that moves in a straight line."""
 
     def __init__(
         self,
@@ -113,7 +114,7 @@ class LinearConveyor(Conveyor):
         count: Callable[[], float],
         clock: Callable[[], float],
     ) -> None:
-        """Take the direction in the base frame, of any length above 0; and the ticks, below 0 to go back."""
+        """Take the direction in the base frame, of any length above 0; ticks below 0 reverse it."""
         super().__init__(tool, count, clock)
         size = hypot(*direction)
         x, y, z = direction
@@ -142,7 +143,7 @@ class CircularConveyor(Conveyor):
         *,
         rotate_tool: bool,
     ) -> None:
-        """Take the frame in the base frame; the ticks, below 0 to go back; whether the tool turns too."""
+        """Take the frame in the base frame; ticks, below 0 to turn backwards; whether the tool turns."""
         super().__init__(tool, count, clock)
         self._centre = centre
         self._from_centre = pose_inv(centre)

@@ -2,13 +2,13 @@
 
 An overlay of the tool path. In every cycle each compliant axis gets a speed
 
-    v = (1 - damping) * v_actual + gain * (wrench asked + wrench felt)
+    v = (1 - damping) * v_actual + gain * (wrench demanded + wrench measured)
 
-within its limit. In free space the speed is maintained and grows while a force is missing, up to the limit;
-in contact the tool stands still, so that only the second term is left and the force approaches the one asked
-for as a first-order lag. Nobody has to find out whether there is contact. `gain` is that lag's rate times the
-compliance that the joint servos give the tool at the present pose, so that contact is equally fast and stable
-everywhere. Where a stiff axis is selected, or nothing compliant, the tool follows the program.
+within its limit. In free space the speed is maintained, and grows up to the limit while a force is missing.
+In contact the tool stands still: only the second term is left, and the force approaches the demanded one as a
+first-order lag. The law is the same with and without contact. `gain` is the rate of that lag times the
+compliance that the joint servos give the tool at its present pose, so contact is equally fast and stable at
+all poses. Along stiff axes the tool follows the program.
 
 Source: URScript manual CB3 3.15, force_mode: compliant axes, limits; force_mode_set_damping: 1 "decelerates
 quickly if no force is present", 0 "maintains the speed"; force_mode_set_gain_scaling. What the program moves
@@ -36,25 +36,25 @@ from ur_emulator.motion.tool import Tool
 # Rate at which the force approaches the one asked for at gain scaling 1 [1/s]. The whole loop takes about
 # 60 ms (poor fidelity 75): 8 * .075 leaves more than 50 degrees of phase, and scaling 2 is still stable.
 FORCE_RATE = 8.0
-# Time constant of the filter of the felt wrench [s]: what is left of 3 N of noise moves the arm inaudibly.
+# Time constant of the filter of the measured wrench [s]: leaves little of 3 N of noise.
 FILTER_TIME = 0.024
-# A speed that is not maintained: that of this force or moment missing [N, Nm]. It keeps noise and the error
-# of the zero from setting a free arm adrift.
+# The speed that this missing force or moment causes [N, Nm] is not maintained. So noise and the error of the
+# zero do not accelerate a free arm.
 _IDLE_WRENCH = np.repeat([1.5, 0.25], 3)
 # Accelerations of the displacement [m/s^2, rad/s^2].
 _ACCELERATION = np.repeat([5.0, 20.0], 3)
-# Least compliance to reckon with, in stretched poses [m/N, rad/Nm].
+# Lower bound of the compliance, for stretched poses [m/N, rad/Nm].
 _STIFFEST = (5e-6, 2e-4)
-# Deviations of stiff axes below this are the arm's own [m, rad]; tighter limits count as these.
+# Stiff axes deviate by this much without any fault [m, rad]; lower limits count as these.
 _LEAST_DEVIATION = np.repeat([0.002, 0.01], 3)
 # No joint moves a tool further than this per radian [m/rad, rad/rad].
 _LONGEST_LEVER = 2.0
-# Cycles for which the gains at a pose hold: the tool has gone a few millimetres.
-_GAIN_CYCLES = 8
+# The gains are computed anew after this time [s]: the tool has moved a few millimetres.
+_GAIN_TIME = 0.064
 
 
-class Felt(NamedTuple):
-    """What force mode feels of the arm.
+class ArmMeasurement(NamedTuple):
+    """What force mode measures of the arm.
 
     Attributes:
         q: joint angles [rad].
@@ -69,11 +69,11 @@ class Felt(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ForceSettings:
-    """Arguments of force_mode and what was set before it.
+    """Arguments of force_mode, and the damping and gain scaling set before it.
 
     Attributes:
         selection: by axis of the task frame, True for compliant.
-        wrench: that the tool shall press with, task axes [N, Nm].
+        wrench: demanded from the tool on its environment, task axes [N, Nm].
         limits: speed of compliant axes [m/s, rad/s], deviation of stiff ones [m, rad].
         damping: 0..1.
         gain_scaling: 0..2.
@@ -87,12 +87,12 @@ class ForceSettings:
 
 
 class Deviation(NamedTuple):
-    """A stiff axis that is too far off.
+    """The deviation of a stiff axis beyond its limit.
 
     Attributes:
         axis: 0..5.
-        size: how far [m or rad].
-        limit: allowed [m or rad].
+        size: deviation [m or rad].
+        limit: greatest allowed one [m or rad].
     """
 
     axis: int
@@ -101,14 +101,14 @@ class Deviation(NamedTuple):
 
 
 class ForceMode:
-    """The overlay. Starts without displacement and speed.
+    """The overlay; it begins without displacement and speed.
 
     Args:
-        tool: what presses.
-        frame: whose axes are compliant or stiff.
-        settings: what is asked.
+        tool: that is moved.
+        frame: its axes are compliant or stiff.
+        settings: arguments of force_mode.
         stiffness: of the joint servos (6,) [Nm/rad].
-        feel: gives the present measurements.
+        measure: gives the present measurement.
     """
 
     def __init__(
@@ -117,24 +117,24 @@ class ForceMode:
         frame: TaskFrame,
         settings: ForceSettings,
         stiffness: Sequence[float],
-        feel: Callable[[], Felt],
+        measure: Callable[[], ArmMeasurement],
     ) -> None:
         self.tool = tool
-        self._feel = feel
+        self._measure = measure
         self._joint_compliance = 1.0 / np.array(stiffness)
         self._shift: Pose = ZERO6
         self._speed = np.zeros(6)  # of the displacement, base axes
-        felt = feel()
-        self._wrench = np.array(felt.wrench)
-        self._twist = np.array(felt.twist)
+        measured = measure()
+        self._wrench = np.array(measured.wrench)
+        self._twist = np.array(measured.twist)
         self._path_pose: Pose | None = None
         self._gain = np.zeros(6)
-        self._gain_age = 0
+        self._gain_time_left = 0.0
         self._settings: ForceSettings | None = None
         self.set(frame, settings)
 
     def set(self, frame: TaskFrame, settings: ForceSettings) -> None:
-        """Go on with another frame and other settings, without a jump."""
+        """Continue with another frame and other settings, without a step of the speed."""
         self.frame = frame
         if settings == self._settings:
             return
@@ -142,9 +142,9 @@ class ForceMode:
         self._rate = settings.gain_scaling * FORCE_RATE
         self._maintained = 1.0 - settings.damping
         self._chosen = np.array(settings.selection)
-        self._asked = np.array(settings.wrench)
+        self._demanded = np.array(settings.wrench)
         self._limits = np.array(settings.limits)
-        self._gain_age = 0
+        self._gain_time_left = 0.0
         stiff = np.maximum(self._limits, _LEAST_DEVIATION)[~self._chosen]
         self._tightest = float(stiff.min()) if stiff.size else inf
 
@@ -152,23 +152,23 @@ class ForceMode:
         """See Overlay."""
         along_path = ZERO6 if self._path_pose is None else shift_between(self._path_pose, tool_pose)
         self._path_pose = tool_pose
-        felt = self._feel()
+        measured = self._measure()
         share = dt / (FILTER_TIME + dt)
-        self._wrench += share * (np.array(felt.wrench) - self._wrench)
-        self._twist += share * (np.array(felt.twist) - self._twist)
+        self._wrench += share * (np.array(measured.wrench) - self._wrench)
+        self._twist += share * (np.array(measured.twist) - self._twist)
         place = apply_shift(self._shift, tool_pose)
         axes = self.frame.turn(place, [way / dt for way in along_path])
         if axes is None or not self._chosen.any():
             speed = np.zeros(6)
-            kept = np.zeros(6)
+            cancelled = np.zeros(6)
         else:
-            turn = _both(axes)
-            speed = turn @ self._axis_speeds(turn, felt.q, dt)
-            # The path's own motion along compliant axes, where the displacement has turned it to, is undone.
+            rotation = _block_diagonal(axes)
+            speed = rotation @ self._axis_speeds(rotation, measured.q, dt)
+            # The program's motion along compliant axes, turned by the displacement, is not executed.
             way = np.array(along_path)
             way[3:] = rotvec_to_matrix(self._shift[3:]) @ way[3:]
-            kept = turn @ np.where(self._chosen, turn.T @ way, 0.0)
-        step = 0.5 * dt * (self._speed + speed) - kept
+            cancelled = rotation @ np.where(self._chosen, rotation.T @ way, 0.0)
+        step = 0.5 * dt * (self._speed + speed) - cancelled
         self._speed = speed
         self._shift = apply_shift(six(step.tolist()), self._shift)
         return apply_shift(self._shift, tool_pose)
@@ -182,7 +182,7 @@ class ForceMode:
         """
         if self.frame.axes is None or _LONGEST_LEVER * sum(map(abs, position_error)) < self._tightest:
             return None
-        off = np.abs(_both(self.frame.axes).T @ self.tool.twist(q, position_error))
+        off = np.abs(_block_diagonal(self.frame.axes).T @ self.tool.twist(q, position_error))
         limits = np.maximum(self._limits, _LEAST_DEVIATION)
         beyond = np.flatnonzero(~self._chosen & (off > limits))
         if not beyond.size:
@@ -190,24 +190,27 @@ class ForceMode:
         axis = int(beyond[0])
         return Deviation(axis, float(off[axis]), float(limits[axis]))
 
-    def _axis_speeds(self, turn: NDArray[np.float64], q: Sequence[float], dt: float) -> NDArray[np.float64]:
+    def _axis_speeds(
+        self, rotation: NDArray[np.float64], q: Sequence[float], dt: float
+    ) -> NDArray[np.float64]:
         """Return the speeds along the axes of the task frame at the end of this cycle."""
-        if self._gain_age == 0:
-            self._gain = self._rate * self._compliance(turn, q)
-        self._gain_age = (self._gain_age + 1) % _GAIN_CYCLES
+        if self._gain_time_left < 0.5 * dt:
+            self._gain = self._rate * self._compliance(rotation, q)
+            self._gain_time_left = _GAIN_TIME
+        self._gain_time_left -= dt
         gain = self._gain
-        missing = self._asked + turn.T @ self._wrench
-        actual = turn.T @ self._twist
+        missing = self._demanded + rotation.T @ self._wrench
+        actual = rotation.T @ self._twist
         idle = gain * _IDLE_WRENCH
         maintained = np.sign(actual) * np.maximum(np.abs(actual) - idle, 0.0)
         wanted = self._maintained * maintained + gain * missing
-        before = turn.T @ self._speed
+        before = rotation.T @ self._speed
         wanted = np.clip(wanted, before - _ACCELERATION * dt, before + _ACCELERATION * dt)
         return np.where(self._chosen, np.clip(wanted, -self._limits, self._limits), 0.0)
 
-    def _compliance(self, turn: NDArray[np.float64], q: Sequence[float]) -> NDArray[np.float64]:
-        """Return the tool's least compliance (6,) among compliant axes, forces and moments apart."""
-        jacobian = turn.T @ self.tool.arm.jacobian(q, self.tool.tcp)
+    def _compliance(self, rotation: NDArray[np.float64], q: Sequence[float]) -> NDArray[np.float64]:
+        """Return the least compliance of the tool along compliant axes (6,), for forces and for moments."""
+        jacobian = rotation.T @ self.tool.arm.jacobian(q, self.tool.tcp)
         compliance = (jacobian * self._joint_compliance) @ jacobian.T
         values = np.zeros(6)
         for part, stiffest in ((slice(0, 3), _STIFFEST[0]), (slice(3, 6), _STIFFEST[1])):
@@ -219,8 +222,8 @@ class ForceMode:
         return values
 
 
-def _both(axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the turn of a wrench or twist (6, 6) that a turn of axes (3, 3) means."""
-    turn = np.zeros((6, 6))
-    turn[:3, :3] = turn[3:, 3:] = axes
-    return turn
+def _block_diagonal(axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotation of wrenches and twists (6, 6) for a rotation of axes (3, 3)."""
+    rotation = np.zeros((6, 6))
+    rotation[:3, :3] = rotation[3:, 3:] = axes
+    return rotation

@@ -14,19 +14,19 @@ from ur_emulator.motion.path import PoseLine, PosePath
 from ur_emulator.motion.path_samples import Sample, reaches_end, sample_path
 from ur_emulator.motion.tool import Tool
 
-# A move stretched more than this does not move in any lifetime; keeps its numbers within those of floats.
+# A move is slowed down by at most this factor: keeps its numbers within the range of floats.
 _STANDSTILL = 1e12
-# Faster than anything that turns, and still far from the largest floats.
+# Upper bounds of speed and acceleration: above those of all arms, within the range of floats.
 _FASTEST, _STRONGEST = 1e6, 1e9
-# Points tried on the way out of a blend zone, and halvings to find its border.
+# Points tested from the waypoint outwards to find the border of a blend zone, and bisections then.
 _SAMPLES, _HALVINGS = 16, 30
-# Two ways to one pose end in the same joint angles if no joint differs by more [rad].
+# Joint angles that differ by less are the same solution of the inverse kinematics [rad].
 _SAME = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One instruction's way to its waypoint.
+    """The path of one move instruction to its waypoint, with its limits.
 
     Attributes:
         path: from the last waypoint to this one.
@@ -38,7 +38,7 @@ class Leg:
         t: duration [s]; above 0 it has priority over `a` and `v`.
         r: blend radius at the waypoint [m]; 0 to end at rest.
         process: the speed stays constant through blends (movep).
-        samples: of a path of the tool, as far as the arm can follow it.
+        samples: of a path of the tool, up to where the arm can follow it.
     """
 
     path: JointPath
@@ -67,20 +67,20 @@ class Leg:
             x, y, z = self.tool.pose(self.path.at(s, ())[0])[:3]
         return x, y, z
 
-    def in_time(self, *, rolling: bool = False) -> Leg:
-        """Return the same leg with `v` and `a` such that it takes `t`, if it asks for that.
+    def with_duration(self, *, from_blend: bool = False) -> Leg:
+        """Return the same leg with `v` and `a` such that it takes `t`, if `t` is given.
 
-        From rest to rest the trapezoid of `a` and `v` is stretched. Where an end blends there is no ramp; the
-        speed is then chosen for the acceleration asked for, if that is enough. Source: URScript manual CB3
-        3.15, movej: `t` has priority; how is chosen.
+        From rest to rest the trapezoid of `a` and `v` is slowed down. An end with a blend has no ramp; there
+        the speed is chosen for the given acceleration, if that is enough. Source: URScript manual CB3 3.15,
+        movej: `t` has priority; how is chosen.
 
         Args:
-            rolling: the leg begins with a blend.
+            from_blend: the leg begins with a blend.
         """
         way, t, a = self.path.length, self.t, self.a
         if t <= 0.0 or way <= 0.0:
             return self
-        ramps = (not rolling) + (self.r <= 0.0)
+        ramps = (not from_blend) + (self.r <= 0.0)
         if ramps == 0:
             v = way / t
         elif ramps == 1:
@@ -100,7 +100,7 @@ class Leg:
             pose: of the tool there.
 
         Returns:
-            None for an arc, whose circle depends on its start, and where the arm would not arrive in the same
+            None for an arc, since its circle depends on its start, and if the arm would arrive with other
             joint angles.
         """
         path, limits = self.path, {"a": self.a, "v": self.v, "t": self.t, "r": self.r}
@@ -147,7 +147,7 @@ def move_j(
     t: float = 0.0,
     r: float = 0.0,
 ) -> Leg:
-    """Return a move that is linear in joint space, all joints starting and stopping together.
+    """Return a move that is linear in joint space: all joints start and stop together.
 
     Source: URScript manual CB3 3.15, movej.
 

@@ -1,10 +1,10 @@
-"""A move under way, and the moves that blend out of it: one generator for the whole chain.
+"""A chain of moves with blends between them: one generator for all of them.
 
-Blending needs to know the next move before the blend begins, and the arm must be able to stop if none comes.
-So an instruction with a blend radius gives way to the script (`open`) as soon as the arm could not go on at
-its speed and still come to rest before the blend; a move that is commanded then joins the chain (`follow`),
-and the speed of all that is known is planned anew. Where waypoints lie close together the script so runs
-several of them ahead. If no further move comes the arm stops at the last waypoint.
+The next move must be known before its blend begins, and the arm must be able to stop if there is none. So an
+instruction with a blend radius returns to the script (`open`) when the arm must begin to brake in order to
+stop before the blend. A move that is commanded then joins the chain (`follow`), and the speed of the whole
+chain is planned again. Where waypoints are close together the script is several of them ahead of the arm. If
+there is no further move, the arm stops at the last waypoint.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from ur_emulator.motion.path_segment import PathSegment, segment_of_blend, segme
 from ur_emulator.motion.speed_plan import SpeedPlan, StoppingCurve, plan, stopping_curve
 from ur_emulator.motion.target import JointTarget
 
-# A blend that the arm is too fast for is made smaller by this factor, so many times, and then given up.
+# If the arm is too fast for a blend, its radius is reduced by this factor, at most so many times.
 _SHRINK, _ATTEMPTS = 0.7, 16
-# A script has this many cycles to command the next move after it was given way.
+# A script has this many cycles to command the next move after the instruction returned.
 _LEAD_CYCLES = 2
 
 
 class Follow(Enum):
-    """What became of a move that was to follow another one.
+    """The result of `Move.follow`.
 
-    `BLENDED`: it joined the chain. `SKIPPED`: its waypoint is left out, as long as the move behind it can do
-    without. `REFUSED`: the arm stops first.
+    `BLENDED`: the move joined the chain. `SKIPPED`: its waypoint is left out, if the next move allows it.
+    `REFUSED`: the arm stops first.
     """
 
     BLENDED = "blended"
@@ -40,18 +40,18 @@ class Follow(Enum):
 
 
 class Move:
-    """Travels legs, one into the next.
+    """Moves along legs, with a blend from each to the next.
 
     Attributes:
         done: at rest at the last waypoint.
-        returned: the instruction has returned: another one may follow, or the arm stops at the waypoint.
-        taken: moves that joined since the last cycle.
-        left_out: the move behind the last one of the chain if its waypoint is left out for now.
+        returned: the script's instruction has returned: another move may follow.
+        n_joined: moves that joined since the last cycle.
+        left_out: the move after the last one of the chain, if its waypoint is left out for now.
     """
 
     def __init__(self, leg: Leg) -> None:
         """Plan a leg from rest to rest."""
-        self._leg = leg = leg.in_time()
+        self._leg = leg = leg.with_duration()
         self._time = self._time_before = 0.0
         self._cycle = 0.0
         self._zone = _zone(leg, 0.0)
@@ -62,31 +62,31 @@ class Move:
         rest = plan(self._segments[0].intervals, 0.0)
         assert rest is not None
         self._use(rest)
-        # A move to where the arm is has no way, but may have a duration.
+        # A move without way may have a duration.
         self._wait = leg.t if leg.path.length <= 0.0 else 0.0
         self.done = self._plan.duration <= 0.0 and self._wait <= 0.0
         self.returned = False
-        self.taken = 0
+        self.n_joined = 0
         self.left_out: Leg | None = None
 
     @property
     def goal(self) -> Vector6 | None:
-        """Joint angles at the waypoint that the arm is on its way to [rad]; None if it cannot be there."""
+        """Joint angles at the next waypoint [rad]; None if the arm cannot reach it."""
         return self._segments[self._at(self._plan.at(self._time)[0])].leg.goal
 
     @property
     def leg(self) -> Leg:
-        """The last leg that was commanded: the next one begins at its waypoint."""
+        """The last leg that was commanded; the next one begins at its waypoint."""
         return self._leg if self.left_out is None else self.left_out
 
     @property
     def duration(self) -> float:
-        """Time that is still planned, at full speed [s]."""
+        """Time until the end of the plan, at a speed scaling of 1 [s]."""
         return max(self._plan.duration, self._wait) - self._time
 
     @property
     def open(self) -> bool:
-        """True from the cycle on in which it must be known whether a move follows."""
+        """True when the next move must be known now: later the arm brakes."""
         if self.done:
             return True
         if self._leg.r <= 0.0 or self._stopping is None:
@@ -95,11 +95,11 @@ class Move:
         return not self._stopping.can_stop(s, speed)
 
     def follow(self, leg: Leg) -> Follow:
-        """Let another leg follow, if this one still may; its path begins at the waypoint of `leg`.
+        """Append another leg, if the arm can still blend into it; its path begins at the waypoint of `leg`.
 
-        A waypoint whose blend overlaps with the one before it is left out: the next move goes there straight
-        from the waypoint before. Where it cannot, since it is an arc or since the arm would not arrive, the
-        waypoint stays, and its blend gets smaller.
+        A waypoint is left out if its blend overlaps with the one before it: the next move then begins at the
+        waypoint before. If that is not possible, for an arc or where the arm would not arrive, the waypoint
+        stays with a smaller blend.
 
         Source: URScript manual CB3 3.15, movej: "if the blend region of this move overlaps with the blend
         radius of previous or following waypoints, this move will be skipped". That it may stay is chosen.
@@ -119,11 +119,11 @@ class Move:
         return Follow.BLENDED if self._join(leg) else Follow.REFUSED
 
     def _join(self, leg: Leg) -> bool:
-        """Blend the last leg into another one; False if the arm is too fast for any blend."""
+        """Blend from the last leg into another one; False if the arm is too fast for all blends."""
         s, speed = self._plan.at(self._time)
         ahead = self._ahead(s)
         last, radius = ahead[-1], self._leg.r
-        second = leg.in_time(rolling=True)
+        second = leg.with_duration(from_blend=True)
         for _ in range(_ATTEMPTS):
             found = blend(self._leg, second, radius, min(self._zone, last.end - last.begin))
             if found is not None:
@@ -141,7 +141,7 @@ class Move:
                     self._segments = segments
                     self._use(planned)
                     self.returned = False
-                    self.taken += 1
+                    self.n_joined += 1
                     return True
             radius *= _SHRINK
         return False
@@ -150,10 +150,10 @@ class Move:
         """Advance on the path by `scale * dt`.
 
         Raises:
-            UnreachableError: the path leads where the arm cannot be.
+            UnreachableError: the arm cannot reach the path there.
         """
         self._cycle = dt
-        self.taken = 0
+        self.n_joined = 0
         time = self._time + scale * dt
         near = [p + dt * v for p, v in zip(target.q, target.qd, strict=True)]
         self._time_before, self._time = self._time, time
@@ -175,12 +175,12 @@ class Move:
         self._time = self._time_before
 
     def abandon(self) -> None:
-        """Give the move up: whoever waits for its end need not wait longer."""
+        """End the move where the arm is, for those that wait for its end."""
         self.done = True
         self.left_out = None
 
     def _use(self, found: SpeedPlan) -> None:
-        """Begin a plan for the segments now."""
+        """Begin to execute a plan for the segments."""
         self._plan = found
         self._time = self._time_before = 0.0
         self._ends = list(accumulate(segment.length for segment in self._segments))
@@ -191,11 +191,11 @@ class Move:
             self._stopping = stopping_curve(intervals, self._ends[-1] - self._zone * last.scale)
 
     def _at(self, s: float) -> int:
-        """Return which segment a way leads to."""
+        """Return the index of the segment at a way."""
         return min(bisect_right(self._ends, s), len(self._segments) - 1)
 
     def _ahead(self, s: float) -> list[PathSegment]:
-        """Return what is left of the segments after a way."""
+        """Return the rest of the segments after a way."""
         k = self._at(s)
         segment = self._segments[k]
         begin = segment.begin + (s - (self._ends[k - 1] if k > 0 else 0.0)) / segment.scale
@@ -203,7 +203,7 @@ class Move:
 
 
 def _zone(leg: Leg, begin: float) -> float:
-    """Return how much of a leg's end its blend may take; at most half of it, and what is left of it."""
+    """Return how much of a leg's end its blend may replace: at most half of the leg, none before `begin`."""
     if leg.r <= 0.0:
         return 0.0
     return min(leg.last_part(leg.r, 0.5 * leg.path.length), leg.path.length - begin)

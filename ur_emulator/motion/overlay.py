@@ -1,7 +1,7 @@
 """Overlays: what displaces the tool from the path of the program while it moves on it.
 
-A conveyor carries the tool along, force mode lets it give way. The program goes on in terms of the path;
-the joints get the displaced target. Without overlays nothing of this runs.
+A conveyor moves the tool along with a belt; force mode moves it until it meets a force. The program works in
+terms of the path; the joints get the displaced target. Without overlays none of this runs.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Overlay(Protocol):
     def displace(self, tool_pose: Pose, path: JointTarget, dt: float) -> Pose:
         """Return where the tool shall be at the end of the cycle, in the base frame [m, rad].
 
-        The first call should displace by next to nothing: a jump here is a jump of the arm.
+        The first displacement must be close to zero: a step here is a step of the arm.
 
         Args:
             tool_pose: tool along the path at the end of the cycle, displaced by the overlays before this one.
@@ -36,13 +36,13 @@ class Overlay(Protocol):
         ...
 
 
-class Frozen:
-    """What is left of an overlay that was removed while a move was under way: its last displacement.
+class LastDisplacement:
+    """Takes the place of an overlay that was removed during a move: keeps its last displacement.
 
-    The residual velocity of the displacement is ramped out.
+    The velocity that the displacement still has is ramped down.
     """
 
-    # Deceleration of the displacement [m/s^2, rad/s^2]. Chosen: gentle for the conveyor, short for contact.
+    # Deceleration of the displacement [m/s^2, rad/s^2]. Chosen: smooth for the conveyor, short for contact.
     LINEAR, ANGULAR = 1.0, 4.0
 
     def __init__(self, tool: Tool, shift: Pose, velocity: Vector6) -> None:
@@ -107,16 +107,16 @@ class OverlayChain:
             self._step_speed = target.qd
         self.overlays.append(overlay)
 
-    def freeze(self, overlay: Overlay) -> None:
+    def keep_last(self, overlay: Overlay) -> None:
         """Replace an overlay by its last displacement."""
         last, before, dt = self._shifts.pop(id(overlay), _NO_SHIFT)
         velocity = six([x / dt for x in shift_between(before, last)])
-        self.overlays[self.overlays.index(overlay)] = Frozen(overlay.tool, last, velocity)
+        self.overlays[self.overlays.index(overlay)] = LastDisplacement(overlay.tool, last, velocity)
 
     @property
-    def only_frozen(self) -> bool:
+    def all_ended(self) -> bool:
         """True when no overlay acts any more."""
-        return all(isinstance(overlay, Frozen) for overlay in self.overlays)
+        return all(isinstance(overlay, LastDisplacement) for overlay in self.overlays)
 
     def clear(self) -> None:
         """Forget all overlays."""

@@ -53,7 +53,7 @@ class PosePath(Protocol):
 
 
 def measure(twist: Sequence[float]) -> float:
-    """Return the size of a twist, linear first: that of its linear part, or TURN_LEVER times its rotation."""
+    """Return the size of a twist, linear first: the greater of its linear part and TURN_LEVER x rotation."""
     x, y, z, rx, ry, rz = twist
     return max(sqrt(x * x + y * y + z * z), TURN_LEVER * sqrt(rx * rx + ry * ry + rz * rz))
 

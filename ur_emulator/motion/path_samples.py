@@ -1,9 +1,9 @@
 """Samples of a path of the tool in joint angles, taken before the tool moves, and the speed that they allow.
 
-Near a singularity a slow tool needs fast joints. So the path is sampled, closer where the joint speeds change
-much, and every part of it gets the greatest speed that keeps the joints within theirs: the tool slows down in
-time. Through the singularity itself it would have to stand still; there it keeps a least speed, and the
-safety system stops it, as a real one does.
+Near a singularity a slow tool needs fast joints. So the path is sampled, more densely where the joint speeds
+change much, and each part of it gets the greatest speed at which the joints keep their limits. The tool slows
+down before the singularity. At the singularity itself it keeps a least speed, and the safety system stops the
+arm, as a real one does.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from ur_emulator.models.robot_model import RobotModel, Vector6
 from ur_emulator.motion.path import PosePath
 from ur_emulator.motion.tool import Tool
 
-# Distance of samples [m], the most of them on a straight stretch, and how often the way between is halved.
+# Distance of samples [m], the greatest number before refinement, and the greatest number of bisections.
 _SPACING, _MOST, _HALVINGS = 0.025, 40, 6
-# No path gets more samples than this, however wild it is.
+# Greatest number of samples of a path.
 _LIMIT = 200
-# The way between samples is halved where a joint is faster than this share of its limit, and its speed in the
-# middle differs from the mean of the ends by more than this share of the fastest.
+# An interval is bisected where a joint is faster than this share of its limit, and its speed in the middle
+# differs from the mean of both ends by more than this share of the greatest one.
 _FAST, _ROUGH = 0.4, 0.1
-# Also where a joint is further than this from where its speeds would bring it [rad]: it may have gone over to
-# another solution, which a tool that follows the path closely would not.
-_ASTRAY = 0.1
-# A prediction for the inverse kinematics reaches no further than this [rad].
+# Also where a joint is further than this from the angle that its speeds predict [rad]: it may have changed to
+# another solution of the inverse kinematics, which does not happen in the small steps of a cycle.
+_GREATEST_JUMP = 0.1
+# Greatest extrapolation of a joint angle as a start for the inverse kinematics [rad].
 _FARTHEST = 0.5
 
-# Share of the joints' rated speed that a move of the tool may use; the rest is for what lies between samples.
+# Share of the joints' rated speed that a move of the tool may use; the rest is a margin between samples.
 JOINT_SPEED_SHARE = 0.97
-# What a bent path may ask of a joint [rad/s^2]. Chosen: twice what stops the arm in an emergency.
+# Greatest acceleration of a joint on a curved path [rad/s^2]. Chosen: twice that of an emergency stop.
 JOINT_ACCELERATION = 40.0
-# Chosen: the tool does not slow down further for the joints than to this [m/s].
+# Least speed to which the tool slows down for the joints [m/s]. Chosen.
 LEAST_SPEED = 0.001
 
 
 class Sample(NamedTuple):
-    """A point of a path in joints.
+    """A point of a path in joint space.
 
     Attributes:
         s: way of the tool [m].
@@ -54,7 +54,7 @@ class Sample(NamedTuple):
 
 
 class JointLimit(NamedTuple):
-    """What the joints allow between two samples.
+    """The limits of the joints between two samples.
 
     Attributes:
         end: where the part ends [m].
@@ -68,13 +68,13 @@ class JointLimit(NamedTuple):
 
 
 def sample_path(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tuple[Sample, ...]:
-    """Sample a path; what the arm cannot reach, and all behind it, is left out.
+    """Sample a path up to the first point that the arm cannot reach.
 
     Args:
         path: of the tool.
         tool: its kinematics.
         near: joint angles at the beginning [rad].
-        speed: at which the tool is to travel [m/s].
+        speed: of the tool [m/s].
     """
     samples: list[Sample] = []
     if path.length > 0.0 and _take(samples, path, tool, 0.0, near):
@@ -89,8 +89,8 @@ def sample_path(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tupl
 def reaches_end(samples: tuple[Sample, ...], end: float, robot: RobotModel) -> bool:
     """Return whether the arm can follow a path up to its end.
 
-    It cannot where even at the least speed a joint would be too fast: through a singularity, or at the end of
-    a joint's range, where the inverse kinematics gives angles that are one turn less.
+    It cannot where a joint would be too fast even at the least speed: at a singularity, or at the end of a
+    joint's range, where the inverse kinematics gives an angle one turn away.
     """
     return (
         bool(samples)
@@ -104,7 +104,7 @@ def reaches_end(samples: tuple[Sample, ...], end: float, robot: RobotModel) -> b
 
 
 def joint_limits(samples: tuple[Sample, ...], robot: RobotModel) -> tuple[JointLimit, ...]:
-    """Return what the joints allow between the samples of a path."""
+    """Return the limits of the joints between the samples of a path."""
     found: list[JointLimit] = []
     for a, b in pairwise(samples):
         way = b.s - a.s
@@ -119,7 +119,7 @@ def joint_limits(samples: tuple[Sample, ...], robot: RobotModel) -> tuple[JointL
         if bend > 0.0:
             speed = min(speed, (JOINT_ACCELERATION / bend) ** 0.5)
         speed = max(speed, LEAST_SPEED)
-        # Where the least speed is too fast, some acceleration must remain.
+        # Where the least speed is too fast, the plan still needs some acceleration.
         bend = min(bend, 0.9 * JOINT_ACCELERATION / speed**2)
         scale = 1.0 / max(fastest, 1e-6)
         found.append(JointLimit(b.s, speed, (JOINT_ACCELERATION * scale, bend * scale)))
@@ -129,7 +129,7 @@ def joint_limits(samples: tuple[Sample, ...], robot: RobotModel) -> tuple[JointL
 def _extend(
     samples: list[Sample], path: PosePath, tool: Tool, end: float, speed: float, halvings: int
 ) -> bool:
-    """Sample up to `end`; False where the arm cannot go on."""
+    """Sample up to `end`; False if the arm cannot reach a point before it."""
     last = samples[-1]
     if not _take(samples, path, tool, end, last.q):
         return False
@@ -158,15 +158,14 @@ def _take(samples: list[Sample], path: PosePath, tool: Tool, s: float, near: Vec
 
 
 def _is_rough(a: Sample, b: Sample, robot: RobotModel, speed: float) -> bool:
-    if (
-        a.aspect != b.aspect
-    ):  # where a path comes close to a singularity and goes back, the arm stays on its side
+    # Close to a singularity the denser samples keep the arm on its side of it.
+    if a.aspect != b.aspect:
         return True
     way = b.s - a.s
     for k, most in enumerate(robot.qd_max):
         u, w, middle = a.slope[k], b.slope[k], _middle(a, b, k, way)
         rate, off = max(abs(u), abs(w), abs(middle)), abs(middle - 0.5 * (u + w))
-        if (speed * rate > _FAST * most and off > _ROUGH * rate) or off * way > _ASTRAY:
+        if (speed * rate > _FAST * most and off > _ROUGH * rate) or off * way > _GREATEST_JUMP:
             return True
     return False
 

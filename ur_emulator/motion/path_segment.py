@@ -13,7 +13,7 @@ from ur_emulator.motion.leg import Leg
 from ur_emulator.motion.path_samples import JOINT_SPEED_SHARE, Sample, joint_limits
 from ur_emulator.motion.speed_plan import Interval
 
-# Longest way on a bend that is planned at a constant acceleration, in units of 1 / bend; most such ways.
+# Longest interval on a curve, in units of 1 / bend, and the greatest number of intervals between two limits.
 _SHORT, _MOST = 0.25, 32
 
 Bounds = tuple[tuple[float, float], ...]
@@ -35,12 +35,12 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PathSegment:
-    """A part of a path to be travelled.
+    """A part of a path.
 
     Attributes:
         path: in its own unit.
         begin, end: of the part [unit].
-        scale: units of the chain that one unit of the path counts.
+        scale: units of the chain per unit of the path.
         leg: the move whose waypoint it leads to.
         limits: of the whole path.
         intervals: the limits within the segment, in units of the chain.

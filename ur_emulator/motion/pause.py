@@ -1,8 +1,8 @@
-"""Pauses: time on the path runs slower and slower until it stands still, and on again later.
+"""Pauses: the time on the path slows down to a standstill, and speeds up again later.
 
-What pauses on its path goes on exactly where it stopped. What was stopped in a hurry, or moved by hand
-meanwhile, first goes back to where it left its path: slowly, all joints together (chosen; a real box leaves
-the way back to the operator).
+An arm that has stopped on its path continues exactly there. An arm that has left its path, in a fast stop or
+moved by hand, first returns to where it left it: slowly, all joints together (chosen; a real box leaves that
+to the operator).
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from ur_emulator.motion.leg import move_j
 from ur_emulator.motion.move import Move
 from ur_emulator.motion.target import JointTarget
 
-# How fast time slows down and comes back [1/s]. Chosen: like the speed slider, at rest after 0.25 s.
+# Rate of change of the time scaling [1/s]. Chosen: as for the speed slider, at rest after 0.25 s.
 PAUSE_RATE = 4.0
-# Leading axis on the way back to the path [rad/s, rad/s^2]. Chosen: a careful speed.
+# Leading axis on the way back to the path [rad/s, rad/s^2]. Chosen: slow.
 RETURN_SPEED, RETURN_ACCELERATION = 0.25, 1.0
 
 
 class TimeScaling:
-    """How fast time passes on the path: a factor that ramps between 1 and 0.
+    """The rate of time on the path: a factor that ramps between 1 and 0.
 
     Attributes:
-        paused: it goes to 0, else to 1.
-        factor: present one.
-        slowing: how fast it goes to 0 [1/s].
+        paused: the factor goes to 0, else to 1.
+        factor: in this cycle.
+        slowing: its rate of change to 0 [1/s].
     """
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class TimeScaling:
 
     @property
     def is_normal(self) -> bool:
-        """True when nothing of a pause is left."""
+        """True without a pause, at a factor of 1."""
         return not self.paused and self.factor == 1.0
 
     def step(self, dt: float) -> float:
@@ -55,11 +55,11 @@ class TimeScaling:
 
 
 class Suspended(NamedTuple):
-    """What goes on after a pause.
+    """What continues after a pause.
 
     Attributes:
         generator: a move, or a stream if it is renewed.
-        owner: whose it is.
+        owner: of the arm.
         q: where the move left its path [rad].
     """
 
@@ -69,12 +69,12 @@ class Suspended(NamedTuple):
 
 
 class ReturnToPath:
-    """The way back to where a move left its path; then the move itself begins.
+    """The way back to where a move left its path; then the move continues.
 
     Attributes:
         done: back on the path.
-        move: that goes on then.
-        back_to: joint angles to go to [rad].
+        move: that continues then.
+        back_to: joint angles on the path [rad].
     """
 
     def __init__(self, move: Move, back_to: Vector6) -> None:
@@ -89,7 +89,7 @@ class ReturnToPath:
         return self._way is None
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Come to rest if need be, then go back."""
+        """Come to rest, then return."""
         if self._way is None:
             if any(target.qd):
                 return StopJ(RETURN_ACCELERATION).step(target, dt, scale)

@@ -1,9 +1,9 @@
-"""servoj: the joints are drawn to a position that is renewed all the time.
+"""servoj: the joints follow a position that is commanded anew in every cycle.
 
 Source: URScript manual CB3 3.15, servoj: `gain` is "the proportional gain for following the target position",
 and `lookahead_time` "projects the current position forward in time with the current velocity"; a long one
-"prevents overshoot". Read as an equation: qdd = gain (q_goal - (q + lookahead qd)). Its lag behind a moving
-goal is just the lookahead time, which is what users measure (plus the arm's own delay).
+"prevents overshoot". As an equation: qdd = gain (q_goal - (q + lookahead qd)). Its lag behind a moving goal
+is the lookahead time, which users measure (plus the delay of the arm).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.generators import Generator, StopJ, Streamed
 from ur_emulator.motion.target import JointTarget
 
-# Ranges of the manual; values beyond them are brought into them.
+# Ranges of the manual; values outside are limited to them.
 LOOKAHEAD = (0.03, 0.2)  # s
 GAIN = (100.0, 2000.0)  # 1/s^2
 # Deceleration when no further servoj comes [rad/s^2]. Chosen: that of a program's end.
@@ -20,7 +20,7 @@ LOST_DECELERATION = 20.0
 
 
 class ServoJ(Streamed):
-    """Draw the joints to `q`; it never ends by itself."""
+    """Move the joints towards `q`; it never ends by itself."""
 
     def __init__(self, q: Vector6, lookahead: float, gain: float) -> None:
         """Take the goal [rad], the lookahead time [s] and the gain [1/s^2]."""
@@ -30,13 +30,13 @@ class ServoJ(Streamed):
         self.done = False
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Advance by `scale * dt`; the force is that at the end of the cycle, so that any gain is stable."""
+        """Advance by `scale * dt`; the integration is implicit, so that all gains are stable."""
         if scale <= 0.0:
             return JointTarget(target.q)
         h = scale * dt
         k = h * self._gain
         denominator = 1.0 + k * (self._lookahead + 0.5 * h)
-        # Speeds on the path, which the slider slows down.
+        # Speeds before speed scaling.
         before = [v / scale for v in target.qd]
         after = [
             (v + k * (goal - q - 0.5 * h * v)) / denominator

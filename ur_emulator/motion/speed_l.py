@@ -1,4 +1,4 @@
-"""speedl and stopl: the tool's twist is taken to a value on a straight line, and kept.
+"""speedl and stopl: the twist of the tool changes linearly to a value and stays there.
 
 Source: URScript manual CB3 3.15, speedl: "accelerate linearly in Cartesian space and continue with constant
 tool speed"; `aRot` for the rotation.
@@ -65,7 +65,7 @@ class SpeedL(Streamed):
         return StopL(self._a, self._a_rot, self._tool)
 
     def when_paused(self) -> Generator:
-        """Stop in the direction of the tool, quickly enough whatever was asked for."""
+        """Stop in the direction of the tool, at least with the decelerations of a pause."""
         return StopL(max(self._a, PAUSE_LINEAR), max(self._a_rot, PAUSE_DECELERATION), self._tool)
 
 

@@ -1,8 +1,8 @@
-"""The task frame of force mode: which way its axes point, cycle by cycle.
+"""The task frame of force mode: the directions of its axes, cycle by cycle.
 
 Source: URScript manual CB3 3.15, force_mode, `type`; UR3/CB3 manual, program node "Force": a point must be at
 least 10 mm away; with the motion type no axis is compliant before the tool moves, and when it stands again
-the frame stays as it was last. What the sentences leave open is chosen: the frame gives directions only, the
+the frame stays as it was last. Chosen, where the manuals leave it open: the frame gives directions only, the
 wrench acts at the tool centre point; the other axes of type 1; the motion of type 3 is that along the
 program's path.
 """
@@ -25,7 +25,7 @@ _MOTION = 1e-6
 
 
 class FrameType(IntEnum):
-    """How the task frame is turned."""
+    """How the task frame is oriented."""
 
     POINT = 1  # y towards its origin
     FIXED = 2
@@ -74,7 +74,7 @@ class TaskFrame:
         if distance < MIN_DISTANCE:
             return
         y = way / distance
-        # z keeps as close to the given one as it can; where that lies along y, the given x takes its part.
+        # z is as close to the given one as possible; if that is parallel to y, the given x takes its place.
         z = self._given[:, 2] - (self._given[:, 2] @ y) * y
         if np.linalg.norm(z) < 1e-6:
             z = np.cross(self._given[:, 0], y)

@@ -1,7 +1,7 @@
-"""The tool of one move: where it is and how it moves, for the joints; and back.
+"""The tool of one move: its pose and twist for joint angles and speeds, and the inverse.
 
-Tool centre point and arm are those that held when the move was commanded: a `set_tcp` meanwhile changes
-nothing of a path that is already under way.
+Tool centre point and arm are those at the time of the command: a later `set_tcp` does not change a move that
+has begun.
 """
 
 from __future__ import annotations
@@ -13,14 +13,12 @@ import numpy as np
 
 from protocol.pose import Pose
 from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.kinematics.damped_inverse import joint_speeds
 from ur_emulator.models.robot_model import Vector6, six
-
-# Keeps joint speeds finite at a singularity; without effect (1e-9 relative) elsewhere.
-_DAMPING = 1e-12 * np.eye(6)
 
 
 class UnreachableError(Exception):
-    """The path leads to a pose that the arm cannot take."""
+    """The path leads to a pose that the arm cannot reach."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +38,12 @@ class Tool:
         return self.arm.fk(q, self.tcp)
 
     def joints(self, pose: Sequence[float], near: Sequence[float]) -> Vector6 | None:
-        """Return the joint angles for a pose, those next to `near` [rad]; None if it cannot be reached."""
+        """Return the joint angles for a pose that are closest to `near` [rad]; None if out of reach."""
         return self.arm.inverse(pose, near, self.tcp)
 
     def rates(self, q: Sequence[float], twist: Sequence[float]) -> Vector6:
         """Return the joint speeds [rad/s] that give the tool a twist, linear first [m/s, rad/s]."""
-        jacobian = self.arm.jacobian(q, self.tcp)
-        transposed = jacobian.T
-        return six(np.linalg.solve(transposed @ jacobian + _DAMPING, transposed @ np.array(twist)).tolist())
+        return six(joint_speeds(self.arm.jacobian(q, self.tcp), np.array(twist)).tolist())
 
     def aspect(self, q: Sequence[float]) -> bool:
         """Return on which side of the singularities the arm is: the sign of the Jacobian's determinant."""

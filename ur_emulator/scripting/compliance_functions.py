@@ -8,7 +8,7 @@ from typing import Any
 from ur_emulator.controller.compliance.force_sense import moved_wrench
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import Vector6, six
-from ur_emulator.motion.force_mode import Felt, ForceMode, ForceSettings
+from ur_emulator.motion.force_mode import ArmMeasurement, ForceMode, ForceSettings
 from ur_emulator.motion.target import ZERO6
 from ur_emulator.motion.task_frame import MIN_DISTANCE, FrameType, TaskFrame
 from ur_emulator.motion.tool import Tool
@@ -120,11 +120,13 @@ def _begin(state: ControllerState, frame: TaskFrame, settings: ForceSettings, st
     compliance.end_force(state)
     compliance.by_program = False  # what is commanded last counts
     offset = ZERO6 if state.external_sensor is not None else state.force_sense.offset(state.steady_cycles)
-    compliance.begin_force(state, ForceMode(tool, frame, settings, stiffness, lambda: _feel(state, offset)))
+    compliance.begin_force(
+        state, ForceMode(tool, frame, settings, stiffness, lambda: _measure(state, offset))
+    )
 
 
-def _feel(state: ControllerState, offset: Vector6) -> Felt:
-    """Return what force mode feels.
+def _measure(state: ControllerState, offset: Vector6) -> ArmMeasurement:
+    """Return what force mode measures in this cycle.
 
     Args:
         state: of the controller.
@@ -135,7 +137,7 @@ def _feel(state: ControllerState, offset: Vector6) -> Felt:
     if offset is not ZERO6:
         moved = moved_wrench(offset, state.arm.fk(snapshot.actual_q), snapshot.actual_tcp_pose)
         wrench = six([w - z for w, z in zip(wrench, moved, strict=True)])
-    return Felt(snapshot.actual_q, wrench, snapshot.actual_tcp_speed)
+    return ArmMeasurement(snapshot.actual_q, wrench, snapshot.actual_tcp_speed)
 
 
 def _floats(values: Any) -> Vector6:

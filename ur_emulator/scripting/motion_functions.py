@@ -59,8 +59,8 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
                 if outcome is Follow.SKIPPED:
                     if not may_overlap:
                         state.events.append(OVERLAPPING_BLENDS)
-                    move.taken += 1
-                    if may_overlap or move.taken >= MOST_PER_CYCLE:
+                    move.n_joined += 1
+                    if may_overlap or move.n_joined >= MOST_PER_CYCLE:
                         yield NEXT_CYCLE
                     return
             while not move.done:
@@ -79,10 +79,10 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         yield from wait_for_return(move)
 
     def wait_for_return(move: Move) -> Cycles:
-        """Wait until a move gives way; where waypoints lie close together that may be in this very cycle."""
+        """Wait until a move's instruction returns; with waypoints close together perhaps in this cycle."""
         if move.done:
             yield NEXT_CYCLE
-        while not move.open or (move.taken >= MOST_PER_CYCLE and not move.done):
+        while not move.open or (move.n_joined >= MOST_PER_CYCLE and not move.done):
             yield NEXT_CYCLE
         move.returned = True
 
