@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motion_support import DT, HOME, TOOL, tool_accelerations, tool_velocities
 
+from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.servo_j import LOST_DECELERATION, ServoJ
 from ur_emulator.motion.speed_l import SpeedL, StopL
-from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.motion.target import JointTarget
 
 twists = st.tuples(*[st.floats(-0.1, 0.1)] * 3, *[st.floats(-0.3, 0.3)] * 3)
 

@@ -7,7 +7,8 @@ from ur_emulator.controller.compliance.external_sensor import VARIABLE
 from ur_emulator.controller.robot_mode import JOINT_VECTORS
 from ur_emulator.controller.snapshot import BoxRecord, Snapshot
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.models.robot_model import ZERO6
+from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
 from ur_emulator.scripting.program_slot import ProgramSlot
 

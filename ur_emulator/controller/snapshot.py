@@ -17,8 +17,7 @@ from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.io.registers import RegisterValues
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety.status_bits import robot_status_bits, safety_status_bits
-from ur_emulator.models.robot_model import Vector3, Vector6
-from ur_emulator.motion.target import ZERO6
+from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6
 
 # Bus voltage and idle current of the box; modelled, chosen from captures of resting arms (48 V bus).
 BUS_VOLTAGE = 48.0

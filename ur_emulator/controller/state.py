@@ -29,9 +29,8 @@ from ur_emulator.controller.safety.speed_limiter import SpeedLimiter
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_generation import RobotGeneration
-from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.target import ZERO6
 
 # How far back a script may ask for joint positions [s]; the real buffer's length is not known.
 HISTORY_TIME = 1.0

@@ -10,9 +10,7 @@ from dataclasses import dataclass
 
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.random_streams import random_stream
-from ur_emulator.models.robot_model import DhRow, RobotModel, Vector6, six
-
-_ZERO: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+from ur_emulator.models.robot_model import ZERO6, DhRow, RobotModel, Vector6, six
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +24,10 @@ class Calibration:
         delta_alpha: [rad].
     """
 
-    delta_theta: Vector6 = _ZERO
-    delta_a: Vector6 = _ZERO
-    delta_d: Vector6 = _ZERO
-    delta_alpha: Vector6 = _ZERO
+    delta_theta: Vector6 = ZERO6
+    delta_a: Vector6 = ZERO6
+    delta_d: Vector6 = ZERO6
+    delta_alpha: Vector6 = ZERO6
 
 
 NOMINAL = Calibration()

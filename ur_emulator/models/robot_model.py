@@ -16,6 +16,9 @@ from dataclasses import dataclass
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 
+# No speed, no wrench, no displacement.
+ZERO6: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
 
 def six(values: Sequence[float]) -> Vector6:
     """Make a Vector6 of six numbers, one a joint; any other count is a ValueError."""

@@ -5,13 +5,13 @@ Must not know scripts or physics.
 
 from __future__ import annotations
 
-from ur_emulator.models.robot_model import Vector6
+from ur_emulator.models.robot_model import ZERO6, Vector6
 from ur_emulator.motion.generators import Generator, StopJ
 from ur_emulator.motion.overlay import Overlay, OverlayChain
 from ur_emulator.motion.path_motion import HOLD, PathMotion
 from ur_emulator.motion.pause import ReturnToPath
 from ur_emulator.motion.speed_l import StopL
-from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.motion.target import JointTarget
 
 
 class ArmMotion(PathMotion):

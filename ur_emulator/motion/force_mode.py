@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from protocol.pose import Pose, rotvec_to_matrix
-from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.overlay import apply_shift, shift_between
-from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.task_frame import TaskFrame
 from ur_emulator.motion.tool import Tool
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from operator import sub
 from typing import Protocol
 
-from ur_emulator.models.robot_model import Vector6, six
-from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.models.robot_model import ZERO6, Vector6, six
+from ur_emulator.motion.target import JointTarget
 
 # A joint speed below this counts as standstill: one cycle of it moves a joint by less than an encoder step.
 REST_SPEED = 1e-6  # rad/s

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from protocol.pose import Pose, pose_inv, pose_trans
-from ur_emulator.models.robot_model import Vector6, six
-from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.models.robot_model import ZERO6, Vector6, six
+from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import Tool, UnreachableError
 
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot
 
-from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.generators import PAUSE_DECELERATION, REST_SPEED, Generator, Streamed
-from ur_emulator.motion.target import ZERO6, JointTarget
+from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import Tool
 
 # Least deceleration of the tool when speedl is paused [m/s^2]. Chosen: the moves' default.

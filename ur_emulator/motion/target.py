@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ur_emulator.models.robot_model import Vector6
-
-ZERO6: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+from ur_emulator.models.robot_model import ZERO6, Vector6
 
 
 class JointTarget(NamedTuple):

@@ -16,14 +16,12 @@ from ur_emulator.errors import PlantError, RefusedError
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robot_generation import CB3, RobotGeneration
-from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.plant_state import PlantState, Target
 from ur_emulator.plant.sensors import SUPPLY_VOLTAGE
-
-_STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class ExactPlant(Plant):
@@ -43,7 +41,7 @@ class ExactPlant(Plant):
         """
         super().reset(q)
         self._q: Vector6 = six([float(angle) for angle in q])
-        self._qd = _STILL
+        self._qd = ZERO6
 
     def step(self, target: Target | None, mode: ControlMode = ControlMode.POSITION) -> None:
         """Be at the target; see `Plant.step`. Without one, and when guided by hand, the arm stands still.
@@ -54,11 +52,11 @@ class ExactPlant(Plant):
         self._state = None
         self.cycle += 1
         if target is None:
-            self._qd = _STILL
+            self._qd = ZERO6
             self._drives.release()
         elif mode is ControlMode.TEACH:
-            self._qd = _STILL
-            self._drives.expect(self._q, _STILL, _STILL)
+            self._qd = ZERO6
+            self._drives.expect(self._q, ZERO6, ZERO6)
         elif self._drives.expect(target.q, target.qd, target.qdd):
             self._q, self._qd = six(target.q), six(target.qd)
         else:
@@ -88,7 +86,7 @@ class ExactPlant(Plant):
                 target_moment=moment,
                 joint_control_output=current,
                 torque_saturated=False,
-                position_error=_STILL,
+                position_error=ZERO6,
             )
         return self._state
 

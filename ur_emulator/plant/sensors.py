@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.random_streams import random_stream
-from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.force_estimate import ForceDrift
 
 # A record of true values: what `Plant` captures in a sub-step.
@@ -33,7 +33,6 @@ REC_SIMULATED = slice(0, 24)  # the part that MuJoCo's sensors fill, in their or
 _BLOCK = 256  # cycles of noise drawn at once
 SUPPLY_VOLTAGE = 48.0  # V, robot bus; its drop along the arm's cable is small and left out
 _SLOW = 0.02  # m/s; the direction of motion is smoothed below this
-_NO_SPEED = (0.0,) * 6
 _SMALLEST_SPEED = 1.4e-45  # smallest float32: the joints filter in float32, whose decay ends there
 
 # The noise has the columns of the record, then the sampling moment.
@@ -107,14 +106,14 @@ class Sensors:
         self._dead_band = fidelity.speed_dead_band
         self._force_friction = fidelity.force_friction
         self._noise: Iterator[tuple[NDArray[np.float64], float]] = iter(())
-        self._speeds: Sequence[float] = _NO_SPEED
+        self._speeds: Sequence[float] = ZERO6
         self._values = np.zeros(N_RECORD)
         self._steps = self._values[REC_Q]
         self._work = np.zeros(6)
 
     def reset(self) -> None:
         """Forget the state of the filters; the random stream goes on."""
-        self._speeds = _NO_SPEED
+        self._speeds = ZERO6
 
     def read(self, record: Record) -> Reading:
         """Read all sensors of an arm whose true values are `record`; for one call a cycle."""

@@ -7,9 +7,8 @@ from typing import Any
 
 from ur_emulator.controller.compliance.force_sense import moved_wrench
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.force_mode import ArmMeasurement, ForceMode, ForceSettings
-from ur_emulator.motion.target import ZERO6
 from ur_emulator.motion.task_frame import MIN_DISTANCE, FrameType, TaskFrame
 from ur_emulator.motion.tool import Tool
 from ur_emulator.plant.physics import ServoGains

@@ -11,8 +11,7 @@ import math
 from dataclasses import dataclass
 
 from protocol.pose import rotvec_to_matrix
-from ur_emulator.models.robot_model import Vector3, Vector6, six
-from ur_emulator.motion.target import ZERO6
+from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6, six
 
 VARIABLE = "external_force_torque"
 

@@ -13,8 +13,7 @@ from itertools import islice
 from math import hypot
 
 from ur_emulator.models.robot_generation import RobotGeneration
-from ur_emulator.models.robot_model import Vector6, six
-from ur_emulator.motion.target import ZERO6
+from ur_emulator.models.robot_model import ZERO6, Vector6, six
 
 # Least and most time that is averaged to tell a zero from noise [s]: 0.2 s leave 0.6 N of 3 N, 1 s 0.3 N.
 # The most is all that is remembered.
