@@ -3,8 +3,9 @@
 import socket
 
 from protocol.frame_buffer import FrameBuffer
+from protocol.primary.framing import MAX_PACKAGE_SIZE
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
-from protocol.primary.packages import MAX_PACKAGE_SIZE, decode_package
+from protocol.primary.packages import decode_package
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 

@@ -12,15 +12,10 @@ from typing import Any
 
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary.layout import NO_TIME
+from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, NO_TIME, PackageType
 from protocol.primary.messages import ThreadLabel, VersionMessage
-from protocol.primary.packages import (
-    MAX_PACKAGE_SIZE,
-    MIN_PACKAGE_SIZE,
-    PackageType,
-    RobotState,
-    decode_package,
-)
+from protocol.primary.packages import decode_package
+from protocol.primary.state import RobotState
 from protocol.primary.values import TypedValue
 from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
 from protocol.rtde.codec import HEADER_SIZE, MAX_SIZE, decode_message, take_package

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from protocol.primary.messages import MESSAGES
-from protocol.primary.packages import state_size, state_types
+from protocol.primary.state import state_size, state_types
 from protocol.primary.values import value_codes
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField
@@ -18,11 +18,11 @@ __all__ = ["describe_layouts", "type_name"]
 
 def describe_layouts(version: SoftwareVersion, interface: str = "") -> Iterator[str]:
     """The tables of one software version as lines of text; of one interface, or of all."""
-    layout_for_version(version)  # says so if there is no such software
+    layout_for_version(version)  # raises LocalProtocolError if there is no such software
     parts = {"realtime": _realtime_layout, "primary": _primary_layout, "rtde": _rtde_layout}
     chosen = [parts["primary" if interface == "secondary" else interface]] if interface else parts.values()
     for number, part in enumerate(chosen):
-        if number and version.major >= 3:
+        if number:
             yield ""
         yield from part(version)
 
@@ -34,13 +34,11 @@ def _realtime_layout(version: SoftwareVersion) -> Iterator[str]:
     for column in layout.columns:
         yield (
             f"{layout.offset(column):>5} {column.count:>6}  {column.name:<28} {column.unit:<12} "
-            f"{column.filled.value:<16} {column.meaning}"
+            f"{column.origin.value:<16} {column.meaning}"
         )
 
 
 def _primary_layout(version: SoftwareVersion) -> Iterator[str]:
-    if version.major < 3:
-        return
     yield (
         f"Robot state, ports 30001 and 30002, software {version}: "
         f"first {state_size(version, first=True)} bytes, later {state_size(version, first=False)}"
@@ -67,9 +65,9 @@ def _rtde_layout(version: SoftwareVersion) -> Iterator[str]:
             yield ""
         yield f"RTDE {title}, port 30004, software {version}: {len(fields)} variables"
         for field in fields:
-            filled = field.filled.value if field.filled else ""
+            origin = field.origin.value if field.origin else ""
             yield (
-                f"  {field.name:<36} {field.type.value:<14} {field.unit:<12} {filled:<16} {field.meaning}"
+                f"  {field.name:<36} {field.type.value:<14} {field.unit:<12} {origin:<16} {field.meaning}"
             ).rstrip()
 
 

@@ -23,8 +23,6 @@ __all__ = [
     "T_to_pose",
     "Vector3",
     "interpolate_pose",
-    "matrix_to_rotvec",
-    "matrix_to_rpy",
     "pose_add",
     "pose_inv",
     "pose_sub",
@@ -34,7 +32,6 @@ __all__ = [
     "rotvec_to_flat",
     "rotvec_to_matrix",
     "rotvec_to_rpy",
-    "rpy_to_matrix",
     "rpy_to_rotvec",
 ]
 
@@ -135,22 +132,10 @@ def rotvec_to_flat(rx: float, ry: float, rz: float) -> _Flat:
     )
 
 
-def _flat(matrix: NDArray[np.float64] | Sequence[float]) -> Sequence[float]:
-    if isinstance(matrix, np.ndarray):
-        flat: list[float] = matrix.ravel().tolist()
-        return flat
-    return matrix
-
-
 def rotvec_to_matrix(rotvec: Sequence[float]) -> NDArray[np.float64]:
     """Rotation matrix (3, 3) of a rotation vector (3,) [rad]."""
     rx, ry, rz = rotvec
     return np.array(rotvec_to_flat(rx, ry, rz)).reshape(3, 3)
-
-
-def matrix_to_rotvec(matrix: NDArray[np.float64] | Sequence[float]) -> Vector3:
-    """Rotation vector [rad], length <= pi, of a rotation matrix: (3, 3) array, or nine floats row by row."""
-    return rotvec_from_flat(*_flat(matrix))
 
 
 # --- pose and homogeneous matrix ---
@@ -258,25 +243,16 @@ def rpy_to_rotvec(rpy: Sequence[float]) -> Vector3:
     return _rotvec(*_rpy_quaternion(roll, pitch, yaw))
 
 
-def rpy_to_matrix(rpy: Sequence[float]) -> NDArray[np.float64]:
-    """Rotation matrix (3, 3) of (roll, pitch, yaw) [rad]."""
-    return rotvec_to_matrix(rpy_to_rotvec(rpy))
-
-
-def matrix_to_rpy(matrix: NDArray[np.float64] | Sequence[float]) -> Vector3:
-    """(roll, pitch, yaw) [rad], pitch within +-pi/2, of a rotation matrix: (3, 3), or nine floats row by row.
+def rotvec_to_rpy(rotvec: Sequence[float]) -> Vector3:
+    """(roll, pitch, yaw) [rad], pitch within +-pi/2, of a rotation vector [rad].
 
     At pitch = +-pi/2 only a sum of roll and yaw is defined. Yaw is read first and roll from what is left
-    after turning yaw back, so the three angles always give the matrix again, whatever rounding made of yaw.
+    after turning yaw back, so the three angles always give the rotation again, whatever rounding made of yaw.
+
+    Source: URScript manual CB3, `rotvec2rpy`.
     """
-    r00, r01, r02, r10, r11, r12, r20, _, _ = _flat(matrix)
+    r00, r01, r02, r10, r11, r12, r20, _, _ = rotvec_to_flat(*rotvec)
     yaw = atan2(r10, r00)
     pitch = atan2(-r20, hypot(r00, r10))
     c, s = cos(yaw), sin(yaw)
     return atan2(s * r02 - c * r12, c * r11 - s * r01), pitch, yaw
-
-
-def rotvec_to_rpy(rotvec: Sequence[float]) -> Vector3:
-    """(roll, pitch, yaw) [rad] of a rotation vector [rad]. Source: URScript manual CB3, `rotvec2rpy`."""
-    rx, ry, rz = rotvec
-    return matrix_to_rpy(rotvec_to_flat(rx, ry, rz))

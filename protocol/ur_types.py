@@ -20,7 +20,6 @@ __all__ = [
     "SIMULATOR_CHECKSUM",
     "ControlMode",
     "JointMode",
-    "LegacyRobotMode",
     "Ports",
     "ProgramState",
     "RobotMode",
@@ -38,10 +37,7 @@ JOINT_NAMES = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 
 
 class RobotMode(IntEnum):
-    """Robot mode, software 3.0 and later.
-
-    Source: UR primary/secondary client interface, robot mode data.
-    """
+    """Robot mode. Source: UR primary/secondary client interface, robot mode data."""
 
     NO_CONTROLLER = -1
     DISCONNECTED = 0
@@ -53,24 +49,6 @@ class RobotMode(IntEnum):
     BACKDRIVE = 6
     RUNNING = 7
     UPDATING_FIRMWARE = 8
-
-
-class LegacyRobotMode(IntEnum):
-    """Robot mode before software 3.0: the same column, other numbers.
-
-    Source: UR "Client_Interface" workbook, software 1.6 to 1.8.
-    """
-
-    RUNNING = 0
-    FREEDRIVE = 1
-    READY = 2
-    INITIALIZING = 3
-    SECURITY_STOPPED = 4
-    EMERGENCY_STOPPED = 5
-    FAULT = 6
-    NO_POWER = 7
-    NOT_CONNECTED = 8
-    SHUTDOWN = 9
 
 
 class JointMode(IntEnum):

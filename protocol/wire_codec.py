@@ -31,10 +31,9 @@ class Codec(Generic[R]):
         record: the class.
         fields: the rows that are on the wire.
         size: bytes of the fixed part; the whole record unless it has text.
-        has_text: whether the size depends on the values.
     """
 
-    __slots__ = ("_parts", "_version", "fields", "has_text", "record", "size")
+    __slots__ = ("_parts", "_version", "fields", "record", "size")
 
     def __init__(self, record: type[R], fields: tuple[WireField, ...], version: SoftwareVersion) -> None:
         self.record = record
@@ -45,7 +44,6 @@ class Codec(Generic[R]):
             part.size if isinstance(part, _Numbers) else _PREFIX_SIZES.get(part.code, 0)
             for part in self._parts
         )
-        self.has_text = any(isinstance(part, WireField) for part in self._parts)
 
     def encode(self, source: Any) -> bytes:
         """Bytes of a record, or of any object or mapping that has its fields.
@@ -153,7 +151,7 @@ class _Numbers:
                     struct.pack(">" + field.code, item)
                 except (struct.error, OverflowError) as problem:
                     return ValueError(f"{field.name} is {item!r}: {problem}")
-        return ValueError("no field is to blame")
+        return ValueError("no single field is wrong")
 
     def decode(self, data: bytes, position: int, values: dict[str, Any]) -> None:
         flat = self._struct.unpack_from(data, position)

@@ -3,7 +3,7 @@
     @dataclass(frozen=True, slots=True)
     class CartesianInfo(...):
         tcp_pose: tuple[float, ...] = wire("d", count=6, unit="m, rad", note="pose of the TCP in base")
-        tcp_offset: tuple[float, ...] = wire("d", count=6, since=since(3, 1))
+        tcp_offset: tuple[float, ...] = wire("d", count=6, since=since((3, 1)))
 
 `wire_codec.codec_for(CartesianInfo, version)` makes the encoder and decoder; everything is big-endian.
 Field types are the letters of `struct`, and four of ours. Text: `p`, a byte with the length, then the text;
@@ -17,12 +17,27 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
-from protocol.filled import Filled
 from protocol.ur_types import SoftwareVersion
 
-__all__ = ["ALWAYS", "OLDEST", "Since", "WireField", "since", "wire", "wire_fields"]
+__all__ = ["ALWAYS", "OLDEST", "Since", "ValueOrigin", "WireField", "since", "wire", "wire_fields"]
+
+
+class ValueOrigin(Enum):
+    """Where the emulated box takes a value from; every value of every port has one."""
+
+    MEASURED = "measured"
+    """From the simulated arm through its simulated sensors: delay, noise and dead band included."""
+    MODELLED = "modelled"
+    """Computed in the box: set-points, kinematics of measured joints, estimates, states of its machines."""
+    PROPERTY = "of this arm"
+    """From the numbers of the arm, its type or its calibration: the same as long as the box lives."""
+    CONSTANT = "constant"
+    """A plausible fixed value; nothing is simulated behind it."""
+    INTERNAL_ZERO = "internal, zero"
+    """Meaning unpublished; always sent as 0, and clients ignore it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +85,7 @@ class WireField:
         unit: SI unit, "enum", or "".
         note: meaning.
         record: table of the records of a `*`.
-        filled: how the emulated box fills it; None where it is what an event says.
+        origin: how the emulated box fills it; None where it is what an event says.
     """
 
     name: str
@@ -82,7 +97,7 @@ class WireField:
     unit: str
     note: str
     record: type[Any] | None = None
-    filled: Filled | None = None
+    origin: ValueOrigin | None = None
 
 
 _METADATA_KEY = "wire"
@@ -99,10 +114,10 @@ def wire(
     only_if: str = "",
     since: Since = ALWAYS,
     record: type[Any] | None = None,
-    filled: Filled | None = None,
+    origin: ValueOrigin | None = None,
 ) -> Any:
     """Declare a field of a record; see `WireField`. The default of a vector is `count` times `default`."""
-    row = WireField("", code, count, interleaved, only_if, since, unit, note, record, filled)
+    row = WireField("", code, count, interleaved, only_if, since, unit, note, record, origin)
     value = (default,) * count if count > 1 else default
     return dataclasses.field(default=value, metadata={_METADATA_KEY: row})
 

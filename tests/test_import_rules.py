@@ -58,7 +58,7 @@ LANGUAGE_ORDER = (
     {"cli"},
 )
 PROTOCOL_ORDER = (
-    {"errors", "filled", "frame_buffer", "patience", "pose", "ur_types", "wire_codec", "wire_record"},
+    {"errors", "frame_buffer", "patience", "pose", "ur_types", "wire_codec", "wire_record"},
     {"controller_words", "modbus", "script_channel", "velocity_stream"},
     {"realtime"},
     {"dashboard"},

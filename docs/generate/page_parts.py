@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from protocol.filled import Filled
+from protocol.wire_record import ValueOrigin
 
 __all__ = ["MARKS", "example", "table"]
 
 MARKS = """\
-Where the box takes a value from, in the column *filled*:
+Where the box takes a value from, in the column *origin*:
 
 | mark | meaning |
 |---|---|
@@ -20,9 +20,9 @@ Where the box takes a value from, in the column *filled*:
 | internal, zero | meaning unpublished, always 0 |
 
 A test runs a box through everything that can happen to it and holds every mark: what is measured or modelled
-changes, the rest does not (`tests/ur_emulator/test_wire_filled.py`).
+changes, the rest does not (`tests/ur_emulator/test_wire_origins.py`).
 """
-assert all(f"| {mark.value} |" in MARKS for mark in Filled)
+assert all(f"| {mark.value} |" in MARKS for mark in ValueOrigin)
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:

@@ -10,11 +10,8 @@ from protocol.capture import StreamDecoder
 from protocol.layout_text import type_name
 from protocol.primary.layout import SUB_PACKAGES
 from protocol.primary.messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
-from protocol.primary.packages import (
-    SECONDARY_MESSAGES,
-    encode_message_package,
-    state_size,
-)
+from protocol.primary.packages import SECONDARY_MESSAGES, encode_message_package
+from protocol.primary.state import state_size
 from protocol.primary.values import value_codes
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import ALWAYS, WireField, wire_fields
@@ -140,9 +137,9 @@ def _sub_packages() -> Iterator[str]:
         yield f"### {record.SUB_TYPE} {record.__name__}\n"
         yield " ".join(notes) + "\n"
         yield from table(
-            ("field", "type", "unit", "filled", "meaning", "from"),
+            ("field", "type", "unit", "origin", "meaning", "from"),
             (
-                (f"`{f.name}`", type_name(f), f.unit, f.filled.value if f.filled else "", f.note, _since(f))
+                (f"`{f.name}`", type_name(f), f.unit, f.origin.value if f.origin else "", f.note, _since(f))
                 for f in wire_fields(record)
             ),
         )

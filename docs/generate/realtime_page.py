@@ -39,8 +39,6 @@ _NOTES = """\
 * The two words of digital bits travel as floats: 5.0 is bits 0 and 2. Three public clients read them as
   integers and get nonsense, as they do from a real robot.
 * Gnuplot columns, as in the maker's sheets, count floats from 1.
-* Frames before 3.0 hold the same values in another order, `python -m protocol layout realtime --version 1.8`
-  prints it.
 """
 
 
@@ -57,7 +55,7 @@ def render() -> str:
             *table(("from software", "bytes"), sizes),
             "\n## Columns\n",
             MARKS,
-            *table(("byte", "column", "name", "floats", "unit", "filled", "meaning", "from"), _rows()),
+            *table(("byte", "column", "name", "floats", "unit", "origin", "meaning", "from"), _rows()),
             "",
             _NOTES.rstrip() + "\n",
         )
@@ -69,7 +67,7 @@ def _rows() -> Iterator[tuple[object, ...]]:
     column = 1
     for row in COLUMNS:
         yield (
-            layout.offset(row), column, f"`{row.name}`", row.count, row.unit, row.filled.value, row.meaning,
+            layout.offset(row), column, f"`{row.name}`", row.count, row.unit, row.origin.value, row.meaning,
             _first(row),
         )  # fmt: skip
         column += row.count
@@ -78,7 +76,7 @@ def _rows() -> Iterator[tuple[object, ...]]:
 def _first(row: RealtimeColumn) -> str:
     """First software of each generation whose frames hold the column."""
     firsts = (
-        next((v for v, size in VERSIONS if v.major in majors and size >= row.since_size), None)
-        for majors in ((3,), (5,))
+        next((v for v, size in VERSIONS if v.major == major and size >= row.since_size), None)
+        for major in (3, 5)
     )
     return " / ".join(f"{first.major}.{first.minor}" if first else "-" for first in firsts)

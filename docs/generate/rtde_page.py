@@ -79,7 +79,7 @@ def render() -> str:
             "\nOf a box that runs; `decode rtde FILE --names ...` reads what was captured from one.\n",
             _OUTPUTS,
             MARKS,
-            *table(("name", "type", "unit", "filled", "meaning", "from"), _output_rows()),
+            *table(("name", "type", "unit", "origin", "meaning", "from"), _output_rows()),
             "",
             *_bits("robot_status_bits", RobotStatusBits),
             *_bits("safety_status_bits", SafetyStatusBits),
@@ -93,8 +93,8 @@ def render() -> str:
 
 def _output_rows() -> Iterator[tuple[object, ...]]:
     for name, field in _grouped(OUTPUTS):
-        if field.filled:
-            yield f"`{name}`", field.type.value, field.unit, field.filled.value, field.meaning, field.since
+        if field.origin:
+            yield f"`{name}`", field.type.value, field.unit, field.origin.value, field.meaning, field.since
 
 
 def _input_rows() -> Iterator[tuple[object, ...]]:

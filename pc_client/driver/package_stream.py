@@ -15,7 +15,7 @@ from pc_client.errors import DriverError, RobotStoppedError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
 from protocol.patience import LONGEST_STEP, Patience
-from protocol.primary.layout import ConfigurationData, SubPackage
+from protocol.primary.framing import SubPackage
 from protocol.primary.messages import (
     ErrorCodeMessage,
     ReportLevel,
@@ -24,6 +24,7 @@ from protocol.primary.messages import (
     VersionMessage,
     decode_message,
 )
+from protocol.primary.setup import ConfigurationData
 from protocol.primary.state import decode_sub_package, split_state
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import OLDEST

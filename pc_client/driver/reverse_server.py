@@ -8,7 +8,7 @@ from pc_client.driver.transport import Listener, Network, PortTakenError, Transp
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
 from protocol.patience import Patience
-from protocol.velocity_stream import HELLO_SIZE, decode_hello
+from protocol.velocity_stream import HELLO_SIZE, check_hello
 
 REVERSE_PORT = 31000
 """The port unless told otherwise: always the same, so that a firewall can be told.
@@ -114,7 +114,7 @@ class ReverseServer:
                     "the robot's program dialled back but did not say hello: it ended or is another one"
                 )
         try:
-            decode_hello(received)
+            check_hello(received)
         except RemoteProtocolError as error:
             raise DriverError(f"the robot's program is not our velocity receiver: {error}") from error
 

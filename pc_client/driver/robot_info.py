@@ -9,7 +9,7 @@ from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.transport import Network
 from pc_client.recording.origin import origin_of
 from protocol.errors import RemoteProtocolError
-from protocol.primary.layout import ConfigurationData, KinematicsInfo
+from protocol.primary.setup import ConfigurationData, KinematicsInfo
 from protocol.ur_types import (
     SIMULATED_MASTERBOARD,
     SIMULATOR_CHECKSUM,

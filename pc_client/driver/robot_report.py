@@ -9,7 +9,8 @@ from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
 from pc_client.driver.rtde_query import ask_rtde
 from pc_client.driver.transport import Network
-from protocol.primary.layout import CartesianInfo, ConfigurationData, RobotModeData
+from protocol.primary.layout import CartesianInfo, RobotModeData
+from protocol.primary.setup import ConfigurationData
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports, RobotType
 

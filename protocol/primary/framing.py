@@ -1,6 +1,7 @@
-"""The frame around everything on the primary and secondary ports.
+"""What all packages and sub-packages of the primary and secondary ports have in common.
 
-    package = i32 size, itself included | u8 package type | body
+    package     = i32 size, itself included | u8 package type | body
+    sub-package = i32 size, itself included | u8 sub-type | fields; tables in `primary.layout`
 
 Cut a received stream with `FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)`.
 """
@@ -8,9 +9,21 @@ Cut a received stream with `FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)`.
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from enum import IntEnum
+from typing import ClassVar
 
-__all__ = ["HEADER", "MAX_PACKAGE_SIZE", "MIN_PACKAGE_SIZE", "PackageType", "encode_package"]
+from protocol.wire_record import ALWAYS, Since
+
+__all__ = [
+    "HEADER",
+    "MAX_PACKAGE_SIZE",
+    "MIN_PACKAGE_SIZE",
+    "NO_TIME",
+    "PackageType",
+    "SubPackage",
+    "encode_package",
+]
 
 
 class PackageType(IntEnum):
@@ -27,11 +40,30 @@ class PackageType(IntEnum):
 
 
 HEADER = struct.Struct(">iB")
-"""Size and type; sub-packages of a state have the same header."""
+"""Size and type."""
 
 MIN_PACKAGE_SIZE = HEADER.size
 MAX_PACKAGE_SIZE = 1 << 20
 """Beyond any package: states stay below 2000 bytes, a message carries one text."""
+
+
+NO_TIME = 2**64 - 1
+"""Timestamp of a package that has none: all ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class SubPackage:
+    """What all sub-packages share.
+
+    Attributes:
+        SUB_TYPE: number on the wire.
+        SINCE: software that first sent the sub-package.
+        FIRST_STATE_ONLY: sent in the first state of a connection and when the configuration changes.
+    """
+
+    SUB_TYPE: ClassVar[int]
+    SINCE: ClassVar[Since] = ALWAYS
+    FIRST_STATE_ONLY: ClassVar[bool] = False
 
 
 def encode_package(package_type: int, body: bytes) -> bytes:

@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from protocol.filled import Filled
+from protocol.primary.framing import SubPackage
 from protocol.primary.setup import (
     CalibrationData,
     ConfigurationData,
@@ -24,30 +24,22 @@ from protocol.primary.setup import (
     ToolCommunicationInfo,
     ToolModeInfo,
 )
-from protocol.primary.sub_package import NO_TIME, SubPackage
 from protocol.ur_types import RobotMode, SafetyMode
-from protocol.wire_record import Since, since, wire
+from protocol.wire_record import Since, ValueOrigin, since, wire
 
 __all__ = [
-    "NO_TIME",
     "SUB_PACKAGES",
     "AdditionalInfo",
-    "CalibrationData",
     "CartesianInfo",
-    "ConfigurationData",
     "ForceModeData",
     "JointData",
-    "KinematicsInfo",
     "MasterboardData",
     "RobotModeData",
     "SafetyData",
-    "SubPackage",
-    "ToolCommunicationInfo",
     "ToolData",
-    "ToolModeInfo",
 ]
 
-_MEASURED, _MODELLED, _PROPERTY, _CONSTANT, _ZERO = Filled
+_MEASURED, _MODELLED, _PROPERTY, _CONSTANT, _ZERO = ValueOrigin
 
 _SINCE_3_1 = since((3, 1))
 _SINCE_3_2 = since((3, 2))
@@ -61,26 +53,26 @@ class RobotModeData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 0
 
-    timestamp: int = wire("Q", "since controller start, a multiple of the cycle", unit="us", filled=_MODELLED)
-    is_real_robot_connected: bool = wire("?", "control box and arm talk", default=True, filled=_MODELLED)
+    timestamp: int = wire("Q", "since controller start, a multiple of the cycle", unit="us", origin=_MODELLED)
+    is_real_robot_connected: bool = wire("?", "control box and arm talk", default=True, origin=_MODELLED)
     is_real_robot_enabled: bool = wire(
-        "?", "true from POWER_ON to RUNNING (inferred)", default=False, filled=_MODELLED
+        "?", "true from POWER_ON to RUNNING (inferred)", default=False, origin=_MODELLED
     )
     is_robot_power_on: bool = wire(
-        "?", "true from POWER_ON to RUNNING (inferred)", default=False, filled=_MODELLED
+        "?", "true from POWER_ON to RUNNING (inferred)", default=False, origin=_MODELLED
     )
-    is_emergency_stopped: bool = wire("?", default=False, filled=_MODELLED)
-    is_protective_stopped: bool = wire("?", default=False, filled=_MODELLED)
-    is_program_running: bool = wire("?", default=False, filled=_MODELLED)
-    is_program_paused: bool = wire("?", default=False, filled=_MODELLED)
+    is_emergency_stopped: bool = wire("?", default=False, origin=_MODELLED)
+    is_protective_stopped: bool = wire("?", default=False, origin=_MODELLED)
+    is_program_running: bool = wire("?", default=False, origin=_MODELLED)
+    is_program_paused: bool = wire("?", default=False, origin=_MODELLED)
     robot_mode: int = wire(
-        "b", "RobotMode; signed, so that NO_CONTROLLER fits", default=RobotMode.POWER_OFF, filled=_MODELLED
+        "b", "RobotMode; signed, so that NO_CONTROLLER fits", default=RobotMode.POWER_OFF, origin=_MODELLED
     )
-    control_mode: int = wire("B", "ControlMode", filled=_MODELLED)
-    target_speed_fraction: float = wire("d", "speed slider, 0 to 1", default=1.0, filled=_MODELLED)
-    speed_scaling: float = wire("d", "resulting scaling, 0 to 1", default=1.0, filled=_MODELLED)
-    target_speed_fraction_limit: float = wire("d", default=1.0, since=_SINCE_3_2, filled=_CONSTANT)
-    reserved: int = wire("B", since=_SINCE_3_5, filled=_ZERO)
+    control_mode: int = wire("B", "ControlMode", origin=_MODELLED)
+    target_speed_fraction: float = wire("d", "speed slider, 0 to 1", default=1.0, origin=_MODELLED)
+    speed_scaling: float = wire("d", "resulting scaling, 0 to 1", default=1.0, origin=_MODELLED)
+    target_speed_fraction_limit: float = wire("d", default=1.0, since=_SINCE_3_2, origin=_CONSTANT)
+    reserved: int = wire("B", since=_SINCE_3_5, origin=_ZERO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,28 +82,28 @@ class JointData(SubPackage):
     SUB_TYPE: ClassVar[int] = 1
 
     q_actual: tuple[float, ...] = wire(
-        "d", count=6, unit="rad", interleaved="joint", default=0.0, filled=_MEASURED
+        "d", count=6, unit="rad", interleaved="joint", default=0.0, origin=_MEASURED
     )
     q_target: tuple[float, ...] = wire(
-        "d", count=6, unit="rad", interleaved="joint", default=0.0, filled=_MODELLED
+        "d", count=6, unit="rad", interleaved="joint", default=0.0, origin=_MODELLED
     )
     qd_actual: tuple[float, ...] = wire(
-        "d", count=6, unit="rad/s", interleaved="joint", default=0.0, filled=_MEASURED
+        "d", count=6, unit="rad/s", interleaved="joint", default=0.0, origin=_MEASURED
     )
     current_actual: tuple[float, ...] = wire(
-        "f", count=6, unit="A", interleaved="joint", default=0.0, filled=_MEASURED
+        "f", count=6, unit="A", interleaved="joint", default=0.0, origin=_MEASURED
     )
     voltage_actual: tuple[float, ...] = wire(
-        "f", "0 on simulators", count=6, unit="V", interleaved="joint", default=0.0, filled=_MEASURED
+        "f", "0 on simulators", count=6, unit="V", interleaved="joint", default=0.0, origin=_MEASURED
     )
     temperature_motor: tuple[float, ...] = wire(
-        "f", count=6, unit="degC", interleaved="joint", default=25.0, filled=_MEASURED
+        "f", count=6, unit="degC", interleaved="joint", default=25.0, origin=_MEASURED
     )
     temperature_micro: tuple[float, ...] = wire(
-        "f", "obsolete", count=6, unit="degC", interleaved="joint", default=0.0, filled=_ZERO
+        "f", "obsolete", count=6, unit="degC", interleaved="joint", default=0.0, origin=_ZERO
     )
     joint_mode: tuple[int, ...] = wire(
-        "B", "JointMode", count=6, interleaved="joint", default=239, filled=_MODELLED
+        "B", "JointMode", count=6, interleaved="joint", default=239, origin=_MODELLED
     )
 
 
@@ -121,15 +113,15 @@ class ToolData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 2
 
-    analog_input_range2: int = wire("B", "0 current, 1 voltage", filled=_MODELLED)
-    analog_input_range3: int = wire("B", "0 current, 1 voltage", filled=_MODELLED)
-    analog_input2: float = wire("d", unit="A or V", default=0.0, filled=_MODELLED)
-    analog_input3: float = wire("d", unit="A or V", default=0.0, filled=_MODELLED)
-    tool_voltage_48v: float = wire("f", unit="V", default=48.0, filled=_MEASURED)
-    tool_output_voltage: int = wire("B", "0, 12 or 24", unit="V", filled=_MODELLED)
-    tool_current: float = wire("f", unit="A", default=0.0, filled=_MODELLED)
-    tool_temperature: float = wire("f", unit="degC", default=25.0, filled=_MEASURED)
-    tool_mode: int = wire("B", "JointMode, the tool's subset", default=239, filled=_MODELLED)
+    analog_input_range2: int = wire("B", "0 current, 1 voltage", origin=_MODELLED)
+    analog_input_range3: int = wire("B", "0 current, 1 voltage", origin=_MODELLED)
+    analog_input2: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
+    analog_input3: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
+    tool_voltage_48v: float = wire("f", unit="V", default=48.0, origin=_MEASURED)
+    tool_output_voltage: int = wire("B", "0, 12 or 24", unit="V", origin=_MODELLED)
+    tool_current: float = wire("f", unit="A", default=0.0, origin=_MODELLED)
+    tool_temperature: float = wire("f", unit="degC", default=25.0, origin=_MEASURED)
+    tool_mode: int = wire("B", "JointMode, the tool's subset", default=239, origin=_MODELLED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,37 +130,37 @@ class MasterboardData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 3
 
-    digital_input_bits: int = wire("i", "0-7 standard, 8-15 configurable, 16-17 tool", filled=_MODELLED)
-    digital_output_bits: int = wire("i", "as the inputs", filled=_MODELLED)
-    analog_input_range0: int = wire("B", "0 current, 1 voltage", default=1, filled=_MODELLED)
-    analog_input_range1: int = wire("B", "0 current, 1 voltage", default=1, filled=_MODELLED)
-    analog_input0: float = wire("d", unit="A or V", default=0.0, filled=_MODELLED)
-    analog_input1: float = wire("d", unit="A or V", default=0.0, filled=_MODELLED)
-    analog_output_domain0: int = wire("b", "0 current, 1 voltage", filled=_MODELLED)
-    analog_output_domain1: int = wire("b", "0 current, 1 voltage", filled=_MODELLED)
-    analog_output0: float = wire("d", unit="A or V", default=0.004, filled=_MODELLED)
-    analog_output1: float = wire("d", unit="A or V", default=0.004, filled=_MODELLED)
-    masterboard_temperature: float = wire("f", unit="degC", default=24.0, filled=_MODELLED)
-    robot_voltage_48v: float = wire("f", unit="V", default=48.0, filled=_MODELLED)
-    robot_current: float = wire("f", unit="A", default=0.0, filled=_MODELLED)
-    master_io_current: float = wire("f", unit="A", default=0.0, filled=_MODELLED)
-    safety_mode: int = wire("B", "SafetyMode", default=SafetyMode.NORMAL, filled=_MODELLED)
-    in_reduced_mode: bool = wire("?", default=False, filled=_MODELLED)
+    digital_input_bits: int = wire("i", "0-7 standard, 8-15 configurable, 16-17 tool", origin=_MODELLED)
+    digital_output_bits: int = wire("i", "as the inputs", origin=_MODELLED)
+    analog_input_range0: int = wire("B", "0 current, 1 voltage", default=1, origin=_MODELLED)
+    analog_input_range1: int = wire("B", "0 current, 1 voltage", default=1, origin=_MODELLED)
+    analog_input0: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
+    analog_input1: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
+    analog_output_domain0: int = wire("b", "0 current, 1 voltage", origin=_MODELLED)
+    analog_output_domain1: int = wire("b", "0 current, 1 voltage", origin=_MODELLED)
+    analog_output0: float = wire("d", unit="A or V", default=0.004, origin=_MODELLED)
+    analog_output1: float = wire("d", unit="A or V", default=0.004, origin=_MODELLED)
+    masterboard_temperature: float = wire("f", unit="degC", default=24.0, origin=_MODELLED)
+    robot_voltage_48v: float = wire("f", unit="V", default=48.0, origin=_MODELLED)
+    robot_current: float = wire("f", unit="A", default=0.0, origin=_MODELLED)
+    master_io_current: float = wire("f", unit="A", default=0.0, origin=_MODELLED)
+    safety_mode: int = wire("B", "SafetyMode", default=SafetyMode.NORMAL, origin=_MODELLED)
+    in_reduced_mode: bool = wire("?", default=False, origin=_MODELLED)
     euromap67_installed: bool = wire(
-        "?", "true: the next four fields are there", default=False, filled=_CONSTANT
+        "?", "true: the next four fields are there", default=False, origin=_CONSTANT
     )
-    euromap67_input_bits: int = wire("I", only_if="euromap67_installed", filled=_CONSTANT)
-    euromap67_output_bits: int = wire("I", only_if="euromap67_installed", filled=_CONSTANT)
+    euromap67_input_bits: int = wire("I", only_if="euromap67_installed", origin=_CONSTANT)
+    euromap67_output_bits: int = wire("I", only_if="euromap67_installed", origin=_CONSTANT)
     euromap67_voltage_24v: float = wire(
-        "f", unit="V", default=0.0, only_if="euromap67_installed", filled=_CONSTANT
+        "f", unit="V", default=0.0, only_if="euromap67_installed", origin=_CONSTANT
     )
     euromap67_current: float = wire(
-        "f", unit="A", default=0.0, only_if="euromap67_installed", filled=_CONSTANT
+        "f", unit="A", default=0.0, only_if="euromap67_installed", origin=_CONSTANT
     )
-    safety_checksum: int = wire("I", "internal; repeats in SafetyData", filled=_PROPERTY)
-    operational_mode_selector_input: int = wire("B", default=1, since=_SINCE_3_2, filled=_CONSTANT)
-    three_position_enabling_device_input: int = wire("B", default=1, since=_SINCE_3_2, filled=_CONSTANT)
-    reserved: int = wire("B", default=1, since=_SINCE_3_10, filled=_CONSTANT)
+    safety_checksum: int = wire("I", "internal; repeats in SafetyData", origin=_PROPERTY)
+    operational_mode_selector_input: int = wire("B", default=1, since=_SINCE_3_2, origin=_CONSTANT)
+    three_position_enabling_device_input: int = wire("B", default=1, since=_SINCE_3_2, origin=_CONSTANT)
+    reserved: int = wire("B", default=1, since=_SINCE_3_10, origin=_CONSTANT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,9 +169,9 @@ class CartesianInfo(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 4
 
-    tcp_pose: tuple[float, ...] = wire("d", "in base", count=6, unit="m, rad", default=0.0, filled=_MODELLED)
+    tcp_pose: tuple[float, ...] = wire("d", "in base", count=6, unit="m, rad", default=0.0, origin=_MODELLED)
     tcp_offset: tuple[float, ...] = wire(
-        "d", "in flange", count=6, unit="m, rad", default=0.0, since=_SINCE_3_1, filled=_MODELLED
+        "d", "in flange", count=6, unit="m, rad", default=0.0, since=_SINCE_3_1, origin=_MODELLED
     )
 
 
@@ -190,9 +182,9 @@ class ForceModeData(SubPackage):
     SUB_TYPE: ClassVar[int] = 7
 
     wrench: tuple[float, ...] = wire(
-        "d", "in base axes", count=6, unit="N, Nm", default=0.0, filled=_MODELLED
+        "d", "in base axes", count=6, unit="N, Nm", default=0.0, origin=_MODELLED
     )
-    robot_dexterity: float = wire("d", "squared determinant of the Jacobian", default=0.0, filled=_MODELLED)
+    robot_dexterity: float = wire("d", "squared determinant of the Jacobian", default=0.0, origin=_MODELLED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,10 +193,10 @@ class AdditionalInfo(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 8
 
-    teach_button_state: int = wire("B", filled=_MODELLED)
-    freedrive_button_enabled: bool = wire("?", default=True, filled=_MODELLED)
-    io_enabled_freedrive: bool = wire("?", default=False, since=since((3, 3)), filled=_MODELLED)
-    reserved: int = wire("B", default=1, since=_SINCE_3_10, filled=_CONSTANT)
+    teach_button_state: int = wire("B", origin=_MODELLED)
+    freedrive_button_enabled: bool = wire("?", default=True, origin=_MODELLED)
+    io_enabled_freedrive: bool = wire("?", default=False, since=since((3, 3)), origin=_MODELLED)
+    reserved: int = wire("B", default=1, since=_SINCE_3_10, origin=_CONSTANT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,11 +206,11 @@ class SafetyData(SubPackage):
     SUB_TYPE: ClassVar[int] = 10
     SINCE: ClassVar[Since] = _SINCE_3_5
 
-    safety_checksum: int = wire("I", "repeats in MasterboardData", filled=_PROPERTY)
-    flag0: int = wire("B", default=1, filled=_CONSTANT)
-    flag1: int = wire("B", default=1, filled=_CONSTANT)
+    safety_checksum: int = wire("I", "repeats in MasterboardData", origin=_PROPERTY)
+    flag0: int = wire("B", default=1, origin=_CONSTANT)
+    flag1: int = wire("B", default=1, origin=_CONSTANT)
     elbow_sphere: tuple[float, ...] = wire(
-        "d", "x y z in base, radius", count=4, unit="m", default=0.0, filled=_MODELLED
+        "d", "x y z in base, radius", count=4, unit="m", default=0.0, origin=_MODELLED
     )
 
 

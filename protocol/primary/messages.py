@@ -19,7 +19,7 @@ from enum import IntEnum
 from typing import ClassVar
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.primary.layout import NO_TIME
+from protocol.primary.framing import NO_TIME
 from protocol.ur_types import SafetyMode, SoftwareVersion
 from protocol.wire_codec import codec_for
 from protocol.wire_record import OLDEST, since, wire

@@ -16,8 +16,6 @@ from typing import TypeAlias
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.primary.framing import (
     HEADER,
-    MAX_PACKAGE_SIZE,
-    MIN_PACKAGE_SIZE,
     PackageType,
     encode_package,
 )
@@ -31,36 +29,19 @@ from protocol.primary.messages import (
 from protocol.primary.program import ProgramStateMessage, decode_program_state
 from protocol.primary.state import (
     RobotState,
-    UnknownSubPackage,
     decode_state,
-    decode_sub_package,
-    encode_state,
-    encode_sub_package,
-    state_size,
-    state_types,
 )
 from protocol.ur_types import SoftwareVersion
 
 __all__ = [
-    "MAX_PACKAGE_SIZE",
-    "MIN_PACKAGE_SIZE",
     "SAFETY_TOLERANCES",
     "SECONDARY_MESSAGES",
     "Package",
-    "PackageType",
-    "RobotState",
     "SafetyTolerances",
     "UnknownPackage",
-    "UnknownSubPackage",
     "decode_package",
-    "decode_sub_package",
     "encode_message_package",
-    "encode_package",
     "encode_safety_tolerances",
-    "encode_state",
-    "encode_sub_package",
-    "state_size",
-    "state_types",
 ]
 
 SECONDARY_MESSAGES: tuple[type[RobotMessage], ...] = (VersionMessage, StartupMessage)

@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.primary.framing import PackageType, encode_package
-from protocol.primary.layout import NO_TIME
+from protocol.primary.framing import NO_TIME, PackageType, encode_package
 from protocol.primary.values import TypedValue, decode_value, encode_value
 from protocol.ur_types import SoftwareVersion
 

@@ -8,10 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from protocol.filled import Filled
-from protocol.primary.sub_package import SubPackage
+from protocol.primary.framing import SubPackage
 from protocol.ur_types import SIMULATED_MASTERBOARD, SIMULATOR_CHECKSUM
-from protocol.wire_record import Since, since, wire
+from protocol.wire_record import Since, ValueOrigin, since, wire
 
 __all__ = [
     "CalibrationData",
@@ -21,7 +20,7 @@ __all__ = [
     "ToolModeInfo",
 ]
 
-_PROPERTY, _CONSTANT, _ZERO = Filled.PROPERTY, Filled.CONSTANT, Filled.INTERNAL_ZERO
+_PROPERTY, _CONSTANT, _ZERO = ValueOrigin.PROPERTY, ValueOrigin.CONSTANT, ValueOrigin.INTERNAL_ZERO
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +31,13 @@ class KinematicsInfo(SubPackage):
     FIRST_STATE_ONLY: ClassVar[bool] = True
 
     checksum: tuple[int, ...] = wire(
-        "I", "all ones on the maker's simulator", count=6, default=SIMULATOR_CHECKSUM, filled=_PROPERTY
+        "I", "all ones on the maker's simulator", count=6, default=SIMULATOR_CHECKSUM, origin=_PROPERTY
     )
-    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
-    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
-    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
-    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
-    calibration_status: int = wire("I", filled=_CONSTANT)
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
+    calibration_status: int = wire("I", origin=_CONSTANT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,35 +48,35 @@ class ConfigurationData(SubPackage):
     FIRST_STATE_ONLY: ClassVar[bool] = True
 
     joint_min_limit: tuple[float, ...] = wire(
-        "d", count=6, unit="rad", interleaved="limits", default=0.0, filled=_PROPERTY
+        "d", count=6, unit="rad", interleaved="limits", default=0.0, origin=_PROPERTY
     )
     joint_max_limit: tuple[float, ...] = wire(
-        "d", count=6, unit="rad", interleaved="limits", default=0.0, filled=_PROPERTY
+        "d", count=6, unit="rad", interleaved="limits", default=0.0, origin=_PROPERTY
     )
     joint_max_speed: tuple[float, ...] = wire(
-        "d", count=6, unit="rad/s", interleaved="rates", default=0.0, filled=_PROPERTY
+        "d", count=6, unit="rad/s", interleaved="rates", default=0.0, origin=_PROPERTY
     )
     joint_max_acceleration: tuple[float, ...] = wire(
-        "d", count=6, unit="rad/s2", interleaved="rates", default=40.0, filled=_CONSTANT
+        "d", count=6, unit="rad/s2", interleaved="rates", default=40.0, origin=_CONSTANT
     )
-    v_joint_default: float = wire("d", unit="rad/s", default=1.0471975511965976, filled=_CONSTANT)
-    a_joint_default: float = wire("d", unit="rad/s2", default=1.3962634015954636, filled=_CONSTANT)
-    v_tool_default: float = wire("d", unit="m/s", default=0.25, filled=_CONSTANT)
-    a_tool_default: float = wire("d", unit="m/s2", default=1.2, filled=_CONSTANT)
-    eq_radius: float = wire("d", unit="m", default=0.25, filled=_CONSTANT)
-    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
-    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, filled=_PROPERTY)
-    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
-    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, filled=_PROPERTY)
+    v_joint_default: float = wire("d", unit="rad/s", default=1.0471975511965976, origin=_CONSTANT)
+    a_joint_default: float = wire("d", unit="rad/s2", default=1.3962634015954636, origin=_CONSTANT)
+    v_tool_default: float = wire("d", unit="m/s", default=0.25, origin=_CONSTANT)
+    a_tool_default: float = wire("d", unit="m/s2", default=1.2, origin=_CONSTANT)
+    eq_radius: float = wire("d", unit="m", default=0.25, origin=_CONSTANT)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
     masterboard_version: int = wire(
         "i",
         f"{SIMULATED_MASTERBOARD} of this box, by which clients know it; 6 in a UR5e capture, CB3 unknown",
         default=6,
-        filled=_CONSTANT,
+        origin=_CONSTANT,
     )
-    controller_box_type: int = wire("i", "4 UR5, 5 UR10, 6 UR3", default=6, filled=_PROPERTY)
-    robot_type: int = wire("i", "RobotType", default=3, filled=_PROPERTY)
-    robot_sub_type: int = wire("i", "1 CB2, 2 CB3, 3 e-Series", default=2, filled=_PROPERTY)
+    controller_box_type: int = wire("i", "4 UR5, 5 UR10, 6 UR3", default=6, origin=_PROPERTY)
+    robot_type: int = wire("i", "RobotType", default=3, origin=_PROPERTY)
+    robot_sub_type: int = wire("i", "1 CB2, 2 CB3, 3 e-Series", default=2, origin=_PROPERTY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +85,7 @@ class CalibrationData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 9
 
-    wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", default=0.0, filled=_ZERO)
+    wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", default=0.0, origin=_ZERO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,12 +95,12 @@ class ToolCommunicationInfo(SubPackage):
     SUB_TYPE: ClassVar[int] = 11
     SINCE: ClassVar[Since] = since(None, (5, 0))
 
-    is_enabled: bool = wire("?", default=False, filled=_CONSTANT)
-    baud_rate: int = wire("i", default=115200, filled=_CONSTANT)
-    parity: int = wire("i", "0 none, 1 odd, 2 even", filled=_CONSTANT)
-    stop_bits: int = wire("i", default=1, filled=_CONSTANT)
-    rx_idle_chars: float = wire("f", default=1.5, filled=_CONSTANT)
-    tx_idle_chars: float = wire("f", default=3.5, filled=_CONSTANT)
+    is_enabled: bool = wire("?", default=False, origin=_CONSTANT)
+    baud_rate: int = wire("i", default=115200, origin=_CONSTANT)
+    parity: int = wire("i", "0 none, 1 odd, 2 even", origin=_CONSTANT)
+    stop_bits: int = wire("i", default=1, origin=_CONSTANT)
+    rx_idle_chars: float = wire("f", default=1.5, origin=_CONSTANT)
+    tx_idle_chars: float = wire("f", default=3.5, origin=_CONSTANT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +110,6 @@ class ToolModeInfo(SubPackage):
     SUB_TYPE: ClassVar[int] = 12
     SINCE: ClassVar[Since] = since(None, (5, 1))
 
-    output_mode: int = wire("B", "0 digital, 1 dual-pin power", filled=_CONSTANT)
-    digital_output_mode0: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, filled=_CONSTANT)
-    digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, filled=_CONSTANT)
+    output_mode: int = wire("B", "0 digital, 1 dual-pin power", origin=_CONSTANT)
+    digital_output_mode0: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, origin=_CONSTANT)
+    digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, origin=_CONSTANT)

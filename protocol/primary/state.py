@@ -17,8 +17,8 @@ from functools import cache
 from typing import Any, TypeVar
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.primary.framing import HEADER, PackageType, encode_package
-from protocol.primary.layout import SUB_PACKAGES, SubPackage
+from protocol.primary.framing import HEADER, PackageType, SubPackage, encode_package
+from protocol.primary.layout import SUB_PACKAGES
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_codec import Codec, codec_for
 from protocol.wire_record import OLDEST, wire_fields

@@ -1,23 +1,24 @@
 """The realtime interface as tables: every column of port 30003, and the frame size of every software version.
 
-A frame of a version is a prefix of `COLUMNS` (software 3.0 and later) or of `CB2_COLUMNS` (before). To add a
-column: add a row at the end with the frame size in which it first appears, and a row to `VERSIONS`.
+A frame of a version is a prefix of `COLUMNS`. To add a column: add a row at the end with the frame size in
+which it first appears, and a row to `VERSIONS`. Frames of CB2 controllers (software before 3.0) have other
+columns and are not supported.
 Columns are named as in RTDE where RTDE has the value; Python names are the same in lower case.
 
 Source of names, order and sizes, unless a row says otherwise: UR "Realtime Client Interface" (2021,
-chapters 5.9 and 5.10) and UR "Client_Interface" workbook (software 1.6 to 3.2); sizes between 3.5 and 3.13
+chapters 5.9 and 5.10) and UR "Client_Interface" workbook (software up to 3.2); sizes between 3.5 and 3.13
 from the layouts in sawUniversalRobot and the Robotics Library. The documents agree except for the digital
 bits, see their row.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from protocol.filled import Filled
 from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import ValueOrigin
 
-__all__ = ["CB2_COLUMNS", "COLUMNS", "VERSIONS", "Filled", "RealtimeColumn"]
+__all__ = ["COLUMNS", "VERSIONS", "RealtimeColumn"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,7 @@ class RealtimeColumn:
         count: number of floats.
         unit: SI unit, or "enum", "bits", "-".
         since_size: size in bytes of the shortest frame that has the column.
-        filled: how the emulated box fills it.
+        origin: how the emulated box fills it.
         meaning: what the value says, and its frame of reference.
         source: only where it is not the sheet named in the module's docstring.
     """
@@ -38,7 +39,7 @@ class RealtimeColumn:
     count: int
     unit: str
     since_size: int
-    filled: Filled
+    origin: ValueOrigin
     meaning: str
     source: str = "UR realtime client interface sheet"
 
@@ -50,10 +51,10 @@ class RealtimeColumn:
 
 _C = RealtimeColumn
 _MEASURED, _MODELLED, _CONSTANT, _ZERO = (
-    Filled.MEASURED,
-    Filled.MODELLED,
-    Filled.CONSTANT,
-    Filled.INTERNAL_ZERO,
+    ValueOrigin.MEASURED,
+    ValueOrigin.MODELLED,
+    ValueOrigin.CONSTANT,
+    ValueOrigin.INTERNAL_ZERO,
 )
 
 _DIGITAL_BITS = (
@@ -61,29 +62,29 @@ _DIGITAL_BITS = (
 )
 
 COLUMNS: tuple[RealtimeColumn, ...] = (
-    _C("timestamp", 1, "s", 756, _MODELLED, "time since the controller started"),
-    _C("target_q", 6, "rad", 756, _MODELLED, "joint position set-point, not wrapped to +-pi"),
-    _C("target_qd", 6, "rad/s", 756, _MODELLED, "joint velocity set-point"),
-    _C("target_qdd", 6, "rad/s2", 756, _MODELLED, "joint acceleration set-point"),
-    _C("target_current", 6, "A", 756, _MODELLED, "joint current that the controller's model expects"),
-    _C("target_moment", 6, "Nm", 756, _MODELLED, "joint torque that the controller's model expects"),
-    _C("actual_q", 6, "rad", 756, _MEASURED, "joint position, not wrapped to +-pi"),
-    _C("actual_qd", 6, "rad/s", 756, _MEASURED, "joint velocity"),
-    _C("actual_current", 6, "A", 756, _MEASURED, "joint motor current"),
+    _C("timestamp", 1, "s", 1044, _MODELLED, "time since the controller started"),
+    _C("target_q", 6, "rad", 1044, _MODELLED, "joint position set-point, not wrapped to +-pi"),
+    _C("target_qd", 6, "rad/s", 1044, _MODELLED, "joint velocity set-point"),
+    _C("target_qdd", 6, "rad/s2", 1044, _MODELLED, "joint acceleration set-point"),
+    _C("target_current", 6, "A", 1044, _MODELLED, "joint current that the controller's model expects"),
+    _C("target_moment", 6, "Nm", 1044, _MODELLED, "joint torque that the controller's model expects"),
+    _C("actual_q", 6, "rad", 1044, _MEASURED, "joint position, not wrapped to +-pi"),
+    _C("actual_qd", 6, "rad/s", 1044, _MEASURED, "joint velocity"),
+    _C("actual_current", 6, "A", 1044, _MEASURED, "joint motor current"),
     _C("joint_control_output", 6, "A", 1044, _MEASURED, "joint control current, output of the servo"),
     _C("actual_TCP_pose", 6, "m, rad", 1044, _MODELLED, "pose of the TCP in base, from actual_q"),
     _C("actual_TCP_speed", 6, "m/s, rad/s", 1044, _MODELLED, "twist of the TCP in base axes, from actual_qd"),
     _C("actual_TCP_force", 6, "N, Nm", 1044, _MODELLED, "external wrench in base axes, from currents on CB3"),
     _C("target_TCP_pose", 6, "m, rad", 1044, _MODELLED, "pose of the TCP in base, from target_q"),
     _C("target_TCP_speed", 6, "m/s, rad/s", 1044, _MODELLED, "twist of the TCP in base axes, from target_qd"),
-    _C("actual_digital_input_bits", 1, "bits", 756, _MODELLED, "0-7 standard, 8-15 configurable, 16-17 tool; "
-       "sent as the double 5.0 for bits 0 and 2", _DIGITAL_BITS),
-    _C("joint_temperatures", 6, "degC", 756, _MEASURED, "motor temperatures"),
-    _C("actual_execution_time", 1, "-", 756, _CONSTANT,
+    _C("actual_digital_input_bits", 1, "bits", 1044, _MODELLED,
+       "0-7 standard, 8-15 configurable, 16-17 tool; sent as the double 5.0 for bits 0 and 2", _DIGITAL_BITS),
+    _C("joint_temperatures", 6, "degC", 1044, _MEASURED, "motor temperatures"),
+    _C("actual_execution_time", 1, "-", 1044, _CONSTANT,
        "controller timer, run time of the real-time thread: 0, so that equal runs are equal"),
-    _C("test_value", 1, "-", 756, _ZERO, "used by UR's own software only"),
-    _C("robot_mode", 1, "enum", 764, _MODELLED, "RobotMode"),
-    _C("joint_mode", 6, "enum", 812, _MODELLED, "JointMode"),
+    _C("test_value", 1, "-", 1044, _ZERO, "used by UR's own software only"),
+    _C("robot_mode", 1, "enum", 1044, _MODELLED, "RobotMode"),
+    _C("joint_mode", 6, "enum", 1044, _MODELLED, "JointMode"),
     _C("safety_mode", 1, "enum", 1044, _MODELLED, "SafetyMode"),
     _C("internal_103", 6, "-", 1044, _ZERO, "used by UR's own software only"),
     _C("actual_tool_accelerometer", 3, "m/s2", 1044, _MEASURED, "x y z at the tool; sign is undocumented"),
@@ -109,39 +110,9 @@ COLUMNS: tuple[RealtimeColumn, ...] = (
     _C("payload_cog", 3, "m", 1220, _MODELLED, "x y z of its centre of gravity in the flange frame"),
     _C("payload_inertia", 6, "kg m2", 1220, _MODELLED, "Ixx Iyy Izz Ixy Ixz Iyz, as stated; else 0"),
 )  # fmt: skip
-"""Software 3.0 and later; a frame of n bytes holds the rows with `since_size` <= n."""
-
-_BY_NAME = {column.name: column for column in COLUMNS}
-_WORKBOOK = "UR Client_Interface workbook, software 1.6 to 1.8"
-
-
-def _cb2(name: str, since_size: int = 756) -> RealtimeColumn:
-    return replace(_BY_NAME[name], since_size=since_size, source=_WORKBOOK)
-
-
-CB2_COLUMNS: tuple[RealtimeColumn, ...] = (
-    *COLUMNS[:9],  # timestamp to actual_current stand in both
-    replace(
-        _cb2("actual_tool_accelerometer"),
-        meaning="x y z at the tool; unused in frames of 756 bytes (software before 1.7)",
-    ),
-    _C("internal_53", 15, "-", 756, _ZERO, "unused", _WORKBOOK),
-    _cb2("actual_TCP_force"),
-    _cb2("actual_TCP_pose"),
-    _cb2("actual_TCP_speed"),
-    replace(_cb2("actual_digital_input_bits"), meaning="0-7 standard, 8-9 tool"),
-    _cb2("joint_temperatures"),
-    _cb2("actual_execution_time"),
-    _cb2("test_value"),
-    replace(_cb2("robot_mode", 764), meaning="LegacyRobotMode: other numbers than from 3.0 on"),
-    _cb2("joint_mode", 812),
-)
-"""Software before 3.0: the same rows in another order."""
+"""A frame of n bytes holds the rows with `since_size` <= n."""
 
 VERSIONS: tuple[tuple[SoftwareVersion, int], ...] = (
-    (SoftwareVersion(1, 0), 756),
-    (SoftwareVersion(1, 7), 764),
-    (SoftwareVersion(1, 8), 812),
     (SoftwareVersion(3, 0), 1044),
     (SoftwareVersion(3, 2), 1060),
     (SoftwareVersion(3, 5), 1108),
@@ -152,4 +123,4 @@ VERSIONS: tuple[tuple[SoftwareVersion, int], ...] = (
     (SoftwareVersion(5, 9), 1140),
     (SoftwareVersion(5, 10), 1220),
 )
-"""First software version of each frame size in bytes, ascending. Major 2 and 4 were never released."""
+"""First software version of each frame size in bytes, ascending. Major 4 was never released."""

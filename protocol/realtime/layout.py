@@ -20,14 +20,13 @@ from numpy.typing import NDArray
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import LENGTH_SIZE
-from protocol.realtime.columns import CB2_COLUMNS, COLUMNS, VERSIONS, Filled, RealtimeColumn
+from protocol.realtime.columns import COLUMNS, VERSIONS, RealtimeColumn
 from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import ValueOrigin
 
 __all__ = [
     "MAX_FRAME_SIZE",
     "SNAPSHOT_FIELDS",
-    "Filled",
-    "RealtimeColumn",
     "RealtimeFrame",
     "RealtimeLayout",
     "layout_for_size",
@@ -40,7 +39,7 @@ MAX_FRAME_SIZE = max(size for _, size in VERSIONS)
 """Longest frame of any version in bytes: the limit to give to a `FrameBuffer`."""
 
 SNAPSHOT_FIELDS: tuple[str, ...] = tuple(
-    column.attribute for column in COLUMNS if column.filled is not Filled.INTERNAL_ZERO
+    column.attribute for column in COLUMNS if column.origin is not ValueOrigin.INTERNAL_ZERO
 )
 """Attributes that an object must have to be encoded in any layout: vectors as tuples of floats, scalars as
 numbers. An encoder of an older version reads only those that its frames carry."""
@@ -130,7 +129,7 @@ class RealtimeLayout:
         # One expression, all columns flattened into one call: this runs every cycle.
         arguments = ", ".join(
             "0.0, " * (column.count - 1) + "0.0"
-            if column.filled is Filled.INTERNAL_ZERO
+            if column.origin is ValueOrigin.INTERNAL_ZERO
             else f"{'*' if column.count > 1 else ''}s.{column.attribute}"
             for column in self.columns
         )
@@ -153,7 +152,7 @@ class RealtimeLayout:
 
     def _explain(self, snapshot: Any, problem: Exception) -> LocalProtocolError:
         for column in self.columns:
-            if column.filled is Filled.INTERNAL_ZERO:
+            if column.origin is ValueOrigin.INTERNAL_ZERO:
                 continue
             value = getattr(snapshot, column.attribute)
             try:
@@ -199,13 +198,10 @@ def layout_for_size(size: int) -> RealtimeLayout:
     known = sorted({known_size for _, known_size in VERSIONS})
     if size not in known:
         raise RemoteProtocolError(
-            f"no realtime frame has {size} bytes: known sizes are {', '.join(map(str, known))}"
+            f"no realtime frame of software 3.0 or later has {size} bytes: known sizes are "
+            f"{', '.join(map(str, known))}"
         )
-    table = COLUMNS if size >= _FIRST_CB3_SIZE else CB2_COLUMNS
-    return RealtimeLayout(tuple(column for column in table if column.since_size <= size))
-
-
-_FIRST_CB3_SIZE = 1044
+    return RealtimeLayout(tuple(column for column in COLUMNS if column.since_size <= size))
 
 
 def layout_for_version(version: SoftwareVersion) -> RealtimeLayout:
@@ -217,5 +213,5 @@ def layout_for_version(version: SoftwareVersion) -> RealtimeLayout:
     sizes = [size for first, size in VERSIONS if first <= version]
     released = {first.major for first, _ in VERSIONS}
     if not sizes or (version.major not in released and version.major < max(released)):
-        raise LocalProtocolError(f"no controller software {version}: use 1.x, 3.0 to 3.15, 5.0 or later")
+        raise LocalProtocolError(f"no controller software {version}: use 3.0 to 3.15, 5.0 or later")
     return layout_for_size(sizes[-1])

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
 
-from protocol.filled import Filled
 from protocol.rtde.types import RtdeType
 from protocol.ur_types import SoftwareVersion
-from protocol.wire_record import Since, since
+from protocol.wire_record import Since, ValueOrigin, since
 
 __all__ = ["INPUTS", "OUTPUTS", "RtdeField", "input_fields", "output_fields"]
 
@@ -33,7 +32,7 @@ class RtdeField:
         type: its data type.
         unit: SI unit, "enum", "bits" or "-".
         since: first software of each generation that has it.
-        filled: how the emulated box fills an output; None for an input, and for an output of late e-Series
+        origin: how the emulated box fills an output; None for an input, and for an output of late e-Series
             software that it does not answer.
         meaning: what the value says, and its frame of reference.
         comes_from: attribute of the snapshot, such as "actual_q" or "registers.output_integers[3]"; empty if
@@ -46,14 +45,14 @@ class RtdeField:
     type: RtdeType
     unit: str
     since: Since
-    filled: Filled | None
+    origin: ValueOrigin | None
     meaning: str
     comes_from: str = ""
     constant: float | int = 0
     source: str = "UR RTDE guide"
 
 
-_MEASURED, _MODELLED, _CONSTANT = Filled.MEASURED, Filled.MODELLED, Filled.CONSTANT
+_MEASURED, _MODELLED, _CONSTANT = ValueOrigin.MEASURED, ValueOrigin.MODELLED, ValueOrigin.CONSTANT
 _BOOL, _U8, _U32, _I32, _U64, _F64, _VEC3, _VEC6, _VEC6I, _VEC6U = RtdeType
 
 _BASE = since((3, 2))
@@ -82,7 +81,7 @@ def _out(
     name: str,
     kind: RtdeType,
     unit: str,
-    filled: Filled,
+    origin: ValueOrigin,
     meaning: str,
     *,
     since: Since = _BASE,
@@ -90,7 +89,7 @@ def _out(
     source: str = "UR RTDE guide",
 ) -> RtdeField:
     """An output from the snapshot; its attribute is the lower-case name unless another is given."""
-    return RtdeField(name, kind, unit, since, filled, meaning, comes_from or name.lower(), 0, source)
+    return RtdeField(name, kind, unit, since, origin, meaning, comes_from or name.lower(), 0, source)
 
 
 def _fixed(
@@ -287,7 +286,7 @@ INPUTS: tuple[RtdeField, ...] = (
 def output_fields(version: SoftwareVersion) -> Mapping[str, RtdeField]:
     """Outputs that a box with software `version` answers, by name."""
     return MappingProxyType(
-        {field.name: field for field in OUTPUTS if field.filled and field.since.covers(version)}
+        {field.name: field for field in OUTPUTS if field.origin and field.since.covers(version)}
     )
 
 

@@ -94,7 +94,7 @@ def snapshot_encoder(fields: Sequence[RtdeField], header: bytes) -> Callable[[An
         LocalProtocolError: one of the fields is not filled by the box.
     """
     for field in fields:
-        if field.filled is None:
+        if field.origin is None:
             raise LocalProtocolError(f"{field.name} is no output that this box fills")
     return _make_encoder(tuple(fields), header)
 

@@ -14,7 +14,7 @@ from pc_client.driver.transport import TcpNetwork
 from pc_client.driver.watchdog import REST_SPEED
 from pc_client.errors import DriverError
 from protocol.ur_types import ProgramState
-from protocol.velocity_stream import COMMAND_SIZE, VelocityMode, decode_velocity
+from protocol.velocity_stream import VelocityMode
 
 KILLED, FROZEN, CUT_OFF = "killed", "frozen", "cut off"
 
@@ -93,12 +93,12 @@ class DyingNetwork:
 
     def took(self, data):
         """The robot has a message; dies after the one that was chosen."""
-        if self.dead.is_set() or len(data) != COMMAND_SIZE:
+        if self.dead.is_set() or len(data) != 28:
             return
-        command = decode_velocity(data)
-        if command.mode is VelocityMode.VELOCITY:
+        mode, *steps = struct.unpack(">7i", data)
+        if mode == VelocityMode.VELOCITY:
             self.last_command = self.stamp
-            is_fast = self.speed is not None and max(map(abs, command.qd)) > self.speed
+            is_fast = self.speed is not None and max(map(abs, steps)) > 1e6 * self.speed
             if is_fast and self.programs == self.program:
                 self.die()
 

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 
 from protocol.frame_buffer import FrameBuffer
+from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
 from protocol.primary.messages import KeyMessage
-from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, decode_package
+from protocol.primary.packages import decode_package
 from protocol.realtime.layout import layout_for_version
 from protocol.ur_types import Ports, ProgramState, SoftwareVersion
 from urscript.programs import velocity_receiver

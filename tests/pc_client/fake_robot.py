@@ -7,7 +7,8 @@ Tests spoil it through `on_tick`, or by setting its attributes.
 
 from __future__ import annotations
 
-from collections import deque
+import struct
+from collections import deque, namedtuple
 from types import SimpleNamespace
 
 from pc_client.driver.transport import PortTakenError
@@ -15,18 +16,19 @@ from pc_client.errors import DriverError
 from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
 from protocol.pose import T_to_pose, pose_trans
-from protocol.primary.layout import CartesianInfo, ConfigurationData, RobotModeData
+from protocol.primary.layout import CartesianInfo, RobotModeData
 from protocol.primary.messages import (
     ErrorCodeMessage,
     RuntimeExceptionMessage,
     encode_message,
     version_message,
 )
+from protocol.primary.setup import ConfigurationData
 from protocol.primary.state import encode_state
 from protocol.realtime.layout import SNAPSHOT_FIELDS, layout_for_version
 from protocol.rtde.server_connection import RtdeServerConnection
 from protocol.ur_types import Ports, RobotType, SoftwareVersion
-from protocol.velocity_stream import VelocityMode, decode_velocity, encode_hello
+from protocol.velocity_stream import VelocityMode
 
 VERSION = SoftwareVersion(3, 15, 8)
 PERIOD = 0.008
@@ -34,6 +36,7 @@ LAYOUT = layout_for_version(VERSION)
 _ENCODE = LAYOUT.encoder()
 _COUNTS = {column.attribute: column.count for column in LAYOUT.columns}
 _ALL_ZERO = {name: 0.0 if _COUNTS.get(name, 1) == 1 else (0.0,) * _COUNTS[name] for name in SNAPSHOT_FIELDS}
+VelocityCommand = namedtuple("VelocityCommand", ("mode", "qd"))
 STOPPED, PLAYING, PAUSED = 1, 2, 4
 CYCLES_PER_STATE = 13
 
@@ -96,7 +99,7 @@ class FakeRobot:
         self, *, lockstep=True, delay=3, on_tick=None, hello=None, dials=True, has_dashboard=True, model="UR3"
     ):
         self.lockstep, self.delay, self.on_tick = lockstep, delay, on_tick
-        self.hello = encode_hello() if hello is None else hello
+        self.hello = b"\0\0\0\x01" if hello is None else hello
         self.dials, self.has_dashboard = dials, has_dashboard
         self.model = model
         self.clock = 0.0
@@ -163,7 +166,8 @@ class FakeRobot:
         if pipe.kind == "secondary":
             self.load(data.decode())
         elif pipe.kind == "reverse":
-            self.commands.append(decode_velocity(data))
+            mode, *steps = struct.unpack(">7i", data)
+            self.commands.append(VelocityCommand(VelocityMode(mode), tuple(step / 1e6 for step in steps)))
             self.received.append(self.commands[-1])
         elif pipe.kind == "rtde":
             pipe.rtde.receive_data(data)

@@ -17,8 +17,9 @@ from pc_client.driver.stop_script import stop_script
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
 from pc_client.recording.origin import origin_of
-from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
+from protocol.primary.layout import CartesianInfo, RobotModeData
 from protocol.primary.messages import TextMessage
+from protocol.primary.setup import ConfigurationData, KinematicsInfo
 from protocol.primary.state import encode_state
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotType, SoftwareVersion
 

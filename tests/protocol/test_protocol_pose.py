@@ -50,28 +50,28 @@ def test_matrix_of_a_rotation_vector_is_scipys(rotvec):
 @given(rotvecs())
 def test_rotation_vector_of_a_matrix_gives_the_matrix_back_and_is_the_short_way(rotvec):
     matrix = Rotation.from_rotvec(rotvec).as_matrix()
-    back = P.matrix_to_rotvec(matrix)
+    back = P.rotvec_from_flat(*matrix.ravel().tolist())
     assert math.hypot(*back) <= math.pi * (1 + 1e-15)
     np.testing.assert_allclose(Rotation.from_rotvec(back).as_matrix(), matrix, atol=2e-14)
 
 
 @given(rotvecs().filter(lambda v: math.hypot(*v) < math.pi - 1e-9))
 def test_short_rotation_vectors_survive_the_matrix_to_the_last_digits(rotvec):
-    back = P.matrix_to_rotvec(P.rotvec_to_matrix(rotvec))
+    back = P.rotvec_from_flat(*P.rotvec_to_flat(*rotvec))
     np.testing.assert_allclose(back, rotvec, atol=1e-14)
 
 
 @pytest.mark.parametrize("angle", [1e-300, 1e-160, 1e-9, 1e-4])
 def test_tiny_rotations_keep_their_relative_accuracy(angle):
     # sin(x) is x to the last digit there, so the matrix holds the whole vector
-    assert P.matrix_to_rotvec(P.rotvec_to_matrix((angle, 0.0, 0.0)))[0] == pytest.approx(angle, rel=1e-8)
+    assert P.rotvec_from_flat(*P.rotvec_to_flat(angle, 0.0, 0.0))[0] == pytest.approx(angle, rel=1e-8)
 
 
 @pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.6, -0.8, 0.0), (-0.48, 0.6, 0.64)])
 @pytest.mark.parametrize("gap", [0.0, 1e-16, 1e-12, 1e-8, 1e-4])
 def test_half_turns_keep_their_axis(axis, gap):
     rotvec = np.array(axis) * (math.pi - gap)
-    back = np.array(P.matrix_to_rotvec(P.rotvec_to_matrix(rotvec)))
+    back = np.array(P.rotvec_from_flat(*P.rotvec_to_flat(*rotvec)))
     assert min(np.abs(back - rotvec).max(), np.abs(back + rotvec).max()) < 2e-14
 
 
@@ -129,27 +129,20 @@ def test_interpolation_goes_on_beyond_its_ends():
     assert P.interpolate_pose(a, b, -1.0) == pytest.approx((-1.0, 0.0, 0.0, 0.0, 0.0, -0.5))
 
 
+def rpy_matrix(rpy):
+    return P.rotvec_to_matrix(P.rpy_to_rotvec(rpy))
+
+
 @given(st.tuples(*[st.floats(-math.pi, math.pi)] * 3))
 def test_roll_pitch_yaw_is_rz_ry_rx(rpy):
     expected = Rotation.from_euler("xyz", rpy).as_matrix()  # SciPy: lower case is extrinsic
-    np.testing.assert_allclose(P.rpy_to_matrix(rpy), expected, atol=1e-14)
-    np.testing.assert_allclose(P.rpy_to_matrix(P.matrix_to_rpy(expected)), expected, atol=1e-14)
+    np.testing.assert_allclose(rpy_matrix(rpy), expected, atol=1e-14)
     back = P.rotvec_to_rpy(P.rpy_to_rotvec(rpy))
-    np.testing.assert_allclose(P.rpy_to_matrix(back), expected, atol=1e-13)
+    np.testing.assert_allclose(rpy_matrix(back), expected, atol=1e-13)
     assert abs(back[1]) <= math.pi / 2
 
 
 @pytest.mark.parametrize("pitch", [math.pi / 2, -math.pi / 2, math.pi / 2 - 1e-9])
-@pytest.mark.parametrize("noise", [0.0, 3e-17])
-def test_gimbal_lock_still_gives_the_matrix_back(pitch, noise):
-    matrix = Rotation.from_euler("xyz", (0.3, pitch, -0.8)).as_matrix()
-    matrix[0, 0] += noise
-    np.testing.assert_allclose(P.rpy_to_matrix(P.matrix_to_rpy(matrix)), matrix, atol=1e-14)
-
-
-def test_matrices_may_be_flat():
-    flat = P.rotvec_to_flat(0.1, -0.2, 0.3)
-    matrix = P.rotvec_to_matrix((0.1, -0.2, 0.3))
-    assert P.matrix_to_rotvec(flat) == P.matrix_to_rotvec(matrix) == P.rotvec_from_flat(*flat)
-    assert P.matrix_to_rpy(flat) == P.matrix_to_rpy(matrix)
-    assert all(type(value) is float for value in P.matrix_to_rotvec(matrix))
+def test_gimbal_lock_still_gives_the_rotation_back(pitch):
+    rotvec = P.rpy_to_rotvec((0.3, pitch, -0.8))
+    np.testing.assert_allclose(rpy_matrix(P.rotvec_to_rpy(rotvec)), P.rotvec_to_matrix(rotvec), atol=1e-14)

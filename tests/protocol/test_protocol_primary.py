@@ -10,9 +10,12 @@ import pytest
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
+from protocol.primary import framing as F
 from protocol.primary import layout as L
 from protocol.primary import messages as M
 from protocol.primary import packages as P
+from protocol.primary import setup as U
+from protocol.primary import state as S
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_codec import codec_for
 from protocol.wire_record import wire_fields
@@ -23,7 +26,7 @@ NO_TIME_HEX = "ff" * 8
 
 def read(data, version=V3_15, step=None):
     """All packages in some bytes, fed in pieces; what is left over must be a beginning of a package."""
-    buffer, packages = FrameBuffer(P.MAX_PACKAGE_SIZE, P.MIN_PACKAGE_SIZE), []
+    buffer, packages = FrameBuffer(F.MAX_PACKAGE_SIZE, F.MIN_PACKAGE_SIZE), []
     for start in range(0, len(data), step or len(data)):
         buffer.feed(data[start : start + (step or len(data))])
         while (frame := buffer.next_frame()) is not None:
@@ -101,7 +104,7 @@ def test_messages_cut_anywhere_are_refused_or_shorter_texts(version, message, da
     ends_with_text = codec.fields[-1].code == "s"
     refused = 0
     for end in range(5, len(data)):
-        package = P.encode_package(20, data[5:end])
+        package = F.encode_package(20, data[5:end])
         try:
             (short,) = read(package, version)
         except RemoteProtocolError:
@@ -117,7 +120,7 @@ def test_messages_cut_anywhere_are_refused_or_shorter_texts(version, message, da
 
 def test_unknown_messages_and_packages_come_out_as_they_are():
     header = f"{NO_TIME_HEX} fd"
-    (message,) = read(P.encode_package(20, bytes.fromhex(f"{header} 08 00112233")))
+    (message,) = read(F.encode_package(20, bytes.fromhex(f"{header} 08 00112233")))
     assert message == M.UnknownMessage(message_type=8, body=b"\x00\x11\x22\x33")
     with pytest.raises(LocalProtocolError, match="UnknownMessage has no table"):
         M.encode_message(message, V3_15)
@@ -187,18 +190,18 @@ def as_sent(record, version):
 def test_state_totals_are_the_documented_ones(version, first, later):
     version = SoftwareVersion.parse(version)
     records = [record() for record in L.SUB_PACKAGES]
-    data = P.encode_state(records, version)
-    assert len(data) == first == P.state_size(version, first=True)
-    data = P.encode_state([record for record in records if not record.FIRST_STATE_ONLY], version)
-    assert len(data) == later == P.state_size(version, first=False)
+    data = S.encode_state(records, version)
+    assert len(data) == first == S.state_size(version, first=True)
+    data = S.encode_state([record for record in records if not record.FIRST_STATE_ONLY], version)
+    assert len(data) == later == S.state_size(version, first=False)
 
 
 @pytest.mark.parametrize("version", [version for version, _, _ in TOTALS])
 def test_states_four_ways(version):
     version = SoftwareVersion.parse(version)
-    records = [distinct(record) for record in P.state_types(version, first=True)]
-    data = P.encode_state(reversed(records), version)
-    state = P.RobotState(tuple(as_sent(record, version) for record in records))
+    records = [distinct(record) for record in S.state_types(version, first=True)]
+    data = S.encode_state(reversed(records), version)
+    state = S.RobotState(tuple(as_sent(record, version) for record in records))
     assert read(data, version) == [state]
     assert read(data, version, step=1) == [state]
     assert read(data + data[:100], version) == [state]
@@ -206,7 +209,7 @@ def test_states_four_ways(version):
 
 
 def test_order_and_sizes_on_the_wire_in_3_15():
-    data = P.encode_state([record() for record in L.SUB_PACKAGES], V3_15)
+    data = S.encode_state([record() for record in L.SUB_PACKAGES], V3_15)
     seen, position = [], 5
     while position < len(data):
         size, sub_type = struct.unpack_from(">iB", data, position)
@@ -222,21 +225,21 @@ def test_robot_mode_data_byte_by_byte():
         timestamp=6_242_520_000, is_real_robot_enabled=True, is_robot_power_on=True, is_program_running=True,
         robot_mode=7, control_mode=0, target_speed_fraction=1.0, speed_scaling=0.5,
     )  # fmt: skip
-    data = P.encode_sub_package(L.RobotModeData, record, V3_15)
+    data = S.encode_sub_package(L.RobotModeData, record, V3_15)
     assert data.hex(" ") == bytes.fromhex(
         "0000002f 00 0000000174154bc0 01 01 01 00 00 01 00 07 00"
         "3ff0000000000000 3fe0000000000000 3ff0000000000000 00"
     ).hex(" ")
-    assert P.encode_sub_package(L.RobotModeData, replace(record, robot_mode=-1), V3_15)[20] == 0xFF
+    assert S.encode_sub_package(L.RobotModeData, replace(record, robot_mode=-1), V3_15)[20] == 0xFF
     for minor, size in ((1, 38), (2, 46), (4, 46), (5, 47)):
-        assert len(P.encode_sub_package(L.RobotModeData, record, SoftwareVersion(3, minor))) == size
+        assert len(S.encode_sub_package(L.RobotModeData, record, SoftwareVersion(3, minor))) == size
 
 
 # Sub-packages of a 5.8 simulator's first state.
 CAPTURED = [
     (L.AdditionalInfo(freedrive_button_enabled=True), "00000009 08 00 01 00 01"),
-    (L.ToolCommunicationInfo(), "0000001a 0b 00 0001c200 00000000 00000001 3fc00000 40600000"),
-    (L.ToolModeInfo(), "00000008 0c 00 01 01"),
+    (U.ToolCommunicationInfo(), "0000001a 0b 00 0001c200 00000000 00000001 3fc00000 40600000"),
+    (U.ToolModeInfo(), "00000008 0c 00 01 01"),
     (
         L.MasterboardData(
             analog_output0=0.004000000189989805,
@@ -256,18 +259,18 @@ CAPTURED = [
 @pytest.mark.parametrize(("record", "data"), CAPTURED, ids=[type(record).__name__ for record, _ in CAPTURED])
 def test_captured_sub_packages(record, data):
     data = bytes.fromhex(data)
-    assert P.encode_sub_package(type(record), record, SoftwareVersion(5, 8)) == data
-    assert P.decode_sub_package(data[4], data[5:]) == record
+    assert S.encode_sub_package(type(record), record, SoftwareVersion(5, 8)) == data
+    assert S.decode_sub_package(data[4], data[5:]) == record
 
 
 def test_joints_stand_together_and_pairs_alternate():
     joints = distinct(L.JointData)
-    data = P.encode_sub_package(L.JointData, joints, V3_15)
+    data = S.encode_sub_package(L.JointData, joints, V3_15)
     for k in range(6):
         block = struct.unpack_from(">3d4fB", data, 5 + 41 * k)
         assert block == tuple(getattr(joints, field.name)[k] for field in fields(joints))
-    configuration = distinct(L.ConfigurationData)
-    data = P.encode_sub_package(L.ConfigurationData, configuration, V3_15)
+    configuration = distinct(U.ConfigurationData)
+    data = S.encode_sub_package(U.ConfigurationData, configuration, V3_15)
     assert struct.unpack_from(">2d", data, 5 + 16 * 4) == (
         configuration.joint_min_limit[4],
         configuration.joint_max_limit[4],
@@ -288,33 +291,33 @@ def test_joints_stand_together_and_pairs_alternate():
 def test_euromap_fields_are_there_only_with_the_board(version, size):
     version = SoftwareVersion.parse(version)
     record = replace(distinct(L.MasterboardData), euromap67_installed=True)
-    data = P.encode_sub_package(L.MasterboardData, record, version)
+    data = S.encode_sub_package(L.MasterboardData, record, version)
     assert len(data) == size
     assert data[67] == 1
     assert struct.unpack_from(">II", data, 68) == (record.euromap67_input_bits, record.euromap67_output_bits)
-    assert P.decode_sub_package(3, data[5:]) == as_sent(record, version)
+    assert S.decode_sub_package(3, data[5:]) == as_sent(record, version)
 
 
 def test_records_may_be_mappings_or_any_object():
     record = distinct(L.CartesianInfo)
-    expected = P.encode_sub_package(L.CartesianInfo, record, V3_15)
-    assert P.encode_sub_package(L.CartesianInfo, asdict(record), V3_15) == expected
-    assert P.encode_sub_package(L.CartesianInfo, SimpleNamespace(**asdict(record)), V3_15) == expected
+    expected = S.encode_sub_package(L.CartesianInfo, record, V3_15)
+    assert S.encode_sub_package(L.CartesianInfo, asdict(record), V3_15) == expected
+    assert S.encode_sub_package(L.CartesianInfo, SimpleNamespace(**asdict(record)), V3_15) == expected
     board = asdict(distinct(L.MasterboardData))
-    assert len(P.encode_sub_package(L.MasterboardData, board, V3_15)) == 75
+    assert len(S.encode_sub_package(L.MasterboardData, board, V3_15)) == 75
     with pytest.raises(LocalProtocolError, match=r"CartesianInfo needs the field .*tcp_offset"):
-        P.encode_sub_package(L.CartesianInfo, {"tcp_pose": (0.0,) * 6}, V3_15)
+        S.encode_sub_package(L.CartesianInfo, {"tcp_pose": (0.0,) * 6}, V3_15)
     with pytest.raises(LocalProtocolError, match="tcp_pose has 5 values instead of 6"):
-        P.encode_sub_package(L.CartesianInfo, replace(record, tcp_pose=(0.0,) * 5), V3_15)
+        S.encode_sub_package(L.CartesianInfo, replace(record, tcp_pose=(0.0,) * 5), V3_15)
 
 
 def test_a_reader_skips_what_newer_software_appends():
-    record = distinct(L.ConfigurationData)
-    data = P.encode_sub_package(L.ConfigurationData, record, V3_15)
-    assert P.decode_sub_package(6, data[5:] + b"\x00\x01\x00\x02") == record
-    body = P.encode_package(13, b"\x01\x02") + P.encode_sub_package(L.ForceModeData, L.ForceModeData(), V3_15)
-    (state,) = read(P.encode_package(16, body))
-    assert state.sub_packages == (P.UnknownSubPackage(13, b"\x01\x02"), L.ForceModeData())
+    record = distinct(U.ConfigurationData)
+    data = S.encode_sub_package(U.ConfigurationData, record, V3_15)
+    assert S.decode_sub_package(6, data[5:] + b"\x00\x01\x00\x02") == record
+    body = F.encode_package(13, b"\x01\x02") + S.encode_sub_package(L.ForceModeData, L.ForceModeData(), V3_15)
+    (state,) = read(F.encode_package(16, body))
+    assert state.sub_packages == (S.UnknownSubPackage(13, b"\x01\x02"), L.ForceModeData())
     assert state.find(L.ForceModeData) == L.ForceModeData()
     assert state.find(L.JointData) is None
 
@@ -331,21 +334,21 @@ def test_a_reader_skips_what_newer_software_appends():
 )
 def test_states_that_do_not_add_up_are_refused(body, problem):
     with pytest.raises(RemoteProtocolError, match=problem):
-        read(P.encode_package(16, bytes.fromhex(body)))
+        read(F.encode_package(16, bytes.fromhex(body)))
 
 
 def test_a_state_takes_each_sub_package_once():
     with pytest.raises(LocalProtocolError, match="ToolData is unknown or repeated"):
-        P.encode_state([L.ToolData(), L.ToolData()], V3_15)
+        S.encode_state([L.ToolData(), L.ToolData()], V3_15)
     with pytest.raises(LocalProtocolError, match="SubPackage is unknown"):
-        P.encode_state([L.SubPackage()], V3_15)
+        S.encode_state([F.SubPackage()], V3_15)
 
 
 def test_software_before_3_0_has_no_table():
     old = SoftwareVersion(1, 8)
-    assert P.state_types(old, first=True) == ()
+    assert S.state_types(old, first=True) == ()
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0: use 3\.0\.0 or later"):
-        P.encode_state([L.ToolData()], old)
+        S.encode_state([L.ToolData()], old)
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0 had other layouts"):
         M.encode_message(M.TextMessage(text="x"), old)
     data = P.encode_message_package(M.TextMessage(text="x"), V3_15)

@@ -5,7 +5,8 @@ from test_protocol_program_variables import NO_TIME, V3_15, read
 
 from protocol.errors import RemoteProtocolError
 from protocol.primary import messages as M
-from protocol.primary.packages import encode_message_package, encode_package
+from protocol.primary.framing import encode_package
+from protocol.primary.packages import encode_message_package
 from protocol.ur_types import SoftwareVersion
 
 TWO = M.ProgramThreadsMessage(

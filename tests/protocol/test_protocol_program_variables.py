@@ -8,7 +8,8 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary import program as S
 from protocol.primary import values as V
-from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, decode_package, encode_package
+from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, encode_package
+from protocol.primary.packages import decode_package
 from protocol.primary.values import TypedValue, ValueType
 from protocol.ur_types import SoftwareVersion
 

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.realtime.columns import CB2_COLUMNS, COLUMNS, VERSIONS
+from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.realtime.layout import (
     MAX_FRAME_SIZE,
     SNAPSHOT_FIELDS,
-    Filled,
     layout_for_size,
     layout_for_version,
 )
 from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import ValueOrigin
 
-SIZES = [756, 764, 812, 1044, 1060, 1108, 1116, 1140, 1220]
+SIZES = [1044, 1060, 1108, 1116, 1140, 1220]
 
 
 def numbered_snapshot():
@@ -37,7 +37,7 @@ def numbered_snapshot():
 @pytest.mark.parametrize(
     ("version", "size"),
     [
-        ("1.6", 756), ("1.7", 764), ("1.8.16941", 812), ("3.0", 1044), ("3.1.18024", 1044), ("3.2", 1060),
+        ("3.0", 1044), ("3.1.18024", 1044), ("3.2", 1060),
         ("3.4.5", 1060), ("3.5", 1108), ("3.9.1", 1108), ("3.10", 1116), ("3.13", 1116), ("3.14.3", 1140),
         ("3.15.8", 1140), ("5.0.5", 1108), ("5.3", 1108), ("5.4", 1116), ("5.8", 1116), ("5.9", 1140),
         ("5.10", 1220), ("5.24", 1220), ("10.7", 1220),
@@ -49,7 +49,7 @@ def test_frame_size_of_each_version(version, size):
     assert layout is layout_for_size(size)
 
 
-@pytest.mark.parametrize("version", ["0.9", "2.0", "4.1"])
+@pytest.mark.parametrize("version", ["0.9", "1.8", "2.0", "4.1"])
 def test_versions_that_never_were(version):
     with pytest.raises(LocalProtocolError, match=version):
         layout_for_version(SoftwareVersion.parse(version))
@@ -85,32 +85,17 @@ def test_offsets_are_those_of_the_sheet():
     assert [(c.name, layout.offset(c), (layout.offset(c) - 4) // 8 + 1) for c in layout.columns] == SHEET
 
 
-@pytest.mark.parametrize(
-    ("name", "offset"),
-    [("actual_current", 348), ("actual_tool_accelerometer", 396), ("actual_TCP_force", 540),
-     ("actual_TCP_pose", 588), ("actual_TCP_speed", 636), ("actual_digital_input_bits", 684),
-     ("joint_temperatures", 692), ("test_value", 748), ("robot_mode", 756), ("joint_mode", 764)],
-)  # fmt: skip
-def test_offsets_before_3_0(name, offset):
-    layout = layout_for_size(812)
-    (column,) = [column for column in layout.columns if column.name == name]
-    assert layout.offset(column) == offset
-
-
-@pytest.mark.parametrize("columns", [COLUMNS, CB2_COLUMNS])
-def test_column_names_are_unique_identifiers(columns):
-    attributes = [column.attribute for column in columns]
+def test_column_names_are_unique_identifiers():
+    attributes = [column.attribute for column in COLUMNS]
     assert len(set(attributes)) == len(attributes)
     assert all(attribute.isidentifier() for attribute in attributes)
     assert not {"values", "names", "layout"} & set(attributes)
 
 
 def test_snapshot_fields_are_all_columns_but_the_internal_ones():
-    internal = {c.attribute for c in COLUMNS if c.filled is Filled.INTERNAL_ZERO}
+    internal = {c.attribute for c in COLUMNS if c.origin is ValueOrigin.INTERNAL_ZERO}
     assert internal == {"test_value"} | {c.attribute for c in COLUMNS if c.name.startswith("internal_")}
     assert set(SNAPSHOT_FIELDS) == {c.attribute for c in COLUMNS} - internal
-    for column in CB2_COLUMNS:
-        assert column.filled is Filled.INTERNAL_ZERO or column.attribute in SNAPSHOT_FIELDS
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -194,5 +179,5 @@ def test_frames_of_another_size_are_refused(data):
 
 
 def test_unknown_sizes_are_refused():
-    with pytest.raises(RemoteProtocolError, match=r"1141 bytes: known sizes are 756, 764"):
+    with pytest.raises(RemoteProtocolError, match=r"1141 bytes: known sizes are 1044, 1060"):
         layout_for_size(1141)

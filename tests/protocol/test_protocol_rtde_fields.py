@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.realtime.columns import COLUMNS, Filled
+from protocol.realtime.columns import COLUMNS
 from protocol.rtde.fields import INPUTS, OUTPUTS, input_fields, output_fields
 from protocol.rtde.types import RtdeType
 from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import ValueOrigin
 
 V3_15 = SoftwareVersion(3, 15, 8)
 
@@ -53,9 +54,11 @@ def test_registers_are_complete_in_both_directions():
 def test_every_output_of_a_cb3_is_filled_and_what_is_not_is_not_answered():
     e_series = output_fields(SoftwareVersion(5, 25))
     for field in OUTPUTS:
-        assert field.filled is not None or field.since.cb3 is None, field.name
-        assert field.filled is not None or field.name not in e_series, field.name
-        assert field.filled is None or bool(field.comes_from) or field.filled is Filled.CONSTANT, field.name
+        assert field.origin is not None or field.since.cb3 is None, field.name
+        assert field.origin is not None or field.name not in e_series, field.name
+        assert field.origin is None or bool(field.comes_from) or field.origin is ValueOrigin.CONSTANT, (
+            field.name
+        )
 
 
 @pytest.mark.parametrize(
@@ -92,6 +95,6 @@ def test_variables_that_the_realtime_interface_has_too_come_from_the_same_attrib
     for column in shared:
         field = rtde[column.name]
         assert field.comes_from == column.attribute
-        assert field.filled is column.filled
+        assert field.origin is column.origin
         assert field.type.count == column.count
         assert field.unit == column.unit

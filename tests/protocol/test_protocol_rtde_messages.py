@@ -219,7 +219,7 @@ def test_data_package_of_the_guide():
     assert recipe.decode(package[4:]) == (1.5, (0.5, -0.5, 1.0, 2.0, 3.0, math.pi))
 
 
-@pytest.mark.parametrize("field", [f for f in OUTPUTS if f.filled is not None and f.type.count == 1])
+@pytest.mark.parametrize("field", [f for f in OUTPUTS if f.origin is not None and f.type.count == 1])
 def test_every_scalar_is_taken_from_where_the_table_says(field):
     encode = snapshot_encoder([field], data_header(field.type.size, None))
     (value,) = Recipe([field.name], [field.type]).decode(encode(Numbered())[HEADER_SIZE:])

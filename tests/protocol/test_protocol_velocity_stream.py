@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 
 import numpy as np
 import pytest
@@ -21,10 +22,10 @@ def test_golden_message():
 @given(st.sampled_from(V.VelocityMode), st.lists(st.floats(-2147.0, 2147.0), min_size=6, max_size=6))
 def test_round_trip_within_half_a_step(mode, qd):
     data = V.encode_velocity(mode, qd)
-    assert len(data) == V.COMMAND_SIZE == 28
-    command = V.decode_velocity(data)
-    assert command.mode is mode
-    assert command.qd == pytest.approx(qd, abs=0.5000001e-6)
+    assert len(data) == 28
+    word, *steps = struct.unpack(">7i", data)
+    assert word == mode
+    assert [step / 1e6 for step in steps] == pytest.approx(qd, abs=0.5000001e-6)
 
 
 def test_arrays_give_the_same_bytes():
@@ -36,7 +37,7 @@ def test_arrays_give_the_same_bytes():
 
 def test_stop_and_hold_need_no_velocities():
     assert V.encode_velocity(V.VelocityMode.STOP_PROGRAM) == bytes(28)
-    assert V.decode_velocity(V.encode_velocity(V.VelocityMode.HOLD)) == (V.VelocityMode.HOLD, (0.0,) * 6)
+    assert V.encode_velocity(V.VelocityMode.HOLD) == b"\0\0\0\x02" + bytes(24)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 2147.5, -1e300, "x", None])
@@ -54,15 +55,8 @@ def test_other_counts_are_refused(count):
         V.encode_velocity(V.VelocityMode.VELOCITY, np.zeros(count))
 
 
-@pytest.mark.parametrize("data", [b"", bytes(27), bytes(29), b"\0\0\0\x03" + bytes(24), b"\xff" * 28])
-def test_a_receiver_refuses_other_messages(data):
-    with pytest.raises(RemoteProtocolError, match=r"28 bytes|mode word"):
-        V.decode_velocity(data)
-
-
 def test_hello():
-    assert V.encode_hello() == b"\0\0\0\x01"
-    V.decode_hello(V.encode_hello())
+    V.check_hello(b"\0\0\0\x01")
     for data in (b"", b"\0\0\0\x02", b"GET / HTTP"):
         with pytest.raises(RemoteProtocolError, match="instead of hello"):
-            V.decode_hello(data)
+            V.check_hello(data)

@@ -6,8 +6,8 @@ from itertools import pairwise
 import pytest
 from test_rtde_port import PortBench
 
-from protocol.rtde import connection as rtde_connection
 from protocol.rtde import messages as M
+from protocol.rtde import server_connection
 
 Q = ("timestamp", "actual_q", "actual_qd")
 POSE = ("timestamp", "actual_TCP_pose")
@@ -23,7 +23,7 @@ def started(bench, *names, **options):
 def encoded(monkeypatch):
     """Counts calls of encoders, by the names of the recipe's variables."""
     calls = Counter()
-    original = rtde_connection.snapshot_encoder
+    original = server_connection.snapshot_encoder
     made = {}
 
     def counting(fields, header):
@@ -38,7 +38,7 @@ def encoded(monkeypatch):
             made[encode] = counted
         return made[encode]
 
-    monkeypatch.setattr(rtde_connection, "snapshot_encoder", counting)
+    monkeypatch.setattr(server_connection, "snapshot_encoder", counting)
     return calls
 
 

@@ -4,6 +4,7 @@ import pytest
 from box_support import VERSION, Bench, MessageReader, connect
 
 from protocol.frame_buffer import FrameBuffer
+from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
 from protocol.primary.messages import (
     KeyMessage,
     ProgramLabelMessage,
@@ -11,8 +12,9 @@ from protocol.primary.messages import (
     TextMessage,
     ThreadLabel,
 )
-from protocol.primary.packages import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, RobotState, decode_package
+from protocol.primary.packages import decode_package
 from protocol.primary.program import GlobalVariablesSetup, GlobalVariablesUpdate
+from protocol.primary.state import RobotState
 from protocol.primary.values import TypedValue, ValueType
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox

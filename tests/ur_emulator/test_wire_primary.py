@@ -10,15 +10,11 @@ from protocol.controller_words import CONTROLLER_WORDS
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary import layout as L
 from protocol.primary import messages as M
-from protocol.primary.packages import (
-    MAX_PACKAGE_SIZE,
-    MIN_PACKAGE_SIZE,
-    RobotState,
-    SafetyTolerances,
-    decode_package,
-    state_size,
-)
+from protocol.primary import setup as U
+from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
+from protocol.primary.packages import SafetyTolerances, decode_package
 from protocol.primary.program import ProgramStateMessage
+from protocol.primary.state import RobotState, state_size
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.commands.power import ReleaseBrakes
 from ur_emulator.commands.safety import (
@@ -125,7 +121,7 @@ def test_the_box_marks_itself_in_every_version(version):
     bench = PortBench(version)
     for port in bench.ports:
         (state,) = (package for package, _ in Client(port).take(version) if isinstance(package, RobotState))
-        assert state.find(L.ConfigurationData).masterboard_version == SIMULATED_MASTERBOARD
+        assert state.find(U.ConfigurationData).masterboard_version == SIMULATED_MASTERBOARD
 
 
 @pytest.mark.parametrize("version", [SoftwareVersion(3, 0), SoftwareVersion(3, 4), V3_15], ids=str)
@@ -160,7 +156,7 @@ def test_setup_comes_again_when_the_brakes_open():
     bench.tick(600)
     states = [state for state, _ in client.take(V3_15)]
     running = [state.find(L.RobotModeData).robot_mode == RobotMode.RUNNING for state in states]
-    has_setup = [state.find(L.ConfigurationData) is not None for state in states]
+    has_setup = [state.find(U.ConfigurationData) is not None for state in states]
     assert has_setup.count(True) == 1
     assert has_setup.index(True) == running.index(True)
 
@@ -276,7 +272,7 @@ def test_the_captured_dexterity_is_that_of_the_captured_pose():
 def test_configuration_is_that_of_the_model(name, robot_type, box_type):
     robot = robot_by_name(name)
     configuration = next(
-        record for record in setup_records(robot, robot.dh, 1) if isinstance(record, L.ConfigurationData)
+        record for record in setup_records(robot, robot.dh, 1) if isinstance(record, U.ConfigurationData)
     )
     assert configuration.robot_type == robot_type
     assert configuration.controller_box_type == box_type

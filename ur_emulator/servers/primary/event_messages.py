@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from protocol.primary.layout import NO_TIME
+from protocol.primary.framing import NO_TIME
 from protocol.primary.messages import (
     ErrorCodeMessage,
     KeyMessage,

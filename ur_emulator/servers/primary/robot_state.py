@@ -6,23 +6,25 @@ import zlib
 
 import numpy as np
 
+from protocol.primary.framing import SubPackage
 from protocol.primary.layout import (
     AdditionalInfo,
-    CalibrationData,
     CartesianInfo,
-    ConfigurationData,
     ForceModeData,
     JointData,
-    KinematicsInfo,
     MasterboardData,
     RobotModeData,
     SafetyData,
-    SubPackage,
-    ToolCommunicationInfo,
     ToolData,
+)
+from protocol.primary.setup import (
+    CalibrationData,
+    ConfigurationData,
+    KinematicsInfo,
+    ToolCommunicationInfo,
     ToolModeInfo,
 )
-from protocol.primary.packages import encode_state
+from protocol.primary.state import encode_state
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import (
     SIMULATED_MASTERBOARD,

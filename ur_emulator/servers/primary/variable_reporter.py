@@ -12,7 +12,7 @@ from itertools import groupby
 from typing import Any
 
 from protocol.errors import LocalProtocolError
-from protocol.primary.layout import NO_TIME
+from protocol.primary.framing import NO_TIME
 from protocol.primary.program import (
     GlobalVariablesSetup,
     GlobalVariablesUpdate,

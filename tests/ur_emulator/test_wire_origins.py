@@ -3,19 +3,19 @@
 import pytest
 from wire_story import Story
 
-from protocol.filled import Filled
 from protocol.primary.layout import SUB_PACKAGES
-from protocol.primary.packages import decode_package, state_types
+from protocol.primary.packages import decode_package
+from protocol.primary.state import state_types
 from protocol.realtime.columns import COLUMNS
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.fields import OUTPUTS, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.ur_types import SoftwareVersion
-from protocol.wire_record import wire_fields
+from protocol.wire_record import ValueOrigin, wire_fields
 from ur_emulator.servers.primary.robot_state import StateEncoder
 
 V3_15 = SoftwareVersion(3, 15, 8)
-ALIVE = (Filled.MEASURED, Filled.MODELLED)
+ALIVE = (ValueOrigin.MEASURED, ValueOrigin.MODELLED)
 # Vectors are looked at element by element, but for these: the last of them is a radius; and a motor that does
 # little stays as warm as it is.
 ANY_ELEMENT = {"elbow_sphere", "joint_temperatures", "temperature_motor"}
@@ -26,15 +26,15 @@ def story():
     return Story()
 
 
-def check(name, filled, values):
+def check(name, origin, values):
     """Check one mark against all values that were sent."""
     columns = list(zip(*(value if isinstance(value, tuple) else (value,) for value in values), strict=True))
     changes = [len(set(column)) > 1 for column in columns]
-    if filled in ALIVE:
-        assert any(changes) if name in ANY_ELEMENT else all(changes), f"{name} is {filled.value}: {changes}"
+    if origin in ALIVE:
+        assert any(changes) if name in ANY_ELEMENT else all(changes), f"{name} is {origin.value}: {changes}"
     else:
-        assert not any(changes), f"{name} is {filled.value}, but changes: {changes}"
-        if filled is Filled.INTERNAL_ZERO:
+        assert not any(changes), f"{name} is {origin.value}, but changes: {changes}"
+        if origin is ValueOrigin.INTERNAL_ZERO:
             assert not any(map(any, columns)), name
 
 
@@ -45,7 +45,7 @@ def test_every_output_of_rtde_is_what_the_table_says(story, version):
     encode = snapshot_encoder(fields, b"")
     packages = [recipe.decode(encode(snapshot)) for snapshot, _ in story.moments]
     for field, *values in zip(fields, *packages, strict=True):
-        check(field.name, field.filled, values)
+        check(field.name, field.origin, values)
 
 
 def test_every_column_of_a_frame_is_what_the_table_says(story):
@@ -54,7 +54,7 @@ def test_every_column_of_a_frame_is_what_the_table_says(story):
     frames = [layout.decode(encode(snapshot)) for snapshot, _ in story.moments]
     for column in layout.columns:
         values = [getattr(frame, column.attribute) for frame in frames]
-        check(column.name, column.filled, [tuple(v) if column.count > 1 else v for v in values])
+        check(column.name, column.origin, [tuple(v) if column.count > 1 else v for v in values])
 
 
 @pytest.mark.parametrize("version", [V3_15, SoftwareVersion(3, 2), SoftwareVersion(5, 12)])
@@ -64,17 +64,17 @@ def test_every_field_of_a_state_is_what_the_table_says(story, version):
     for record, *sent in zip(state_types(version, first=True), *states, strict=True):
         for field in wire_fields(record):
             if field.since.covers(version) and not field.only_if:
-                check(f"{field.name}", field.filled, [getattr(one, field.name) for one in sent])
+                check(f"{field.name}", field.origin, [getattr(one, field.name) for one in sent])
 
 
 def test_every_field_of_the_tables_has_a_mark():
-    assert all(field.filled for record in SUB_PACKAGES for field in wire_fields(record))
-    assert all(column.filled for column in COLUMNS)
-    assert all(field.filled for field in OUTPUTS if field.since.cb3)
+    assert all(field.origin for record in SUB_PACKAGES for field in wire_fields(record))
+    assert all(column.origin for column in COLUMNS)
+    assert all(field.origin for field in OUTPUTS if field.since.cb3)
 
 
 def test_what_is_constant_is_little():
-    constants = {f.name for f in output_fields(V3_15).values() if f.filled is Filled.CONSTANT}
+    constants = {f.name for f in output_fields(V3_15).values() if f.origin is ValueOrigin.CONSTANT}
     assert constants == {
         "actual_execution_time", "actual_main_voltage", "euromap67_24V_voltage", "euromap67_24V_current"
     }  # fmt: skip
