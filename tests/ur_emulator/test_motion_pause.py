@@ -85,7 +85,6 @@ def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_as
     for _ in range(20):
         motion.step(DT, 1.0)
     motion.pause()
-    assert motion.is_pausing
     assert not motion.is_paused
     for _ in range(32):
         motion.step(DT, 1.0)
@@ -210,7 +209,7 @@ def test_a_program_that_ends_in_a_pause_leaves_nothing_behind(end):
     for _ in range(30):
         motion.step(DT, 1.0)
     assert not motion.is_moving
-    assert not motion.is_pausing
+    assert not motion.is_paused
     assert motion.owner is None
     assert move.done
     assert motion.target.qd == ZERO6

@@ -211,7 +211,7 @@ def test_a_paused_program_can_be_replaced(bench, cycles):
     bench.run(f'def other():\n  movej({goal})\n  textmsg("other")\nend\n')
     assert printed(bench) == ["other"]
     assert bench.now.target_q == pytest.approx(goal)
-    assert not bench.controller.state.motion.is_pausing
+    assert not bench.controller.state.motion.is_paused
 
 
 def test_nothing_to_pause_or_to_resume(bench):

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import acos, cos, hypot, pi, sin, sqrt, tan
+from math import acos, cos, dist, hypot, pi, sin, sqrt, tan
 
 from protocol.pose import Pose, pose_add, pose_sub
-from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.cubic import Cubic, Vector
 from ur_emulator.motion.joint_path import JointCurve, JointLine, JointPath, ToolPath
 from ur_emulator.motion.leg import Leg
-from ur_emulator.motion.path import PoseLine, PosePath, measure
+from ur_emulator.motion.path import PoseLine, PosePath, measure, times
 from ur_emulator.motion.path_samples import Sample, reaches_end, sample_path
 from ur_emulator.motion.tool import UnreachableError
 
@@ -96,7 +96,7 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     else:
         scale, length = 1.0, min(before + after, _GREATEST_RATIO * min(before, after))
         end_length = length
-    cubic = Cubic.between(start_q, _times(length, slope), end_q, _times(end_length, end_slope))
+    cubic = Cubic.between(start_q, times(length, slope), end_q, times(end_length, end_slope))
     joint_curve = JointCurve(cubic, length)
     v = max(first.v, scale * second.v)
     if scale == 1.0 and isinstance(a, JointLine):
@@ -118,7 +118,7 @@ def _tool_curve(
     waypoint = first.goal_pose
     length = 2.0 * enter
     cubic = Cubic.between(
-        pose_sub(start, waypoint), _times(length, slope), pose_sub(end, waypoint), _times(length, end_slope)
+        pose_sub(start, waypoint), times(length, slope), pose_sub(end, waypoint), times(length, end_slope)
     )
     return PoseCurve(cubic, waypoint, length)
 
@@ -137,7 +137,7 @@ class PoseCurve:
         """See PosePath."""
         value, slope = self._cubic.at(s / self.length)
         twist = (*slope[:3], *_turn_rate(value[3:], slope[3:]))
-        return pose_add(value, self._waypoint), _times(1.0 / self.length, twist)
+        return pose_add(value, self._waypoint), times(1.0 / self.length, twist)
 
 
 class PoseCorner:
@@ -179,18 +179,18 @@ def _corner(first: PosePath, second: PosePath, leg: Leg, leave: float, enter: fl
     end, end_slope = second.at(enter)
     waypoint = leg.goal_pose
     d1, d2 = slope[:3], end_slope[:3]
-    r = min(hypot(*_minus(start[:3], waypoint[:3])), hypot(*_minus(end[:3], waypoint[:3])))
+    r, r2 = dist(start[:3], waypoint[:3]), dist(end[:3], waypoint[:3])
     # The speed is constant only where s is the way of the tool on both lines.
-    if abs(hypot(*d1) - 1.0) > _STRAIGHT or abs(hypot(*d2) - 1.0) > _STRAIGHT or r <= 0.0:
+    if abs(hypot(*d1) - 1.0) > _STRAIGHT or abs(hypot(*d2) - 1.0) > _STRAIGHT or min(r, r2) <= 0.0:
         return None
-    if abs(hypot(*_minus(start[:3], waypoint[:3])) - hypot(*_minus(end[:3], waypoint[:3]))) > 1e-6 * r:
+    if abs(r - r2) > 1e-6 * min(r, r2):
         return None
     cosine = sum(x * y for x, y in zip(d1, d2, strict=True))
     angle = acos(max(-1.0, min(1.0, cosine)))
     if angle < 1e-4 or angle > _SHARPEST_ARC:
         return None
     w = tuple((y - cosine * x) / sin(angle) for x, y in zip(d1, d2, strict=True))
-    radius = r / tan(0.5 * angle)
+    radius = min(r, r2) / tan(0.5 * angle)
     length = radius * angle
     turn = Cubic.between(
         pose_sub(start, waypoint)[3:],
@@ -220,11 +220,3 @@ def _turn_rate(rotvec: Sequence[float], slope: Sequence[float]) -> tuple[float, 
         j + b * py + c * (z * px - x * pz),
         k + b * pz + c * (x * py - y * px),
     )
-
-
-def _times(k: float, values: Sequence[float]) -> Vector6:
-    return six([k * value for value in values])
-
-
-def _minus(a: Sequence[float], b: Sequence[float]) -> Vector:
-    return tuple(x - y for x, y in zip(a, b, strict=True))

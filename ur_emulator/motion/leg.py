@@ -116,25 +116,22 @@ class Leg:
         )
         return leg if arrives else None
 
-    @property
-    def _way_rate(self) -> float | None:
-        """Way of the tool per unit of s, where it is the same all along the path and straight."""
-        path = self.path
-        return path.path.way_rate if isinstance(path, ToolPath) and isinstance(path.path, PoseLine) else None
-
     def last_part(self, r: float, most: float) -> float:
-        """Return how much of the path's end lies within `r` of the waypoint, at most `most` [unit of s]."""
+        """Return how much of the path's end is within `r` of the waypoint, at most `most` [unit of s]."""
         end = self.path.length
-        if (rate := self._way_rate) is not None:
-            return min(most, r / rate) if rate > 0.0 else most
-        return _inside(lambda d: dist(self.position(end - d), self.goal_pose[:3]) <= r, most)
+        return self._part(r, most, lambda d: dist(self.position(end - d), self.goal_pose[:3]))
 
     def first_part(self, r: float, most: float) -> float:
-        """Return how much of the path's beginning lies within `r` of its start, at most `most`."""
-        if (rate := self._way_rate) is not None:
-            return min(most, r / rate) if rate > 0.0 else most
+        """Return how much of the path's beginning is within `r` of its start, at most `most` [unit of s]."""
         start = self.position(0.0)
-        return _inside(lambda d: dist(self.position(d), start) <= r, most)
+        return self._part(r, most, lambda d: dist(self.position(d), start))
+
+    def _part(self, r: float, most: float, distance: Callable[[float], float]) -> float:
+        path = self.path
+        if isinstance(path, ToolPath) and isinstance(path.path, PoseLine):
+            rate = path.path.way_rate
+            return min(most, r / rate) if rate > 0.0 else most
+        return _inside(lambda d: distance(d) <= r, most)
 
 
 def move_j(

@@ -64,7 +64,7 @@ class Move:
         self._use(rest)
         # A move without way may have a duration.
         self._wait = leg.t if leg.path.length <= 0.0 else 0.0
-        self.done = self._plan.duration <= 0.0 and self._wait <= 0.0
+        self.done = self.duration <= 0.0
         self.returned = False
         self.n_joined = 0
         self.left_out: Leg | None = None
@@ -157,7 +157,7 @@ class Move:
         time = self._time + scale * dt
         near = [p + dt * v for p, v in zip(target.q, target.qd, strict=True)]
         self._time_before, self._time = self._time, time
-        if time >= max(self._plan.duration, self._wait):
+        if self.duration <= 0.0:
             q, _ = self._leg.path.at(self._leg.path.length, near)
             self.done = True
             return JointTarget(q)

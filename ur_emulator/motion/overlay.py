@@ -11,6 +11,7 @@ from typing import Protocol
 
 from protocol.pose import Pose, pose_inv, pose_trans
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
+from ur_emulator.motion.speed_l import twist_towards
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import Tool, UnreachableError
 
@@ -60,12 +61,7 @@ class LastDisplacement:
     def displace(self, tool_pose: Pose, path: JointTarget, dt: float) -> Pose:
         """See Overlay."""
         if self._velocity is not ZERO6:
-            after = six(
-                [
-                    *_braked(self._velocity[:3], self.LINEAR * dt),
-                    *_braked(self._velocity[3:], self.ANGULAR * dt),
-                ]
-            )
+            after = twist_towards(self._velocity, ZERO6, self.LINEAR, self.ANGULAR, dt)
             way = [0.5 * dt * (a + b) for a, b in zip(self._velocity, after, strict=True)]
             self._shift = apply_shift(six(way), self._shift)
             self._velocity = after if any(after) else ZERO6
@@ -163,8 +159,3 @@ class OverlayChain:
         qd = six([1.5 * new - 0.5 * old for new, old in zip(speed, self._step_speed, strict=True)])
         self._step_speed = speed
         return JointTarget(q, qd, six([(b - a) / dt for a, b in zip(before.qd, qd, strict=True)]))
-
-
-def _braked(velocity: Sequence[float], reach: float) -> list[float]:
-    size = sum(v * v for v in velocity) ** 0.5
-    return [0.0] * 3 if size <= reach else [v * (1.0 - reach / size) for v in velocity]

@@ -12,7 +12,7 @@ from math import acos, cos, pi, sin, sqrt
 from typing import Protocol
 
 from protocol.pose import Pose, pose_add, pose_sub
-from ur_emulator.models.robot_model import Vector3, Vector6
+from ur_emulator.models.robot_model import Vector3, Vector6, six
 
 # A rotation without way needs a speed too; nothing is published. Chosen: a rotation counts as the way of a
 # point at this distance from the tool centre point, if that is longer than the tool's own way [m/rad].
@@ -58,6 +58,12 @@ def measure(twist: Sequence[float]) -> float:
     return max(sqrt(x * x + y * y + z * z), TURN_LEVER * sqrt(rx * rx + ry * ry + rz * rz))
 
 
+def times(k: float, values: Sequence[float]) -> Vector6:
+    """Return k times a vector of six."""
+    a, b, c, d, e, f = values
+    return (k * a, k * b, k * c, k * d, k * e, k * f)
+
+
 class PoseLine:
     """Straight line from one pose to another."""
 
@@ -66,11 +72,11 @@ class PoseLine:
 
     def __init__(self, start: Sequence[float], goal: Sequence[float]) -> None:
         self._start = start
-        self._goal = _pose(goal)
+        self._goal = six(goal)
         self._change = pose_sub(goal, start)
         length = measure(self._change)
         self.length = length if length > LEAST_LENGTH else 0.0
-        self._twist = _scaled(self._change, 1.0 / self.length if self.length > 0.0 else 0.0)
+        self._twist = times(1.0 / self.length if self.length > 0.0 else 0.0, self._change)
 
     @property
     def way_rate(self) -> float:
@@ -81,7 +87,7 @@ class PoseLine:
         """See PosePath; the end is exactly the goal."""
         if s >= self.length:
             return self._goal, self._twist
-        return pose_add(_scaled(self._change, s / self.length), self._start), self._twist
+        return pose_add(times(s / self.length, self._change), self._start), self._twist
 
 
 class PoseArc:
@@ -164,17 +170,7 @@ def arc_through(
     angle = acos(max(-1.0, min(1.0, _dot(u, v) / (_norm(u) * _norm(v)))))
     if _dot(_cross(u, v), axis) < 0.0:
         angle = 2.0 * pi - angle
-    return PoseArc(start, centre, axis, angle, _pose(goal), fixed=fixed)
-
-
-def _pose(values: Sequence[float]) -> Pose:
-    x, y, z, rx, ry, rz = values
-    return (x, y, z, rx, ry, rz)
-
-
-def _scaled(pose: Sequence[float], k: float) -> Vector6:
-    x, y, z, rx, ry, rz = pose
-    return (k * x, k * y, k * z, k * rx, k * ry, k * rz)
+    return PoseArc(start, centre, axis, angle, six(goal), fixed=fixed)
 
 
 def _position(pose: Sequence[float]) -> Vector3:

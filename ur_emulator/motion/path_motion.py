@@ -98,11 +98,6 @@ class PathMotion:
     # --- pauses
 
     @property
-    def is_pausing(self) -> bool:
-        """True from `pause` to `resume`."""
-        return self._time_scaling.paused
-
-    @property
     def is_returning(self) -> bool:
         """True while the arm goes back to the path that an interruption led it away from."""
         return isinstance(self._generator, ReturnToPath)
