@@ -1,4 +1,4 @@
-"""What the motion tests share: an arm, a place to move in, and a way to ride a generator to its end."""
+"""What the motion tests share: an arm, a starting pose, and functions that run generators to their ends."""
 
 import itertools
 
@@ -30,7 +30,7 @@ def line(start, goal, near=HOME, **limits):
     return move_tool(PoseLine(start, goal), near, TOOL, **({"a": 1.2, "v": 0.25} | limits))
 
 
-def ride(generator, q=HOME, scale=1.0, limit=4000):
+def run_to_end(generator, q=HOME, scale=1.0, limit=4000):
     """All targets until the generator is done, the first included."""
     targets = [JointTarget(tuple(q), ZERO6)]
     while not generator.done:
@@ -40,7 +40,7 @@ def ride(generator, q=HOME, scale=1.0, limit=4000):
 
 
 def follow_when_open(move, legs, q=HOME, scale=1.0, limit=4000):
-    """Ride a move and let legs follow as a script would: in the cycle in which it opens."""
+    """Run a move; each leg follows in the cycle in which the move opens, as in a script."""
     targets = [JointTarget(tuple(q), ZERO6)]
     outcomes = []
     legs = list(legs)
@@ -76,7 +76,7 @@ def distance_to_polyline(points, corners):
 
 
 class RecordedMove(Move):
-    """A move that notes the legs that joined it."""
+    """A move that records the legs that joined it."""
 
     def __init__(self, leg):
         super().__init__(leg)
@@ -90,7 +90,7 @@ class RecordedMove(Move):
 
 
 def run_chain(makers, q=HOME, limit=20000):
-    """Ride moves one after the other as a program does: each in the cycle in which the one before gives way.
+    """Run moves one after the other as a program does: each in the cycle in which the one before returns.
 
     Args:
         makers: each makes a leg for joint angles and tool pose at its start.
@@ -98,7 +98,7 @@ def run_chain(makers, q=HOME, limit=20000):
         limit: most cycles.
 
     Returns:
-        All targets, the legs that were travelled, and what became of those that were to follow.
+        All targets, the executed legs, and the result of each `follow`.
     """
     targets = [JointTarget(tuple(q), ZERO6)]
     makers, legs, outcomes, first = list(makers), [], [], None

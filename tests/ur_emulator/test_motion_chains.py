@@ -1,4 +1,4 @@
-"""Chains of moves: many waypoints close together, sharp corners, singularities, anything at random."""
+"""Chains of moves: many waypoints close together, sharp corners, singularities, random chains."""
 
 import itertools
 import math
@@ -17,8 +17,8 @@ from motion_support import (
     at,
     distance_to_polyline,
     positions,
-    ride,
     run_chain,
+    run_to_end,
     tool_accelerations,
     tool_velocities,
 )
@@ -83,7 +83,7 @@ def test_waypoints_close_together_do_not_slow_the_tool_down(spacing, process):
     makers = [straight(p, r=0.4 * spacing, process=process) for p in corners[:-1]]
     targets, legs, _ = run_chain([*makers, straight(corners[-1], process=process)])
     assert len(legs) == len(corners)
-    plain = ride(Move(straight(corners[-1])(HOME, START)))
+    plain = run_to_end(Move(straight(corners[-1])(HOME, START)))
     # As fast as the whole way in one move.
     assert len(targets) <= len(plain) + 2
     assert speeds(targets).max() <= V * (1 + 1e-6)
@@ -91,7 +91,7 @@ def test_waypoints_close_together_do_not_slow_the_tool_down(spacing, process):
     assert TOOL.pose(targets[-1].q) == pytest.approx(corners[-1], abs=1e-9)
 
 
-def test_a_polygon_that_is_nearly_a_circle_is_ridden_like_one():
+def test_a_polygon_that_is_nearly_a_circle_has_the_speed_of_one():
     corners = circle(60)
     side = math.dist(corners[0][:3], corners[1][:3])
     makers = [straight(p, r=0.45 * side, process=True) for p in corners[:-1]]
@@ -135,7 +135,7 @@ def test_waypoints_whose_blends_overlap_are_left_out_without_a_stop():
     targets, _, outcomes = run_chain([*makers, straight(at(0.126, 0, 0))])
     assert outcomes.count(Follow.SKIPPED) == 26
     assert Follow.REFUSED not in outcomes
-    assert len(targets) <= len(ride(Move(straight(at(0.126, 0, 0))(HOME, START)))) + 2
+    assert len(targets) <= len(run_to_end(Move(straight(at(0.126, 0, 0))(HOME, START)))) + 2
 
 
 @pytest.mark.parametrize("fixed", [False, True])
@@ -197,7 +197,7 @@ def test_arcs_keep_the_acceleration(radius, v, fixed):
     assert speeds(targets).max() <= min(v, math.sqrt(A * radius)) * 1.001
 
 
-def test_a_turn_in_a_small_blend_is_not_torn():
+def test_a_turn_in_a_small_blend_keeps_the_acceleration():
     corner = at(0.05, 0, 0, 1.0, 0, 0)
     targets, _, outcomes = run_chain(
         [straight(corner, r=0.003, v=0.5), straight(at(0.1, 0, 0, 1.0, 0.8, 0), v=0.5)]
@@ -217,7 +217,7 @@ def test_near_a_singularity_the_tool_slows_down_for_the_joints():
     start = TOOL.pose(WRIST)
     goal = (start[0], start[1] + 0.1, start[2], *start[3:])
     move = Move(move_tool(PoseLine(start, goal), WRIST, TOOL, a=A, v=1.0))
-    targets = ride(move, WRIST)
+    targets = run_to_end(move, WRIST)
     qd = np.array([t.qd for t in targets])
     limits = np.array(ARM.robot.qd_max)
     assert (np.abs(qd) / limits).max() <= 1.0
@@ -228,7 +228,7 @@ def test_near_a_singularity_the_tool_slows_down_for_the_joints():
         assert find_invalid_setpoint(ARM.robot, before, after, DT) is None
 
 
-# --- anything
+# --- random chains
 
 places = st.builds(at, *[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.6, 0.6)] * 3)
 angles = st.tuples(*[st.floats(-0.5, 0.5)] * 6).map(
@@ -250,14 +250,14 @@ def is_accepted(targets):
     return all(find_invalid_setpoint(ARM.robot, a, b, DT) is None for a, b in pairs)
 
 
-def can_be_ridden_one_by_one(makers):
+def can_be_executed_one_by_one(makers):
     q = HOME
     try:
         for make in makers:
             move = Move(make(q, TOOL.pose(q)))
             if move.duration > LONGEST:
                 return False
-            alone = ride(move, q, limit=2 * round(LONGEST / DT))
+            alone = run_to_end(move, q, limit=2 * round(LONGEST / DT))
             if not is_accepted(alone):
                 return False
             q = alone[-1].q
@@ -279,8 +279,8 @@ def check_chain(makers):
 
 @settings(max_examples=25, deadline=None)
 @given(st.lists(moves, min_size=2, max_size=5))
-def test_moves_that_can_be_ridden_one_by_one_can_be_ridden_as_a_chain(makers):
-    assume(can_be_ridden_one_by_one(makers))
+def test_moves_that_can_be_executed_one_by_one_can_be_executed_as_a_chain(makers):
+    assume(can_be_executed_one_by_one(makers))
     check_chain(makers)
 
 
@@ -326,8 +326,8 @@ FOUND = {
 
 
 @pytest.mark.parametrize("name", FOUND)
-def test_chains_that_random_search_has_found_can_be_ridden(name):
-    assert can_be_ridden_one_by_one(FOUND[name])
+def test_chains_that_random_search_has_found_can_be_executed(name):
+    assert can_be_executed_one_by_one(FOUND[name])
     check_chain(FOUND[name])
 
 
@@ -339,7 +339,7 @@ def test_chains_that_random_search_has_found_can_be_ridden(name):
 )
 def test_chains_of_the_tool_keep_to_their_path_and_limits(waypoints, v, process):
     makers = [straight(p, r=r, v=v, process=process) for p, r in waypoints]
-    assume(can_be_ridden_one_by_one(makers))
+    assume(can_be_executed_one_by_one(makers))
     targets, legs, _ = run_chain(makers)
     assert speeds(targets).max() <= v * (1 + 1e-6)
     assert tool_accelerations(targets).max(initial=0.0) <= A * (1 + 5e-3) + 1e-6
@@ -350,7 +350,7 @@ def test_chains_of_the_tool_keep_to_their_path_and_limits(waypoints, v, process)
     assert TOOL.pose(targets[-1].q) == pytest.approx(legs[-1].goal_pose, abs=1e-9)
 
 
-# --- what a chain may meet
+# --- programs and other tools
 
 
 def test_the_waypoint_is_that_of_the_move_under_way_also_when_more_are_known():

@@ -1,4 +1,4 @@
-"""Conveyor tracking: moves ride on a belt whose encoder a program feeds."""
+"""Conveyor tracking: moves follow a belt; a program sets the counts of its encoder."""
 
 import math
 

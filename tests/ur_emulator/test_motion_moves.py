@@ -16,7 +16,7 @@ from motion_support import (
     follow_when_open,
     line,
     positions,
-    ride,
+    run_to_end,
     tool_accelerations,
     tool_velocities,
 )
@@ -37,7 +37,7 @@ def test_movel_keeps_its_limits_stays_on_the_line_and_arrives_exactly(way, v, a)
     assume(math.dist(way[:3], (0, 0, 0)) > 0.045)
     goal = at(*way)
     move = Move(line(START, goal, v=v, a=a))
-    targets = ride(move)
+    targets = run_to_end(move)
     speed = np.linalg.norm(tool_velocities(targets), axis=1)
     assert speed.max() <= v * (1 + 1e-6)
     # The last cycle is cut short; the change of speed in it is not larger, but falls into less time.
@@ -49,7 +49,7 @@ def test_movel_keeps_its_limits_stays_on_the_line_and_arrives_exactly(way, v, a)
 
 
 def test_positions_are_the_integral_of_velocities():
-    targets = ride(Move(line(START, at(0.06, 0.05, -0.04, 0.2, 0.1, 0.3))))
+    targets = run_to_end(Move(line(START, at(0.06, 0.05, -0.04, 0.2, 0.1, 0.3))))
     q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
     steps = np.diff(q, axis=0) / DT
     assert np.abs(steps - 0.5 * (qd[1:] + qd[:-1]))[:-1].max() < 5e-3
@@ -60,12 +60,12 @@ def test_t_has_priority_over_v_and_a():
         line(START, at(0.05, 0, 0), t=1.6),
         move_j(HOME, (0.4, *HOME[1:]), TOOL, a=1.4, v=1.05, t=1.6),
     ):
-        assert len(ride(Move(leg))) - 1 == 200
+        assert len(run_to_end(Move(leg))) - 1 == 200
 
 
 @pytest.mark.parametrize("make", [lambda: line(START, at(0.08, 0, 0)), lambda: _joints(0.8)])
 def test_half_the_speed_takes_twice_the_time_on_the_same_path(make):
-    fast, slow = ride(Move(make())), ride(Move(make()), scale=0.5)
+    fast, slow = run_to_end(Move(make())), run_to_end(Move(make()), scale=0.5)
     assert len(slow) - 1 == pytest.approx(2 * (len(fast) - 1), abs=1)
     assert slow[60].q == pytest.approx(fast[30].q, abs=1e-9)
     assert slow[60].qd == pytest.approx([0.5 * x for x in fast[30].qd], abs=1e-9)
@@ -75,7 +75,7 @@ def test_half_the_speed_takes_twice_the_time_on_the_same_path(make):
 def test_movec_passes_through_its_via_point_and_keeps_its_speed(mode):
     via, goal = at(0.04, 0.04, 0.0), at(0.08, 0.0, 0.02, 0.0, 0.0, 0.4)
     path = arc_through(START, via, goal, fixed=mode == 1)
-    targets = ride(Move(move_tool(path, HOME, TOOL, a=A, v=0.1)))
+    targets = run_to_end(Move(move_tool(path, HOME, TOOL, a=A, v=0.1)))
     assert np.linalg.norm(positions(targets) - via[:3], axis=1).min() <= 0.5 * 0.1 * DT + 1e-6
     assert positions(targets)[-1] == pytest.approx(goal[:3], abs=1e-9)
     speed = np.linalg.norm(tool_velocities(targets), axis=1)
@@ -188,6 +188,6 @@ def test_a_late_follower_gets_a_smaller_blend_or_none_but_never_a_jump():
 
 
 def test_a_move_to_where_the_arm_is_is_done_at_once():
-    assert len(ride(Move(line(START, START)))) <= 2
+    assert len(run_to_end(Move(line(START, START)))) <= 2
     assert Move(_joints(0.0)).done
-    assert len(ride(Move(_joints(0.0, t=0.8)))) - 1 == 100
+    assert len(run_to_end(Move(_joints(0.0, t=0.8)))) - 1 == 100

@@ -1,4 +1,4 @@
-"""What a script sees of moves: when they return, what they refuse, what is said."""
+"""Moves in scripts: when they return, what they refuse, their messages."""
 
 import numpy as np
 import pytest
@@ -67,7 +67,7 @@ def test_a_movej_that_cannot_arrive_is_a_runtime_error_before_any_motion(bench):
     assert bench.now.target_q == q
 
 
-def test_a_movel_that_cannot_arrive_sets_out_and_ends_in_a_protective_stop(bench):
+def test_a_movel_that_cannot_arrive_begins_and_ends_in_a_protective_stop(bench):
     bench.run(f"movel({shifted(0.9)})\n")
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
     (error,) = errors(bench)
@@ -104,7 +104,7 @@ def test_a_program_that_waits_after_a_blending_move_comes_to_rest_at_the_waypoin
     assert min(np.linalg.norm(np.subtract(s.target_tcp_pose[:3], corner)) for s in bench.snapshots) < 1e-9
 
 
-def test_overlapping_blends_are_told_and_the_waypoint_is_left_out(bench):
+def test_overlapping_blends_are_reported_and_the_waypoint_is_left_out(bench):
     bench.run(
         f"def f():\n  movel({shifted(0.1)}, r=0.03)\n  movel({shifted(0.1, 0.04)}, r=0.03)\n"
         f"  movel({shifted(0.0, 0.1)})\nend\n"

@@ -1,4 +1,4 @@
-"""set_pos: the simulated arm is put somewhere else."""
+"""set_pos: the simulated arm is placed at other joint angles."""
 
 import pytest
 from box_support import Bench

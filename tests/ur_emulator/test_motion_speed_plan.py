@@ -15,7 +15,7 @@ accelerations = st.floats(0.05, 40.0)
 
 @st.composite
 def intervals(draw):
-    """Parts of a path whose bends never ask for more acceleration than there is."""
+    """Intervals whose bends never need more acceleration than the limit."""
     found = []
     for _ in range(draw(st.integers(1, 8))):
         a = draw(accelerations)

@@ -1,4 +1,4 @@
-"""Motions that scripts renew all the time: servoj, speedl; and the stop of the tool."""
+"""Motions that scripts renew in every cycle: servoj, speedl; and stopl."""
 
 import itertools
 import math

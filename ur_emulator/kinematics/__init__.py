@@ -1,1 +1,1 @@
-"""The controller's own kinematics: what it believes about the geometry of its arm."""
+"""The controller's kinematics of its arm."""

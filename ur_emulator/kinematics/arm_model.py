@@ -1,8 +1,7 @@
 """ArmModel: forward, differential and inverse kinematics of one calibrated arm.
 
-This is what the controller itself computes poses with, so it must know the calibration and nothing of the
-physics: no friction, no gear ripple, no contact. The chain is evaluated by MuJoCo's kinematic stages on a
-model without any of that, which takes about two microseconds; the rest is plain floats.
+The controller computes poses with it: it knows the calibration and no physics. MuJoCo's kinematic stages
+evaluate the chain on a model of their own, in about two microseconds; the rest is plain floats.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from ur_emulator.models.calibration import NOMINAL, Calibration, calibrated_dh
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 
-_POSITION_TOLERANCE = 1e-11  # m and rad; the promise to callers is ten times wider
+_POSITION_TOLERANCE = 1e-11  # m and rad; a tenth of what `inverse` promises
 _MAX_ITERATIONS = 20
-_NEAR = 0.3  # rad; a Newton result this close to its start cannot belong to another branch
-_LONGEST_STEP = 0.5  # rad; keeps Newton's method from flying off near singularities
+_NEAR = 0.3  # rad; a result of Newton's method this close to its start is on the same branch
+_LONGEST_STEP = 0.5  # rad; greatest step of Newton's method, for convergence near singularities
 
 
 class CartesianState(NamedTuple):
-    """What a state of the joints is in space; base frame.
+    """The Cartesian state of the arm, in the base frame.
 
     Attributes:
         tcp_pose: of the tool centre point [m, rad].
@@ -56,7 +55,7 @@ class ArmModel:
 
     Args:
         robot: type of the arm.
-        calibration: differences of this very arm; NOMINAL for the table's arm.
+        calibration: differences of this arm from the nominal one.
 
     `tcp` in all methods: pose of the tool centre point in the flange frame; None for the flange itself.
     """
@@ -70,7 +69,7 @@ class ArmModel:
         self._flange_link: int = self._model.body(LINKS[5]).id
         elbow_link: int = self._model.joint(JOINTS[2]).bodyid[0]
         root: int = self._model.body(LINKS[0]).id
-        # Views into MuJoCo's memory: one attribute lookup each, once.
+        # Views of MuJoCo's memory: saves attribute look-ups in each call.
         site: int = self._model.site(FLANGE).id
         self._qpos = data.qpos
         self._qvel = data.qvel
@@ -95,7 +94,7 @@ class ArmModel:
     def state(
         self, q: Sequence[float], qd: Sequence[float], tcp: Sequence[float] | None = None
     ) -> CartesianState:
-        """Evaluate everything that is published of the arm in space.
+        """Return the Cartesian state.
 
         Args:
             q: joint angles (6,) [rad].
@@ -110,7 +109,7 @@ class ArmModel:
         mujoco.mj_comVel(model, data)
         mujoco.mj_subtreeVel(model, data)
         pose = self._tcp_pose(tcp)
-        # MuJoCo's cvel is (angular, linear) of the point of the body that passes the chain's centre of mass.
+        # MuJoCo's cvel is (angular, linear), of the point of the body at the centre of mass of the chain.
         cx, cy, cz = self._centre.tolist()
         wx, wy, wz, vx, vy, vz = self._flange_motion.tolist()
         rx, ry, rz = pose[0] - cx, pose[1] - cy, pose[2] - cz
@@ -139,14 +138,14 @@ class ArmModel:
     def inverse(
         self, pose: Sequence[float], q_near: Sequence[float], tcp: Sequence[float] | None = None
     ) -> Vector6 | None:
-        """Inverse kinematics: the solution next to given joint angles.
+        """Inverse kinematics: the solution closest to given joint angles.
 
-        Starts from `q_near` itself, which settles it along a path; else from the closed-form branches of the
-        nominal arm in the order of their distance.
+        Newton's method starts from `q_near`, which is enough along a path; else from the closed-form branches
+        of the nominal arm, the closest first.
 
         Args:
             pose: wanted pose of the tool centre point in the base frame.
-            q_near: joint angles (6,) [rad] to stay close to.
+            q_near: joint angles (6,) [rad].
             tcp: tool centre point in the flange frame.
 
         Returns:
@@ -215,7 +214,7 @@ class ArmModel:
     def _refine(
         self, start: Sequence[float], position: Sequence[float], rotation: Sequence[float]
     ) -> Vector6 | None:
-        """Newton's method on the calibrated arm, for a flange pose; None when it does not converge."""
+        """Newton's method on the calibrated arm for a flange pose; None if it does not converge."""
         q = np.array(start)
         wanted = np.array(rotation).reshape(3, 3)
         error = np.empty(6)

@@ -1,11 +1,11 @@
 """Inverse kinematics of the nominal UR geometry in closed form, all eight branches.
 
-Holds for every arm whose table has the UR pattern: axes 2, 3 and 4 parallel, d2 = d3 = 0, twists
-+90, 0, 0, +90, -90, 0 degrees. It knows nothing of calibration; `ArmModel.inverse` refines its results.
+Valid for all arms whose table has the UR pattern: axes 2, 3 and 4 parallel, d2 = d3 = 0, twists
++90, 0, 0, +90, -90, 0 degrees. Calibration is not included; `ArmModel.inverse` refines the results.
 
 Derivation: the first axis follows from the wrist's distance d4 to the plane of the arm; joint 5 from the
-flange's distance to the same plane; joint 6 from the direction of the parallel axes seen in the flange; what
-is left is a planar two-link arm. Same geometry as K. P. Hawkins, "Analytic inverse kinematics for the
+flange's distance to the same plane; joint 6 from the direction of the parallel axes in the flange frame; the
+rest is a planar two-link arm. Same geometry as K. P. Hawkins, "Analytic inverse kinematics for the
 Universal Robots UR-5/UR-10 arms", Georgia Tech, 2013.
 """
 
@@ -16,9 +16,9 @@ from math import acos, atan2, cos, hypot, pi, sin
 
 from ur_emulator.models.robot_model import DhRow, Vector3, Vector6, six
 
-_SLACK = 0.02
-"""A cosine may be this far outside [-1, 1] and is then taken as the limit: a calibrated arm reaches a little
-further than its nominal table, and the refinement decides."""
+# A cosine outside [-1, 1] by less than this counts as the limit: a calibrated arm may reach a little further
+# than the nominal one, and the refinement decides.
+_TOLERANCE = 0.02
 
 
 def closed_form_inverse(
@@ -33,8 +33,8 @@ def closed_form_inverse(
         q6_free: value for joint 6 where it is undetermined (wrist singularity) [rad].
 
     Returns:
-        Up to eight solutions, each angle within [-pi, pi); none when out of
-        reach. Near the limits of reach a solution may be approximate.
+        Up to eight solutions, each angle within [-pi, pi); none out of reach. Close to the limits of reach a
+        solution may be approximate.
     """
     d1, d4, d5, d6 = dh[0].d, dh[3].d, dh[4].d, dh[5].d
     a2, a3 = dh[1].a, dh[2].a
@@ -51,7 +51,7 @@ def closed_form_inverse(
         bend = _acos(s1 * px - c1 * py - d4, d6)
         if bend is None:
             continue
-        # The common direction of axes 2, 3 and 4, seen from the flange.
+        # The direction of axes 2, 3 and 4 in the flange frame.
         axis_x, axis_y = s1 * r00 - c1 * r10, s1 * r01 - c1 * r11
         for q5 in (bend, -bend):
             s5 = sin(q5)
@@ -68,17 +68,17 @@ def closed_form_inverse(
             for q3 in (fold, -fold):
                 q2 = atan2(v, u) - atan2(a3 * sin(q3), a2 + a3 * cos(q3))
                 angles = (q1, q2, q3, q234 - q2 - q3, q5, q6)
-                solutions.append(six([wrap(angle) for angle in angles]))
+                solutions.append(six([_wrap(angle) for angle in angles]))
     return solutions
 
 
-def wrap(angle: float) -> float:
+def _wrap(angle: float) -> float:
     """Bring an angle [rad] into [-pi, pi)."""
     return (angle + pi) % (2.0 * pi) - pi
 
 
 def _acos(numerator: float, denominator: float) -> float | None:
-    """Arc cosine of a quotient; None when it is out of range by more than the slack."""
-    if abs(numerator) > (1.0 + _SLACK) * abs(denominator):
+    """Arc cosine of a quotient; None if it is out of range by more than the tolerance."""
+    if abs(numerator) > (1.0 + _TOLERANCE) * abs(denominator):
         return None
     return acos(max(-1.0, min(1.0, numerator / denominator))) if denominator else None

@@ -1,4 +1,4 @@
-"""What the joints are asked to do: pure generators of joint targets, one cycle at a time.
+"""Motion: generators of joint targets, one control cycle at a time.
 
-Nothing here knows physics, sockets, scripts or a clock.
+No module here knows physics, sockets, scripts or a clock.
 """

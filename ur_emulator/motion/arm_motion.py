@@ -1,4 +1,4 @@
-"""Where the arm is asked to go: along the path of the program, displaced by overlays; and its stops.
+"""The motion of the arm: along the path of the program, displaced by overlays; and its stops.
 
 Must not know scripts or physics.
 """
@@ -17,14 +17,14 @@ from ur_emulator.motion.target import JointTarget
 class ArmMotion(PathMotion):
     """The motion state of the arm.
 
-    When a program ends, is replaced or killed while the arm moves, the leading axis brakes with
-    `stop_deceleration`. Users call the real stop "abrupt"; its number is not published. Chosen: that of the
-    maker's tests of stop category 0, which the model of the arm holds.
+    When a program ends, is replaced or killed during a motion, the leading axis brakes with
+    `stop_deceleration`. Users call the real stop "abrupt"; its value is not published. Chosen: the value of
+    the maker's tests of stop category 0, from the model of the arm.
 
     Attributes:
         stop_deceleration: of the leading axis [rad/s^2].
-        path: target along the path of the program; what generators see.
-        target: what the joints get; the same object as `path` unless overlays displace it.
+        path: target along the path of the program, which generators work on.
+        target: of the joints; the same object as `path` unless overlays displace it.
     """
 
     def __init__(self, q: Vector6, stop_deceleration: float) -> None:
@@ -36,7 +36,7 @@ class ArmMotion(PathMotion):
 
     @property
     def is_moving(self) -> bool:
-        """True unless the target stands still and nothing is about to move it."""
+        """True while a generator or an overlay moves the arm, unless a pause has stopped it."""
         return (self._generator is not HOLD or bool(self._overlays)) and not self.is_paused
 
     @property
@@ -47,10 +47,10 @@ class ArmMotion(PathMotion):
     # --- stops
 
     def release(self, owner: object) -> None:
-        """End the ownership of `owner`, if it has it; a motion still under way is stopped at once.
+        """End the ownership of `owner`, if it has the arm, and stop its motion at once.
 
-        A move whose instruction has ended for a blend is on its last way to the waypoint and may arrive: a
-        program that ends with it is no different from one whose last move does not blend.
+        A move whose instruction has returned for a blend continues to its waypoint: the end of a program is
+        the same with and without a blend in its last move.
         """
         if self._owner is owner:
             move = self._move
@@ -60,19 +60,19 @@ class ArmMotion(PathMotion):
                 self.stop(self.stop_deceleration)
 
     def stop(self, deceleration: float) -> None:
-        """Take the arm from whoever has it and ramp it to rest, leading axis at `deceleration` [rad/s^2].
+        """Take the arm from its owner and ramp it to rest, leading axis at `deceleration` [rad/s^2].
 
-        All overlays end; where they have led the arm is part of the path from then on. So does a pause.
+        All overlays and a pause end; the path continues from the displaced target.
         """
         self._abandon()
         self._brake(deceleration)
         self._time_scaling.reset()
 
     def place(self, q: Vector6, qd: Vector6 = ZERO6) -> None:
-        """Set the target to `q` [rad], without a path: the joints were moved by something else.
+        """Set the target to `q` [rad], where the joints are without a motion of the program.
 
-        If they still move, with `qd` [rad/s], they are ramped to rest. In a pause, what was under way goes on
-        from there.
+        If they still move, with `qd` [rad/s], they are ramped to rest. A paused move returns to its path from
+        there.
         """
         if self._time_scaling.paused:
             self._suspend()
@@ -86,7 +86,7 @@ class ArmMotion(PathMotion):
             self._generator = StopJ(self.stop_deceleration)
 
     def retract(self, target: JointTarget) -> None:
-        """Take back the last step: `target` is the one from before it."""
+        """Undo the last step: `target` is the one before it."""
         self._chain.clear()
         self.path = self.target = target
         if (move := self._move) is not None:
@@ -99,9 +99,9 @@ class ArmMotion(PathMotion):
             self._generator = StopJ(deceleration)
 
     def interrupt(self, deceleration: float) -> None:
-        """Pause without regard for the path: ramp to rest, leading axis at `deceleration` [rad/s^2].
+        """Pause by a stop that leaves the path: leading axis at `deceleration` [rad/s^2].
 
-        Overlays end, and with them a move that they have led away from its path.
+        Overlays end, and with them a move that they displace.
         """
         if self._overlays:
             self._abandon()
@@ -114,7 +114,7 @@ class ArmMotion(PathMotion):
     # --- overlays
 
     def add_overlay(self, overlay: Overlay) -> None:
-        """Let an overlay displace the tool from the next cycle on, after those that are active already."""
+        """Add an overlay from the next cycle on, after those that are active already."""
         self._chain.add(overlay, self.target)
         self._is_special = True
 
@@ -123,9 +123,9 @@ class ArmMotion(PathMotion):
         return overlay in self._overlays
 
     def remove_overlay(self, overlay: Overlay) -> None:
-        """End an overlay, if it is active; the arm stays where it has led it.
+        """End an overlay, if it is active; the arm keeps its last displacement.
 
-        A move under way, or another overlay, goes on displaced by what there is of this one.
+        A move or another overlay continues with that displacement.
         """
         if overlay in self._overlays:
             self._chain.keep_last(overlay)
@@ -135,7 +135,7 @@ class ArmMotion(PathMotion):
                     self._generator = StopJ(self.stop_deceleration)
 
     def _may_settle(self) -> bool:
-        """True when no overlay acts any more, no move is on a displaced path nor has only just ended."""
+        """True when all overlays have ended, and the move that they displaced has ended at rest."""
         if not self._chain.all_ended or self._move is not None:
             return False
         return self._generator is not HOLD or not any(self.target.qd)
@@ -151,10 +151,10 @@ class ArmMotion(PathMotion):
 
         Args:
             dt: duration of a cycle [s].
-            scale: speed scaling of the trajectory asked for, 0..1; a moving arm takes it on gradually.
+            scale: commanded speed scaling, 0..1; during a motion it is reached gradually.
 
         Raises:
-            UnreachableError: the move's path leads where the arm cannot be.
+            UnreachableError: the arm cannot reach the path there.
         """
         if self._is_special:
             return self._special_step(dt, scale)
@@ -167,7 +167,7 @@ class ArmMotion(PathMotion):
         return self.target
 
     def _special_step(self, dt: float, scale: float) -> JointTarget:
-        """Do a cycle with overlays or in a pause."""
+        """Step with overlays or in a pause."""
         before = self.target
         time_factor = self._time_scaling.step(dt)
         if time_factor > 0.0 or _brakes(self._generator):
@@ -187,7 +187,7 @@ class ArmMotion(PathMotion):
 
 
 def _brakes(generator: Generator) -> bool:
-    """True for what comes to rest by itself, in a pause too."""
+    """True for generators that brake; they do so in a pause too."""
     return isinstance(generator, StopJ | StopL) or (
         isinstance(generator, ReturnToPath) and generator.is_braking
     )

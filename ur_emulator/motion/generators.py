@@ -1,9 +1,7 @@
-"""What a generator of motion is, and those that stream or stop in joint space.
+"""Generators of motion: the protocol, and those that stream or stop in joint space.
 
-`step` gives the joint target at the end of the next cycle.
-
-A generator is started from the target that holds at that moment and keeps the rest of its state itself.
-`done` says that it has nothing more to do; the last target it gave then holds.
+`step` returns the joint target at the end of the next cycle. A generator begins at the current target and
+keeps the rest of its state itself. When `done`, its last target stays in force.
 """
 
 from __future__ import annotations
@@ -23,11 +21,11 @@ PAUSE_DECELERATION = 4.0
 
 
 class Generator(Protocol):
-    """A motion under way."""
+    """A motion, cycle by cycle."""
 
     @property
     def done(self) -> bool:
-        """True when the motion has reached what it was asked for."""
+        """True when the motion has reached its goal."""
         ...
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
@@ -46,8 +44,8 @@ def ramp_towards(
 ) -> JointTarget:
     """Return the target one cycle on, its velocity moved towards `qd_goal` on a straight line.
 
-    The joint with the longest way to go changes at `acceleration`; the others arrive together with it
-    ("acceleration of the leading axis"). The position is the integral of that linear velocity.
+    The joint with the greatest change accelerates at `acceleration`; the others arrive together with it
+    ("acceleration of the leading axis"). The position is the integral of the linear velocity.
 
     Args:
         target: target at the end of the last cycle.
@@ -75,7 +73,7 @@ def ramp_towards(
 
 
 class Hold:
-    """Stand still where the last motion ended."""
+    """Stands still where the last motion ended."""
 
     done = True
 
@@ -85,16 +83,16 @@ class Hold:
 
 
 class Streamed:
-    """A motion that lasts only while a script renews it in every cycle."""
+    """A motion that a script must renew in every cycle."""
 
     done: bool
 
     def when_lost(self) -> Generator:
-        """Return what the arm does when the next command does not come."""
+        """Return the generator that stops the arm when the command is not renewed."""
         raise NotImplementedError
 
     def when_paused(self) -> Generator:
-        """Return how the arm comes to rest when the program pauses."""
+        """Return the generator that stops the arm when the program pauses."""
         return StopJ(PAUSE_DECELERATION)
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
@@ -106,8 +104,8 @@ class SpeedJ(Streamed):
     """Accelerate to a joint velocity and keep it.
 
     Source: URScript manual CB3 3.15, speedj (semantics since 3.2): linear acceleration of the leading axis,
-    then constant speed. `done` means that the velocity is reached; the motion itself goes on until
-    something replaces it.
+    then constant speed. `done` means that the velocity is reached; the motion continues until another one
+    replaces it.
     """
 
     def __init__(self, qd: Vector6, a: float) -> None:

@@ -1,13 +1,12 @@
-"""Who moves the arm along its path: the current generator, its owner, and what a pause does to both.
+"""The motion along the path of a program: the current generator, its owner, and their pauses.
 
-The rules of ownership come from the controller's behaviour as users report it:
+The rules of ownership are the controller's behaviour as users report it:
 
 * only one script thread moves the arm at a time; a second one gets "Another thread is already controlling
   the robot";
 * ownership ends when the motion has brought the arm to rest, or when the owner ends or is killed;
-* a velocity command lives only as long as it is renewed in every cycle: when the next `speedj` is late the
-  arm begins to stop (the stutter seen by every driver that streams too slowly), and when the program ends it
-  stops.
+* a velocity command must be renewed in every cycle: when the next `speedj` is late the arm begins to stop
+  (drivers that stream too slowly see a stutter), and when the program ends it stops.
 
 Must not know scripts or physics: an owner is any object, compared by identity.
 """
@@ -20,14 +19,14 @@ from ur_emulator.motion.move import Move
 from ur_emulator.motion.pause import PAUSE_RATE, ReturnToPath, Suspended, TimeScaling
 from ur_emulator.motion.target import JointTarget
 
-# How fast the speed scaling follows the slider [1/s]: a step would be a step of the joints' speed. Chosen.
+# Rate of change of the speed scaling [1/s], so that the joint speeds have no step. Chosen.
 SCALING_RATE = 4.0
 
 HOLD = Hold()
 
 
 class OwnershipError(Exception):
-    """A second owner asked for the arm while the first still has it."""
+    """Another owner has the arm."""
 
 
 class PathMotion:
@@ -35,7 +34,7 @@ class PathMotion:
 
     Attributes:
         path: target along the path of the program; what generators see.
-        scaling_rate: how fast the speed scaling follows what is asked for [1/s].
+        scaling_rate: rate of change of the speed scaling [1/s].
     """
 
     def __init__(self, q: Vector6) -> None:
@@ -47,12 +46,12 @@ class PathMotion:
         self._scale = 1.0
         self._time_scaling = TimeScaling()
         self._suspended: Suspended | None = None
-        # A pause, or something else that the usual cycle does not look after: one test in the hot path.
+        # Overlays or a pause: a single test in the hot path.
         self._is_special = False
 
     @property
     def owner(self) -> object | None:
-        """The object that controls the arm at present, or None."""
+        """The object that has the arm, or None."""
         return self._owner
 
     @property
@@ -62,28 +61,28 @@ class PathMotion:
 
     @property
     def goal(self) -> Vector6:
-        """Joint positions that the present move leads to; the path's own if no move has a goal [rad]."""
+        """Joint angles at the next waypoint; those of the path if there is none [rad]."""
         move = self._move
         goal = None if move is None else move.goal
         return self.path.q if goal is None else goal
 
     @property
     def _move(self) -> Move | None:
-        """The move under way, also while it is interrupted."""
+        """The current move, also while it is interrupted."""
         generator = self._generator if self._suspended is None else self._suspended.generator
         if isinstance(generator, ReturnToPath):
             return generator.move
         return generator if isinstance(generator, Move) else None
 
     def move_of(self, owner: object) -> Move | None:
-        """Return the move that `owner` has under way, if it has one."""
+        """Return the current move of `owner`, if it has one."""
         return self._move if self._owner is owner else None
 
     def command(self, owner: object, generator: Generator) -> None:
-        """Let `owner` move the arm with `generator` from the next cycle on.
+        """Move the arm with `generator` for `owner` from the next cycle on.
 
         Raises:
-            OwnershipError: somebody else has the arm.
+            OwnershipError: another owner has the arm.
         """
         if self._owner is not None and self._owner is not owner:
             raise OwnershipError
@@ -92,23 +91,21 @@ class PathMotion:
         self._renewed = True
 
     def renew(self) -> None:
-        """Keep a streamed velocity alive for one more cycle."""
+        """Renew a streamed velocity for one more cycle."""
         self._renewed = True
 
     # --- pauses
 
     @property
     def is_returning(self) -> bool:
-        """True while the arm goes back to the path that an interruption led it away from."""
+        """True while the arm returns to the path that it left in an interruption."""
         return isinstance(self._generator, ReturnToPath)
 
     def pause(self, deceleration: float = 0.0) -> None:
-        """Ramp the arm to rest on its path; a stream ends like one that is not renewed any more.
-
-        Overlays stand still too.
+        """Ramp the arm to rest on its path; a stream is stopped; overlays stand still too.
 
         Args:
-            deceleration: of the leading axis, if that is faster than the usual ramp [rad/s^2].
+            deceleration: of the leading axis, if that is faster than PAUSE_RATE [rad/s^2].
         """
         scaling = self._time_scaling
         if scaling.paused:
@@ -122,7 +119,7 @@ class PathMotion:
             self._generator = StopJ(deceleration) if deceleration else generator.when_paused()
 
     def resume(self) -> None:
-        """End a pause: a move goes on where it stopped, a stream if it is renewed in this cycle."""
+        """End a pause: a move continues, and a stream if it is renewed in this cycle."""
         if not self._time_scaling.paused:
             return
         self._time_scaling.paused = False
@@ -141,7 +138,7 @@ class PathMotion:
                 self._suspended = Suspended(generator, self._owner, self.path.q)
 
     def _abandon(self) -> None:
-        """Give up the move under way, for good."""
+        """End the current move; it does not continue after a pause."""
         if (move := self._move) is not None:
             move.abandon()
         self._suspended = None

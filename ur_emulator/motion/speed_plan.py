@@ -1,11 +1,12 @@
-"""How fast a path is travelled: the fastest speed that keeps the limits of every part of it.
+"""Speed along a path: the fastest plan within the limits of all its parts.
 
-The square z of the speed is what a plan is made of, for at a constant acceleration it is a straight line over
-the way: z' = 2 a. From the end a curve runs backwards, the speed from which the end can still be reached;
-from the beginning one runs forwards below it. The lower of both and of the limits is the plan.
+A plan is made in z, the square of the speed: at a constant acceleration z is a straight line over the way,
+z' = 2 a. A curve from the end backwards gives the greatest z from which the arm can stop at the end; one from
+the beginning forwards gives the greatest z that the arm can reach. The plan is the lowest of both and the
+limits.
 
-Where a path bends, a part of the acceleration goes into the bend: what is left along the path is
-a - b z, with the bend b per unit of way. Units are those of the path.
+On a curved path a part of the acceleration changes the direction: a - b z remains along the path, with the
+bend b per unit of way. Units are those of the path.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from dataclasses import dataclass
 from math import inf, sqrt
 from typing import NamedTuple
 
-# A speed may lie above the curve that reaches the end by rounding, not by more.
+# Factor for rounding when a speed is compared with the curve from the end.
 _ROUNDING = 1.0 + 1e-9
 
-# Corners of a plan closer together than this share of an interval differ by rounding only.
+# Corners of a plan that are closer than this share of an interval are one corner.
 _NOTHING = 1e-12
 
 
@@ -98,7 +99,7 @@ class StoppingCurve(NamedTuple):
     z: tuple[float, ...]
 
     def can_stop(self, s: float, speed: float) -> bool:
-        """Return whether an arm that is at `s` with a speed can come to rest at the point."""
+        """Return whether an arm at `s` with a speed can stop at the point."""
         if s >= self.knots[-1]:
             return False
         k = max(1, bisect_right(self.knots, s))
@@ -114,7 +115,7 @@ def plan(intervals: Sequence[Interval], entry: float) -> SpeedPlan | None:
         entry: speed at the beginning.
 
     Returns:
-        None when the speed at the beginning is too high for what follows.
+        None if the speed at the beginning is too high.
     """
     backward, slopes = _backward(intervals)
     z = entry * entry
@@ -140,7 +141,7 @@ def plan(intervals: Sequence[Interval], entry: float) -> SpeedPlan | None:
 
 
 def stopping_curve(intervals: Sequence[Interval], stop: float) -> StoppingCurve:
-    """Return from which speeds a path can come to rest at a point of it, before its end."""
+    """Return the greatest speeds from which the arm can stop at a point of a path."""
     cut: list[Interval] = []
     knots = [0.0]
     for interval in intervals:
@@ -153,10 +154,10 @@ def stopping_curve(intervals: Sequence[Interval], stop: float) -> StoppingCurve:
 
 
 def _backward(intervals: Sequence[Interval]) -> tuple[list[float], list[float]]:
-    """Return the greatest z at every border from which the end can be reached at rest, and the way down.
+    """Return the greatest z from which the arm can stop at the end.
 
     Returns:
-        z at the borders, and between them the slopes.
+        z at the ends of the intervals, and the slopes between them.
     """
     z = 0.0
     found, slopes = [z], []
@@ -172,7 +173,7 @@ def _backward(intervals: Sequence[Interval]) -> tuple[list[float], list[float]]:
 
 
 def _shape(interval: Interval, z: float, z_end: float, down: float) -> list[tuple[float, float]]:
-    """Return the corners (way, z) of a plan within one interval: up, along the cap, down.
+    """Return the corners (way, z) of a plan within one interval: rising, at the cap, falling.
 
     Args:
         interval: in question.

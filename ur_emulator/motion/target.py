@@ -1,4 +1,4 @@
-"""The joint target: what the controller wants of the arm at the end of a cycle."""
+"""The joint target: the set-point of the arm at the end of a control cycle."""
 
 from __future__ import annotations
 

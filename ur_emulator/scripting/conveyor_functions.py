@@ -1,4 +1,4 @@
-"""Builtins that let the moves of a program ride on a conveyor, and those that look at the path without it."""
+"""Builtins of conveyor tracking: moves follow a conveyor; the path without the conveyor can be read."""
 
 from __future__ import annotations
 
