@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 from bench.script import SYNC_THREADS
 from ur_emulator.commands.programs import StartProgram
@@ -11,6 +12,7 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.interpreter import collection_put_off
+from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import CompiledProgram, compile_program
 from urscript.syntax.parser import prepare
 
@@ -50,8 +52,8 @@ def measure_script_in_box() -> dict[str, float]:
 
 
 def _box() -> Controller:
-    # No network: nothing here opens a socket.
-    return Controller(robot_by_name("ur3"), fidelity_by_name("typical"), 7, None)  # type: ignore[arg-type]
+    programs = partial(ProgramSlot, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
+    return Controller(robot_by_name("ur3"), fidelity_by_name("typical"), 7, programs)
 
 
 def _box_running(n_threads: int) -> Controller:

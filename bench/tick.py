@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import mujoco
 
 from bench.limit import STEPS, best_of
@@ -9,6 +11,7 @@ from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
 from urscript.syntax.parser import prepare
 
@@ -33,8 +36,8 @@ end
 def measure_tick() -> dict[str, float]:
     """Measure the tick and four steps of the same arm in turn; the best of each counts."""
     prepare()
-    # No network: nothing here opens a socket.
-    controller = Controller(robot_by_name("ur3"), fidelity_by_name("typical"), 7, None)  # type: ignore[arg-type]
+    programs = partial(ProgramSlot, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
+    controller = Controller(robot_by_name("ur3"), fidelity_by_name("typical"), 7, programs)
     controller.tick([StartProgram(compile_program(_SPEEDJ))])
     for _ in range(WARM_UP):
         controller.tick(())
@@ -45,7 +48,7 @@ def measure_tick() -> dict[str, float]:
 
     def tick() -> None:
         controller.tick(())
-        controller.take_events()
+        controller.state.events.take()
 
     pairs = [(best_of(tick), best_of(lambda: mujoco.mj_step(model, beside, STEPS))) for _ in range(ROUNDS)]
     tick_us, steps_us = (min(times) for times in zip(*pairs, strict=True))

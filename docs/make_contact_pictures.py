@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import argparse
 import os
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.commands.push import Push
+from ur_emulator.scripting.program_slot import ProgramSlot
 
 os.environ.setdefault("MUJOCO_GL", "egl")
 
@@ -53,11 +55,11 @@ class Run:
     """A program on a box, and what it left behind, cycle by cycle."""
 
     def __init__(self, start_z, program):
-        self.controller = Controller(UR3, TYPICAL, SEED, NoNetwork())
+        self.controller = Controller(UR3, TYPICAL, SEED, partial(ProgramSlot, network=NoNetwork()))
         self._play(f"movej({DOWN.format(z=start_z)}, a=3, v=2)")
         self.rows = []
         self.errors = []
-        self.controller.take_events()
+        self.controller.state.events.take()
         self.controller.tick((StartProgram(compile_program(program)),))
 
     def _play(self, text):
@@ -71,7 +73,7 @@ class Run:
         for _ in range(round(seconds / PERIOD)):
             snapshot = self.controller.tick(commands)
             commands = ()
-            for event in self.controller.take_events():
+            for event in self.controller.state.events.take():
                 if isinstance(event, ErrorReported):
                     self.errors.append((len(self.rows) * PERIOD, event))
             self.rows.append(

@@ -31,7 +31,8 @@ BOX_ORDER = (
     {"kinematics"},
     {"motion"},
     {"plant"},
-    {"controller", "scripting"},
+    {"controller"},
+    {"scripting"},
     {"box_log"},
     {"commands"},
     {"programs"},
@@ -40,6 +41,20 @@ BOX_ORDER = (
     {"control"},
     {"emulator", "rack"},
     {"__main__", "cli", "descriptor_limit", "pytest_plugin", "script_robots", "script_run"},
+)
+CONTROLLER_ORDER = (
+    {"events"},
+    {"clock", "operator", "program_requests", "programs", "robot_mode", "tool_settings"},
+    {"io"},
+    {"safety"},
+    {"arm_in_space", "client_inputs", "electrics", "error_settings"},
+    {"snapshot"},
+    {"past_cycles"},
+    {"compliance"},
+    {"state"},
+    {"modbus", "safety_system"},
+    {"command", "reporting"},
+    {"controller"},
 )
 LANGUAGE_ORDER = (
     {"courtesy", "dialect", "errors", "programs", "source", "values"},
@@ -68,7 +83,12 @@ PROTOCOL_ORDER = (
     {"live"},
     {"__main__"},
 )
-ORDERS = {"ur_emulator": BOX_ORDER, "urscript": LANGUAGE_ORDER, "protocol": PROTOCOL_ORDER}
+ORDERS = {
+    "ur_emulator": BOX_ORDER,
+    "ur_emulator.controller": CONTROLLER_ORDER,
+    "urscript": LANGUAGE_ORDER,
+    "protocol": PROTOCOL_ORDER,
+}
 LEVELS = [
     pytest.param(package, order, level, id=f"{package}-{'+'.join(sorted(order[level]))}")
     for package, order in ORDERS.items()
@@ -91,7 +111,11 @@ def imports(path):
 
 
 def modules(package):
-    return sorted((ROOT / package).rglob("*.py"))
+    return sorted(folder(package).rglob("*.py"))
+
+
+def folder(package):
+    return ROOT.joinpath(*package.split("."))
 
 
 @pytest.mark.parametrize("package", sorted(OURS))
@@ -108,7 +132,7 @@ def test_packages_import_only_what_their_row_allows(package):
 
 @pytest.mark.parametrize("package", ORDERS)
 def test_every_part_of_a_package_has_its_place_in_the_order(package):
-    parts = {path.relative_to(ROOT / package).parts[0].removesuffix(".py") for path in modules(package)}
+    parts = {path.relative_to(folder(package)).parts[0].removesuffix(".py") for path in modules(package)}
     assert parts - {"__init__"} == set().union(*ORDERS[package])
 
 
@@ -118,9 +142,10 @@ def test_the_parts_of_a_package_import_in_one_direction(package, order, level):
     wrong = {
         f"{path.relative_to(ROOT)}: {module}"
         for path in modules(package)
-        if path.relative_to(ROOT / package).parts[0].removesuffix(".py") in order[level]
+        if path.relative_to(folder(package)).parts[0].removesuffix(".py") in order[level]
         for module in imported_modules(path)
-        if module.startswith(f"{package}.") and module.split(".")[1] not in allowed
+        if module.startswith(f"{package}.")
+        and module.removeprefix(f"{package}.").split(".")[0] not in allowed
     }
     assert not wrong
 

@@ -13,6 +13,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
@@ -37,6 +38,7 @@ from ur_emulator.realtime.event_loop import WAKE_UP, EventLoop
 from ur_emulator.realtime.loop_runner import LoopRunner
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
+from ur_emulator.scripting.program_slot import ProgramSlot
 from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from ur_emulator.servers.dashboard.answers import DashboardAnswers
 from ur_emulator.servers.dashboard.port import DashboardPort
@@ -138,9 +140,14 @@ class ControlBox(BoxOperations):
         self._runner = LoopRunner(self._loop, self.close)
         self._network = LoopNetwork(self._loop, generation.period_s, host)
         controller = Controller(
-            model, imperfections, seed, self._network, mode=RobotMode.RUNNING, generation=generation
+            model,
+            imperfections,
+            seed,
+            partial(ProgramSlot, network=self._network),
+            mode=RobotMode.RUNNING,
+            generation=generation,
+            version=(asked.major, asked.minor),
         )
-        controller.state.ports.version = (asked.major, asked.minor)
         self._box = ServedBox(
             controller,
             make_pacer(named_pace, controller.period_s, speed, phase, WAKE_UP if self._owns_loop else 0.0),

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from protocol.primary.messages import RequestedType
@@ -23,6 +24,7 @@ from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robot_generation import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.scripting.program_slot import ProgramSlot
 from ur_emulator.servers.scripts.sockets import LoopNetwork
 from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 
@@ -68,9 +70,12 @@ class ScriptBox:
         model = robot_by_name(robot)
         self._loop = EventLoop()
         self._controller = Controller(
-            model, fidelity_by_name(fidelity), seed, LoopNetwork(self._loop, CB3.period_s)
+            model,
+            fidelity_by_name(fidelity),
+            seed,
+            partial(ProgramSlot, network=LoopNetwork(self._loop, CB3.period_s)),
+            version=(software[0], software[1]),
         )
-        self._controller.state.ports.version = (software[0], software[1])
         self._answers = deque(answers)
         self._start_tick = self._controller.snapshot.tick
         self.title = f"{model.title}, fidelity {fidelity}, seed {seed}"
@@ -154,7 +159,7 @@ class _Run:
         commands, self._commands = self._commands, []
         self._controller.tick(commands)
         self._due = now + self._controller.period_s
-        for event in self._controller.take_events():
+        for event in self._controller.state.events.take():
             self._take(event)
         if self._is_at_rest():
             self._loop.stop()

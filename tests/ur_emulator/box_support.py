@@ -3,6 +3,7 @@
 import socket
 import struct
 from contextlib import contextmanager
+from functools import partial
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
@@ -14,6 +15,7 @@ from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
 
 VERSION = SoftwareVersion(3, 15, 8)
@@ -100,7 +102,11 @@ class Bench:
     def __init__(self, *, robot="ur3", seed=7, fidelity="typical", **kwargs):
         self.network = FakeNetwork()
         self.controller = Controller(
-            robot_by_name(robot), fidelity_by_name(fidelity), seed, self.network, **kwargs
+            robot_by_name(robot),
+            fidelity_by_name(fidelity),
+            seed,
+            partial(ProgramSlot, network=self.network),
+            **kwargs,
         )
         self.events = []
         self.snapshots = []
@@ -113,7 +119,7 @@ class Bench:
         for _ in range(n):
             self.snapshots.append(self.controller.tick(commands))
             commands = ()
-            self.events += self.controller.take_events()
+            self.events += self.controller.state.events.take()
         return self.now
 
     def start(self, text):

@@ -2,6 +2,7 @@
 
 import re
 from ast import literal_eval
+from functools import partial
 
 from box_support import Bench
 from chunk_actions import act
@@ -13,6 +14,7 @@ from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.program import check_program
@@ -26,7 +28,10 @@ class ChunkBench(Bench):
     def __init__(self, chunk):
         self.network = ChunkNetwork(chunk)
         self.controller = Controller(
-            robot_by_name("ur3"), fidelity_by_name(chunk.fidelity), chunk.seed, self.network
+            robot_by_name("ur3"),
+            fidelity_by_name(chunk.fidelity),
+            chunk.seed,
+            partial(ProgramSlot, network=self.network),
         )
         self.events = []
         self.snapshots = []

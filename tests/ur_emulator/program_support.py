@@ -4,6 +4,8 @@ A peer is a function of the bytes that came since it last answered: it returns w
 Nothing comes within the cycle in which it is asked for.
 """
 
+from functools import partial
+
 from box_support import Bench, FakeNetwork
 
 from protocol.script_channel import ControlLine, ProgramText, ScriptChannel
@@ -12,6 +14,7 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.network import RemoteCallError
+from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.errors import ScriptError
@@ -110,7 +113,9 @@ class Box(Bench):
 
     def __init__(self, *, peers=None, servers=None, software="3.15", robot="ur3", fidelity="ideal", seed=7):
         self.network = PeerNetwork(peers or {}, servers or {})
-        self.controller = Controller(robot_by_name(robot), fidelity_by_name(fidelity), seed, self.network)
+        self.controller = Controller(
+            robot_by_name(robot), fidelity_by_name(fidelity), seed, partial(ProgramSlot, network=self.network)
+        )
         self.events = []
         self.snapshots = []
         self._channel = ScriptChannel()

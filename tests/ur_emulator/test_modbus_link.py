@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.modbus import take_frame
-from ur_emulator.controller.modbus.signals import ModbusSignal, SignalType, UnitAddress
+from ur_emulator.controller.io.modbus_signals import ModbusSignal, SignalType, UnitAddress
 from ur_emulator.servers.modbus.link import (
     ANSWER_TIMEOUT,
     CONNECT_TIMEOUT,

@@ -3,7 +3,7 @@
 import pytest
 from box_support import Bench, FakeModbusUnit
 
-from ur_emulator.controller.modbus.signals import MAX_SIGNALS
+from ur_emulator.controller.io.modbus_signals import MAX_SIGNALS
 
 ADD = 'modbus_add_signal("10.0.0.2", 255, {address}, {kind}, "{name}")'
 

@@ -1,5 +1,6 @@
 """Every arm of the family: geometry against an independent model, sensible numbers, at rest and in motion."""
 
+from functools import partial
 from math import hypot, pi, radians
 
 import numpy as np
@@ -15,6 +16,7 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.fidelity import FIDELITIES
 from ur_emulator.models.robots import ROBOTS
+from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
 
 ARMS = [pytest.param(robot, id=name) for name, robot in ROBOTS.items()]
@@ -71,7 +73,7 @@ def test_drives_can_carry_the_stretched_arm_with_its_payload(robot):
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 @pytest.mark.parametrize("robot", ARMS)
 def test_moves_with_the_rated_payload_and_comes_to_rest_on_target(robot, fidelity):
-    controller = Controller(robot, FIDELITIES[fidelity], 7, FakeNetwork())
+    controller = Controller(robot, FIDELITIES[fidelity], 7, partial(ProgramSlot, network=FakeNetwork()))
     program = compile_program(f"""def prog():
       set_payload({robot.payload_max}, [0, 0, 0.03])
       q = get_target_joint_positions()
@@ -85,7 +87,7 @@ def test_moves_with_the_rated_payload_and_comes_to_rest_on_target(robot, fidelit
         if not controller.is_active:
             break
         controller.tick(())
-        events += controller.take_events()
+        events += controller.state.events.take()
     assert not controller.is_active
     assert not [event for event in events if type(event).__name__ in ("ErrorReported", "ScriptFailed")]
     snapshot = controller.snapshot

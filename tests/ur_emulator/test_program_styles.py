@@ -100,7 +100,7 @@ def test_an_export_with_threads_labels_and_an_endless_loop_sorts_its_parts():
     assert nearest(box, 0.30, -0.15, 0.12) < 1e-6, "laid down"
     assert nearest(box, 0.28, -0.28, 0.20) > 1e-3, "blended above"
     assert not io.digital_out & 8, "low when it has ended"
-    assert box.controller.state.tcp_offset == (0.0, 0.0, 0.05, 0.0, 0.0, 0.0)
+    assert box.controller.state.tool.tcp_offset == (0.0, 0.0, 0.05, 0.0, 0.0, 0.0)
     assert box.now.target_qd == (0.0,) * 6
 
 
@@ -409,7 +409,7 @@ def test_the_lines_of_a_python_client():
     assert_clean(box)
     assert box.now.target_q == pytest.approx([0.1, -1.5, -1.2, -1.6, 1.1, 0.2])
     assert box.controller.state.io.digital_out & 0b100
-    assert box.controller.state.payload.mass == 1.2
+    assert box.controller.state.tool.payload.mass == 1.2
 
 
 def test_secondary_programs_run_beside_the_primary_one():

@@ -1,4 +1,5 @@
 from dataclasses import dataclass
+from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -17,6 +18,7 @@ from ur_emulator.realtime.pacing import (
     make_pacer,
 )
 from ur_emulator.realtime.served_box import ServedBox
+from ur_emulator.scripting.program_slot import ProgramSlot
 
 PERIOD = 0.008
 
@@ -89,7 +91,9 @@ def test_the_lead_is_at_most_a_quarter_of_a_short_period():
 
 
 def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count_in_the_next_cycle():
-    controller = Controller(robot_by_name("ur3"), fidelity_by_name("exact"), 0, None)
+    controller = Controller(
+        robot_by_name("ur3"), fidelity_by_name("exact"), 0, partial(ProgramSlot, network=None)
+    )
     box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None)
     seen = []
     box.attach(SimpleNamespace(publish=seen.append, say=lambda event: None))

@@ -228,9 +228,9 @@ def test_inputs_are_free_as_soon_as_their_owner_is_gone(bench):
 
 def test_the_script_line_is_wanted_from_the_recipe_on(bench):
     bench.client("timestamp")
-    assert not bench.controller.state.wants_script_line
+    assert not bench.controller.programs.reports_line
     bench.client("script_control_line")
-    assert bench.controller.state.wants_script_line
+    assert bench.controller.programs.reports_line
 
 
 # --- clients that misbehave

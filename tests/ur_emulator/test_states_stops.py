@@ -1,5 +1,6 @@
 """What stops do to a moving arm, and how people and clients get it going again."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,7 +32,7 @@ from ur_emulator.commands.safety import (
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
 from ur_emulator.controller.safety.inputs import SafetyInput
-from ur_emulator.controller.safety.speed_limiter import (
+from ur_emulator.controller.safety.speed_scaling import (
     RECOVERY_SPEED,
     REDUCED_SHARE,
     TOLERANCE,
@@ -42,6 +43,7 @@ from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import SpeedJ
+from ur_emulator.scripting.program_slot import ProgramSlot
 
 PRESS, RELEASE = PressEmergencyStop("robot"), ReleaseEmergencyStop()
 OPEN, CLOSE = SafeguardStop(True), SafeguardStop(False)
@@ -287,7 +289,7 @@ def test_an_emergency_stop_over_a_protective_stop_leads_back_to_it():
 @pytest.mark.parametrize("name", ["ur3", "ur5", "ur10"])
 def test_every_arm_brakes_with_its_own_deceleration(name):
     robot = robot_by_name(name)
-    controller = Controller(robot, fidelity_by_name("ideal"), 1, FakeNetwork())
+    controller = Controller(robot, fidelity_by_name("ideal"), 1, partial(ProgramSlot, network=FakeNetwork()))
     bench = Bench(fidelity="ideal")
     bench.controller = controller
     bench.start(LONG_MOVE)
@@ -341,7 +343,7 @@ def test_a_fast_arm_is_within_the_limits_half_a_second_after_reduced_mode_began(
 def test_who_is_too_fast_for_too_long_is_stopped():
     bench = Bench(fidelity="ideal")
     bench.tick(1, REDUCE)
-    limiter = bench.controller.state.limiter
+    limiter = bench.controller.state.speed.limiter
     fast = (0.0, 0.0, 3.0, 0.0, 0.0, 0.0)
     found = [limiter.find_violation(fast, 0.008) for _ in range(70)]
     assert found[:60] == [None] * 60
@@ -383,7 +385,7 @@ def test_the_scale_of_an_arm_at_rest_is_that_of_the_slider():
     motion = ArmMotion((0.0,) * 6, 20.0)
     bench = Bench()
     bench.tick(1, REDUCE)
-    limiter = bench.controller.state.limiter
+    limiter = bench.controller.state.speed.limiter
     assert limiter.step(motion, 0.4, 0.008) == 0.4
     assert limiter.step(motion, 0.0, 0.008) == 0.0
     motion.command(SimpleNamespace(), SpeedJ((0.0,) * 6, 1.0))

@@ -98,7 +98,7 @@ def enter(mode):
     way_in = WAY_IN[mode]
     if mode is M.RECOVERY:
         bench.controller.safety.happen(E.RANGE_LEFT)
-        bench.controller.state.snapshot = bench.now._replace(actual_q=(7.0, *bench.now.actual_q[1:]))
+        bench.controller.state.past.snapshot = bench.now._replace(actual_q=(7.0, *bench.now.actual_q[1:]))
     elif way_in is not None:
         bench.tick(1, COMMANDS[way_in])
     return bench

@@ -43,7 +43,7 @@ def test_ports_agree_in_recovery_and_on_the_way_up():
         bench.tick()
     assert bench.now.robot_mode == RobotMode.RUNNING
     bench.controller.safety.happen(SafetyEvent.RANGE_LEFT)
-    bench.controller.state.snapshot = bench.now._replace(safety_mode=int(SafetyMode.RECOVERY))
+    bench.controller.state.past.snapshot = bench.now._replace(safety_mode=int(SafetyMode.RECOVERY))
     assert bench.now.safety_status_bits == 1 << 3
     check_wires(bench)
 

@@ -42,7 +42,7 @@ def test_the_lever_of_the_sensor(builtin, sign):
     snap = run(bench, f"{builtin}(True, 0.5, [0.01, 0.02, 0.05], [0, 0, 0.02])")
     moment = np.add(READING[3:], sign * np.cross((0.01, 0.02, 0.05), READING[:3]))
     assert snap.actual_tcp_force[3:] == pytest.approx(list(rotation(bench) @ moment), abs=1e-3)
-    assert bench.controller.state.external_sensor.mass == 0.5
+    assert bench.controller.state.force_sense.sensor.mass == 0.5
 
 
 def test_the_moment_is_given_at_the_tcp():

@@ -89,7 +89,7 @@ class Story(Bench):
 
     def __init__(self):
         super().__init__(mode=RobotMode.NO_CONTROLLER)
-        self.controller.state.wants_script_line = True
+        self.controller.programs.reports_line = True
         self.moments = []
         self.note()
         self.power_up()

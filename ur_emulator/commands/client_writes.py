@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from protocol.rtde.types import RtdeValue
 from ur_emulator.controller.command import Box
-from ur_emulator.controller.io.client_inputs import write_inputs
 from ur_emulator.controller.modbus.robot_map import write_range
 
 
@@ -21,7 +20,7 @@ class WriteInputs:
     values: tuple[tuple[str, RtdeValue], ...]
 
     def apply(self, box: Box) -> None:
-        write_inputs(box.state, self.values)
+        box.state.client_inputs.write(self.values)
 
 
 @dataclass(frozen=True, slots=True)

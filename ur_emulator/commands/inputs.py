@@ -42,8 +42,7 @@ class SetDigitalInput(CommandOperation):
             raise ArgumentError(f"{self.group} digital input {self.n} given: allowed are 0 to {count - 1}")
 
     def apply(self, box: Box) -> None:
-        io, mask = box.state.io, 1 << (DIGITAL_GROUPS[self.group][0] + self.n)
-        io.digital_in = io.digital_in | mask if self.level else io.digital_in & ~mask
+        box.state.io.write_digital_in(DIGITAL_GROUPS[self.group][0] + self.n, self.level)
 
 
 class SetAnalogInput(CommandOperation):

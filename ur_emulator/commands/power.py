@@ -28,7 +28,7 @@ class ReleaseBrakes(CommandOperation):
     """Go to RUNNING, powering on first if need be."""
 
     def apply(self, box: Box) -> None:
-        box.state.compliance.by_client = False
+        box.state.compliance.end_guiding_by_client()
         _give_power(box, ModeCommand.BRAKE_RELEASE)
 
 

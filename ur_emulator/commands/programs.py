@@ -69,7 +69,7 @@ class SetSpeedSlider(CommandOperation):
     fraction: float = parameter("of full speed", low=0.0, high=1.0)
 
     def apply(self, box: Box) -> None:
-        box.state.speed_slider = self.fraction
+        box.state.speed.set_slider(self.fraction)
 
 
 def _why_not_running(state: ControllerState) -> str:
@@ -82,4 +82,4 @@ def _why_not_running(state: ControllerState) -> str:
 
 
 def _program_state(box: Box) -> str:
-    return ProgramState(box.state.snapshot.runtime_state).name
+    return ProgramState(box.state.past.snapshot.runtime_state).name

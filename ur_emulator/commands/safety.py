@@ -62,7 +62,7 @@ class TriggerProtectiveStop(CommandOperation):
     """Stop the arm as a safety function would."""
 
     def apply(self, box: Box) -> None:
-        box.state.stop_requested = True
+        box.state.requests.protective_stop()
 
 
 class UnlockProtectiveStop(CommandOperation):
@@ -178,7 +178,6 @@ class PressButton:
     pressed: bool
 
     def apply(self, box: Box) -> None:
-        state, bit = box.state, self.button.value
-        state.buttons = state.buttons | bit if self.pressed else state.buttons & ~bit
+        box.state.operator.press(self.button.value, self.pressed)
         if self.button is Button.TEACH:
-            state.compliance.press(self.pressed)
+            box.state.compliance.press(self.pressed)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ur_emulator.controller.compliance.force_sense import moved_wrench
 from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
+from ur_emulator.kinematics.wrench import moved_wrench
 from ur_emulator.models.robot_model import Vector6
 
 

@@ -16,10 +16,10 @@ from ur_emulator.errors import RefusedError
 
 if TYPE_CHECKING:
     from ur_emulator.controller.compliance.flange_push import FlangePush
-    from ur_emulator.controller.safety.system import SafetySystem
+    from ur_emulator.controller.programs import Programs
+    from ur_emulator.controller.safety_system import SafetySystem
     from ur_emulator.controller.state import ControllerState
     from ur_emulator.plant.plant import Plant
-    from ur_emulator.scripting.program_slot import ProgramSlot
 
 # What a command has to tell; most have nothing.
 Result = Mapping[str, Any] | None
@@ -41,7 +41,7 @@ class Box(Protocol):
     state: ControllerState
     plant: Plant
     push: FlangePush
-    programs: ProgramSlot
+    programs: Programs
     safety: SafetySystem
 
 

@@ -7,19 +7,31 @@ time is the tick.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import partial
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import ControlMode, RobotMode
+from ur_emulator.controller.client_inputs import ClientInputs
+from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.command import Command
+from ur_emulator.controller.compliance.compliance import Compliance
 from ur_emulator.controller.compliance.flange_push import FlangePush
-from ur_emulator.controller.events import (
-    ErrorReported,
-    Event,
-    RobotModeChanged,
-)
-from ur_emulator.controller.io.watchdogs import WatchdogAction
+from ur_emulator.controller.compliance.force_sense import ForceSense
+from ur_emulator.controller.error_settings import ErrorSettings
+from ur_emulator.controller.events import ErrorReported, EventQueue, RobotModeChanged
+from ur_emulator.controller.io.configuration import IoConfiguration
+from ur_emulator.controller.io.encoders import Encoders
+from ur_emulator.controller.io.lines import InputOutput
+from ur_emulator.controller.io.modbus_memory import MapMemory
+from ur_emulator.controller.io.modbus_signals import ModbusSignals
+from ur_emulator.controller.io.registers import Registers
+from ur_emulator.controller.io.watchdogs import WatchdogAction, Watchdogs
+from ur_emulator.controller.operator import Operator
+from ur_emulator.controller.past_cycles import PastCycles
+from ur_emulator.controller.program_requests import ProgramRequests
+from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety.limit_checks import (
@@ -29,10 +41,12 @@ from ur_emulator.controller.safety.limit_checks import (
     find_violation,
 )
 from ur_emulator.controller.safety.modes import SafetyEvent
-from ur_emulator.controller.safety.safety_state import UNLOCK_DELAY
-from ur_emulator.controller.safety.system import SafetySystem
+from ur_emulator.controller.safety.safety_state import UNLOCK_DELAY, SafetyState
+from ur_emulator.controller.safety.speed_scaling import SpeedScaling
+from ur_emulator.controller.safety_system import SafetySystem
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.tool_settings import ToolSettings
 from ur_emulator.errors import RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
@@ -45,8 +59,6 @@ from ur_emulator.motion.tool import UnreachableError
 from ur_emulator.plant.exact import ExactPlant
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.plant_state import PlantState
-from ur_emulator.scripting.network import Network
-from ur_emulator.scripting.program_slot import ProgramSlot
 
 # A box that serves has booted a minute ago [s]: clients distrust a controller clock below 40 s (public client
 # library).
@@ -63,10 +75,11 @@ class Controller:
         robot: RobotModel,
         fidelity: Fidelity,
         seed: int,
-        network: Network,
+        make_programs: Callable[[ControllerState], Programs],
         *,
         mode: RobotMode = RobotMode.RUNNING,
         generation: RobotGeneration = CB3,
+        version: tuple[int, int] = (3, 15),
     ) -> None:
         """Assemble the box.
 
@@ -74,15 +87,15 @@ class Controller:
             robot: the arm.
             fidelity: how far it is from a perfect one.
             seed: of everything random in it: calibration, phases, noise.
-            network: opens the sockets of scripts.
+            make_programs: makes what runs the programs, which act on the parts of the controller.
             mode: robot mode to start in.
             generation: of the robot; its control cycle.
+            version: of the software, major and minor.
         """
         self.generation = generation
         self.period_s = generation.period_s
         make_plant = Plant if fidelity.has_physics else ExactPlant
         self.plant = make_plant(robot, fidelity, seed, generation)
-        arm = ArmModel(robot, draw_calibration(fidelity, seed))
         q = six(robot.home_q)
         self.plant.reset(q)
         self._setpoints = SetpointCheck(robot, self.period_s)
@@ -93,18 +106,19 @@ class Controller:
         # A protective stop can be unlocked after a while; time must not stand still before that. Two cycles
         # more: the one in which it happens counts, and the delay must have passed, not be about to.
         self._unlock_cycles = generation.cycles(UNLOCK_DELAY) + 2
-        self.state = ControllerState(
-            robot=robot,
-            arm=arm,
-            generation=generation,
-            seed=seed,
-            motion=ArmMotion(q, robot.stop_deceleration),
-            mode=RobotModeMachine(mode, self.period_s),
-            tick=generation.cycles(BOOT_TIME),
+        motion = ArmMotion(q, robot.stop_deceleration)
+        self.state = _make_state(
+            robot,
+            ArmModel(robot, draw_calibration(fidelity, seed)),
+            seed,
+            Clock(generation, generation.cycles(BOOT_TIME)),
+            motion,
+            RobotModeMachine(mode, self.period_s),
+            partial(_place_arm, self.plant, motion),
+            version,
         )
-        self.state.place_arm = self._place_arm
-        self._payload = self.state.payload
-        self.programs = ProgramSlot(self.state, network)
+        self._payload = self.state.tool.payload
+        self.programs = make_programs(self.state)
         self.safety = SafetySystem(self.state, self.programs)
         self.push = FlangePush(self.plant, self.period_s)
         self.state.mode.command(ModeCommand.BOOT)
@@ -114,7 +128,7 @@ class Controller:
     @property
     def snapshot(self) -> Snapshot:
         """State at the end of the last cycle."""
-        return self.state.snapshot
+        return self.state.past.snapshot
 
     @property
     def is_active(self) -> bool:
@@ -138,11 +152,6 @@ class Controller:
         """True while a script waits for something that only the outside can bring."""
         return self.programs.waits_outside
 
-    def take_events(self) -> list[Event]:
-        """Return what was said since the last call and forget it."""
-        events, self.state.events = self.state.events, []
-        return events
-
     def tick(self, commands: Iterable[Command]) -> Snapshot:
         """Advance one control cycle.
 
@@ -153,7 +162,7 @@ class Controller:
             The state at the end of the cycle.
         """
         state = self.state
-        state.tick += 1
+        state.clock.advance()
         n_events = len(state.events)
         was_pushing = self.push.will_end
         if was_pushing:
@@ -172,13 +181,11 @@ class Controller:
         settings = state.error_settings
         if settings.pause_codes and settings.asks_for_pause(state.events[n_events:]):
             self.programs.pause()
-        is_still = not control and not any(target.qd)
-        state.steady_cycles = state.steady_cycles + 1 if is_still else 0
         was_active = was_active or (control is _BY_HAND and any(target.qd))
         self._settle = max(self._settle - 1, self._settle_cycles if was_active else 0)
-        state.snapshot = make_snapshot(state, self.programs, target, sensed)
-        state.q_history.appendleft(sensed.actual_q)
-        return state.snapshot
+        snapshot = make_snapshot(state, self.programs, target, sensed)
+        state.past.add(snapshot, is_still=not control and not any(target.qd))
+        return snapshot
 
     # --- the parts of a cycle, in their order
 
@@ -198,50 +205,50 @@ class Controller:
         if state.encoders.decoding:
             state.encoders.step(state.io.digital_in)
         if state.modbus.signals:
-            state.modbus.step(state.tick)
+            state.modbus.step(state.clock.tick)
 
     def _step_scripts(self) -> None:
         """All threads of all programs, and what they have asked of the box."""
         state = self.state
         self.programs.step()
-        if state.power_off_requested:
-            state.power_off_requested = False
+        if state.requests.take_power_off():
             self.safety.cut_power()
-        if state.payload is not self._payload:
+        payload = state.tool.payload
+        if payload is not self._payload:
             # What a program declares is taken to be really there: the arm carries it from now on.
-            self._payload = state.payload
-            self.plant.set_payload(state.payload.mass, state.payload.cog)
+            self._payload = payload
+            self.plant.set_payload(payload.mass, payload.cog)
 
     def _step_motion(self, running: bool) -> tuple[ControlMode, JointTarget]:
         """How the arm is driven in this cycle, and to where."""
         state, compliance = self.state, self.state.compliance
         control = _BY_POSITION
         if compliance.is_on or state.io_configuration.input_actions or state.modbus.signals:
-            control = compliance.step(state)
-        target = self._next_target() if running else state.motion.step(self.period_s, state.speed_slider)
-        return control, compliance.follow_hand(state) if control is _BY_HAND else target
+            control = compliance.step()
+        target = self._next_target() if running else state.motion.step(self.period_s, state.speed.slider)
+        return control, compliance.follow_hand() if control is _BY_HAND else target
 
     def _watch(self, sensed: PlantState, control: ControlMode, running: bool) -> None:
         """Stop the arm if what the sensors say breaks a limit, or somebody has asked for it."""
         state = self.state
         self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
+        stop_requested = state.requests.take_protective_stop()
         if running and state.safety.is_watched:
             violation = find_violation(state.robot, sensed, self._saturated_s)
             if self.safety.is_busy and violation is None:
                 violation = self.safety.find_violation(sensed)
             if control and violation is None:
                 violation = state.compliance.find_violation(state.robot, sensed)
-            if violation is None and state.stop_requested:
+            if violation is None and stop_requested:
                 violation = _REQUESTED_STOP
             if violation is not None:
                 self._stop_for(violation, sensed.actual_q)
             settings = state.error_settings
             if settings.warns_of_deviation and (warning := settings.deviation_warning(sensed.position_error)):
                 state.events.append(warning)
-        state.stop_requested = False
 
     def _check_watchdogs(self) -> None:
-        late = self.state.watchdogs.late(self.state.tick)
+        late = self.state.watchdogs.late(self.state.clock.tick)
         if late is None:
             return
         self.state.events.append(late.report)
@@ -255,9 +262,7 @@ class Controller:
     def _next_target(self) -> JointTarget:
         """Advance the motion; an invalid set-point never reaches the joints: they brake before it."""
         state, before = self.state, self.state.motion.target
-        scale = state.speed_slider
-        if state.limiter is not None:
-            scale = state.limiter.step(state.motion, scale, self.period_s)
+        scale = state.speed.step(state.motion, self.period_s)
         try:
             target = state.motion.step(self.period_s, scale)
             if target is before or state.safety.is_stopped:
@@ -268,7 +273,7 @@ class Controller:
         if violation is None:
             return target
         state.motion.retract(before)
-        self._stop_for(violation, state.snapshot.actual_q)
+        self._stop_for(violation, state.past.snapshot.actual_q)
         return state.motion.step(self.period_s, scale)
 
     def _stop_for(self, violation: Violation, actual_q: Vector6) -> None:
@@ -280,12 +285,58 @@ class Controller:
             state.motion.place(actual_q)
             self.plant.rest_trim()
 
-    def _place_arm(self, q: Vector6) -> bool:
-        if self.plant.touches(q):
-            return False
-        self.plant.reset(q)
-        self.state.motion.place(q)
-        return True
+
+def _make_state(
+    robot: RobotModel,
+    arm: ArmModel,
+    seed: int,
+    clock: Clock,
+    motion: ArmMotion,
+    mode: RobotModeMachine,
+    place_arm: Callable[[Vector6], bool],
+    version: tuple[int, int],
+) -> ControllerState:
+    """Return the parts of a controller, made in the order in which they need each other."""
+    io, registers, safety, speed = InputOutput(), Registers(), SafetyState(), SpeedScaling()
+    past = PastCycles(clock.generation)
+    modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
+    io_configuration = IoConfiguration(io, registers, modbus)
+    return ControllerState(
+        robot=robot,
+        arm=arm,
+        seed=seed,
+        clock=clock,
+        motion=motion,
+        place_arm=place_arm,
+        mode=mode,
+        safety=safety,
+        speed=speed,
+        tool=ToolSettings(),
+        io=io,
+        registers=registers,
+        io_configuration=io_configuration,
+        client_inputs=ClientInputs(io, registers, speed, watchdogs, clock),
+        watchdogs=watchdogs,
+        encoders=Encoders(),
+        modbus=modbus,
+        modbus_map=MapMemory(version),
+        compliance=Compliance(motion, mode, safety, io_configuration, past),
+        force_sense=ForceSense(clock.generation),
+        operator=Operator(),
+        error_settings=ErrorSettings(),
+        requests=ProgramRequests(),
+        past=past,
+        events=EventQueue(),
+    )
+
+
+def _place_arm(plant: Plant | ExactPlant, motion: ArmMotion, q: Vector6) -> bool:
+    """Put a resting arm at joint angles [rad]; False where it would touch itself or something."""
+    if plant.touches(q):
+        return False
+    plant.reset(q)
+    motion.place(q)
+    return True
 
 
 _BY_POSITION, _BY_HAND = ControlMode.POSITION, ControlMode.TEACH

@@ -37,6 +37,26 @@ class ErrorSettings:
     revolution_reference: Vector6 | None = None
     _has_warned: bool = False
 
+    def pause_on(self, code: int, argument: int | None) -> None:
+        """Pause the program when an error is reported; None: with any argument."""
+        self.pause_codes.add((code, argument))
+
+    def program_ended(self) -> None:
+        """Forget the errors at which the program was to be paused."""
+        self.pause_codes.clear()
+
+    def warn_of_deviation(self, enabled: bool, threshold: float) -> None:
+        """Report joints that deviate by this part of the limit, or do not."""
+        self.warns_of_deviation, self.deviation_threshold = enabled, threshold
+
+    def set_transition_hardness(self, hardness: int) -> None:
+        """Set how a safeguard stop and reduced mode begin: 0 hard, 1 soft."""
+        self.transition_hardness = hardness
+
+    def set_revolution_reference(self, q: Vector6) -> None:
+        """Keep the joint positions of `reset_revolution_counter` [rad]."""
+        self.revolution_reference = q
+
     def asks_for_pause(self, events: Iterable[Event]) -> bool:
         """True when one of the events is an error code at which the program wants to be paused."""
         return any(

@@ -149,3 +149,15 @@ Event = (
     | PopupShown
     | ValueRequested
 )
+
+
+class EventQueue(list[Event]):
+    """Messages in their order; everybody may append, the loop takes them once a cycle."""
+
+    __slots__ = ()
+
+    def take(self) -> list[Event]:
+        """Return the messages since the last call and forget them."""
+        events = list(self)
+        self.clear()
+        return events

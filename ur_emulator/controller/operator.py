@@ -1,4 +1,6 @@
-"""What programs ask of the operator: values, and popups to be closed. Nobody stands there: a client answers.
+"""What programs ask of the operator: values, and popups to be closed; and the buttons of the pendant.
+
+Nobody stands there: a client answers.
 
 Answers come as `AnswerRequest` and `ClosePopup` of `ur_emulator.commands.operator`.
 """
@@ -53,9 +55,14 @@ class OperatorRequest:
 
 
 class Operator:
-    """All open questions, the oldest first."""
+    """All open questions, the oldest first.
+
+    Attributes:
+        buttons: those of the pendant that are pressed, as in RobotStatusBits.
+    """
 
     def __init__(self) -> None:
+        self.buttons = 0
         self._count = 0
         self._open: dict[int, OperatorRequest] = {}
         self._shown: deque[str] = deque(maxlen=MAX_SHOWN)
@@ -69,6 +76,10 @@ class Operator:
     def shown(self) -> tuple[str, ...]:
         """Texts of popups for which nobody waits, the oldest first."""
         return tuple(self._shown)
+
+    def press(self, button: int, pressed: bool) -> None:
+        """Press a button of the pendant, a bit of RobotStatusBits, or let it go."""
+        self.buttons = self.buttons | button if pressed else self.buttons & ~button
 
     def show(self, text: str) -> None:
         """Show a popup for which nobody waits; it stays, also without power, until it is closed."""

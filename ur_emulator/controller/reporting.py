@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.compliance.external_sensor import VARIABLE
+from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import JOINT_VECTORS
 from ur_emulator.controller.snapshot import BoxRecord, Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
-from ur_emulator.scripting.program_slot import ProgramSlot
 
 
 def make_snapshot(
-    state: ControllerState, programs: ProgramSlot, target: JointTarget, sensed: PlantState
+    state: ControllerState, programs: Programs, target: JointTarget, sensed: PlantState
 ) -> Snapshot:
     """Return everything that any port may publish of this cycle.
 
@@ -24,11 +24,11 @@ def make_snapshot(
         target: set-point at the end of the cycle.
         sensed: what the box reads from its arm.
     """
-    arm, sensor, wrench = state.arm, state.external_sensor, sensed.tcp_force
+    arm, clock, sensor, wrench = state.arm, state.clock, state.force_sense.sensor, sensed.tcp_force
     if sensor is not None:
         wrench = sensor.wrench_at_flange(state.client_inputs.get(VARIABLE, ZERO6), arm.fk(sensed.actual_q))
     wrench = state.force_sense.take(wrench)
-    tcp = state.tcp_offset
+    tcp = state.tool.tcp_offset
     space = ArmInSpace(
         arm,
         (target.q, target.qd),
@@ -36,31 +36,31 @@ def make_snapshot(
         wrench,
         tcp if any(tcp) else None,
     )
-    return Snapshot._make((state.tick, state.time, *target, *sensed, *box_record(state, programs), space))
+    return Snapshot._make((clock.tick, clock.time, *target, *sensed, *box_record(state, programs), space))
 
 
-def box_record(state: ControllerState, programs: ProgramSlot) -> BoxRecord:
+def box_record(state: ControllerState, programs: Programs) -> BoxRecord:
     """Return the box without its arm at the end of a cycle."""
     mode, safety_mode = state.mode.mode, state.safety.mode
-    limiter, slider = state.limiter, state.speed_slider
-    payload, io, compliance = state.payload, state.io, state.compliance
+    speed, tool, io, compliance = state.speed, state.tool, state.io, state.compliance
+    payload = tool.payload
     analog, euromap = io.analog, io.euromap
     return BoxRecord(
         robot_mode=int(mode),
         joint_mode=JOINT_VECTORS[mode, safety_mode],
         safety_mode=int(safety_mode),
-        speed_scaling=1.0 if limiter is None else limiter.share(slider),
-        target_speed_fraction=slider,
+        speed_scaling=speed.share,
+        target_speed_fraction=speed.slider,
         runtime_state=int(programs.runtime_state),
         program_name=programs.name,
-        script_control_line=programs.line if state.wants_script_line else 0,
+        script_control_line=programs.line if programs.reports_line else 0,
         control_mode=int(compliance.mode),
         is_guided_by_input=compliance.by_input,
-        buttons=state.buttons,
+        buttons=state.operator.buttons,
         payload=payload.mass,
         payload_cog=payload.cog,
         payload_inertia=payload.inertia,
-        tcp_offset=state.tcp_offset,
+        tcp_offset=tool.tcp_offset,
         actual_digital_input_bits=io.digital_in,
         actual_digital_output_bits=io.digital_out,
         analog_values=analog.values,

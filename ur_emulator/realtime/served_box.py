@@ -160,7 +160,7 @@ class ServedBox:
         self._last_frame = now
         # Events first: an error must have arrived before the state that shows its effect.
         if self.controller.state.events:
-            for event in self.controller.take_events():
+            for event in self.controller.state.events.take():
                 self.announce(event)
         for publisher in self._publishers:
             publisher.publish(snapshot)

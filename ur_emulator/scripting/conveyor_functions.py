@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from math import hypot
 from typing import Any
 
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.clock import Clock
+from ur_emulator.controller.io.encoders import Encoders
 from ur_emulator.motion.conveyor import CircularConveyor, Conveyor, LinearConveyor
 from ur_emulator.motion.generators import StopJ
-from ur_emulator.motion.tool import Tool
-from ur_emulator.scripting.arm_taking import Cycles, floats, require_positive, take_arm
+from ur_emulator.scripting.script_arm import Cycles, ScriptArm, floats, require_positive
 from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import NEXT_CYCLE
 from urscript.values import Pose
@@ -24,23 +24,21 @@ STOP_DECELERATION = 20.0
 class ProgramConveyor:
     """The conveyor that one program tracks."""
 
-    def __init__(self, state: ControllerState) -> None:
-        self._state = state
+    def __init__(self, arm: ScriptArm, encoders: Encoders, clock: Clock) -> None:
+        self._arm = arm
+        self._encoders = encoders
+        self._clock = clock
         self._tracked: Conveyor | None = None
 
     def end(self) -> None:
         """Track no more; the arm ramps to rest."""
         if self._tracked is not None:
-            self._state.motion.remove_overlay(self._tracked)
+            self._arm.motion.remove_overlay(self._tracked)
             self._tracked = None
 
     def functions(self) -> Mapping[str, Callable[..., Any]]:
         """Return the conveyor builtins."""
-        state = self._state
-        motion = state.motion
-
-        def tool() -> Tool:
-            return Tool(state.arm, state.tcp_offset)
+        arm, motion = self._arm, self._arm.motion
 
         def track(conveyor: Conveyor) -> None:
             self.end()
@@ -48,11 +46,11 @@ class ProgramConveyor:
             motion.add_overlay(conveyor)
 
         def counter(index: float) -> Callable[[], float]:
-            encoder = state.encoders.encoders[int(index)]
+            encoder = self._encoders.encoders[int(index)]
             return lambda: encoder.travel
 
         def clock() -> float:
-            return state.time
+            return self._clock.time
 
         def track_linear(
             thread: object, direction: Pose, ticks_per_meter: float, encoder_index: float
@@ -64,7 +62,7 @@ class ProgramConveyor:
                     f"track_conveyor_linear: direction ({x:g}, {y:g}, {z:g}) leads nowhere, "
                     "give its x, y, z in the base frame"
                 )
-            track(LinearConveyor((x, y, z), float(ticks_per_meter), tool(), counter(encoder_index), clock))
+            track(LinearConveyor((x, y, z), float(ticks_per_meter), arm.tool, counter(encoder_index), clock))
 
         def track_circular(
             thread: object, center: Pose, ticks_per_revolution: float, rotate_tool: bool, encoder_index: float
@@ -74,7 +72,7 @@ class ProgramConveyor:
                 CircularConveyor(
                     floats(tuple(center)),
                     float(ticks_per_revolution),
-                    tool(),
+                    arm.tool,
                     counter(encoder_index),
                     clock,
                     rotate_tool=bool(rotate_tool),
@@ -84,20 +82,20 @@ class ProgramConveyor:
         def stop(thread: object, a: float) -> Cycles:
             a = a or STOP_DECELERATION  # field programs write 0
             require_positive("stop_conveyor_tracking", a=a)
-            take_arm(state, thread, ramp := StopJ(a))
+            arm.take(thread, ramp := StopJ(a))
             self.end()
             while not ramp.done:
                 yield NEXT_CYCLE
 
         def speed_along_path(thread: object) -> Pose:
             path = motion.path
-            return Pose.of(tool().twist(path.q, path.qd))
+            return Pose.of(arm.tool.twist(path.q, path.qd))
 
         return {
             "track_conveyor_linear": track_linear,
             "track_conveyor_circular": track_circular,
             "stop_conveyor_tracking": stop,
-            "get_target_tcp_pose_along_path": lambda thread: Pose.of(tool().pose(motion.path.q)),
+            "get_target_tcp_pose_along_path": lambda thread: Pose.of(arm.tool.pose(motion.path.q)),
             "get_target_tcp_speed_along_path": speed_along_path,
         }
 

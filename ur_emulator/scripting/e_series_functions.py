@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.tool_settings import ToolSettings
 from ur_emulator.models.robot_model import six
 from urscript.errors import ScriptRuntimeError
 
@@ -19,12 +19,12 @@ MAX_INERTIA: Final = 133.0
 
 
 def e_series_functions(
-    state: ControllerState, set_payload: Callable[[object, float, Any], None]
+    tool: ToolSettings, set_payload: Callable[[object, float, Any], None]
 ) -> Mapping[str, Callable[..., Any]]:
-    """Return the builtins bound to one controller.
+    """Return the builtins.
 
     Args:
-        state: what they read and change.
+        tool: gets the inertia of the payload.
         set_payload: the builtin that takes mass and centre of gravity.
     """
 
@@ -47,7 +47,7 @@ def e_series_functions(
                 "the first three not below 0"
             )
         set_payload(thread, m, cog)
-        state.payload.inertia = six(inertia)
+        tool.set_inertia(six(inertia))
 
     return {
         "set_tool_communication": set_tool_communication,

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.io.encoders import PULSE_INPUTS, RANGES, Decoder
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.io.encoders import PULSE_INPUTS, RANGES, Decoder, Encoders
+from ur_emulator.controller.io.lines import InputOutput
 from urscript.errors import ScriptRuntimeError
 
 # The encoder that the old forms speak of.
 _CONVEYOR = 0
 
 
-def encoder_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return the encoder builtins bound to one controller."""
-    encoders = state.encoders
+def encoder_functions(encoders: Encoders, io: InputOutput) -> Mapping[str, Callable[..., Any]]:
+    """Return the encoder builtins."""
 
     def pin(number: float) -> int:
         bit = PULSE_INPUTS.get(int(number))
@@ -27,7 +26,7 @@ def encoder_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]
         return bit
 
     def enable_pulse_decode(thread: object, index: float, decoder: float, a: float, b: float) -> None:
-        encoders.decode(int(index), Decoder(int(decoder)), pin(a), pin(b), state.io.digital_in)
+        encoders.decode(int(index), Decoder(int(decoder)), pin(a), pin(b), io.digital_in)
 
     def enable_set_tick_count(thread: object, index: float, range_id: float) -> None:
         encoders.feed(int(index), int(range_id))

@@ -5,32 +5,35 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.error_settings import ErrorSettings
+from ur_emulator.controller.past_cycles import PastCycles
+from ur_emulator.controller.program_requests import ProgramRequests
 from ur_emulator.models.robot_model import six
 from urscript.run.threads import ProgramHalted
 
 
-def error_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return the builtins bound to one controller."""
-    settings = state.error_settings
+def error_functions(
+    settings: ErrorSettings, past: PastCycles, requests: ProgramRequests
+) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins about errors, and `powerdown`."""
 
     def pause_on_error_code(thread: object, code: float, argument: float | None) -> None:
-        settings.pause_codes.add((int(code), None if argument is None else int(argument)))
+        settings.pause_on(int(code), None if argument is None else int(argument))
 
     def position_deviation_warning(thread: object, enabled: bool, threshold: float) -> None:
-        settings.warns_of_deviation, settings.deviation_threshold = enabled, float(threshold)
+        settings.warn_of_deviation(enabled, float(threshold))
 
     def set_safety_mode_transition_hardness(thread: object, kind: float) -> None:
-        settings.transition_hardness = int(kind)
+        settings.set_transition_hardness(int(kind))
 
     def reset_revolution_counter(thread: object, q_near: Any) -> None:
         # A real box uses it when new safety settings limit a joint that had no limits: not here.
-        settings.revolution_reference = (
-            state.snapshot.actual_q if q_near is None else six([float(x) for x in q_near])
+        settings.set_revolution_reference(
+            past.snapshot.actual_q if q_near is None else six([float(x) for x in q_near])
         )
 
     def powerdown(thread: object) -> NoReturn:
-        state.power_off_requested = True
+        requests.power_off()
         raise ProgramHalted
 
     return {

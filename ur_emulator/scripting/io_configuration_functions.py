@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ur_emulator.controller.io.configuration import OutputKind
-from ur_emulator.controller.io.euromap import N_EUROMAP
-from ur_emulator.controller.io.lines import CURRENT, N_STANDARD, N_TOOL, VOLTAGE, AnalogLine
+from ur_emulator.controller.io.configuration import IoConfiguration, OutputKind
+from ur_emulator.controller.io.euromap import N_EUROMAP, Euromap
+from ur_emulator.controller.io.lines import CURRENT, N_STANDARD, N_TOOL, VOLTAGE, AnalogLine, InputOutput
 from ur_emulator.controller.io.run_states import RunState
-from ur_emulator.controller.state import ControllerState
 from urscript.errors import ScriptRuntimeError
 
 Function = Callable[..., Any]
@@ -36,14 +35,17 @@ _LISTED_OUTPUTS = (
 )
 
 
-def io_configuration_functions(state: ControllerState) -> Mapping[str, Function]:
-    """Return the builtins for the set-up of lines bound to one controller."""
-    return {**_domains(state), **_actions(state), **_runstates(state), **_euromap(state)}
+def io_configuration_functions(io: InputOutput, configuration: IoConfiguration) -> Mapping[str, Function]:
+    """Return the builtins for the set-up of lines."""
+    return {
+        **_domains(io),
+        **_actions(configuration),
+        **_runstates(configuration),
+        **_euromap(io.euromap, configuration),
+    }
 
 
-def _domains(state: ControllerState) -> dict[str, Function]:
-    io = state.io
-
+def _domains(io: InputOutput) -> dict[str, Function]:
     def domain_setter(lines: Sequence[AnalogLine]) -> Function:
         return lambda thread, port, domain: lines[int(port)].set_domain(int(domain))
 
@@ -70,21 +72,17 @@ def _domains(state: ControllerState) -> dict[str, Function]:
     }
 
 
-def _actions(state: ControllerState) -> dict[str, Function]:
-    configuration = state.io_configuration
-
+def _actions(configuration: IoConfiguration) -> dict[str, Function]:
     def setter(group: str) -> Function:
         return lambda thread, port, action: configuration.set_input_action(group, int(port), action)
 
     return {
         **{f"set_{group}_input_action": setter(group) for group in _INPUT_GROUPS},
-        "set_input_actions_to_default": lambda thread: configuration.input_actions.clear(),
+        "set_input_actions_to_default": lambda thread: configuration.clear_input_actions(),
     }
 
 
-def _runstates(state: ControllerState) -> dict[str, Function]:
-    configuration = state.io_configuration
-
+def _runstates(configuration: IoConfiguration) -> dict[str, Function]:
     def setter(kind: OutputKind, name: str) -> Function:
         def set_runstate(thread: object, output: float, code: float) -> None:
             if code not in tuple(RunState):
@@ -116,9 +114,7 @@ def _runstates(state: ControllerState) -> dict[str, Function]:
     return functions
 
 
-def _euromap(state: ControllerState) -> dict[str, Function]:
-    euromap = state.io.euromap
-
+def _euromap(euromap: Euromap, configuration: IoConfiguration) -> dict[str, Function]:
     def port(number: float) -> int:
         if not 0 <= number < N_EUROMAP:
             raise ScriptRuntimeError(
@@ -130,7 +126,7 @@ def _euromap(state: ControllerState) -> dict[str, Function]:
         "get_euromap_input": lambda thread, n: euromap.read_input(port(n)),
         "get_euromap_output": lambda thread, n: euromap.read_output(port(n)),
         "set_euromap_output": lambda thread, n, value: euromap.write_output(port(n), value),
-        "set_euromap_runstate_dependent_choice": lambda thread, n, choice: state.io_configuration.set_rule(
+        "set_euromap_runstate_dependent_choice": lambda thread, n, choice: configuration.set_rule(
             OutputKind.EUROMAP, port(n), RunState(int(choice))
         ),
     }

@@ -15,8 +15,9 @@ from ur_emulator.controller.io.lines import (
     N_TOOL,
     TOOL_SHIFT,
     AnalogLine,
+    InputOutput,
 )
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.io.registers import Registers
 
 Function = Callable[..., Any]
 
@@ -30,14 +31,12 @@ _DIGITAL_GROUPS = (
 _DEPRECATED_BITS = (*range(N_STANDARD), TOOL_SHIFT, TOOL_SHIFT + 1)
 
 
-def io_functions(state: ControllerState) -> Mapping[str, Function]:
-    """Return the builtins for lines and flags bound to one controller."""
-    return {**_digital(state), **_analog(state), **_flags(state)}
+def io_functions(io: InputOutput) -> Mapping[str, Function]:
+    """Return the builtins for lines and flags."""
+    return {**_digital(io), **_analog(io), **_flags(io.flags)}
 
 
-def _digital(state: ControllerState) -> dict[str, Function]:
-    io = state.io
-
+def _digital(io: InputOutput) -> dict[str, Function]:
     def reader(read: Callable[[int], bool], bits: tuple[int, ...]) -> Function:
         return lambda thread, n: read(bits[int(n)])
 
@@ -56,17 +55,12 @@ def _digital(state: ControllerState) -> dict[str, Function]:
     return functions
 
 
-def _analog(state: ControllerState) -> dict[str, Function]:
-    io = state.io
-
+def _analog(io: InputOutput) -> dict[str, Function]:
     def reader(lines: list[AnalogLine]) -> Function:
         return lambda thread, n: lines[int(n)].value
 
     def writer(lines: list[AnalogLine]) -> Function:
         return lambda thread, n, f: lines[int(n)].set_ratio(f)
-
-    def set_tool_voltage(thread: object, voltage: float) -> None:
-        io.tool_voltage = int(voltage)
 
     return {
         "get_standard_analog_in": reader(io.analog_in),
@@ -76,26 +70,24 @@ def _analog(state: ControllerState) -> dict[str, Function]:
         "get_analog_in": reader([*io.analog_in, *io.tool_analog_in]),
         "get_analog_out": reader(io.analog_out),
         "set_analog_out": writer(io.analog_out),
-        "set_tool_voltage": set_tool_voltage,
+        "set_tool_voltage": lambda thread, voltage: io.set_tool_voltage(int(voltage)),
     }
 
 
-def _flags(state: ControllerState) -> dict[str, Function]:
-    flags = state.io.flags
-
+def _flags(flags: list[bool]) -> dict[str, Function]:
     def set_flag(thread: object, n: int, b: bool) -> None:
         flags[int(n)] = b
 
     return {"get_flag": lambda thread, n: flags[int(n)], "set_flag": set_flag}
 
 
-def register_functions(state: ControllerState) -> Mapping[str, Function]:
-    """Return the builtins for the general purpose registers bound to one controller."""
+def register_functions(registers: Registers) -> Mapping[str, Function]:
+    """Return the builtins for the general purpose registers."""
     functions: dict[str, Function] = {}
     for kind, inputs, outputs in (
-        ("boolean", state.registers.inputs.booleans, state.registers.outputs.booleans),
-        ("integer", state.registers.inputs.integers, state.registers.outputs.integers),
-        ("float", state.registers.inputs.floats, state.registers.outputs.floats),
+        ("boolean", registers.inputs.booleans, registers.outputs.booleans),
+        ("integer", registers.inputs.integers, registers.outputs.integers),
+        ("float", registers.inputs.floats, registers.outputs.floats),
     ):
         functions[f"read_input_{kind}_register"] = _register_reader(inputs)
         functions[f"read_output_{kind}_register"] = _register_reader(outputs)

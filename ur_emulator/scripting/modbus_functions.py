@@ -11,16 +11,18 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.io.run_states import RunState
-from ur_emulator.controller.modbus.signals import (
+from ur_emulator.controller.clock import Clock
+from ur_emulator.controller.io.configuration import IoConfiguration
+from ur_emulator.controller.io.modbus_signals import (
     DEFAULT_ACTION,
     DEFAULT_PORT,
     MAX_SIGNALS,
     ModbusSignal,
+    ModbusSignals,
     SignalType,
     UnitAddress,
 )
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.scripting.network import Network
 from urscript.errors import ScriptRuntimeError
 
@@ -36,19 +38,25 @@ MAX_DATA = 252
 _ADDRESS = re.compile(r"([A-Za-z0-9._-]{1,253})(?::(\d{1,5}))?")
 
 
-def modbus_functions(state: ControllerState, network: Network) -> Mapping[str, Function]:
-    """Return the Modbus builtins bound to one controller.
+def modbus_functions(
+    modbus: ModbusSignals, configuration: IoConfiguration, clock: Clock, network: Network
+) -> Mapping[str, Function]:
+    """Return the Modbus builtins.
 
     Args:
-        state: its signals.
+        modbus: the signals.
+        configuration: says whether a program runs.
+        clock: when a signal is due.
         network: connects to units.
     """
-    return {**_definitions(state, network), **_values(state), **_settings(state)}
+    return {
+        **_definitions(modbus, network),
+        **_values(modbus),
+        **_settings(modbus, configuration, clock),
+    }
 
 
-def _definitions(state: ControllerState, network: Network) -> dict[str, Function]:
-    modbus = state.modbus
-
+def _definitions(modbus: ModbusSignals, network: Network) -> dict[str, Function]:
     def add_signal(
         thread: object, ip: str, slave: float, address: float, kind: float, name: str, sequential: bool
     ) -> None:
@@ -80,12 +88,10 @@ def _definitions(state: ControllerState, network: Network) -> dict[str, Function
     }
 
 
-def _values(state: ControllerState) -> dict[str, Function]:
-    modbus = state.modbus
-
+def _values(modbus: ModbusSignals) -> dict[str, Function]:
     def get_signal_status(thread: object, name: str, is_secondary: bool) -> bool | int:
         builtin = "modbus_get_signal_status"
-        signal = _signal(state, builtin, name)
+        signal = _signal(modbus, builtin, name)
         if not signal.frequency:
             modbus.refresh(signal)
         _must_be_well(builtin, signal)
@@ -93,7 +99,7 @@ def _values(state: ControllerState) -> dict[str, Function]:
 
     def set_output_signal(thread: object, name: str, value: bool, is_secondary: bool) -> None:
         builtin = "modbus_set_output_signal"
-        _set(builtin, _signal(state, builtin, name, SignalType.DIGITAL_OUTPUT), int(value))
+        _set(builtin, _signal(modbus, builtin, name, SignalType.DIGITAL_OUTPUT), int(value))
 
     def set_output_register(thread: object, name: str, value: float, is_secondary: bool) -> None:
         builtin = "modbus_set_output_register"
@@ -101,7 +107,7 @@ def _values(state: ControllerState) -> dict[str, Function]:
             raise ScriptRuntimeError(
                 f"{builtin}: {value} does not fit into a register, allowed are 0 to {WORD_MAX}"
             )
-        _set(builtin, _signal(state, builtin, name, SignalType.REGISTER_OUTPUT), int(value))
+        _set(builtin, _signal(modbus, builtin, name, SignalType.REGISTER_OUTPUT), int(value))
 
     def _set(builtin: str, signal: ModbusSignal, value: int) -> None:
         modbus.set_output(signal, value)
@@ -114,22 +120,22 @@ def _values(state: ControllerState) -> dict[str, Function]:
     }
 
 
-def _settings(state: ControllerState) -> dict[str, Function]:
+def _settings(modbus: ModbusSignals, configuration: IoConfiguration, clock: Clock) -> dict[str, Function]:
     def set_update_frequency(thread: object, name: str, frequency: float) -> None:
-        signal = _signal(state, "modbus_set_signal_update_frequency", name)
+        signal = _signal(modbus, "modbus_set_signal_update_frequency", name)
         signal.frequency = float(frequency)
-        signal.due = state.tick
+        signal.due = clock.tick
 
     def set_input_action(thread: object, name: str, action: str) -> None:
         builtin = "modbus_set_digital_input_action"
-        _signal(state, builtin, name, SignalType.DIGITAL_INPUT).action = action or DEFAULT_ACTION
+        _signal(modbus, builtin, name, SignalType.DIGITAL_INPUT).action = action or DEFAULT_ACTION
 
     def set_runstate_choice(thread: object, name: str, code: float) -> None:
         builtin = "modbus_set_runstate_dependent_choice"
-        signal = _signal(state, builtin, name)
+        signal = _signal(modbus, builtin, name)
         if not signal.type.is_output:
             raise ScriptRuntimeError(f'{builtin}: signal "{name}" is a {signal.type.title}, not an output')
-        state.modbus.set_rule(signal, RunState(int(code)), state.io_configuration.program_runs)
+        modbus.set_rule(signal, RunState(int(code)), configuration.program_runs)
 
     return {
         "modbus_set_signal_update_frequency": set_update_frequency,
@@ -138,11 +144,9 @@ def _settings(state: ControllerState) -> dict[str, Function]:
     }
 
 
-def _signal(
-    state: ControllerState, builtin: str, name: str, wanted: SignalType | None = None
-) -> ModbusSignal:
+def _signal(modbus: ModbusSignals, builtin: str, name: str, wanted: SignalType | None = None) -> ModbusSignal:
     """Return a signal, which must be of the wanted type."""
-    signal = state.modbus.signals.get(name)
+    signal = modbus.signals.get(name)
     if signal is None:
         raise ScriptRuntimeError(
             f'{builtin}: there is no Modbus signal "{name}", add it with modbus_add_signal'

@@ -7,16 +7,13 @@ from typing import Any
 
 from protocol.pose import Pose as ToolPose
 from protocol.primary.messages import ReportLevel
-from ur_emulator.controller.events import ErrorReported
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.events import ErrorReported, EventQueue
 from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.generators import StopJ
 from ur_emulator.motion.leg import Leg, move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
 from ur_emulator.motion.path import PoseLine, PosePath, arc_through
-from ur_emulator.motion.tool import Tool
-from ur_emulator.scripting.arm_taking import Cycles, floats, require_positive, take_arm
-from ur_emulator.scripting.speed_functions import speed_functions
+from ur_emulator.scripting.script_arm import Cycles, ScriptArm, floats, require_positive
 from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import NEXT_CYCLE
 from urscript.values import Pose
@@ -31,12 +28,17 @@ OVERLAPPING_BLENDS = ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blend
 MOST_PER_CYCLE = 4
 
 
-def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return all builtins that move the arm, bound to one controller."""
-    motion = state.motion
+def motion_functions(
+    arm: ScriptArm, place_arm: Callable[[Vector6], bool], events: EventQueue
+) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins that move the arm from waypoint to waypoint.
 
-    def tool() -> Tool:
-        return Tool(state.arm, state.tcp_offset)
+    Args:
+        arm: that they move.
+        place_arm: puts it at joint angles [rad]; False where it would touch something.
+        events: get warnings of overlapping blends.
+    """
+    motion = arm.motion
 
     def travel(
         thread: object, make: Callable[[Vector6, ToolPose], Leg], *, may_overlap: bool = False
@@ -51,14 +53,14 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         move = motion.move_of(thread)
         if move is not None and move.returned and not move.done:
             last = move.leg
-            if last.goal is not None and last.tool.tcp == state.tcp_offset:
+            if last.goal is not None and last.tool.tcp == arm.settings.tcp_offset:
                 outcome = move.follow(make(last.goal, last.goal_pose))
                 if outcome is Follow.BLENDED:
                     yield from wait_for_return(move)
                     return
                 if outcome is Follow.SKIPPED:
                     if not may_overlap:
-                        state.events.append(OVERLAPPING_BLENDS)
+                        events.append(OVERLAPPING_BLENDS)
                     move.n_joined += 1
                     if may_overlap or move.n_joined >= MOST_PER_CYCLE:
                         yield NEXT_CYCLE
@@ -66,16 +68,16 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
             while not move.done:
                 yield NEXT_CYCLE
             if move.left_out is not None:  # without a blend none overlaps
-                take_arm(state, thread, lead := Move(move.left_out))
+                arm.take(thread, lead := Move(move.left_out))
                 while not lead.done:
                     yield NEXT_CYCLE
         if any(motion.path.qd):  # a move begins at rest, also after a program that was replaced in motion
-            take_arm(state, thread, stop := StopJ(motion.stop_deceleration))
+            arm.take(thread, stop := StopJ(motion.stop_deceleration))
             while not stop.done:
                 yield NEXT_CYCLE
         start = motion.path.q
-        move = Move(make(start, state.arm.fk(start, state.tcp_offset)))
-        take_arm(state, thread, move)
+        move = Move(make(start, arm.tcp_pose(start)))
+        arm.take(thread, move)
         yield from wait_for_return(move)
 
     def wait_for_return(move: Move) -> Cycles:
@@ -87,20 +89,20 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         move.returned = True
 
     def pose_of(target: Any) -> ToolPose:
-        return _pose(target) if isinstance(target, Pose) else state.arm.fk(floats(target), state.tcp_offset)
+        return _pose(target) if isinstance(target, Pose) else arm.tcp_pose(floats(target))
 
     def movej(thread: object, q: Any, a: float, v: float, t: float, r: float) -> Cycles:
         a, v = _limits("movej", a, v, t, r, JOINT_DEFAULTS)
 
         def make(start: Vector6, _: ToolPose) -> Leg:
-            return move_j(start, joints_of(q, start), tool(), a=a, v=v, t=t, r=r)
+            return move_j(start, joints_of(q, start), arm.tool, a=a, v=v, t=t, r=r)
 
         return travel(thread, make)
 
     def joints_of(target: Any, near: Vector6) -> Vector6:
         if not isinstance(target, Pose):
             return floats(target)
-        solution = state.arm.inverse(_pose(target), near, state.tcp_offset)
+        solution = arm.model.inverse(_pose(target), near, arm.settings.tcp_offset)
         if solution is None:
             raise ScriptRuntimeError(
                 "The robot cannot reach the requested pose. "
@@ -119,7 +121,7 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         process: bool,
     ) -> Cycles:
         def make(q: Vector6, start: ToolPose) -> Leg:
-            return move_tool(make_path(start), q, tool(), a=a, v=v, t=t, r=r, process=process)
+            return move_tool(make_path(start), q, arm.tool, a=a, v=v, t=t, r=r, process=process)
 
         return travel(thread, make)
 
@@ -138,7 +140,7 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         goal = pose_of(pose)
 
         def make(q: Vector6, start: ToolPose) -> Leg:
-            return move_tool(PoseLine(start, goal), q, tool(), a=a, v=v, r=r, process=True)
+            return move_tool(PoseLine(start, goal), q, arm.tool, a=a, v=v, r=r, process=True)
 
         # Drivers call it with the same pose again and again: nothing to warn of.
         return travel(thread, make, may_overlap=True)
@@ -156,12 +158,12 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         angles = floats(q)
         if motion.is_moving or motion.owner is not None:
             raise ScriptRuntimeError("set_pos: the arm moves, stop it first")
-        for i, (x, low, high) in enumerate(zip(angles, state.robot.q_min, state.robot.q_max, strict=True)):
+        for i, (x, low, high) in enumerate(zip(angles, arm.robot.q_min, arm.robot.q_max, strict=True)):
             if not low <= x <= high:
                 raise ScriptRuntimeError(
                     f"set_pos: joint {i} cannot be at {x:g} rad, allowed are {low:.4f} to {high:.4f}"
                 )
-        if not state.place_arm(angles):
+        if not place_arm(angles):
             raise ScriptRuntimeError(
                 "set_pos: the arm would touch itself or the table there, choose another place"
             )
@@ -173,7 +175,6 @@ def motion_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]
         "movec": movec,
         "servoc": servoc,
         "set_pos": set_pos,
-        **speed_functions(state),
     }
 
 

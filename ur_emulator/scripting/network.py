@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from ur_emulator.controller.modbus.signals import ModbusUnit, UnitAddress
+from ur_emulator.controller.io.modbus_signals import ModbusUnit, UnitAddress
 
 
 class ScriptSocket(Protocol):

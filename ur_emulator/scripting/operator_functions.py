@@ -6,9 +6,8 @@ from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
 from protocol.primary.messages import RequestedType
-from ur_emulator.controller.events import PopupShown, ValueRequested
-from ur_emulator.controller.operator import Answer, OperatorRequest
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.events import EventQueue, PopupShown, ValueRequested
+from ur_emulator.controller.operator import Answer, Operator, OperatorRequest
 from urscript.builtins.text import wire_text
 from urscript.run.waits import Blocked
 
@@ -20,14 +19,14 @@ _KINDS = {
 }
 
 
-def operator_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return the builtins bound to one controller."""
+def operator_functions(operator: Operator, events: EventQueue) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins for popups and requests."""
 
     def wait_for(request: OperatorRequest) -> Generator[Blocked, None, Answer | None]:
         try:
             yield Blocked(lambda: request.is_answered, outside=True)
         finally:
-            state.operator.withdraw(request)  # the program may have been stopped meanwhile
+            operator.withdraw(request)  # the program may have been stopped meanwhile
         return request.answer
 
     def popup(
@@ -35,17 +34,17 @@ def operator_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
     ) -> Generator[Blocked, None, None]:
         text = wire_text(s)
         if not blocking:
-            state.operator.show(text)
-            state.events.append(PopupShown(title, text, warning, error, blocking))
+            operator.show(text)
+            events.append(PopupShown(title, text, warning, error, blocking))
             return
-        request = state.operator.ask(RequestedType.NONE, text)
-        state.events.append(PopupShown(title, text, warning, error, blocking, request.request_id))
+        request = operator.ask(RequestedType.NONE, text)
+        events.append(PopupShown(title, text, warning, error, blocking, request.request_id))
         yield from wait_for(request)
 
     def requester(kind: RequestedType) -> Callable[..., Generator[Blocked, None, Answer | None]]:
         def request_value(thread: object, text: str) -> Generator[Blocked, None, Answer | None]:
-            request = state.operator.ask(kind, text)
-            state.events.append(ValueRequested(request.request_id, kind, text))
+            request = operator.ask(kind, text)
+            events.append(ValueRequested(request.request_id, kind, text))
             return (yield from wait_for(request))
 
         return request_value

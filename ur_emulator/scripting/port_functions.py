@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from ur_emulator.controller.modbus import robot_map as port_map
+from ur_emulator.controller.modbus import robot_map
 from ur_emulator.controller.modbus.robot_map import PortAddressError
 from ur_emulator.controller.state import ControllerState
 from urscript.errors import ScriptRuntimeError
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 def port_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return the builtins for the Modbus map bound to one controller.
+    """Return the builtins for the Modbus map of one controller, whose whole state it shows.
 
     What can only be read ignores writes: the manual's own example writes to an input.
     """
@@ -28,17 +28,17 @@ def port_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
             raise ScriptRuntimeError(str(error)) from None
 
     def read_port_register(thread: object, address: float) -> int:
-        word = access(port_map.read_register, address)
+        word = access(robot_map.read_register, address)
         return word - 2 * _SIGN if word & _SIGN else word
 
     def write_port_register(thread: object, address: float, value: float) -> None:
-        access(port_map.write_register, address, int(value))
+        access(robot_map.write_register, address, int(value))
 
     def write_port_bit(thread: object, address: float, value: bool) -> None:
-        access(port_map.write_coil, address, value)
+        access(robot_map.write_coil, address, value)
 
     return {
-        "read_port_bit": lambda thread, address: access(port_map.read_coil, address),
+        "read_port_bit": lambda thread, address: access(robot_map.read_coil, address),
         "read_port_register": read_port_register,
         "write_port_bit": write_port_bit,
         "write_port_register": write_port_register,

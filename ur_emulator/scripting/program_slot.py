@@ -31,6 +31,7 @@ class ProgramSlot:
     Attributes:
         name: of the primary program, or of the last one.
         latest: the primary program or the last one, whose variables can still be read; None before the first.
+        reports_line: a client reads the line that the program executes.
     """
 
     def __init__(self, state: ControllerState, network: Network) -> None:
@@ -42,6 +43,7 @@ class ProgramSlot:
         self._phase = ProgramState.PLAYING
         self._phase_since = 0
         self.name = ""
+        self.reports_line = False
         self.latest: RunningProgram | None = None
 
     @property
@@ -131,7 +133,7 @@ class ProgramSlot:
         if self.is_paused:
             state = self._state
             state.motion.resume()
-            state.watchdogs.restart(state.tick)
+            state.watchdogs.restart(state.clock.tick)
             state.io_configuration.program_started()
             state.events.append(ProgramResumed(self.name))
             self._enter(ProgramState.RESUMING)
@@ -149,7 +151,7 @@ class ProgramSlot:
                     program.kill()  # a secondary program has one cycle
             self._secondaries.clear()
         if self._primary is not None and (self._phase is _PLAYING or self._may_run()):
-            self._state.program_tick += 1
+            self._state.clock.advance_program()
             status = self._primary.step()
             if status is not ProgramStatus.RUNNING:
                 if status is ProgramStatus.FAILED:
@@ -159,7 +161,7 @@ class ProgramSlot:
     def _may_run(self) -> bool:
         """Go on towards a pause or out of it; return whether the threads have their turn in this cycle."""
         state = self._state
-        is_new = self._phase_since == state.tick
+        is_new = self._phase_since == state.clock.tick
         if self._phase is ProgramState.PAUSING and not is_new and state.motion.is_paused:
             self._enter(ProgramState.PAUSED)
             state.io_configuration.program_stopped()
@@ -172,7 +174,7 @@ class ProgramSlot:
 
     def _enter(self, phase: ProgramState) -> None:
         self._phase = phase
-        self._phase_since = self._state.tick
+        self._phase_since = self._state.clock.tick
 
     def _report(self, program: RunningProgram, *, secondary: bool = False) -> None:
         error = program.error
@@ -183,8 +185,8 @@ class ProgramSlot:
 
     def _end(self) -> None:
         self._primary = None
-        self._state.compliance.end_of_program(self._state)
+        self._state.compliance.program_ended()
         self._state.io_configuration.program_stopped()
         self._state.watchdogs.clear()
-        self._state.error_settings.pause_codes.clear()
+        self._state.error_settings.program_ended()
         self._state.events.append(ProgramStopped(self.name))

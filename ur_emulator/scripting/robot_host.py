@@ -20,8 +20,10 @@ from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.operator_functions import operator_functions
 from ur_emulator.scripting.port_functions import port_functions
 from ur_emulator.scripting.remote_procedures import ProgramRemotes
+from ur_emulator.scripting.script_arm import ScriptArm
 from ur_emulator.scripting.settings_functions import settings_functions
 from ur_emulator.scripting.socket_functions import ProgramSockets
+from ur_emulator.scripting.speed_functions import speed_functions
 from ur_emulator.scripting.state_functions import state_functions
 from ur_emulator.scripting.watchdog_functions import watchdog_functions
 from urscript.builtins import pure_builtins
@@ -34,32 +36,34 @@ class RobotHost:
         """Bind the builtins.
 
         Args:
-            state: what they read and change.
+            state: the parts of the controller; each group of builtins gets those that it acts on.
             network: opens the program's sockets.
         """
         random = pure_builtins(state.seed)["random"]
-        self.step_time = state.period_s
+        self.step_time = state.clock.period_s
+        arm = ScriptArm(state.robot, state.arm, state.motion, state.tool)
         self._state = state
-        self._sockets = ProgramSockets(state, network)
+        self._sockets = ProgramSockets(state.clock, state.events, network)
         self._remotes = ProgramRemotes(network)
-        self._conveyor = ProgramConveyor(state)
-        settings = settings_functions(state)
+        self._conveyor = ProgramConveyor(arm, state.encoders, state.clock)
+        settings = settings_functions(state.robot, state.tool, state.requests)
         self._builtins: Mapping[str, Callable[..., Any]] = {
-            **motion_functions(state),
-            **state_functions(state),
-            **compliance_functions(state),
+            **motion_functions(arm, state.place_arm, state.events),
+            **speed_functions(arm, self.step_time),
+            **state_functions(arm, state.past, self.step_time),
+            **compliance_functions(arm, state.compliance, state.force_sense, state.past),
             **settings,
-            **e_series_functions(state, settings["set_payload"]),
-            **io_functions(state),
-            **register_functions(state),
-            **io_configuration_functions(state),
+            **e_series_functions(state.tool, settings["set_payload"]),
+            **io_functions(state.io),
+            **register_functions(state.registers),
+            **io_configuration_functions(state.io, state.io_configuration),
             **port_functions(state),
-            **modbus_functions(state, network),
-            **watchdog_functions(state),
-            **encoder_functions(state),
+            **modbus_functions(state.modbus, state.io_configuration, state.clock, network),
+            **watchdog_functions(state.watchdogs, state.force_sense, state.clock),
+            **encoder_functions(state.encoders, state.io),
             **self._conveyor.functions(),
-            **operator_functions(state),
-            **error_functions(state),
+            **operator_functions(state.operator, state.events),
+            **error_functions(state.error_settings, state.past, state.requests),
             **self._sockets.functions(),
             **self._remotes.functions(),
             "random": lambda thread: random(),

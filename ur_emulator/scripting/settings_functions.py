@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.state import ControllerState, Payload
-from ur_emulator.models.robot_model import Vector3, six
+from ur_emulator.controller.program_requests import ProgramRequests
+from ur_emulator.controller.tool_settings import ToolSettings
+from ur_emulator.models.robot_model import RobotModel, Vector3, six
 from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
 
@@ -17,8 +18,16 @@ MAX_TCP_OFFSET = 100.0
 MAX_COG = 1.0
 
 
-def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return the setting builtins bound to one controller."""
+def settings_functions(
+    robot: RobotModel, tool: ToolSettings, requests: ProgramRequests
+) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins for TCP, payload and gravity, and the protective stop.
+
+    Args:
+        robot: says how much the arm carries.
+        tool: what they set.
+        requests: get the protective stop.
+    """
 
     def set_tcp(thread: object, pose: Any) -> None:
         offset = six([float(x) for x in pose])
@@ -26,9 +35,9 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
             raise ScriptRuntimeError(
                 f"set_tcp: {wire_text(pose)} is no tool, allowed are numbers up to {MAX_TCP_OFFSET:g}"
             )
-        if state.payload.at_tcp:
-            state.payload = Payload(state.payload.mass, cog_of(offset[:3]), at_tcp=True)
-        state.tcp_offset = offset
+        if tool.payload.at_tcp:
+            cog_of(offset[:3])
+        tool.set_tcp(offset)
 
     def cog_of(value: Any) -> Vector3:
         x, y, z = map(float, value)
@@ -40,29 +49,25 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
         return (x, y, z)
 
     def mass_of(mass: float) -> float:
-        if not 0.0 <= mass <= state.robot.payload_max:
+        if not 0.0 <= mass <= robot.payload_max:
             raise ScriptRuntimeError(
-                f"a payload of {mass:g} kg was given, allowed are 0 to {state.robot.payload_max:g} kg"
+                f"a payload of {mass:g} kg was given, allowed are 0 to {robot.payload_max:g} kg"
             )
         return float(mass)
 
     def set_payload(thread: object, m: float, cog: Any) -> None:
-        # Left out, the centre of gravity is the TCP, also that of a later set_tcp. Source: URScript manual.
-        at_tcp = cog is None
-        state.payload = Payload(mass_of(m), cog_of(state.tcp_offset[:3] if at_tcp else cog), at_tcp)
+        mass, place = mass_of(m), cog_of(tool.tcp_offset[:3] if cog is None else cog)
+        tool.set_payload(mass, None if cog is None else place)
 
     def set_payload_mass(thread: object, m: float) -> None:
-        state.payload = Payload(mass_of(m), state.payload.cog, state.payload.at_tcp)
+        tool.set_payload_mass(mass_of(m))
 
     def set_payload_cog(thread: object, cog: Any) -> None:
-        state.payload = Payload(state.payload.mass, cog_of(cog))
+        tool.set_payload_cog(cog_of(cog))
 
     def set_gravity(thread: object, d: Any) -> None:
         x, y, z = d
-        state.gravity = (float(x), float(y), float(z))
-
-    def protective_stop(thread: object) -> None:
-        state.stop_requested = True
+        tool.set_gravity((float(x), float(y), float(z)))
 
     return {
         "set_tcp": set_tcp,
@@ -70,5 +75,5 @@ def settings_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
         "set_payload_mass": set_payload_mass,
         "set_payload_cog": set_payload_cog,
         "set_gravity": set_gravity,
-        "protective_stop": protective_stop,
+        "protective_stop": lambda thread: requests.protective_stop(),
     }

@@ -11,8 +11,8 @@ import struct
 from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
-from ur_emulator.controller.events import LogAdded
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.clock import Clock
+from ur_emulator.controller.events import EventQueue, LogAdded
 from ur_emulator.scripting.network import Network, ScriptSocket
 from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
@@ -31,8 +31,9 @@ Function = Callable[..., Any]
 class ProgramSockets:
     """The named sockets of one program."""
 
-    def __init__(self, state: ControllerState, network: Network) -> None:
-        self._state = state
+    def __init__(self, clock: Clock, events: EventQueue, network: Network) -> None:
+        self._clock = clock
+        self._events = events
         self._network = network
         self._sockets: dict[str, ScriptSocket] = {}
 
@@ -75,7 +76,7 @@ class ProgramSockets:
             # Source: log of a real controller; "refused" is ours.
             reason = "Connection timed out" if socket.is_connecting else "Connection refused"
             text = f"Not able to open socket [{name}] to host: {address} at port: {port}: {reason}"
-            self._state.events.append(LogAdded("Program", text))
+            self._events.append(LogAdded("Program", text))
             socket.close()
             if self._sockets.get(name) is socket:
                 del self._sockets[name]
@@ -114,9 +115,9 @@ class ProgramSockets:
         """Return a function: has the program run for `timeout` seconds? Never, if it is not above 0."""
         if not timeout > 0.0:
             return lambda: False
-        state = self._state
-        end = state.program_tick + math.ceil(timeout / state.period_s)
-        return lambda: state.program_tick >= end
+        clock = self._clock
+        end = clock.program_tick + math.ceil(timeout / clock.period_s)
+        return lambda: clock.program_tick >= end
 
     def _take(
         self, name: str, timeout: float, find: Callable[[bytearray], int]
@@ -146,16 +147,16 @@ class ProgramSockets:
 
     def _take_fixed(self, name: str, timeout: float, size: int) -> Generator[Blocked, None, bytes | None]:
         """As `_take`, for a message of a fixed size: a stream of commands passes here every cycle."""
-        socket, state = self._sockets.get(name), self._state
+        socket, clock = self._sockets.get(name), self._clock
         if socket is None:
             return None
         inbox = socket.inbox
         # Nothing to read is nothing that could come: it ends with the time-out.
         enough = min(size, MAX_INBOX + 1) if size > 0 else MAX_INBOX + 1
         if len(inbox) < enough and socket.is_open:
-            end = state.program_tick + math.ceil(timeout / state.period_s) if timeout > 0.0 else math.inf
+            end = clock.program_tick + math.ceil(timeout / clock.period_s) if timeout > 0.0 else math.inf
             yield Blocked(
-                lambda: len(inbox) >= enough or not socket.is_open or state.program_tick >= end, outside=True
+                lambda: len(inbox) >= enough or not socket.is_open or clock.program_tick >= end, outside=True
             )
         else:
             yield GIVE_WAY

@@ -6,25 +6,28 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.generators import SpeedJ, StopJ, Streamed
 from ur_emulator.motion.servo_j import ServoJ
 from ur_emulator.motion.speed_l import SpeedL, StopL
-from ur_emulator.motion.tool import Tool
-from ur_emulator.scripting.arm_taking import LEAST_LIMIT, Cycles, floats, require_positive, take_arm
+from ur_emulator.scripting.script_arm import LEAST_LIMIT, Cycles, ScriptArm, floats, require_positive
 from urscript.run.waits import NEXT_CYCLE
 
 
-def speed_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return the streaming builtins and the stops, bound to one controller."""
-    motion = state.motion
+def speed_functions(arm: ScriptArm, step_time: float) -> Mapping[str, Callable[..., Any]]:
+    """Return the streaming builtins and the stops.
+
+    Args:
+        arm: that they move.
+        step_time: duration of a cycle [s].
+    """
+    motion = arm.motion
 
     def stream(thread: object, generator: Streamed, t: float | None) -> Cycles:
         """Keep a motion alive for the time t [s], or until it has got where it should."""
-        take_arm(state, thread, generator)
+        arm.take(thread, generator)
         if t is not None and t > 0.0:
             # Exactly one cycle for t = step time, whatever the rounding of the division.
-            for _ in range(max(1, math.ceil(t / state.period_s - 1e-6))):
+            for _ in range(max(1, math.ceil(t / step_time - 1e-6))):
                 motion.renew()
                 yield NEXT_CYCLE
         else:
@@ -33,7 +36,7 @@ def speed_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
                 yield NEXT_CYCLE
 
     def stop(thread: object, generator: StopJ | StopL) -> Cycles:
-        take_arm(state, thread, generator)
+        arm.take(thread, generator)
         while not generator.done:
             yield NEXT_CYCLE
 
@@ -46,7 +49,7 @@ def speed_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
         a_rot = _limit("speedl", t, aRot=a if aRot is None else aRot)
         a = _limit("speedl", t, a=a)
         twist = floats(tuple(xd))
-        return stream(thread, SpeedL(twist, a, a_rot, Tool(state.arm, state.tcp_offset)), t)
+        return stream(thread, SpeedL(twist, a, a_rot, arm.tool), t)
 
     def servoj(
         thread: object, q: list[float], a: float, v: float, t: float, lookahead_time: float, gain: float
@@ -61,7 +64,7 @@ def speed_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
     def stopl(thread: object, a: float, aRot: float | None) -> Cycles:
         a_rot = a if aRot is None else aRot
         require_positive("stopl", a=a, aRot=a_rot)
-        return stop(thread, StopL(a, a_rot, Tool(state.arm, state.tcp_offset)))
+        return stop(thread, StopL(a, a_rot, arm.tool))
 
     return {"speedj": speedj, "speedl": speedl, "servoj": servoj, "stopj": stopj, "stopl": stopl}
 

@@ -9,8 +9,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.models.robot_model import six
+from ur_emulator.scripting.script_arm import ScriptArm
 from urscript.errors import ScriptRuntimeError
 from urscript.values import Pose
 
@@ -18,21 +19,27 @@ from urscript.values import Pose
 STEADY_TIME = 0.5
 
 
-def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return the reading builtins bound to one controller."""
-    arm = state.arm
+def state_functions(arm: ScriptArm, past: PastCycles, step_time: float) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins that read the robot.
+
+    Args:
+        arm: with its settings.
+        past: what the last cycle has come to.
+        step_time: duration of a cycle [s].
+    """
+    model, motion, settings = arm.model, arm.motion, arm.settings
 
     def joints(value: Any) -> tuple[float, ...]:
-        return state.snapshot.actual_q if value is None else six([float(x) for x in value])
+        return past.snapshot.actual_q if value is None else six([float(x) for x in value])
 
     def tool(value: Any) -> tuple[float, ...]:
-        return state.tcp_offset if value is None else tuple(value)
+        return settings.tcp_offset if value is None else tuple(value)
 
     def get_forward_kin(thread: object, q: Any, tcp: Any) -> Pose:
-        return Pose.of(arm.fk(joints(q), tool(tcp)))
+        return Pose.of(model.fk(joints(q), tool(tcp)))
 
     def inverse(pose: Pose, q_near: Any, tcp: Any) -> tuple[float, ...] | None:
-        return arm.inverse(tuple(pose), joints(q_near), tool(tcp))
+        return model.inverse(tuple(pose), joints(q_near), tool(tcp))
 
     def get_inverse_kin(
         thread: object, x: Pose, qnear: Any, max_position_error: float, max_orientation_error: float, tcp: Any
@@ -55,62 +62,62 @@ def state_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
         return inverse(pose, qnear, tcp) is not None
 
     def get_actual_tool_flange_pose(thread: object) -> Pose:
-        return Pose.of(arm.fk(state.snapshot.actual_q))
+        return Pose.of(model.fk(past.snapshot.actual_q))
 
     def is_within_safety_limits(thread: object, pose: Any, qnear: Any) -> bool:
         q = inverse(pose, qnear, None) if isinstance(pose, Pose) else tuple(pose)
         return q is not None and all(
-            low <= x <= high for x, low, high in zip(q, state.robot.q_min, state.robot.q_max, strict=True)
+            low <= x <= high for x, low, high in zip(q, arm.robot.q_min, arm.robot.q_max, strict=True)
         )
 
     def get_actual_joint_positions_history(thread: object, steps: float) -> list[float]:
-        if not steps < len(state.q_history):
+        if not steps < len(past.q_history):
             raise ScriptRuntimeError(
                 f"get_actual_joint_positions_history: {steps:g} steps back, "
-                f"allowed are 0 to {len(state.q_history) - 1}"
+                f"allowed are 0 to {len(past.q_history) - 1}"
             )
-        return list(state.q_history[int(steps)])
+        return list(past.q_history[int(steps)])
 
     def get_joint_torques(thread: object) -> list[float]:
-        snap = state.snapshot
+        snap = past.snapshot
         return [
             k * (actual - target)
             for k, actual, target in zip(
-                state.robot.torque_constant, snap.actual_current, snap.target_current, strict=True
+                arm.robot.torque_constant, snap.actual_current, snap.target_current, strict=True
             )
         ]
 
     def get_actual_tcp_pose(thread: object) -> Pose:
-        return Pose.of(arm.fk(state.snapshot.actual_q, state.tcp_offset))
+        return Pose.of(arm.tcp_pose(past.snapshot.actual_q))
 
     return {
-        "get_actual_joint_positions": lambda thread: list(state.snapshot.actual_q),
-        "get_target_joint_positions": lambda thread: list(state.motion.target.q),
-        "get_joint_positions": lambda thread: list(state.motion.path.q),
-        "get_actual_joint_speeds": lambda thread: list(state.snapshot.actual_qd),
-        "get_target_joint_speeds": lambda thread: list(state.motion.target.qd),
+        "get_actual_joint_positions": lambda thread: list(past.snapshot.actual_q),
+        "get_target_joint_positions": lambda thread: list(motion.target.q),
+        "get_joint_positions": lambda thread: list(motion.path.q),
+        "get_actual_joint_speeds": lambda thread: list(past.snapshot.actual_qd),
+        "get_target_joint_speeds": lambda thread: list(motion.target.qd),
         "get_actual_joint_positions_history": get_actual_joint_positions_history,
-        "get_target_waypoint": lambda thread: Pose.of(arm.fk(state.motion.goal, state.tcp_offset)),
+        "get_target_waypoint": lambda thread: Pose.of(arm.tcp_pose(motion.goal)),
         "get_joint_torques": get_joint_torques,
-        "get_joint_temp": lambda thread, j: state.snapshot.joint_temperatures[int(j)],
-        "get_controller_temp": lambda thread: state.snapshot.masterboard_temperature,
+        "get_joint_temp": lambda thread, j: past.snapshot.joint_temperatures[int(j)],
+        "get_controller_temp": lambda thread: past.snapshot.masterboard_temperature,
         "get_actual_tcp_pose": get_actual_tcp_pose,
         "tool_pose": get_actual_tcp_pose,
-        "get_target_tcp_pose": lambda thread: Pose.of(arm.fk(state.motion.target.q, state.tcp_offset)),
+        "get_target_tcp_pose": lambda thread: Pose.of(arm.tcp_pose(motion.target.q)),
         "get_actual_tool_flange_pose": get_actual_tool_flange_pose,
-        "get_actual_tcp_speed": lambda thread: Pose.of(state.snapshot.actual_tcp_speed),
-        "get_target_tcp_speed": lambda thread: Pose.of(state.snapshot.target_tcp_speed),
-        "get_tcp_force": lambda thread: Pose.of(state.snapshot.actual_tcp_force),
-        "force": lambda thread: math.hypot(*state.snapshot.actual_tcp_force[:3]),
-        "get_tcp_offset": lambda thread: Pose.of(state.tcp_offset),
-        "get_tool_accelerometer_reading": lambda thread: list(state.snapshot.actual_tool_accelerometer),
-        "get_tool_current": lambda thread: state.snapshot.tool_output_current,
-        "get_steptime": lambda thread: state.period_s,
-        "get_target_payload": lambda thread: state.payload.mass,
-        "get_target_payload_cog": lambda thread: list(state.payload.cog),
+        "get_actual_tcp_speed": lambda thread: Pose.of(past.snapshot.actual_tcp_speed),
+        "get_target_tcp_speed": lambda thread: Pose.of(past.snapshot.target_tcp_speed),
+        "get_tcp_force": lambda thread: Pose.of(past.snapshot.actual_tcp_force),
+        "force": lambda thread: math.hypot(*past.snapshot.actual_tcp_force[:3]),
+        "get_tcp_offset": lambda thread: Pose.of(settings.tcp_offset),
+        "get_tool_accelerometer_reading": lambda thread: list(past.snapshot.actual_tool_accelerometer),
+        "get_tool_current": lambda thread: past.snapshot.tool_output_current,
+        "get_steptime": lambda thread: step_time,
+        "get_target_payload": lambda thread: settings.payload.mass,
+        "get_target_payload_cog": lambda thread: list(settings.payload.cog),
         "get_forward_kin": get_forward_kin,
         "get_inverse_kin": get_inverse_kin,
         "get_inverse_kin_has_solution": get_inverse_kin_has_solution,
-        "is_steady": lambda thread: state.steady_cycles * state.period_s >= STEADY_TIME,
+        "is_steady": lambda thread: past.steady_cycles * step_time >= STEADY_TIME,
         "is_within_safety_limits": is_within_safety_limits,
     }

@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from protocol.rtde.fields import INPUTS
+from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.compliance.external_sensor import VARIABLE, ExternalSensor
-from ur_emulator.controller.io.watchdogs import WatchdogAction
-from ur_emulator.controller.state import ControllerState
+from ur_emulator.controller.compliance.force_sense import ForceSense
+from ur_emulator.controller.io.watchdogs import WatchdogAction, Watchdogs
 from ur_emulator.models.robot_model import Vector3
 from urscript.errors import ScriptRuntimeError
 
@@ -20,8 +21,10 @@ SENSOR_ACTION = WatchdogAction.PAUSE
 _INPUT_NAMES = frozenset(field.name for field in INPUTS)
 
 
-def watchdog_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
-    """Return the builtins bound to one controller."""
+def watchdog_functions(
+    watchdogs: Watchdogs, force_sense: ForceSense, clock: Clock
+) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins for watchdogs and the external force sensor."""
 
     def rtde_set_watchdog(thread: object, variable: str, min_frequency: float, action: str) -> None:
         if variable not in _INPUT_NAMES:
@@ -32,17 +35,17 @@ def watchdog_functions(state: ControllerState) -> Mapping[str, Callable[..., Any
             raise ScriptRuntimeError(
                 f'rtde_set_watchdog: action "{action}" does not exist, choose ignore, pause or stop'
             ) from None
-        state.watchdogs.set(variable, min_frequency, chosen, state.tick)
+        watchdogs.set(variable, min_frequency, chosen, clock.tick)
 
     def sensor_function(lever_sign: float) -> Callable[..., None]:
         def enable_sensor(thread: object, enable: bool, mass: float, offset: Any, cog: Any) -> None:
             if enable:
-                state.external_sensor = ExternalSensor(float(mass), _three(offset), _three(cog), lever_sign)
-                state.watchdogs.set(VARIABLE, SENSOR_FREQUENCY, SENSOR_ACTION, state.tick)
+                sensor = ExternalSensor(float(mass), _three(offset), _three(cog), lever_sign)
+                watchdogs.set(VARIABLE, SENSOR_FREQUENCY, SENSOR_ACTION, clock.tick)
+                force_sense.use(sensor)
             else:
-                state.external_sensor = None
-                state.watchdogs.set(VARIABLE, 0.0, WatchdogAction.IGNORE, state.tick)
-            state.force_sense.forget()
+                watchdogs.set(VARIABLE, 0.0, WatchdogAction.IGNORE, clock.tick)
+                force_sense.use(None)
 
         return enable_sensor
 

@@ -152,7 +152,7 @@ class RtdePort:
         if isinstance(request, SetupInputs) and len(session.protocol.input_recipes) > n_recipes:
             self._owners.update(dict.fromkeys(request.names, connection))
         if isinstance(request, SetupOutputs) and _SCRIPT_LINE in request.names:
-            self._controller.state.wants_script_line = True
+            self._controller.programs.reports_line = True
         session.restart()
         self._find_streams()
         if not connection.send(reply):

@@ -10,19 +10,20 @@ mode.
 from __future__ import annotations
 
 from math import hypot
-from typing import TYPE_CHECKING
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, ControlMode, RobotMode
 from ur_emulator.controller.events import ErrorReported
+from ur_emulator.controller.io.configuration import IoConfiguration
+from ur_emulator.controller.past_cycles import PastCycles
+from ur_emulator.controller.robot_mode import RobotModeMachine
 from ur_emulator.controller.safety.limit_checks import SPEED_TOLERANCE, Violation
+from ur_emulator.controller.safety.safety_state import SafetyState
 from ur_emulator.models.robot_model import RobotModel, Vector6
+from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.force_mode import ForceMode
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
-
-if TYPE_CHECKING:
-    from ur_emulator.controller.state import ControllerState
 
 # A wrench that nobody expects when hand guiding begins is a wrong payload or a push: beyond this, which is
 # twice the stated precision of the estimate [N].
@@ -40,10 +41,34 @@ class Compliance:
         by_client: the word `set robotmode freedrive` does.
         by_input: an input or the teach button does, and it is granted.
         force_mode: the overlay while a program is in force mode.
+        force_damping: as programs have set it, for a force mode to come; 0..1.
+        force_gain_scaling: likewise, 0..2.
         is_on: there is something to look after in every cycle.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        motion: ArmMotion,
+        mode: RobotModeMachine,
+        safety: SafetyState,
+        inputs: IoConfiguration,
+        past: PastCycles,
+    ) -> None:
+        """Begin with an arm that is driven by position.
+
+        Args:
+            motion: of the arm; force mode is an overlay of it, a guided arm its place.
+            mode: compliance ends when it is not RUNNING.
+            safety: compliance ends when it stops the arm.
+            inputs: may ask for hand guiding.
+            past: where the arm is.
+        """
+        self._motion = motion
+        self._robot_mode = mode
+        self._safety = safety
+        self._inputs = inputs
+        self._past = past
+        self.force_damping, self.force_gain_scaling = 0.0, 1.0
         self.mode = ControlMode.POSITION
         self.by_program = self.by_client = self.by_input = False
         self.force_mode: ForceMode | None = None
@@ -77,41 +102,59 @@ class Compliance:
         """
         self._is_refused = hypot(*wrench[:3]) > UNEXPECTED_FORCE
 
-    def begin_force(self, state: ControllerState, force_mode: ForceMode) -> None:
-        """Go into force mode."""
+    def end_guiding_by_program(self) -> None:
+        """End the hand guiding that the program has asked for."""
+        self.by_program = False
+
+    def end_guiding_by_client(self) -> None:
+        """End the hand guiding that a client has asked for."""
+        self.by_client = False
+
+    def set_force_damping(self, damping: float) -> None:
+        """Set the damping of a force mode to come, 0..1."""
+        self.force_damping = damping
+
+    def set_force_gain_scaling(self, scaling: float) -> None:
+        """Set the gain scaling of a force mode to come, 0..2."""
+        self.force_gain_scaling = scaling
+
+    def begin_force(self, force_mode: ForceMode) -> None:
+        """Go into force mode; hand guiding by the program ends: what is commanded last counts."""
+        self.end_force()
+        self.by_program = False
         self.force_mode = force_mode
-        state.motion.add_overlay(force_mode)
+        self._motion.add_overlay(force_mode)
         self.is_on = True
 
-    def end_force(self, state: ControllerState) -> None:
+    def end_force(self) -> None:
         """Leave force mode, if the arm is in it; the arm stays where it is."""
         if self.force_mode is not None:
-            state.motion.remove_overlay(self.force_mode)
+            self._motion.remove_overlay(self.force_mode)
             self.force_mode = None
 
-    def end_of_program(self, state: ControllerState) -> None:
+    def program_ended(self) -> None:
         """End what the program has asked for."""
         self.by_program = False
-        self.end_force(state)
+        self.end_force()
 
     # --- cycle
 
-    def step(self, state: ControllerState) -> ControlMode:
+    def step(self) -> ControlMode:
         """Return how the arm is driven in this cycle, after the scripts have had their turn."""
-        motion = state.motion
-        if state.mode.mode is not RobotMode.RUNNING or state.safety.is_stopped:
+        motion = self._motion
+        if self._robot_mode.mode is not RobotMode.RUNNING or self._safety.is_stopped:
             self.by_program = self.by_client = self.by_input = False
-            self.end_force(state)
+            self.end_force()
         else:
-            wanted = self._is_teach_pressed or state.io_configuration.asks_for_freedrive()
+            wanted = self._is_teach_pressed or self._inputs.asks_for_freedrive()
             self.by_input = wanted and (self.by_input or not motion.is_moving)
         was_guided = self.mode is ControlMode.TEACH
         if self.is_guided:
-            self.end_force(state)
+            self.end_force()
             self.mode = ControlMode.TEACH
         else:
             if was_guided:
-                snapshot = state.snapshot
+                snapshot = self._past.snapshot
                 motion.place(snapshot.actual_q, snapshot.actual_qd)
             self.mode = ControlMode.POSITION
             if self.force_mode is not None:
@@ -122,14 +165,14 @@ class Compliance:
         self.is_on = self.mode is not ControlMode.POSITION or self._is_teach_pressed
         return self.mode
 
-    def follow_hand(self, state: ControllerState) -> JointTarget:
+    def follow_hand(self) -> JointTarget:
         """Return what counts as the target of an arm that is guided by hand: where it is.
 
         Moves are not followed. They take their time on paper, and end with the guiding.
         """
-        snapshot = state.snapshot
-        if not state.motion.is_moving:
-            state.motion.place(snapshot.actual_q)
+        snapshot = self._past.snapshot
+        if not self._motion.is_moving:
+            self._motion.place(snapshot.actual_q)
         return JointTarget(snapshot.actual_q, snapshot.actual_qd)
 
     def find_violation(self, robot: RobotModel, sensed: PlantState) -> Violation | None:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from itertools import islice
 from math import hypot
 
+from ur_emulator.controller.compliance.external_sensor import ExternalSensor
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
 
@@ -35,6 +36,7 @@ class ForceSense:
 
     Attributes:
         zero: what counts as no wrench; None until a program has said so.
+        sensor: an external sensor, which takes the place of the estimate; None without one.
     """
 
     def __init__(self, generation: RobotGeneration) -> None:
@@ -43,6 +45,7 @@ class ForceSense:
         self._n_recent, self._n_early = generation.cycles(_RECENT_TIME), generation.cycles(_EARLY_TIME)
         self._history: deque[Vector6] = deque(maxlen=self._n_most)
         self.zero: Vector6 | None = None
+        self.sensor: ExternalSensor | None = None
 
     def take(self, wrench: Vector6) -> Vector6:
         """Take the measurement of this cycle; returns it less the zero."""
@@ -50,8 +53,9 @@ class ForceSense:
         zero = self.zero
         return wrench if zero is None else six([w - z for w, z in zip(wrench, zero, strict=True)])
 
-    def forget(self) -> None:
-        """Forget the past: what measures is another one from now on."""
+    def use(self, sensor: ExternalSensor | None) -> None:
+        """Measure with an external sensor from now on, or with the estimate; the past is forgotten."""
+        self.sensor = sensor
         self._history.clear()
         self.zero = None
 
@@ -110,19 +114,6 @@ class ForceSense:
         # The arm comes to rest a little after its target.
         latest = list(islice(self._history, min(max(still_cycles - least, least), most)))
         return six(_mean(latest)) if latest else ZERO6
-
-
-def moved_wrench(wrench: Vector6, of: Sequence[float], to: Sequence[float]) -> Vector6:
-    """Return a wrench at another point, in the same axes: the moment loses lever times force.
-
-    Args:
-        wrench: [N, Nm].
-        of: point that its moment refers to, (3,) or the pose of it [m].
-        to: the other point.
-    """
-    rx, ry, rz = (b - a for a, b in zip(of[:3], to[:3], strict=True))
-    fx, fy, fz, mx, my, mz = wrench
-    return (fx, fy, fz, mx - ry * fz + rz * fy, my - rz * fx + rx * fz, mz - rx * fy + ry * fx)
 
 
 def _mean(vectors: Sequence[Sequence[float]]) -> list[float]:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from ur_emulator.controller.io.lines import CONFIGURABLE_SHIFT, TOOL_SHIFT, InputOutput
+from ur_emulator.controller.io.modbus_signals import ModbusSignals
 from ur_emulator.controller.io.registers import Registers
 from ur_emulator.controller.io.run_states import RunState, level
-from ur_emulator.controller.modbus.signals import ModbusSignals
 
 DEFAULT_ACTION, FREEDRIVE_ACTION = "default", "freedrive"
 
@@ -65,6 +65,10 @@ class IoConfiguration:
             self.input_actions.pop((group, index), None)
         else:
             self.input_actions[group, index] = action
+
+    def clear_input_actions(self) -> None:
+        """Let all inputs do nothing beside being read."""
+        self.input_actions.clear()
 
     def asks_for_freedrive(self) -> bool:
         """True while a line that is set up for it, or a signal of another unit, is high."""

@@ -120,7 +120,20 @@ class InputOutput:
         """Return the state of output `bit` of the digital word."""
         return bool(self.digital_out >> bit & 1)
 
+    def write_digital_in(self, bit: int, value: bool) -> None:
+        """Set input `bit` of the digital word."""
+        mask = 1 << bit
+        self.digital_in = self.digital_in | mask if value else self.digital_in & ~mask
+
     def write_digital_out(self, bit: int, value: bool) -> None:
         """Set output `bit` of the digital word."""
         mask = 1 << bit
         self.digital_out = self.digital_out | mask if value else self.digital_out & ~mask
+
+    def write_digital_outputs(self, word: int, mask: int) -> None:
+        """Set the outputs in `mask` to the bits of `word`."""
+        self.digital_out = self.digital_out & ~mask | word & mask
+
+    def set_tool_voltage(self, voltage: int) -> None:
+        """Set the supply of the tool [V]: 0, 12 or 24."""
+        self.tool_voltage = voltage

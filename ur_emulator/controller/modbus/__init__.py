@@ -1,1 +1,1 @@
-"""Modbus, as state: the robot's own map, and the signals of other units that programs have added."""
+"""The robot's own Modbus map: its rows, and how an address is read and written."""

@@ -116,7 +116,7 @@ def set_analog_domain(lines: str, index: int) -> Writer:
 def write_tool_voltage(state: ControllerState, offset: int, value: int) -> None:
     """Set the supply of the tool [V]; other values than the allowed ones change nothing."""
     if value in (0, 12, 24):
-        state.io.tool_voltage = value
+        state.io.set_tool_voltage(value)
 
 
 # --- state of the robot
@@ -124,7 +124,7 @@ def write_tool_voltage(state: ControllerState, offset: int, value: int) -> None:
 
 def of_snapshot(values: Callable[[Snapshot], tuple[float, ...]], scale: float = 1.0) -> Reader:
     """Read one element of something that is published, in other units."""
-    return lambda state, offset: values(state.snapshot)[offset] * scale
+    return lambda state, offset: values(state.past.snapshot)[offset] * scale
 
 
 def flag(state: ControllerState, offset: int) -> int:
@@ -135,8 +135,8 @@ def flag(state: ControllerState, offset: int) -> int:
             state.mode.mode in POWERED,
             safety is SafetyMode.PROTECTIVE_STOP,
             safety in EMERGENCY_MODES,
-            bool(state.buttons & RobotStatusBits.TEACH_BUTTON_PRESSED),
-            bool(state.buttons & RobotStatusBits.POWER_BUTTON_PRESSED),
+            bool(state.operator.buttons & RobotStatusBits.TEACH_BUTTON_PRESSED),
+            bool(state.operator.buttons & RobotStatusBits.POWER_BUTTON_PRESSED),
             state.safety.is_stopped,
         )[offset]
     )
@@ -144,12 +144,12 @@ def flag(state: ControllerState, offset: int) -> int:
 
 def latch_clock(state: ControllerState, offset: int, value: int) -> None:
     """Remember the present time."""
-    state.ports.latched_tick = state.tick
+    state.modbus_map.latch_clock(state.clock.tick)
 
 
 def clock(state: ControllerState, offset: int) -> int:
     """Read the latched time: ms, s, min, h, days since the controller started."""
-    milliseconds = state.ports.latched_tick * state.generation.period_us // 1000
+    milliseconds = state.modbus_map.latched_tick * state.clock.generation.period_us // 1000
     seconds = milliseconds // 1000
     return (milliseconds % 1000, seconds % 60, seconds // 60 % 60, seconds // 3600 % 24, seconds // 86400)[
         offset
@@ -158,7 +158,7 @@ def clock(state: ControllerState, offset: int) -> int:
 
 def write_general(state: ControllerState, offset: int, value: int) -> None:
     """Write a general purpose word."""
-    state.ports.words[offset] = value
+    state.modbus_map.write(offset, value)
 
 
 def write_gp_input(state: ControllerState, offset: int, value: int) -> None:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 from ur_emulator.controller.io.euromap import N_EUROMAP
 from ur_emulator.controller.io.lines import N_CONFIGURABLE, N_TOOL
+from ur_emulator.controller.io.modbus_memory import FIRST_GENERAL, N_GENERAL
 from ur_emulator.controller.io.registers import N_BOOLEAN
 from ur_emulator.controller.modbus.addresses import (
     N_BOX_BITS,
@@ -43,7 +44,6 @@ from ur_emulator.controller.modbus.addresses import (
     write_gp_input,
     write_tool_voltage,
 )
-from ur_emulator.controller.modbus.map_memory import FIRST_GENERAL, N_GENERAL
 from ur_emulator.controller.state import ControllerState
 
 TURN = 2.0 * math.pi
@@ -118,27 +118,28 @@ REGISTERS: tuple[PortRow, ...] = (
     PortRow(33, 1, "configurable outputs to clear", None,
             write_bits(configurable_bit, N_CONFIGURABLE, False)),
     PortRow(34, 94, "reserved"),
-    PortRow(FIRST_GENERAL, N_GENERAL, "general purpose", lambda s, i: s.ports.words[i], write_general),
-    PortRow(256, 2, "software version, major and minor", lambda s, i: s.ports.version[i]),
-    PortRow(258, 1, "robot mode", lambda s, i: s.snapshot.robot_mode),
+    PortRow(FIRST_GENERAL, N_GENERAL, "general purpose", lambda s, i: s.modbus_map.words[i], write_general),
+    PortRow(256, 2, "software version, major and minor", lambda s, i: s.modbus_map.version[i]),
+    PortRow(258, 1, "robot mode", lambda s, i: s.past.snapshot.robot_mode),
     PortRow(260, 6, "flags, see the coils", flag),
-    PortRow(266, 1, "safety mode", lambda s, i: s.snapshot.safety_mode),
-    PortRow(270, 6, "joint angle within its turn, mrad", lambda s, i: s.snapshot.actual_q[i] % TURN * 1e3),
+    PortRow(266, 1, "safety mode", lambda s, i: s.past.snapshot.safety_mode),
+    PortRow(270, 6, "joint angle within its turn, mrad",
+            lambda s, i: s.past.snapshot.actual_q[i] % TURN * 1e3),
     PortRow(280, 6, "joint velocity, mrad/s", of_snapshot(lambda snap: snap.actual_qd, 1e3)),
     PortRow(290, 6, "joint current, mA", of_snapshot(lambda snap: snap.actual_current, 1e3)),
     PortRow(300, 6, "joint temperature, degree C", of_snapshot(lambda snap: snap.joint_temperatures)),
     PortRow(310, 6, "joint mode", of_snapshot(lambda snap: snap.joint_mode)),
-    PortRow(320, 6, "turns of the joint", lambda s, i: s.snapshot.actual_q[i] // TURN),
+    PortRow(320, 6, "turns of the joint", lambda s, i: s.past.snapshot.actual_q[i] // TURN),
     PortRow(400, 3, "TCP in base, 0.1 mm", of_snapshot(lambda snap: snap.actual_tcp_pose[:3], 1e4)),
     PortRow(403, 3, "its rotation vector, mrad", of_snapshot(lambda snap: snap.actual_tcp_pose[3:], 1e3)),
     PortRow(410, 6, "TCP speed, mm/s and mrad/s", of_snapshot(lambda snap: snap.actual_tcp_speed, 1e3)),
     PortRow(420, 6, "TCP offset, mm and mrad", of_snapshot(lambda snap: snap.tcp_offset, 1e3)),
-    PortRow(450, 1, "robot current, mA", lambda s, i: s.snapshot.actual_robot_current * 1e3),
-    PortRow(451, 1, "I/O current, mA", lambda s, i: s.snapshot.io_current * 1e3),
-    PortRow(768, 1, "tool mode", lambda s, i: s.snapshot.tool_mode),
+    PortRow(450, 1, "robot current, mA", lambda s, i: s.past.snapshot.actual_robot_current * 1e3),
+    PortRow(451, 1, "I/O current, mA", lambda s, i: s.past.snapshot.io_current * 1e3),
+    PortRow(768, 1, "tool mode", lambda s, i: s.past.snapshot.tool_mode),
     PortRow(769, 1, "tool temperature, degree C: that of the last joint",
-            lambda s, i: s.snapshot.tool_temperature),
-    PortRow(770, 1, "tool current, mA", lambda s, i: s.snapshot.tool_output_current * 1e3),
+            lambda s, i: s.past.snapshot.tool_temperature),
+    PortRow(770, 1, "tool current, mA", lambda s, i: s.past.snapshot.tool_output_current * 1e3),
     PortRow(1024, 1, "state of the user interface, reserved"),
     PortRow(2048, 1, "write anything to latch the clock", None, latch_clock),
     PortRow(2049, 5, "latched clock: ms, s, min, h, day", clock),

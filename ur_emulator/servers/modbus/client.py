@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 
-from ur_emulator.controller.modbus.signals import UnitAddress
+from ur_emulator.controller.io.modbus_signals import UnitAddress
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.network import ScriptSocket
 from ur_emulator.servers.modbus.link import ModbusLink

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from protocol.errors import RemoteProtocolError
 from protocol.modbus import ModbusFrame, decode_value, encode_frame, take_frame
-from ur_emulator.controller.modbus.signals import ModbusSignal
+from ur_emulator.controller.io.modbus_signals import ModbusSignal
 from ur_emulator.scripting.network import ScriptSocket
 from ur_emulator.servers.modbus.requests import SentRequest, complaint, request_for
 

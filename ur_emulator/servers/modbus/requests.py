@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from protocol.modbus import EXCEPTION_BIT, ExceptionCode, ModbusFunction, encode_read, encode_write
-from ur_emulator.controller.modbus.signals import ModbusSignal, SignalType
+from ur_emulator.controller.io.modbus_signals import ModbusSignal, SignalType
 
 _READ = {
     SignalType.DIGITAL_INPUT: ModbusFunction.READ_DISCRETE_INPUTS,

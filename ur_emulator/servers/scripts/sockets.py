@@ -8,7 +8,7 @@ import socket
 import threading
 from weakref import WeakSet
 
-from ur_emulator.controller.modbus.signals import UnitAddress
+from ur_emulator.controller.io.modbus_signals import UnitAddress
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.modbus.client import ModbusClient
 from ur_emulator.servers.modbus.link import ModbusLink

@@ -1,4 +1,6 @@
-"""Reduced and recovery mode: the time on the path runs slower, so that no joint exceeds a limit.
+"""Speed scaling: the speed slider, and the joint limits of reduced and recovery mode.
+
+In these modes the time on the path runs slower, so that no joint exceeds its limit.
 
 Sources: recovery mode 30 deg/s, tolerance 1.15 deg/s and 0.5 s until the limits of reduced mode hold: UR3 and
 UR5/CB3 user manuals. The defaults of the joint speeds in reduced mode were not at hand: half the rated ones
@@ -93,3 +95,35 @@ class SpeedLimiter:
             f"{abs(actual_qd[worst]):.3f} rad/s, limit {self._limits[worst]:.3f}"
         )
         return Violation(ErrorReported(191, 32 + worst, ReportLevel.WARNING, text))
+
+
+class SpeedScaling:
+    """How fast the time on the path runs, as the speed slider and the safety mode want it.
+
+    Attributes:
+        slider: speed slider, 0..1.
+        limiter: keeps joint speeds below the limits of the safety mode; None in a mode that has none.
+    """
+
+    __slots__ = ("limiter", "slider")
+
+    def __init__(self) -> None:
+        self.slider = 1.0
+        self.limiter: SpeedLimiter | None = None
+
+    def set_slider(self, fraction: float) -> None:
+        """Set the speed slider, 0..1."""
+        self.slider = fraction
+
+    def set_limiter(self, limiter: SpeedLimiter | None) -> None:
+        """Limit the joint speeds from now on, or no longer."""
+        self.limiter = limiter
+
+    def step(self, motion: ArmMotion, dt: float) -> float:
+        """Return the scale for the next cycle; arguments as in `SpeedLimiter.step`."""
+        return self.slider if self.limiter is None else self.limiter.step(motion, self.slider, dt)
+
+    @property
+    def share(self) -> float:
+        """What the limits leave of the speed that the slider asks for, 0..1."""
+        return 1.0 if self.limiter is None else self.limiter.share(self.slider)

@@ -1,12 +1,13 @@
 """What safety events come to: the mode changes as the tables say, and arm, program and power follow.
 
-The tables are in `modes`. In cycles in which nothing of this goes on nobody asks here: `is_busy`.
+The tables are in `safety/modes.py`. In cycles in which nothing of this goes on nobody asks here: `is_busy`.
 """
 
 from __future__ import annotations
 
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller.events import SafetyModeChanged
+from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.controller.safety.inputs import SafetyInput, SafetyInputs
 from ur_emulator.controller.safety.limit_checks import Violation
@@ -17,11 +18,10 @@ from ur_emulator.controller.safety.modes import (
     ProgramEffect,
     SafetyEvent,
 )
-from ur_emulator.controller.safety.speed_limiter import SpeedLimiter, joint_limits
+from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, joint_limits
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.path_motion import SCALING_RATE
 from ur_emulator.plant.plant_state import PlantState
-from ur_emulator.scripting.program_slot import ProgramSlot
 
 # The drives follow their targets by 30 to 50 ms; the brakes wait for them, but no longer than the second [s].
 BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
@@ -35,7 +35,7 @@ class SafetySystem:
         is_busy: `step` and `find_violation` want their turn in every cycle.
     """
 
-    def __init__(self, state: ControllerState, programs: ProgramSlot) -> None:
+    def __init__(self, state: ControllerState, programs: Programs) -> None:
         self._state = state
         self._programs = programs
         self.inputs = SafetyInputs(self.happen)
@@ -59,7 +59,7 @@ class SafetySystem:
         state, safety = self._state, self._state.safety
         before = safety.mode
         was_stopping = self.is_stopping
-        safety.apply(event, state.time)
+        safety.apply(event, state.clock.time)
         if safety.mode is not before:
             state.events.append(SafetyModeChanged(int(safety.mode)))
             self._react(before)
@@ -75,7 +75,7 @@ class SafetySystem:
         self._programs.stop()
         state.mode.command(ModeCommand.POWER_OFF)
         state.motion.stop(state.robot.stop_deceleration)
-        state.motion.place(state.snapshot.actual_q)
+        state.motion.place(state.past.snapshot.actual_q)
         self.happen(SafetyEvent.POWERED_OFF)
 
     def check_range(self) -> None:
@@ -96,18 +96,18 @@ class SafetySystem:
             if any(state.motion.target.qd):
                 self._rests_since = None
             elif self._rests_since is None:
-                self._rests_since = state.tick
-            if state.tick >= self._cut_after or (
+                self._rests_since = state.clock.tick
+            if state.clock.tick >= self._cut_after or (
                 self._rests_since is not None
-                and (state.tick - self._rests_since) * state.period_s >= BRAKE_DELAY
+                and (state.clock.tick - self._rests_since) * state.clock.period_s >= BRAKE_DELAY
             ):
                 self.cut_power()
         self._update()
 
     def find_violation(self, sensed: PlantState) -> Violation | None:
         """Return what the arm has done wrong beside what is always looked at, or None."""
-        limiter = self._state.limiter
-        return None if limiter is None else limiter.find_violation(sensed.actual_qd, self._state.period_s)
+        limiter, dt = self._state.speed.limiter, self._state.clock.period_s
+        return None if limiter is None else limiter.find_violation(sensed.actual_qd, dt)
 
     # --- what follows
 
@@ -121,7 +121,7 @@ class SafetySystem:
                 self._is_waiting = False
                 self._programs.stop()
                 if robot_mode is RobotMode.RUNNING:
-                    self._cut_after = state.tick + round(LONGEST_BRAKING / state.period_s)
+                    self._cut_after = state.clock.tick + round(LONGEST_BRAKING / state.clock.period_s)
                 elif robot_mode in POWERED:
                     self.cut_power()
         elif row.arm is ArmEffect.STOP:
@@ -149,22 +149,20 @@ class SafetySystem:
         state = self._state
         limits = joint_limits(mode, state.robot)
         state.motion.scaling_rate = SCALING_RATE
-        state.limiter = None
-        if limits is not None:
-            hard = not state.error_settings.transition_hardness
-            state.limiter = SpeedLimiter(limits, state.motion.scale, hard)
+        hard = not state.error_settings.transition_hardness
+        state.speed.set_limiter(None if limits is None else SpeedLimiter(limits, state.motion.scale, hard))
 
     def _is_in_range(self) -> bool:
         robot = self._state.robot
         return all(
             low <= q <= high
-            for low, q, high in zip(robot.q_min, self._state.snapshot.actual_q, robot.q_max, strict=True)
+            for low, q, high in zip(robot.q_min, self._state.past.snapshot.actual_q, robot.q_max, strict=True)
         )
 
     def _update(self) -> None:
         self.is_busy = (
             self._cut_after is not None
             or bool(self.inputs.assigned)
-            or self._state.limiter is not None
+            or self._state.speed.limiter is not None
             or self._state.safety.has(SafetyMode.RECOVERY)
         )

@@ -1,0 +1,136 @@
+"""What the input variables of RTDE do in the box. Names and types stand in `protocol.rtde.fields`.
+
+A register is written at once. Variables that act together, a mask and its values, act whenever one of them
+is written, with the last values of the others; what a mask leaves out is never looked at, since clients
+leave it uninitialised.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from ur_emulator.controller.clock import Clock
+from ur_emulator.controller.io.lines import (
+    CONFIGURABLE_SHIFT,
+    N_CONFIGURABLE,
+    N_STANDARD,
+    N_TOOL,
+    TOOL_SHIFT,
+    InputOutput,
+)
+from ur_emulator.controller.io.registers import N_BOOLEAN, N_FLOAT, N_INTEGER, N_PACKED, Registers
+from ur_emulator.controller.io.watchdogs import Watchdogs
+from ur_emulator.controller.safety.speed_scaling import SpeedScaling
+
+_WORD = 32
+# Registers by the name of their variable: (kind of memory, first register, how many).
+_REGISTERS: dict[str, tuple[str, int, int]] = {
+    "input_bit_registers0_to_31": ("booleans", 0, _WORD),
+    "input_bit_registers32_to_63": ("booleans", _WORD, _WORD),
+    **{f"input_bit_register_{i}": ("booleans", i, 1) for i in range(N_PACKED, N_BOOLEAN)},
+    **{f"input_int_register_{i}": ("integers", i, 1) for i in range(N_INTEGER)},
+    **{f"input_double_register_{i}": ("floats", i, 1) for i in range(N_FLOAT)},
+}
+
+
+class ClientInputs:
+    """Writes variables into the parts of the box that they are for, and keeps the values of the others.
+
+    Args:
+        io: the lines that they switch.
+        registers: the input registers.
+        speed: the speed slider.
+        watchdogs: are told what was written.
+        clock: when.
+    """
+
+    def __init__(
+        self, io: InputOutput, registers: Registers, speed: SpeedScaling, watchdogs: Watchdogs, clock: Clock
+    ) -> None:
+        self.io = io
+        self.speed = speed
+        self._registers = registers.inputs
+        self._watchdogs = watchdogs
+        self._clock = clock
+        self._values: dict[str, Any] = {}
+
+    def get(self, name: str, default: Any) -> Any:
+        """Return the last value of a variable that is no register; `default` before the first."""
+        return self._values.get(name, default)
+
+    def write(self, values: Iterable[tuple[str, Any]]) -> None:
+        """Write variables, in order.
+
+        Args:
+            values: names with values of the types that `protocol.rtde.fields.INPUTS` gives.
+        """
+        acts: dict[Callable[[ClientInputs], None], None] = {}
+        values = tuple(values)
+        if self._watchdogs:
+            self._watchdogs.written((name for name, _ in values), self._clock.tick)
+        for name, value in values:
+            register = _REGISTERS.get(name)
+            if register is None:
+                self._values[name] = value
+                acts[_ACTS[name]] = None
+                continue
+            kind, first, count = register
+            memory = getattr(self._registers, kind)
+            if count == 1:
+                memory[first] = value
+            else:
+                for bit in range(count):
+                    memory[first + bit] = bool(value >> bit & 1)
+        for act in acts:
+            act(self)
+
+
+def _digital_group(group: str, shift: int, size: int) -> Callable[[ClientInputs], None]:
+    mask_name, value_name = f"{group}_digital_output_mask", f"{group}_digital_output"
+
+    def act(inputs: ClientInputs) -> None:
+        mask = (inputs.get(mask_name, 0) & (1 << size) - 1) << shift
+        inputs.io.write_digital_outputs(inputs.get(value_name, 0) << shift, mask)
+
+    return act
+
+
+def _set_analog_outputs(inputs: ClientInputs) -> None:
+    mask = inputs.get("standard_analog_output_mask", 0)
+    domains = inputs.get("standard_analog_output_type", 0)
+    for i, line in enumerate(inputs.io.analog_out):
+        if mask >> i & 1:
+            line.domain = domains >> i & 1
+            line.set_ratio(inputs.get(f"standard_analog_output_{i}", 0.0))
+
+
+def _set_speed_slider(inputs: ClientInputs) -> None:
+    fraction = inputs.get("speed_slider_fraction", math.nan)
+    if inputs.get("speed_slider_mask", 0) and math.isfinite(fraction):
+        inputs.speed.set_slider(min(1.0, max(0.0, fraction)))
+
+
+def _keep(inputs: ClientInputs) -> None:
+    """Nothing acts on the value; it is kept for a script to enable."""
+
+
+_DIGITAL_GROUPS = (
+    ("standard", 0, N_STANDARD),
+    ("configurable", CONFIGURABLE_SHIFT, N_CONFIGURABLE),
+    ("tool", TOOL_SHIFT, N_TOOL),
+)
+# What to do when a variable that is no register has been written.
+_ACTS: dict[str, Callable[[ClientInputs], None]] = {
+    "speed_slider_mask": _set_speed_slider,
+    "speed_slider_fraction": _set_speed_slider,
+    "standard_analog_output_mask": _set_analog_outputs,
+    "standard_analog_output_type": _set_analog_outputs,
+    "standard_analog_output_0": _set_analog_outputs,
+    "standard_analog_output_1": _set_analog_outputs,
+    "external_force_torque": _keep,
+}
+for _group, _shift, _size in _DIGITAL_GROUPS:
+    _act = _digital_group(_group, _shift, _size)
+    _ACTS[f"{_group}_digital_output_mask"] = _ACTS[f"{_group}_digital_output"] = _act

@@ -1,0 +1,40 @@
+"""Clock: the time of the controller, counted in control cycles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ur_emulator.models.robot_generation import RobotGeneration
+
+
+@dataclass(slots=True)
+class Clock:
+    """Counts the cycles of the controller, and those that primary programs have had.
+
+    Attributes:
+        generation: of the robot, which says how long a cycle is.
+        tick: number of the present cycle.
+        program_tick: cycles that primary programs have had; it does not count while a program is paused.
+        period_s: duration of a control cycle [s].
+    """
+
+    generation: RobotGeneration
+    tick: int
+    program_tick: int = 0
+    period_s: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.period_s = self.generation.period_s
+
+    @property
+    def time(self) -> float:
+        """Seconds since the controller started, at the end of the present cycle."""
+        return self.generation.seconds(self.tick)
+
+    def advance(self) -> None:
+        """Begin the next cycle."""
+        self.tick += 1
+
+    def advance_program(self) -> None:
+        """Count a cycle of the primary program."""
+        self.program_tick += 1

@@ -1,0 +1,78 @@
+"""Programs: what the controller needs of the programs that run on it. `scripting` provides it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+from protocol.ur_types import ProgramState
+
+if TYPE_CHECKING:
+    from urscript import CompiledProgram, RunningProgram
+
+
+class Programs(Protocol):
+    """The primary program of the box, and the secondary programs beside it.
+
+    Attributes:
+        name: of the primary program, or of the last one.
+        latest: the primary program or the last one, whose variables can still be read; None before the first.
+        reports_line: a client reads the line that the program executes.
+    """
+
+    name: str
+    latest: RunningProgram | None
+    reports_line: bool
+
+    @property
+    def is_running(self) -> bool:
+        """True while there is a primary program, paused or not."""
+        ...
+
+    @property
+    def is_paused(self) -> bool:
+        """True while the primary program is paused, or about to be."""
+        ...
+
+    @property
+    def has_work(self) -> bool:
+        """True while any program wants cycles, and in the cycle in which one ended."""
+        ...
+
+    @property
+    def waits_outside(self) -> bool:
+        """True when a program cannot go on before something comes from outside the box."""
+        ...
+
+    @property
+    def runtime_state(self) -> ProgramState:
+        """Program state as published."""
+        ...
+
+    @property
+    def line(self) -> int:
+        """Line of the primary program's main thread as sent, 1 being the first; 0 without a program."""
+        ...
+
+    def start(self, program: CompiledProgram) -> None:
+        """Start a program; a primary one replaces the one that runs."""
+        ...
+
+    def stop(self) -> None:
+        """End the primary program, if one runs, and stop the arm."""
+        ...
+
+    def pause(self, deceleration: float = 0.0) -> None:
+        """Pause the primary program; the arm comes to rest on its path, at least this fast [rad/s^2]."""
+        ...
+
+    def interrupt(self, deceleration: float) -> None:
+        """Stop the arm without regard for its path [rad/s^2]; a program that runs is paused."""
+        ...
+
+    def resume(self) -> None:
+        """Let a paused program go on."""
+        ...
+
+    def step(self) -> None:
+        """Run all programs for one cycle."""
+        ...
