@@ -61,7 +61,7 @@ def measure_steps(fidelity: Fidelity) -> float:
     plant = Plant(robot, fidelity, 7)
     for _ in range(100):
         plant.step(JointTarget(robot.home_q))
-    model, data = plant._model, plant._data
+    model, data = plant._physics.model, plant._physics.data
     return best_of(lambda: mujoco.mj_step(model, data, STEPS))
 
 

@@ -41,7 +41,7 @@ def measure_tick() -> dict[str, float]:
     controller.tick([StartProgram(compile_program(_SPEEDJ))])
     for _ in range(WARM_UP):
         controller.tick(())
-    model, data = controller.plant._model, controller.plant._data
+    model, data = controller.plant._physics.model, controller.plant._physics.data
     # A second state of the same arm: the steps must not move the one that ticks.
     beside = mujoco.MjData(model)
     mujoco.mj_copyData(beside, model, data)

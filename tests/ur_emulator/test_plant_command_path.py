@@ -12,43 +12,46 @@ N, DT = 4, 0.002
 PERIOD = N * DT
 
 
-LEAD = 0.03
+LEAD, TRIM_GAIN = 0.03, 0.1
 
 
-def advance(path, target):
-    """A cycle of the path for a target (3, 6) of q, qd and tau."""
+def advance(path, target, error=None):
+    """A cycle of the path for a target (3, 6) of q, qd and deflection."""
     path.take(JointTarget(*map(tuple, target)))
     path.advance()
+    path.keep(error)
 
 
 def smooth(t):
-    """Position, speed and a torque stand-in of a smooth motion at time t, one row each, six joints."""
+    """Position, speed and no deflection of a smooth motion at time t, one row each, six joints."""
     phase = np.arange(6.0)
-    return np.array([np.sin(2 * t + phase), 2 * np.cos(2 * t + phase), np.sin(t + phase)])
+    return np.array([np.sin(2 * t + phase), 2 * np.cos(2 * t + phase), 0.0 * phase])
 
 
 @pytest.mark.parametrize("dead_substeps", [0, 1, 4, 5, 11])
 def test_the_matrix_is_the_sub_step_definition(dead_substeps):
     lag = 0.01
-    path = CommandPath(N, DT, dead_substeps, lag, LEAD)
+    path = CommandPath(N, DT, dead_substeps, lag, LEAD, TRIM_GAIN)
     rng = np.random.default_rng(dead_substeps)
     start = rng.standard_normal((3, 6))
     start[1] = 0.0
-    path.reset(start[0], start[2])
-    path.trim[:] = trim = rng.standard_normal(6)
+    trim = rng.standard_normal(6)
+    path.reset(start[0], start[2], start[0] + trim)
     knots = [start] * 6
     filtered = start
     for _ in range(8):
         newest = rng.standard_normal((3, 6))
         knots = [newest, *knots[:5]]
-        advance(path, newest)
+        error = rng.standard_normal(6)
+        advance(path, newest, error)
+        assert path.trim == pytest.approx(trim, abs=1e-12)
         for joint in range(6):
             rows = trace_cycle(filtered[:, joint], np.array(knots)[:, :, joint], N, DT, dead_substeps, lag)
-            position = rows[:-1, 0] + LEAD * rows[:-1, 1] + trim[joint]
-            assert path.position[:, joint] == pytest.approx(position, abs=1e-12)
+            control = rows[:-1, 0] + LEAD * rows[:-1, 1] + rows[:-1, 2] + trim[joint]
+            assert path.control[:, joint] == pytest.approx(control, abs=1e-12)
             assert path.speeds[1:, joint] == pytest.approx([newest[1, joint], rows[-2, 1]], abs=1e-12)
-            assert path.tau[:, joint] == pytest.approx(rows[:-1, 2], abs=1e-12)
             assert path.q_final[joint] == pytest.approx(rows[-1, 0], abs=1e-12)
+        trim = trim + TRIM_GAIN * error
         filtered = np.array(
             [
                 [
@@ -64,7 +67,7 @@ def test_the_matrix_is_the_sub_step_definition(dead_substeps):
 def test_a_ramp_comes_late_by_dead_time_plus_lag(dead_substeps, lag):
     path = CommandPath(N, DT, dead_substeps, lag)
     speed = 0.7
-    path.reset(np.zeros(6), np.zeros(6))
+    path.reset(np.zeros(6), np.zeros(6), np.zeros(6))
     for k in range(1, 60):
         advance(path, np.array([np.full(6, speed * k * PERIOD), np.full(6, speed), np.zeros(6)]))
     late = (speed * 59 * PERIOD - path.q_final[0]) / speed
@@ -73,24 +76,32 @@ def test_a_ramp_comes_late_by_dead_time_plus_lag(dead_substeps, lag):
 
 def test_without_delay_the_set_point_follows_a_smooth_motion_between_targets():
     path = CommandPath(N, DT, 0, 0.0)
-    path.reset(smooth(0.0)[0], smooth(0.0)[2])
+    path.reset(smooth(0.0)[0], smooth(0.0)[2], smooth(0.0)[0])
     advance(path, smooth(PERIOD))
     for k in range(2, 40):
         advance(path, smooth(k * PERIOD))
         for i in range(1, N):
             q, qd, _ = smooth((k - 1) * PERIOD + i * DT)
-            assert path.position[i] == pytest.approx(q, abs=1e-9)
+            assert path.control[i] == pytest.approx(q, abs=1e-9)
         assert path.speeds[2] == pytest.approx(qd, abs=1e-4)
         assert path.q_final == pytest.approx(smooth(k * PERIOD)[0], abs=1e-12)
 
 
 def test_after_reset_it_stands_still():
     path = CommandPath(N, DT, 6, 0.01)
-    q, tau = np.arange(6.0), -np.arange(6.0)
-    path.reset(np.ones(6), np.ones(6))
+    q, deflection = np.arange(6.0), -np.arange(6.0)
+    path.reset(np.ones(6), np.ones(6), np.ones(6))
     advance(path, smooth(1.0))
-    path.reset(q, tau)
-    advance(path, np.array([q, np.zeros(6), tau]))
-    assert path.position == pytest.approx(np.tile(q, (N, 1)), abs=1e-12)
+    path.reset(q, deflection, q)
+    advance(path, np.array([q, np.zeros(6), deflection]))
+    assert path.control == pytest.approx(np.tile(q + deflection, (N, 1)), abs=1e-12)
     assert path.speeds == pytest.approx(np.zeros((3, 6)), abs=1e-12)
-    assert path.tau == pytest.approx(np.tile(tau, (N, 1)), abs=1e-12)
+
+
+@pytest.mark.parametrize(("dead_substeps", "later"), [(0, False), (3, False), (4, True), (8, True)])
+def test_a_dead_time_of_a_cycle_keeps_a_target_out_of_its_own_cycle(dead_substeps, later):
+    path = CommandPath(N, DT, dead_substeps, 0.01)
+    assert path.newest_acts_later is later
+    path.reset(np.zeros(6), np.zeros(6), np.zeros(6))
+    advance(path, smooth(1.0))
+    assert path.q_final.any() != later

@@ -55,7 +55,7 @@ def test_the_table_stops_the_arm_and_is_felt():
     assert last.tcp_force[2] > 50.0
     assert not states[20].torque_saturated
     # The wrist yields, the table does not.
-    assert np.all(plant._data.contact.dist > -5e-4)
+    assert np.all(plant._physics.data.contact.dist > -5e-4)
 
 
 def test_the_arm_cannot_fold_into_itself():

@@ -143,8 +143,8 @@ def test_the_physical_flange_is_where_the_controller_computes_it():
     for q in np.random.default_rng(1).uniform(-2.0, 2.0, (10, 6)):
         plant.reset(q)
         # The gear's error of .1 mrad is in the encoders, not in the links.
-        assert plant._flange_position == pytest.approx(arm.fk(q)[:3], abs=2e-4)
-        assert np.abs(plant._flange_position - ArmModel(UR3).fk(q)[:3]).max() > 1e-5
+        assert plant.flange_position == pytest.approx(arm.fk(q)[:3], abs=2e-4)
+        assert np.abs(plant.flange_position - ArmModel(UR3).fk(q)[:3]).max() > 1e-5
 
 
 # --- loads ---

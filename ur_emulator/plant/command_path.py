@@ -1,12 +1,28 @@
-"""CommandPath: from the controller's target, once a cycle, to the set-point of the servos, every sub-step.
+"""CommandPath: from the controller's target, once a cycle, to what the servos are told, every sub-step.
 
 Three things happen on the way. The drives interpolate between the targets of successive cycles (cubic in
 position, so that it agrees with the target speeds; linear in speed and torque). They do so some dead time
-later. And their set-point filter, a first-order lag, rounds what arrives.
+later. And their set-point filter, a first-order lag, rounds what arrives. The slow outer loop trims the rest.
 
-All of it is linear in the targets, and so is what the law of the servos makes of position and speed. One
-matrix, built once from the plain definition below, does a whole cycle of all joints in one product. This
-module does not know the arm.
+All of it is linear in the targets, and so is the law of the servos. One matrix, built once from the plain
+definition below, does a whole cycle of all joints in one product:
+
+| rows of the inputs         | what they are                                                         |
+|----------------------------|-----------------------------------------------------------------------|
+| q, qd, deflection          | the filter, at the end of the last cycle                              |
+| trim                       | shift of the servos in the last cycle                                 |
+| error                      | of the joints at the end of the last cycle, trimmed from now on       |
+| q, qd, deflection, n times | targets, the newest first                                             |
+
+| rows of the outputs        | what they are                                                         |
+|----------------------------|-----------------------------------------------------------------------|
+| target speed               | of the newest target                                                  |
+| set-point speed            | at the start of the last sub-step                                     |
+| control, n times           | q + lead qd + deflection + trim at the start of each sub-step         |
+| q, qd, deflection, trim, 0 | the first rows of the inputs of the next cycle                        |
+
+A torque goes down the path as the deflection of the servo that gives it: torque / kp. This module does not
+know the arm.
 """
 
 from __future__ import annotations
@@ -18,12 +34,16 @@ from numpy.typing import NDArray
 
 from ur_emulator.plant.plant_state import Target
 
-N_SIGNALS = 3  # position, speed, torque
-_TRIM = N_SIGNALS  # the row of the trim among the inputs
+N_SIGNALS = 3  # position, speed, deflection
+_TRIM, _ERROR = N_SIGNALS, N_SIGNALS + 1
+_N_KEPT = N_SIGNALS + 2  # rows that go from a cycle to the next
 
 
 class CommandPath:
     """The delayed and filtered set-point of all joints.
+
+    A cycle is `take`, `advance`, `keep`; the first two may be repeated, or change places where
+    `newest_acts_later`.
 
     Args:
         n_substeps: sub-steps in a control cycle.
@@ -31,29 +51,37 @@ class CommandPath:
         dead_substeps: dead time in sub-steps.
         lag: time constant of the set-point filter [s].
         lead: gain in speed over gain in position of the servos, the same for all joints [s].
+        trim_gain: part of the error that is trimmed away in a cycle.
 
     Attributes:
-        newest: the target of this cycle (3, 6): q [rad], qd [rad/s], tau [Nm]; see `take`.
-        trim: shift of the servos (6,) [rad].
+        newest: the target of this cycle (3, 6): q [rad], qd [rad/s], deflection [rad]; see `take`.
+        newest_acts_later: of the outputs of a cycle only the target speed depends on its target.
         speeds: (3, 6) [rad/s]: the first row is the caller's, for the actual speeds; then the speed of the
             newest target, and that of the set-point at the start of the last sub-step.
-        position: (n_substeps, 6), q_set + lead qd_set + trim at the start of each sub-step [rad].
-        tau: (n_substeps, 6), likewise the torque [Nm].
+        control: what the servos are told at the start of each sub-step (n_substeps, 6) [rad].
         q_final: set-point position at the end of the cycle (6,) [rad].
+        trim: shift of the servos in this cycle (6,) [rad].
     """
 
     def __init__(
-        self, n_substeps: int, substep: float, dead_substeps: int, lag: float, lead: float = 0.0
+        self,
+        n_substeps: int,
+        substep: float,
+        dead_substeps: int,
+        lag: float,
+        lead: float = 0.0,
+        trim_gain: float = 0.0,
     ) -> None:
         self._period = n_substeps * substep
         self._delay = dead_substeps * substep + lag
-        self._matrix = _cycle_matrix(path_responses(n_substeps, substep, dead_substeps, lag), lead)
+        responses = path_responses(n_substeps, substep, dead_substeps, lag)
+        self._matrix = _cycle_matrix(responses, lead, trim_gain)
+        self.newest_acts_later = not self._matrix[1:, _N_KEPT : _N_KEPT + N_SIGNALS].any()
         n_outputs, n_inputs = self._matrix.shape
-        # Rows of six, one a joint: filter (q, qd, tau), trim, then targets (q, qd, tau), newest first.
         self._inputs = np.zeros((n_inputs, 6))
-        self._filtered = self._inputs[:N_SIGNALS]
-        self.trim: NDArray[np.float64] = self._inputs[_TRIM]
-        self._targets = self._inputs[_TRIM + 1 :]
+        self._kept = self._inputs[:_N_KEPT]
+        self._error: NDArray[np.float64] = self._inputs[_ERROR]
+        self._targets = self._inputs[_N_KEPT:]
         self.newest: NDArray[np.float64] = self._targets[:N_SIGNALS]
         self._newest_memory = self.newest.data.cast("B")
         self._younger = self._targets[:-N_SIGNALS]
@@ -62,39 +90,54 @@ class CommandPath:
         memory = np.zeros((1 + n_outputs, 6))
         self._outputs = memory[1:]
         self.speeds: NDArray[np.float64] = memory[:3]
-        self.position: NDArray[np.float64] = memory[3 : 3 + n_substeps]
-        self.tau: NDArray[np.float64] = memory[3 + n_substeps : -N_SIGNALS]
-        self._final = memory[-N_SIGNALS:]
+        self.control: NDArray[np.float64] = memory[3 : 3 + n_substeps]
+        self._final = memory[-_N_KEPT:]
         self.q_final: NDArray[np.float64] = self._final[0]
+        self.trim: NDArray[np.float64] = self._final[_TRIM]
 
     def reset(
-        self, q: NDArray[np.float64], tau: NDArray[np.float64], qd: NDArray[np.float64] | None = None
+        self,
+        q: NDArray[np.float64],
+        deflection: NDArray[np.float64],
+        q_motor: NDArray[np.float64],
+        qd: NDArray[np.float64] | None = None,
     ) -> None:
-        """Start anew, as if the present motion had always been so; the trim stays.
+        """Start anew, as if the present motion had always been so.
 
         Args:
             q: newest target (6,) [rad].
-            tau: torque (6,) [Nm].
+            deflection: of the servos (6,) [rad].
+            q_motor: where the motors are (6,) [rad]; what they are away from the set-point is trimmed.
             qd: speed of the target (6,) [rad/s]; None for rest.
         """
         speed = np.zeros(6) if qd is None else qd
         n_knots = len(self._targets) // N_SIGNALS
-        self._filtered[:] = q - self._delay * speed, speed, tau
         self._targets[:] = np.concatenate(
-            [[q - k * self._period * speed, speed, tau] for k in range(n_knots)]
+            [[q - k * self._period * speed, speed, deflection] for k in range(n_knots)]
         )
-        self._final[:] = self._filtered
+        set_point = q - self._delay * speed
+        self._final[:] = set_point, speed, deflection, q_motor - set_point, np.zeros(6)
+        self.keep()
 
     def take(self, target: Target) -> None:
-        """Make room and fill `newest`; its third row with qdd, for the caller to replace by the torque."""
-        self._older[:] = self._younger
+        """Fill `newest`; its third row with qdd, for the caller to replace by the deflection."""
         # One call for three assignments of tuples.
         _PACK(self._newest_memory, 0, *target.q, *target.qd, *target.qdd)
 
     def advance(self) -> None:
-        """Fill the outputs of this cycle for `newest` and `trim`."""
+        """Fill the outputs of this cycle."""
         self._matrix.dot(self._inputs, self._outputs)
-        self._filtered[:] = self._final
+
+    def keep(self, error: NDArray[np.float64] | None = None) -> None:
+        """End the cycle: make room for the next target.
+
+        Args:
+            error: of the joints (6,) [rad], to be trimmed away from the next cycle on; None: the trim rests.
+        """
+        self._kept[:] = self._final
+        self._older[:] = self._younger
+        if error is not None:
+            self._error[:] = error
 
 
 _PACK = Struct("18d").pack_into
@@ -104,8 +147,8 @@ def path_responses(n_substeps: int, substep: float, dead_substeps: int, lag: flo
     """Return what each input of the path of one joint does to its set-point; arguments as `trace_cycle`.
 
     Returns:
-        (3, n_substeps + 1, n): q, qd, tau at the start of each sub-step and at the end of the cycle by input:
-        the filter's q, qd, tau, then those of each target, newest first.
+        (3, n_substeps + 1, n): q, qd, deflection at the start of each sub-step and at the end of the cycle by
+        input: the filter's q, qd, deflection, then those of each target, newest first.
     """
     # A delayed cycle lies between targets that are up to this many cycles old.
     n_knots = 2 + -(-dead_substeps // n_substeps)
@@ -120,12 +163,14 @@ def path_responses(n_substeps: int, substep: float, dead_substeps: int, lag: flo
     return responses
 
 
-def _cycle_matrix(responses: NDArray[np.float64], lead: float) -> NDArray[np.float64]:
-    """Return the outputs of `CommandPath`, in the order of its memory, by its inputs."""
-    q, qd, tau = np.insert(responses, _TRIM, 0.0, axis=2)
-    trim, newest_qd = np.eye(q.shape[1])[[_TRIM, _TRIM + 2]]
-    position = q[:-1] + lead * qd[:-1] + trim
-    return np.array([newest_qd, qd[-2], *position, *tau[:-1], q[-1], qd[-1], tau[-1]])
+def _cycle_matrix(responses: NDArray[np.float64], lead: float, trim_gain: float) -> NDArray[np.float64]:
+    """Return the matrix of the tables above."""
+    q, qd, deflection = np.insert(responses, [_TRIM, _TRIM], 0.0, axis=2)
+    trim, newest_qd = np.zeros((2, q.shape[1]))
+    newest_qd[_N_KEPT + 1] = 1.0
+    trim[[_TRIM, _ERROR]] = 1.0, trim_gain
+    control = q[:-1] + lead * qd[:-1] + deflection[:-1] + trim
+    return np.array([newest_qd, qd[-2], *control, q[-1], qd[-1], deflection[-1], trim, 0.0 * trim])
 
 
 def trace_cycle(
@@ -139,7 +184,7 @@ def trace_cycle(
     """Follow one cycle of the command path of one joint, sub-step by sub-step: the definition.
 
     Args:
-        filtered: filter state at the start of the cycle (3,): q, qd, tau.
+        filtered: filter state at the start of the cycle (3,): q, qd, deflection.
         knots: targets (n, 3), newest first; the newest is for the end of this cycle.
         n_substeps: sub-steps in a cycle.
         substep: [s].
@@ -167,7 +212,7 @@ def trace_cycle(
 def _interpolate(
     before: NDArray[np.float64], after: NDArray[np.float64], share: float, period: float
 ) -> NDArray[np.float64]:
-    """Between two targets (q, qd, tau): Hermite cubic for q, linear for the others; share in [0, 1]."""
+    """Between two targets: Hermite cubic for q, linear for qd and deflection; share in [0, 1]."""
     between = before + share * (after - before)
     s2, s3 = share * share, share * share * share
     between[0] = (

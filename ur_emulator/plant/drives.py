@@ -1,13 +1,13 @@
 """Drives: from the controller's target to what the joint servos are told in every sub-step.
 
 The controller sends position, speed and the torque of its rigid-body model down the command path. A servo
-adds up
+gives
 
-    tau = kp (q_set + lead qd_set + trim) + tau_set + friction compensation at qd_set - kp q - kv qd
+    tau = kp (control - q) - kv qd + bias,   control = q_set + lead qd_set + tau_set / kp + trim
 
-with lead = kv / kp. The terms in q and qd live in MuJoCo's actuators. `trim` is the slow outer loop: it
-integrates the error at the joint's own encoder, so that gear error, wrong masses and left-over friction
-vanish at rest.
+with lead = kv / kp. The law itself lives in MuJoCo's actuators (`physics.py`); `control` comes from the
+command path, the bias compensates friction at qd_set. `trim` is the slow outer loop: it integrates the error
+at the joint's own encoder, so that gear error, wrong masses and left-over friction vanish at rest.
 
 While the arm is guided by hand there is no set-point: see `HandGuiding`.
 """
@@ -39,6 +39,10 @@ NO_LOAD: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 class Drives:
     """The six drives and the controller's torque model that feeds them.
 
+    A cycle is `command`, `advance`, `keep`, or for an arm that is guided by hand `guide` alone. Only `keep`
+    takes a cycle for done: the others may be repeated. Where `target_acts_later`, `advance` may come first;
+    it must be repeated then for `target_current`.
+
     Args:
         robot: type of the arm.
         calibration: of this arm.
@@ -50,8 +54,11 @@ class Drives:
         period: control cycle [s].
 
     Attributes:
-        table: (n_substeps, 6), what to write to MuJoCo's `ctrl` before each sub-step of this cycle [Nm].
-        rows: of the table.
+        target_acts_later: the dead time keeps the target of a cycle out of it.
+        actual_speed: (6,) [rad/s], for the caller to fill before `advance`: it sets the true friction.
+        control: n_substeps rows (6,), what to write to MuJoCo's `ctrl` before each sub-step of this cycle:
+            angles for the servos [rad], torques while the joints are free [Nm].
+        bias: torque of the servos beside their law in this cycle (6,) [Nm].
         q_final: set-point at the end of this cycle (6,) [rad].
         coulomb: true size of the Coulomb friction at the speeds last given (6,) [Nm].
         target_moment: rigid-body torque for the present target (6,) [Nm].
@@ -70,24 +77,26 @@ class Drives:
         period: float,
     ) -> None:
         self._dynamics = InverseDynamics(robot, calibration)
-        self._friction = Friction(robot, fidelity, seed)
         self._guiding = HandGuiding(robot)
         n_substeps = round(period / substep)
-        self._path = path = CommandPath(n_substeps, substep, dead_substeps, fidelity.drive_lag, gains.lead)
+        self._path = path = CommandPath(
+            n_substeps, substep, dead_substeps, fidelity.drive_lag, gains.lead, period / _INTEGRAL_TIME
+        )
+        self._friction = Friction(robot, fidelity, seed)
+        self.target_acts_later = path.newest_acts_later
         self._period = period
         self._kp = gains.kp
-        # One row a sub-step: broadcasting costs twice the arithmetic at this size.
-        self._kp_rows = np.tile(gains.kp, (n_substeps, 1))
+        self._per_kp = 1.0 / gains.kp
         self._per_torque = 1.0 / np.array(robot.torque_constant)
         # A servo that gives more than this at rest presses against something: more than its joint's friction
         # at rest, and a few parts in a hundred of wrong masses, can ask for.
         self._pressing = 0.5 * np.array(robot.coulomb)
-        self._trim_gain = np.full(6, period / _INTEGRAL_TIME)
-        self._q, self._qd, self._qdd_then_tau = path.newest
-        self._actual_speeds = path.speeds[0]
+        self._q, self._qd, self._qdd_then_deflection = path.newest
+        self._moment = self._dynamics.torque
         self._work = np.zeros(6)
-        self.table: NDArray[np.float64] = np.zeros((n_substeps, 6))
-        self.rows = list(self.table)
+        self.control = list(path.control)
+        self.actual_speed = path.speeds[0]
+        self.bias = self._friction.compensation
         self.q_final = path.q_final
         self.coulomb = self._friction.coulomb
         self.target_moment = self.target_current = NO_LOAD
@@ -99,8 +108,7 @@ class Drives:
     def take_over(self, q: NDArray[np.float64], q_motor: NDArray[np.float64]) -> None:
         """Hold the arm at rest: joints at q, motors at q_motor, (6,) each [rad]."""
         still = np.zeros(6)
-        self._path.reset(q, self._dynamics.evaluate(q, still, still))
-        np.subtract(q_motor, q, self._path.trim)
+        self._path.reset(q, self._dynamics.evaluate(q, still, still) * self._per_kp, q_motor)
 
     def take_over_moving(self, target: Target, q_motor: NDArray[np.float64]) -> None:
         """Follow a target that begins now, the motors being at q_motor (6,) [rad].
@@ -109,38 +117,36 @@ class Drives:
         away and then pulled in as fast as any other error.
         """
         q, qd = np.array(target.q), np.array(target.qd)
-        path = self._path
-        path.reset(q - self._period * qd, self._dynamics.evaluate(q, qd, np.zeros(6)), qd)
-        np.subtract(q_motor, path.q_final, path.trim)
+        moment = self._dynamics.evaluate(q, qd, np.zeros(6))
+        self._path.reset(q - self._period * qd, moment * self._per_kp, q_motor, qd)
 
     def release(self) -> None:
         """Carry nothing: the brakes do."""
         self.target_moment = self.target_current = NO_LOAD
 
-    def command(self, target: Target, qd_actual: NDArray[np.float64]) -> bool:
-        """Take the target of this cycle and fill `table`; qd_actual (6,) [rad/s] sets the true friction.
+    def command(self, target: Target) -> bool:
+        """Take the target of this cycle.
 
         Returns:
             False when the target is not finite or absurd; nothing has changed then.
         """
         if not hypot(*target.q, *target.qd, *target.qdd) < TARGET_MAX:
             return False
-        path, friction, moment = self._path, self._friction, self._qdd_then_tau
-        table, work = self.table, self._work
-        path.take(target)
-        # The third signal of the command path is torque, in place of the acceleration that it came from.
-        moment[:] = self._dynamics.evaluate(self._q, self._qd, moment)
-        self._actual_speeds[:] = qd_actual
-        path.advance()
-        friction.evaluate(path.speeds)
-        np.multiply(path.position, self._kp_rows, table)
-        np.add(table, path.tau, table)
-        np.add(table, friction.compensation, table)
+        self._path.take(target)
+        moment = self._dynamics.evaluate(self._q, self._qd, self._qdd_then_deflection)
+        np.multiply(moment, self._per_kp, self._qdd_then_deflection)
         self.target_moment = six(moment.tolist())
-        np.add(moment, friction.expected, work)
-        np.multiply(work, self._per_torque, work)
-        self.target_current = six(work.tolist())
         return True
+
+    def advance(self) -> None:
+        """Fill `control`, `bias`, `coulomb`, `q_final` and `target_current`."""
+        self._path.advance()
+        self._friction.evaluate(self._path.speeds)
+        self._expect_current()
+
+    def keep(self, error: NDArray[np.float64] | None) -> None:
+        """End the cycle; the servos are trimmed by the joints' error (6,) [rad] unless that is None."""
+        self._path.keep(error)
 
     def expect(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> bool:
         """Set `target_moment` and `target_current` for a target, (6,) each, that the arm follows by itself.
@@ -151,19 +157,26 @@ class Drives:
         if not hypot(*q, *qd, *qdd) < TARGET_MAX:
             return False
         speeds = np.array([qd, qd, qd], dtype=np.float64)
-        moment = self._dynamics.evaluate(np.array(q), speeds[0], np.array(qdd))
+        self.target_moment = six(self._dynamics.evaluate(np.array(q), speeds[0], np.array(qdd)).tolist())
         self._friction.evaluate(speeds)
-        self.target_moment = six(moment.tolist())
-        self.target_current = six(((moment + self._friction.expected) * self._per_torque).tolist())
+        self._expect_current()
         return True
 
+    def _expect_current(self) -> None:
+        """Set the current for the model's torque and the friction at the target."""
+        current = self._work
+        np.add(self._moment, self._friction.expected, current)
+        np.multiply(current, self._per_torque, current)
+        self.target_current = six(current.tolist())
+
     def guide(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> None:
-        """Fill `table` for an arm that is guided by hand, with joints at q (6,) [rad], qd (6,) [rad/s]."""
+        """Fill `control` for an arm that is guided by hand, with joints at q (6,) [rad], qd (6,) [rad/s]."""
         still = np.zeros(6)
         gravity = self._dynamics.evaluate(q, still, still)
         self._friction.evaluate(np.array([qd, qd, qd]))
         torque = self._guiding.torque(gravity, self._friction.dry_compensation, q, qd)
-        self.table[:] = torque
+        self._path.control[:] = torque
+        self.bias[:] = 0.0
         self.target_moment = six(gravity.tolist())
         self.target_current = six((torque * self._per_torque).tolist())
 
@@ -171,8 +184,3 @@ class Drives:
         """True when some servo of a resting arm, motors at q_motor (6,) [rad], pushes against something."""
         effort = self._kp * (self.q_final + self._path.trim - q_motor)
         return bool((np.abs(effort) > self._pressing).any())
-
-    def integrate(self, error: NDArray[np.float64]) -> None:
-        """Trim the servos by the joints' error (6,) [rad] of this cycle; not to be called in saturation."""
-        np.multiply(error, self._trim_gain, self._work)
-        np.add(self._path.trim, self._work, self._path.trim)

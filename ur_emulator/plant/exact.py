@@ -31,7 +31,7 @@ class ExactPlant(Plant):
         self, robot: RobotModel, fidelity: Fidelity, seed: int, generation: RobotGeneration = CB3
     ) -> None:
         super().__init__(robot, fidelity, seed, generation)
-        self.obstacles = _NoObstacles(self._model, self._qpos)
+        self._physics.obstacles = _NoObstacles(self._physics.model, self._physics.q)
 
     def reset(self, q: Sequence[float]) -> None:
         """Put the arm at rest at q (6,) [rad], brakes on.
@@ -64,14 +64,14 @@ class ExactPlant(Plant):
                 f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
                 cycle=self.cycle,
             )
-        self._qpos[:] = self._q
-        self._qvel[:] = self._qd
+        self._physics.q[:] = self._q
+        self._physics.qd[:] = self._qd
 
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
         if self._state is None:
-            mujoco.mj_kinematics(self._model, self._data)
-            x, y, z = (GRAVITY * self._flange_rotation[2]).tolist()
+            mujoco.mj_kinematics(self._physics.model, self._physics.data)
+            x, y, z = (GRAVITY * self._physics.flange_rotation[2]).tolist()
             current, moment = self._drives.target_current, self._drives.target_moment
             self._thermometers.step(current)
             self._state = PlantState(

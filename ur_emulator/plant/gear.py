@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.plant.sensors import Record
 
 
 class GearRipple:
@@ -32,37 +33,31 @@ class GearRipple:
         first, second = robot.gear_ratio, 2.0 * robot.gear_ratio
         # A speed ripple of rms r has the slope amplitude sqrt(2) r.
         slopes = sqrt(2.0) * np.array([fidelity.ripple_first, fidelity.ripple_second])
-        # Four waves: error and slope of the first harmonic, error and slope of the second.
-        # Constants have the full shape: broadcasting costs twice the arithmetic at this size.
-        self._cycles = _rows(first, first, second, second)
-        self._phases = np.array([phases[0], phases[0] + np.pi / 2, phases[1], phases[1] + np.pi / 2])
-        self._sizes = _rows(slopes[0] / first, slopes[0], slopes[1] / second, slopes[1])
-        self._waves = np.zeros((4, 6))
-        self._first, self._second = self._waves[:2], self._waves[2:]
+        # Four waves a joint: error and slope of the first harmonic, error and slope of the second. Products
+        # with matrices cost less than broadcasting at this size.
+        self._cycles = np.kron([[first], [first], [second], [second]], np.eye(6))
+        self._phases = np.concatenate([phases[0], phases[0] + np.pi / 2, phases[1], phases[1] + np.pi / 2])
+        sizes = [[slopes[0] / first, 0.0, slopes[1] / second, 0.0], [0.0, slopes[0], 0.0, slopes[1]]]
+        self._sizes = np.kron(sizes, np.eye(6))
+        self._waves = np.zeros(24)
         # What the joint has beyond the motor: error and, after `apply`, speed.
-        self._sum = np.zeros((2, 6))
-        self.error: NDArray[np.float64] = self._sum[0]
-        self.slope: NDArray[np.float64] = self._sum[1]
+        self._sum = np.zeros(12)
+        self.error: NDArray[np.float64] = self._sum[:6]
+        self.slope: NDArray[np.float64] = self._sum[6:]
 
     def evaluate(self, q_motor: NDArray[np.float64]) -> None:
         """Set `error` e [rad] and `slope` de/dq [1] for motor positions q_motor (6,)."""
         waves = self._waves
-        np.multiply(q_motor, self._cycles, waves)
+        self._cycles.dot(q_motor, waves)
         np.add(waves, self._phases, waves)
         np.sin(waves, waves)
-        np.multiply(waves, self._sizes, waves)
-        np.add(self._first, self._second, self._sum)
+        self._sizes.dot(waves, self._sum)
 
-    def apply(self, motion: NDArray[np.float64], qd_motor: NDArray[np.float64]) -> None:
-        """Turn `motion` (2, 6), positions and speeds of the motors, into those of the joints; sets `error`.
-
-        Args:
-            motion: [rad, rad/s]; changed in place.
-            qd_motor: its second row.
-        """
-        self.evaluate(motion[0])
-        np.multiply(self.slope, qd_motor, self.slope)
-        np.add(motion, self._sum, motion)
+    def apply(self, record: Record) -> None:
+        """Turn positions and speeds of the motors in a record into those of the joints; sets `error`."""
+        self.evaluate(record.q)
+        np.multiply(self.slope, record.qd, self.slope)
+        np.add(record.motion, self._sum, record.motion)
 
     def motor_position(self, q_joint: NDArray[np.float64]) -> NDArray[np.float64]:
         """Invert the gear: motor positions (6,) that put the joints at q_joint (6,) [rad]."""
@@ -72,8 +67,3 @@ class GearRipple:
             self.evaluate(q_motor)
             q_motor = q_joint - self.error
         return q_motor
-
-
-def _rows(*values: float) -> NDArray[np.float64]:
-    """Return one row of six equal entries for each value."""
-    return np.repeat(np.array(values)[:, None], 6, axis=1)

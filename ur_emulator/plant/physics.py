@@ -1,7 +1,7 @@
 """The plant's MuJoCo model: the mechanism with hull, friction, drives, table and raw sensors.
 
-The joint servo's proportional and speed terms are MuJoCo actuators (force = ctrl - kp q - kv qd), so that
-they act within every sub-step, in C, and implicitly in speed. What goes into `ctrl` is the drives' business.
+The law of the joint servos is that of MuJoCo's actuators, force = kp (ctrl - q) - kv qd + bias, so that it
+acts within every sub-step, in C, and implicitly in speed. The drives say what goes into `ctrl` and `bias`.
 """
 
 from __future__ import annotations
@@ -67,16 +67,22 @@ class JointServos:
     """Switches the joints of a compiled model between their servos and being free.
 
     Free means: actuators give `ctrl` as it is, and friction holds what stands still.
+
+    Attributes:
+        bias: torque beside the law (6,) [Nm].
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        self._bias = model.actuator_biasprm
-        self._servo_bias = model.actuator_biasprm.copy()
+        self._gain = model.actuator_gainprm
+        self._law = model.actuator_biasprm
+        self._servo_gain, self._servo_law = self._gain.copy(), self._law.copy()
         self._solimp = model.dof_solimp
+        self.bias: NDArray[np.float64] = self._law[:, 0]
 
     def set_free(self, free: bool) -> None:
         """Free the joints, or give them back to their servos."""
-        self._bias[:] = 0.0 if free else self._servo_bias
+        self._gain[:, 0] = 1.0 if free else self._servo_gain[:, 0]
+        self._law[:] = 0.0 if free else self._servo_law
         self._solimp[:] = _STICTION_SOLIMP if free else _FRICTION_SOLIMP
 
 
@@ -124,7 +130,7 @@ def _add_drives(spec: mujoco.MjSpec, robot: RobotModel, gains: ServoGains) -> No
         drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         drive.gaintype = mujoco.mjtGain.mjGAIN_FIXED
         drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-        drive.gainprm[0] = 1.0
+        drive.gainprm[0] = gains.kp[i]
         drive.biasprm[1] = -gains.kp[i]
         drive.biasprm[2] = -gains.kv[i]
         drive.forcelimited = True

@@ -18,7 +18,6 @@ from collections import deque
 from collections.abc import Sequence
 from operator import ge, truediv
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,21 +25,18 @@ from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
 from ur_emulator.models.calibration import calibrated_dh, draw_calibration
 from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.mjcf import FLANGE, GRAVITY
+from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_generation import CB3, RobotGeneration
 from ur_emulator.models.robot_model import RobotModel, Vector3, six
-from ur_emulator.plant.contact import contact_wrench
+from ur_emulator.plant.arm_physics import ArmPhysics
 from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX, Drives
 from ur_emulator.plant.gear import GearRipple
-from ur_emulator.plant.loads import Loads
 from ur_emulator.plant.obstacles import Obstacles
-from ur_emulator.plant.physics import JointServos, ServoGains, build_physics
+from ur_emulator.plant.physics import ServoGains
 from ur_emulator.plant.plant_state import PlantState, Target
 from ur_emulator.plant.sensors import REC_ACCELERATION, Record, Sensors
 from ur_emulator.plant.thermometers import Thermometers
-
-_RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 
 
 class Plant:
@@ -57,7 +53,6 @@ class Plant:
     Attributes:
         calibration: the factory calibration of this arm, for the controller's kinematics.
         dead_time: the delay drawn for this box, from the start of a cycle to the drives acting on it [s].
-        obstacles: what stands around the arm.
     """
 
     def __init__(
@@ -76,21 +71,9 @@ class Plant:
         self.dead_time = dead_substeps * substep
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
         gains = ServoGains.of(robot)
-        self._model = build_physics(
+        self._physics = ArmPhysics(
             robot, calibrated_dh(robot, self.calibration), mass_scale.tolist(), gains, substep
         )
-        self._data = data = mujoco.MjData(self._model)
-        # Views into MuJoCo's memory: one attribute lookup each, once.
-        self._qpos: NDArray[np.float64] = data.qpos
-        self._qvel: NDArray[np.float64] = data.qvel
-        self._ctrl: NDArray[np.float64] = data.ctrl
-        self._raw: NDArray[np.float64] = data.sensordata
-        self._force: NDArray[np.float64] = data.actuator_force
-        self._frictionloss: NDArray[np.float64] = self._model.dof_frictionloss
-        site: int = self._model.site(FLANGE).id
-        self._flange_position: NDArray[np.float64] = data.site_xpos[site]
-        self._flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
-
         self._drives = Drives(
             robot, self.calibration, fidelity, seed, gains, dead_substeps, substep, self.period_s
         )
@@ -102,21 +85,20 @@ class Plant:
         age_substeps = max(1, round(fidelity.feedback_age / substep))
         self._capture_at = -age_substeps % self._n_substeps
         # The record of this cycle stands last; the oldest one is read.
+        # The first record is that of this cycle; the next one, which is the oldest, is read.
         self._records = deque(Record() for _ in range(1 + (age_substeps - 1) // self._n_substeps))
+        self._read_at = 1 % len(self._records)
 
         self._per_torque = 1.0 / np.array(robot.torque_constant)
         self._currents = np.zeros(6)
         # Below this no joint can be at its torque limit [A].
         self._unsaturated = min(map(truediv, robot.tau_max, robot.torque_constant))
-        self._servos = JointServos(self._model)
         self._mode = ControlMode.POSITION
         # In force mode and after it, until the arm is moved away; see `rest_trim`.
         self._trim_rests = False
-        self._loads = Loads(self._model, data)
-        self.obstacles = Obstacles(self._model, data.qpos)
         self._error = np.zeros(6)
         self._braked = True
-        self._saturated = self._saturated_now = False
+        self._saturated_before = self._saturated_now = False
         self._control_current = NO_LOAD
         self._rest = Record()
         self._state: PlantState | None = None
@@ -125,31 +107,36 @@ class Plant:
     # --- state for tests and for the control API ---
 
     @property
+    def obstacles(self) -> Obstacles:
+        """What stands around the arm."""
+        return self._physics.obstacles
+
+    @property
     def q_true(self) -> NDArray[np.float64]:
         """True joint angles (6,) now [rad]; no real controller knows them."""
-        self._gear.evaluate(self._qpos)
-        return self._qpos + self._gear.error
+        self._gear.evaluate(self._physics.q)
+        return self._physics.q + self._gear.error
 
     @property
     def qd_true(self) -> NDArray[np.float64]:
         """True joint speeds (6,) now [rad/s]."""
-        self._gear.evaluate(self._qpos)
-        return self._qvel * (1.0 + self._gear.slope)
+        self._gear.evaluate(self._physics.q)
+        return self._physics.qd * (1.0 + self._gear.slope)
 
     @property
     def n_contacts(self) -> int:
         """Number of contact points of the arm with itself, its base or the table."""
-        return int(self._data.ncon)
+        return self._physics.n_contacts
 
     @property
     def flange_position(self) -> NDArray[np.float64]:
         """True position of the flange (3,) in the base frame [m], at the start of the last sub-step."""
-        return self._flange_position.copy()
+        return self._physics.flange_position.copy()
 
     @property
     def contact_wrench(self) -> NDArray[np.float64]:
         """What table and base press on the arm (6,), at the flange in base axes [N, Nm]: the truth."""
-        return contact_wrench(self._model, self._data, self._flange_position)
+        return self._physics.contact_wrench
 
     def reset(self, q: Sequence[float]) -> None:
         """Put the arm at rest at q (6,) [rad], brakes on; payload, push and random streams stay.
@@ -161,21 +148,17 @@ class Plant:
         if angles.shape != (6,) or not np.isfinite(angles).all():
             raise PlantError(f"joint angles {list(q)} given: six finite numbers are needed")
         self.cycle = 0
-        mujoco.mj_resetData(self._model, self._data)
-        self._qpos[:] = self._gear.motor_position(angles)
+        self._physics.place(self._gear.motor_position(angles))
         self._sensors.reset()
         self._engage_brakes()
         for record in self._records:
             record.values[:] = self._rest.values
+        self._reading = self._sensors.read(self._records[self._read_at])
         self._state = None
 
     def touches(self, q: Sequence[float]) -> bool:
-        """Return whether the arm would touch itself, its base or the table at q (6,) [rad]."""
-        data = mujoco.MjData(self._model)
-        data.qpos[:] = q
-        mujoco.mj_kinematics(self._model, data)
-        mujoco.mj_collision(self._model, data)
-        return int(data.ncon) > 0
+        """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
+        return self._physics.touches(q)
 
     def set_payload(self, mass: float, cog: Vector3) -> None:
         """Declare a payload to the controller; it hangs on the flange unless `hang` has put another there.
@@ -187,7 +170,7 @@ class Plant:
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
-        self._loads.declare(mass, cog)
+        self._physics.loads.declare(mass, cog)
         self._drives.set_payload(mass, cog)
 
     def hang(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
@@ -202,7 +185,7 @@ class Plant:
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
-        self._loads.hang(mass, cog)
+        self._physics.loads.hang(mass, cog)
 
     def rest_trim(self) -> None:
         """Let the slow outer loop of the servos rest until the target moves, where the arm presses something.
@@ -221,7 +204,7 @@ class Plant:
         Raises:
             PlantError: when a number is not finite.
         """
-        self._loads.push(force, point)
+        self._physics.loads.push(force, point)
 
     # --- the cycle ---
 
@@ -240,10 +223,7 @@ class Plant:
         self._state = None
         self.cycle += 1
         if target is None:
-            if not self._braked:
-                self._engage_brakes()
-            self._records.rotate(-1)
-            self._records[-1].values[:] = self._rest.values
+            self._stand_still()
             return
         if self._braked:
             self._release_brakes()
@@ -252,92 +232,98 @@ class Plant:
         elif self._trim_rests and mode is ControlMode.POSITION and any(target.qd):
             self._trim_rests = False
         if mode is ControlMode.TEACH:
-            self._drives.guide(self._qpos, self._qvel)
-        elif not self._drives.command(target, self._qvel):
+            self._drives.guide(self._physics.q, self._physics.qd)
+        elif not self._drives.command(target):
             raise PlantError(
                 f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
                 cycle=self.cycle,
             )
-        self._frictionloss[:] = self._drives.coulomb
-        if self._loads.is_felt:
-            self._loads.apply()
-        self._run_substeps()
-        self._look_after_saturation()
-        self._record_cycle()
+        self._run()
+        self._keep()
 
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
         if self._state is None:
-            reading = self._sensors.read(self._records[0])
-            self._thermometers.step(reading.actual_current)
             self._state = PlantState(
-                *reading,
+                *self._reading,
                 self._thermometers.reading,
                 self._drives.target_current,
                 self._drives.target_moment,
                 self._control_current,
-                self._saturated,
+                self._saturated_before and self._saturated_now,
                 six(self._error.tolist()),
             )
         return self._state
 
-    def _run_substeps(self) -> None:
-        model, data, ctrl, step = self._model, self._data, self._ctrl, mujoco.mj_step
-        self._records.rotate(-1)
-        to_capture = self._capture_at
-        for torques in self._drives.rows:
-            ctrl[:] = torques
-            step(model, data)
-            if not to_capture:
-                self._records[-1].simulated[:] = self._raw
-            to_capture -= 1
-        if not self._qvel.dot(self._qvel) < _RUNAWAY**2:
+    def _run(self) -> None:
+        """Let the arm move for a cycle and read its sensors; nobody knows of it before `_keep`."""
+        physics, drives, gear = self._physics, self._drives, self._gear
+        record, error = self._records[0], self._error
+        is_guided = self._mode is ControlMode.TEACH
+        if not is_guided:
+            drives.actual_speed[:] = physics.qd
+            drives.advance()
+        physics.run(drives, self._capture_at, record.simulated)
+        np.multiply(physics.torque, self._per_torque, self._currents)
+        self._control_current = six(self._currents.tolist())
+        gear.apply(record)
+        record.wrench[:] = physics.loads.wrench if physics.loads.is_felt else 0.0
+        if physics.data.ncon:
+            record.wrench += physics.contact_wrench
+        if is_guided:
+            error[:] = 0.0
+        else:
+            np.add(physics.q, gear.error, error)
+            np.subtract(drives.q_final, error, error)
+        self._reading = self._sensors.read(self._records[self._read_at])
+
+    def _keep(self) -> None:
+        """Take the cycle that ran for done."""
+        physics, currents = self._physics, self._control_current
+        if physics.has_diverged:
             raise PlantError(
-                f"the simulation diverged in cycle {self.cycle}: joint speeds {self._qvel.tolist()} rad/s; "
+                f"the simulation diverged in cycle {self.cycle}: joint speeds {physics.qd.tolist()} rad/s; "
                 "reset the plant and check the targets",
                 cycle=self.cycle,
             )
-
-    def _look_after_saturation(self) -> None:
-        saturated_before = self._saturated_now
-        np.multiply(self._force, self._per_torque, self._currents)
-        self._control_current = currents = six(self._currents.tolist())
+        self._saturated_before = self._saturated_now
         self._saturated_now = not (max(currents) < self._unsaturated > -min(currents)) and any(
-            map(ge, map(abs, self._force.tolist()), self.robot.tau_max)
+            map(ge, map(abs, physics.torque.tolist()), self.robot.tau_max)
         )
-        self._saturated = saturated_before and self._saturated_now
+        if self._mode is not ControlMode.TEACH:
+            trims = not (self._saturated_now or (self._trim_rests and self._presses))
+            self._drives.keep(self._error if trims else None)
+        self._keep_reading()
 
-    def _record_cycle(self) -> None:
-        """Finish the record of this cycle for the sensors, and trim the servos by what they left."""
-        gear, record, error = self._gear, self._records[-1], self._error
-        gear.apply(record.motion, record.qd)
-        record.wrench[:] = self._loads.wrench if self._loads.is_felt else 0.0
-        if self._data.ncon:
-            record.wrench += contact_wrench(self._model, self._data, self._flange_position)
-        if self._mode is ControlMode.TEACH:
-            error[:] = 0.0
-            return
-        np.subtract(self._drives.q_final, self._qpos, error)
-        np.subtract(error, gear.error, error)
-        if not (self._saturated_now or (self._trim_rests and self._presses)):
-            self._drives.integrate(error)
+    def _keep_reading(self) -> None:
+        self._records.rotate(-1)
+        self._sensors.keep()
+        self._thermometers.step(self._reading.actual_current)
 
     @property
     def _presses(self) -> bool:
         """True in force mode, and after it while the joints press against something."""
-        return self._mode is ControlMode.FORCE or self._drives.presses(self._qpos)
+        return self._mode is ControlMode.FORCE or self._drives.presses(self._physics.q)
 
     # --- ways to be driven ---
 
     def _switch(self, mode: ControlMode, target: Target) -> None:
         """Change the way that the arm is driven, without a jump of the torques."""
         was_guided, self._mode = self._mode is ControlMode.TEACH, mode
-        self._servos.set_free(mode is ControlMode.TEACH)
+        self._physics.servos.set_free(mode is ControlMode.TEACH)
         if was_guided:
-            self._drives.take_over_moving(target, self._qpos)
+            self._drives.take_over_moving(target, self._physics.q)
         self._trim_rests = mode is ControlMode.FORCE or (self._trim_rests and not was_guided)
 
     # --- brakes ---
+
+    def _stand_still(self) -> None:
+        """Let a cycle pass with the brakes on."""
+        if not self._braked:
+            self._engage_brakes()
+        self._records[0].values[:] = self._rest.values
+        self._reading = self._sensors.read(self._records[self._read_at])
+        self._keep_reading()
 
     def _engage_brakes(self) -> None:
         """Stand still at once, wherever the arm is."""
@@ -345,17 +331,16 @@ class Plant:
         self._trim_rests = False
         if self._mode is not ControlMode.POSITION:
             self._mode = ControlMode.POSITION
-            self._servos.set_free(False)
-        self._saturated = self._saturated_now = False
-        self._qvel[:] = 0.0
+            self._physics.servos.set_free(False)
+        self._saturated_before = self._saturated_now = False
         self._error[:] = 0.0
         self._control_current = NO_LOAD
         self._drives.release()
-        mujoco.mj_kinematics(self._model, self._data)
+        self._physics.stop()
         self._rest.q[:] = self.q_true
-        self._rest.values[REC_ACCELERATION] = GRAVITY * self._flange_rotation[2]
+        self._rest.values[REC_ACCELERATION] = GRAVITY * self._physics.flange_rotation[2]
 
     def _release_brakes(self) -> None:
         """Hand the load over to the drives, at the pose in which the brakes hold it."""
         self._braked = False
-        self._drives.take_over(self._rest.q, self._qpos)
+        self._drives.take_over(self._rest.q, self._physics.q)

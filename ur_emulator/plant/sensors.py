@@ -6,7 +6,6 @@ comes in blocks from seeded streams, so equal seeds and equal motions give equal
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from math import exp, pi, sqrt
 from typing import NamedTuple
 
@@ -48,7 +47,7 @@ class Record:
         simulated: the part that MuJoCo's sensors fill.
         q: joint angles (6,) [rad].
         qd: joint speeds (6,) [rad/s].
-        motion: both, (2, 6).
+        motion: both, (12,).
         wrench: external wrench (6,) [N, Nm].
     """
 
@@ -59,7 +58,7 @@ class Record:
         self.simulated: NDArray[np.float64] = self.values[REC_SIMULATED]
         self.q: NDArray[np.float64] = self.values[REC_Q]
         self.qd: NDArray[np.float64] = self.values[REC_QD]
-        self.motion: NDArray[np.float64] = self.values[REC_MOTION].reshape(2, 6)
+        self.motion: NDArray[np.float64] = self.values[REC_MOTION]
         self.wrench: NDArray[np.float64] = self.values[REC_WRENCH]
 
 
@@ -105,8 +104,9 @@ class Sensors:
         self._keep = [exp(-2.0 * pi * pole * period) for pole in fidelity.speed_filter_hz]
         self._dead_band = fidelity.speed_dead_band
         self._force_friction = fidelity.force_friction
-        self._noise: Iterator[tuple[NDArray[np.float64], float]] = iter(())
-        self._speeds: Sequence[float] = ZERO6
+        self._noise: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        self._at = _BLOCK
+        self._speeds = self._next_speeds = ZERO6
         self._values = np.zeros(N_RECORD)
         self._steps = self._values[REC_Q]
         self._work = np.zeros(6)
@@ -116,21 +116,20 @@ class Sensors:
         self._speeds = ZERO6
 
     def read(self, record: Record) -> Reading:
-        """Read all sensors of an arm whose true values are `record`; for one call a cycle."""
-        noise = next(self._noise, None) or self._next_noise()
+        """Read all sensors of an arm whose true values are `record`; the same again until `keep`."""
+        if self._at == _BLOCK:
+            self._draw_noise()
+        noise, moment = self._noise[self._at]
         values, steps, work = self._values, self._steps, self._work
         # In the sensors' units and noisy; angles also sampled a moment early or late, in whole encoder steps.
         np.multiply(record.values, self._scale, values)
-        np.add(values, noise[0], values)
-        np.multiply(record.qd, noise[1], work)
+        np.add(values, noise, values)
+        np.multiply(record.qd, moment, work)
         np.add(steps, work, steps)
         np.rint(steps, steps)
         np.multiply(steps, self._step, steps)
         reading: list[float] = values.tolist()
-        true_qd: list[float] = record.qd.tolist()
-        self._speeds = speeds = six(
-            list(map(self._filter, true_qd, reading[REC_QD], self._speeds, self._keep))
-        )
+        self._next_speeds = speeds = self._filtered(record.qd.tolist(), reading[REC_QD])
         # The force estimate takes some of the friction for a force against the motion.
         ax, ay, az, vx, vy, vz, fx, fy, fz, mx, my, mz = reading[18:30]
         if self._force_friction:
@@ -145,19 +144,29 @@ class Sensors:
             (fx, fy, fz, mx, my, mz),
         )
 
-    def _filter(self, true_speed: float, measured: float, before: float, keep: float) -> float:
-        """One joint's one-pole filter y = u + keep (y - u), whose input u is gated to zero at rest."""
-        if -self._dead_band < true_speed < self._dead_band:
-            speed = keep * before
-            return speed if abs(speed) >= _SMALLEST_SPEED else 0.0
-        return measured + keep * (before - measured)
+    def keep(self) -> None:
+        """Go on to the next cycle."""
+        self._at += 1
+        self._speeds = self._next_speeds
 
-    def _next_noise(self) -> tuple[NDArray[np.float64], float]:
-        """Draw a block; return the noise of its first cycle: of the record's columns, and of the moment."""
+    def _filtered(self, true_qd: list[float], measured: list[float]) -> Vector6:
+        """One pole a joint: y = u + keep (y - u), whose input u is gated to zero at rest."""
+        band = self._dead_band
+        return six(
+            [
+                (keep * before if abs(keep * before) >= _SMALLEST_SPEED else 0.0)
+                if -band < true < band
+                else speed + keep * (before - speed)
+                for true, speed, before, keep in zip(true_qd, measured, self._speeds, self._keep, strict=True)
+            ]
+        )
+
+    def _draw_noise(self) -> None:
+        """Draw the noise of a block of cycles: of the record's columns, and of the sampling moment."""
         block = self._rng.standard_normal((_BLOCK, _N_NOISE))
         block *= self._sigmas
         block[:, REC_WRENCH] += self._drift.next_block(_BLOCK)
         block[:, REC_VOLTAGE] += SUPPLY_VOLTAGE
-        moments: list[float] = block[:, _NOISE_MOMENT].tolist()
-        self._noise = zip(np.ascontiguousarray(block[:, :N_RECORD]), moments, strict=True)
-        return next(self._noise)
+        moments = np.repeat(block[:, _NOISE_MOMENT, None], 6, axis=1)
+        self._noise = list(zip(np.ascontiguousarray(block[:, :N_RECORD]), moments, strict=True))
+        self._at = 0
