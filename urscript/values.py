@@ -135,7 +135,7 @@ def is_number(value: Any) -> bool:
     return kind is float or kind is int or (isinstance(value, (int, float)) and not isinstance(value, bool))
 
 
-def script_text(text: str) -> str:
+def to_script_text(text: str) -> str:
     """A text from outside as scripts have it: one character for each byte of its UTF-8 form."""
     return text.encode("utf-8", "replace").decode("latin-1")
 
@@ -164,9 +164,9 @@ def str_form(value: Any) -> str:
 
 
 def log_form(value: Any) -> str:
-    """The text that `textmsg` shows: floats with six significant digits, elements without blanks.
+    """The text that `textmsg` shows and sockets send: floats with six significant digits, no spaces.
 
-    Source: primary interface captures of text messages.
+    Source: primary interface captures of text messages; field use for sockets.
     """
     if isinstance(value, str):
         return value

@@ -17,13 +17,13 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+from pc_client.driver.receiver_script import fill_template, receiver_template
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
 from protocol.primary.messages import KeyMessage
 from protocol.primary.packages import decode_package
 from protocol.realtime.layout import layout_for_version
 from protocol.ur_types import Ports, ProgramState, SoftwareVersion
-from urscript.programs import velocity_receiver
 
 VERSION = SoftwareVersion(3, 15, 8)
 LAYOUT = layout_for_version(VERSION)
@@ -186,6 +186,14 @@ def is_closed(sock):
         return sock.recv(1) == b""
     except ConnectionResetError:
         return True
+
+
+def velocity_receiver(host, port, **values):
+    """The client's program for the robot, with other values than the client's where given."""
+    standard = {"acceleration": 20.0, "stop_deceleration": 20.0, "read_timeout": 1.0, "missed_allowed": 1}
+    return fill_template(
+        receiver_template(), {"pc_address": f'"{host}"', "pc_port": port, **standard, **values}
+    )
 
 
 class VelocitySession:

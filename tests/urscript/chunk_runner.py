@@ -30,11 +30,11 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
+from tree_printer import print_program
 
 from urscript.catalogue import catalogue_for
 from urscript.compile.inference import StaticTypes, Type
 from urscript.errors import ScriptCompileError, ScriptError
-from urscript.layout.printer import print_program
 from urscript.program import ProgramStatus, check_program, compile_program
 from urscript.recording_host import FakeSocket, RecordingHost
 from urscript.source import Source

@@ -1,8 +1,8 @@
 """Hypothesis strategies of syntax trees: every node, in every place where the grammar can put it."""
 
 from hypothesis import strategies as st
+from tree_printer import print_expression
 
-from urscript.layout.printer import print_expression
 from urscript.syntax import nodes
 
 VARIABLES = ["a", "b", "c", "type", "time", "p", "_x1"]

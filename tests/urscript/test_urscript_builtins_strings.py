@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urscript.builtins import PURE
-from urscript.builtins.text import message_text, wire_text
 from urscript.errors import ScriptRuntimeError
-from urscript.values import Matrix, Pose
+from urscript.values import Matrix, Pose, log_form
 
 BYTES = st.text(st.characters(max_codepoint=255), max_size=60)
 POSE = Pose(1, 2, 3, 4, 5, 6)
@@ -202,11 +201,5 @@ def test_floats_survive_text_to_six_decimals(value: float) -> None:
         ("as it is", "as it is"),
     ],
 )
-def test_log_and_wire_form(value: object, text: str) -> None:
-    assert message_text(value) == text
-    assert wire_text(value) == text
-
-
-def test_textmsg_joins_without_a_separator() -> None:
-    assert message_text("value=", 3) == "value=3"
-    assert message_text("speed ", 0.25) == "speed 0.25"
+def test_log_form(value: object, text: str) -> None:
+    assert log_form(value) == text

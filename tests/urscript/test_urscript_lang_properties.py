@@ -3,10 +3,10 @@
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from tree_printer import print_program
 
 from urscript.dialect import Dialect
 from urscript.errors import ScriptCompileError, ScriptSyntaxError
-from urscript.layout.printer import print_program
 from urscript.program import ProgramStatus, check_program, compile_program
 from urscript.recording_host import RecordingHost
 from urscript.source import Source

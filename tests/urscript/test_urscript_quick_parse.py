@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lark.exceptions import LarkError
 from test_urscript_lang_properties import WORDS, functions, statements, threads
+from tree_printer import print_program
 
 from urscript.errors import ScriptSyntaxError
-from urscript.layout.printer import print_program
 from urscript.syntax.parser import _lark, _quick
 
 CHUNKS = sorted(Path(__file__).parent.glob("chunks/*.script"))

@@ -9,12 +9,12 @@ import threading
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from random_trees import expressions, node_classes, programs
+from tree_printer import print_expression, print_program
 
 from urscript.catalogue import CB3_3_15
 from urscript.dialect import Dialect
 from urscript.errors import ScriptCompileError
 from urscript.layout.formatter import format_program
-from urscript.layout.printer import print_expression, print_program
 from urscript.program import ProgramStatus, check_program, compile_program
 from urscript.recording_host import RecordingHost
 from urscript.source import Source

@@ -4,13 +4,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_urscript_lang_properties import WORDS, statements
+from tree_printer import print_program
 from typer.testing import CliRunner
 
 from urscript.advice import check_for_people
 from urscript.advice.checking import RULES, advise, first_syntax_error
 from urscript.cli import app
 from urscript.errors import ScriptSyntaxError
-from urscript.layout.printer import print_program
 from urscript.program import check_program, compile_program
 from urscript.source import Source, as_utf8
 from urscript.syntax.parser import parse

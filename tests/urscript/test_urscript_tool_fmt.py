@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lark import Lark
 from test_urscript_lang_properties import functions, statements, threads
+from tree_printer import print_program
 from typer.testing import CliRunner
 
 from urscript.cli import app
 from urscript.errors import ScriptSyntaxError
 from urscript.layout.formatter import format_program
-from urscript.layout.printer import print_program
 from urscript.source import Source
 from urscript.syntax.parser import parse
 from urscript.syntax.walk import same_tree

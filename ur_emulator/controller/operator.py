@@ -11,7 +11,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from protocol.primary.messages import RequestedType
-from urscript.values import INT_MAX, INT_MIN, script_text
+from urscript.values import INT_MAX, INT_MIN, to_script_text
 
 # Popups for which nobody waits: older ones than the last so many are forgotten.
 MAX_SHOWN = 20
@@ -31,7 +31,7 @@ def _as_asked(kind: RequestedType, value: Answer) -> Answer | None:
         case RequestedType.FLOAT, int() | float():
             return float(value)
         case RequestedType.STRING, str():
-            return script_text(value)
+            return to_script_text(value)
     return None
 
 

@@ -13,11 +13,12 @@ from ur_emulator.programs.installation import (
     Installation,
     installation_of,
 )
-from ur_emulator.programs.script_text import as_one_program, read_script, wire_text
+from ur_emulator.programs.script_text import as_one_program, read_script
 from ur_emulator.programs.script_writer import Gap
 from ur_emulator.programs.urp_program import ROOT, make_script, uses_external_control
 from ur_emulator.programs.urp_values import identifier
 from ur_emulator.programs.xml_tree import read_xml
+from urscript.values import to_script_text
 
 SCRIPT_SUFFIX = ".script"
 PROGRAM_SUFFIX = ".urp"
@@ -115,4 +116,4 @@ def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
 
 
 def _in_bytes(parts: tuple[str | Gap, ...]) -> tuple[str | Gap, ...]:
-    return tuple(wire_text(part) if isinstance(part, str) else part for part in parts)
+    return tuple(to_script_text(part) if isinstance(part, str) else part for part in parts)

@@ -7,6 +7,7 @@ from pathlib import Path
 from protocol.script_channel import MAX_PROGRAM, ProgramText, ScriptChannel
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.xml_tree import read_bytes
+from urscript.values import to_script_text
 
 _BYTE_ORDER_MARK = "\ufeff"
 
@@ -39,13 +40,8 @@ def as_one_program(text: str, name: str) -> str:
     """
     if len(text) > MAX_PROGRAM:
         raise ProgramFileError(f"the script has more than {MAX_PROGRAM} bytes")
-    plain = wire_text(text).rstrip() + "\n"
+    plain = to_script_text(text).rstrip() + "\n"
     items = ScriptChannel().feed(plain.encode("latin-1"))
     if len(items) == 1 and isinstance(items[0], ProgramText) and items[0].kind == "def":
         return items[0].text.rstrip("\n")
     return f"def {name}():\n{plain}end"
-
-
-def wire_text(text: str) -> str:
-    """Return a text as a script port would hand it on: UTF-8, one character a byte."""
-    return text.encode("utf-8", "replace").decode("latin-1")

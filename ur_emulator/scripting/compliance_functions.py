@@ -16,8 +16,8 @@ from ur_emulator.motion.force_mode import ArmMeasurement, ForceMode, ForceSettin
 from ur_emulator.motion.task_frame import MIN_DISTANCE, FrameType, TaskFrame
 from ur_emulator.plant.physics import ServoGains
 from ur_emulator.scripting.script_arm import ScriptArm
-from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
+from urscript.values import log_form
 
 # No task frame is further away [m]: beyond, poses lose their digits.
 MAX_FRAME_DISTANCE = 100.0
@@ -44,7 +44,7 @@ def compliance_functions(
     def freedrive_mode(thread: object, free_axes: Any = (1,) * 6, feature: Any = None) -> None:
         if not all(x == 1 for x in free_axes):
             raise ScriptRuntimeError(
-                f"freedrive_mode: blocked axes are not modelled, got freeAxes={wire_text(free_axes)}, "
+                f"freedrive_mode: blocked axes are not modelled, got freeAxes={log_form(free_axes)}, "
                 "allowed is [1,1,1,1,1,1]"
             )
         if not compliance.is_guided:
@@ -81,10 +81,10 @@ def _force_mode(
         ):
             if not all(map(good, values)):
                 allowed = "hold only 0 and 1" if name == "selection_vector" else "not be below 0"
-                raise ScriptRuntimeError(f"force_mode: {name} must {allowed}, got {wire_text(values)}")
+                raise ScriptRuntimeError(f"force_mode: {name} must {allowed}, got {log_form(values)}")
         if max(map(abs, frame)) > MAX_FRAME_DISTANCE:
             raise ScriptRuntimeError(
-                f"force_mode: {wire_text(task_frame)} is no task frame, "
+                f"force_mode: {log_form(task_frame)} is no task frame, "
                 f"allowed are numbers up to {MAX_FRAME_DISTANCE:g}"
             )
         settings = ForceSettings(

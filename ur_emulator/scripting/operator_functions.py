@@ -8,8 +8,8 @@ from typing import Any
 from protocol.primary.messages import RequestedType
 from ur_emulator.controller.events import EventQueue, PopupShown, ValueRequested
 from ur_emulator.controller.operator import Answer, Operator, OperatorRequest
-from urscript.builtins.text import wire_text
 from urscript.run.waits import Blocked
+from urscript.values import log_form
 
 _KINDS = {
     "boolean": RequestedType.BOOLEAN,
@@ -32,7 +32,7 @@ def operator_functions(operator: Operator, events: EventQueue) -> Mapping[str, C
     def popup(
         thread: object, s: Any, title: str, warning: bool, error: bool, blocking: bool
     ) -> Generator[Blocked, None, None]:
-        text = wire_text(s)
+        text = log_form(s)
         if not blocking:
             operator.show(text)
             events.append(PopupShown(title, text, warning, error, blocking))

@@ -14,7 +14,7 @@ from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, 
 from urscript.errors import ScriptRuntimeError
 from urscript.run.threads import ScriptThread
 from urscript.run.waits import Blocked
-from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type, script_text
+from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type, to_script_text
 
 _POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
 # The method that a handle answers itself.
@@ -92,7 +92,7 @@ def _from_wire(value: Any) -> Any:
         case int() if INT_MIN <= value <= INT_MAX:
             return value
         case str():
-            return script_text(value)
+            return to_script_text(value)
         case dict() if set(value) == set(_POSE_KEYS):
             numbers = [value[key] for key in _POSE_KEYS]
             if all(type(number) in (int, float) for number in numbers):

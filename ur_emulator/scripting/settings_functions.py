@@ -8,8 +8,8 @@ from typing import Any
 from ur_emulator.controller.program_requests import ProgramRequests
 from ur_emulator.controller.tool_settings import ToolSettings
 from ur_emulator.models.robot_model import RobotModel, Vector3, six
-from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
+from urscript.values import log_form
 
 # No tool is longer than this [m], no rotation vector either [rad]; beyond, poses would lose all their digits.
 MAX_TCP_OFFSET = 100.0
@@ -33,7 +33,7 @@ def settings_functions(
         offset = six([float(x) for x in pose])
         if max(map(abs, offset)) > MAX_TCP_OFFSET:
             raise ScriptRuntimeError(
-                f"set_tcp: {wire_text(pose)} is no tool, allowed are numbers up to {MAX_TCP_OFFSET:g}"
+                f"set_tcp: {log_form(pose)} is no tool, allowed are numbers up to {MAX_TCP_OFFSET:g}"
             )
         if tool.payload.at_tcp:
             cog_of(offset[:3])
@@ -43,7 +43,7 @@ def settings_functions(
         x, y, z = map(float, value)
         if max(abs(x), abs(y), abs(z)) > MAX_COG:
             raise ScriptRuntimeError(
-                f"a centre of gravity at {wire_text([x, y, z])} m was given, "
+                f"a centre of gravity at {log_form([x, y, z])} m was given, "
                 f"allowed are numbers up to {MAX_COG:g} m from the flange"
             )
         return (x, y, z)

@@ -14,9 +14,9 @@ from typing import Any
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.events import EventQueue, LogAdded
 from ur_emulator.scripting.network import Network, ScriptSocket
-from urscript.builtins.text import wire_text
 from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import GIVE_WAY, Blocked
+from urscript.values import log_form
 
 # socket_open gives up after this [s of robot time]. Source: URScript manual, socket_open.
 OPEN_TIMEOUT = 2.0
@@ -101,13 +101,13 @@ class ProgramSockets:
         return self._send(name, struct.pack(">i", int(value)))
 
     def _send_string(self, thread: object, text: Any, name: str) -> bool:
-        return self._send(name, wire_text(text).encode("latin-1", "replace"))
+        return self._send(name, log_form(text).encode("latin-1", "replace"))
 
     def _send_line(self, thread: object, text: Any, name: str) -> bool:
-        return self._send(name, wire_text(text).encode("latin-1", "replace") + b"\n")
+        return self._send(name, log_form(text).encode("latin-1", "replace") + b"\n")
 
     def _set_var(self, thread: object, variable: str, value: int, name: str) -> None:
-        self._send(name, f"SET {variable} {wire_text(value)}\n".encode("latin-1", "replace"))
+        self._send(name, f"SET {variable} {log_form(value)}\n".encode("latin-1", "replace"))
 
     # --- reading
 

@@ -7,6 +7,7 @@ import re
 from urscript.advice.problem import Advice, Edit, Problem, about, replaced
 from urscript.advice.words import INVISIBLE, SIGNS
 from urscript.source import as_utf8
+from urscript.values import to_script_text
 
 _DIVISION_BEHIND = re.compile(r"//(\d|\(|\w| \d)")
 _VALUE_BEFORE = re.compile(r"=.*[\w)\]]\s*$")
@@ -42,17 +43,13 @@ def quotes(problem: Problem) -> Advice | None:
     mark = as_utf8(piece.text)
     if SIGNS.get(mark, ("", ""))[0] != '"':
         return None
-    marks = "|".join(re.escape(_as_written(sign)) for sign, (new, _) in SIGNS.items() if new == '"')
+    marks = "|".join(re.escape(to_script_text(sign)) for sign, (new, _) in SIGNS.items() if new == '"')
     start, line = problem.rough.line_start(piece.line), problem.rough.line(piece.line)
     edits = [
         Edit(start + match.start(), start + match.end(), '"'.ljust(len(match[0])))
         for match in re.finditer(marks, line)
     ]
     return about(piece, f"{mark} is no quotation mark", SIGNS[mark][1], *edits)
-
-
-def _as_written(sign: str) -> str:
-    return sign.encode("utf-8").decode("latin-1") if ord(sign) > 127 else sign
 
 
 def sign(problem: Problem) -> Advice | None:

@@ -21,6 +21,7 @@ from urscript.lint.rules import ScriptWarning
 from urscript.program import check_program
 from urscript.source import Source, as_bytes
 from urscript.syntax.parser import find_syntax_errors, parse
+from urscript.values import to_script_text
 
 RULES: Final[tuple[Rule, ...]] = (
     characters.quotes,
@@ -191,15 +192,10 @@ def _told(advice: Advice, error: ScriptSyntaxError, text: str, source: Source) -
     rough = RoughText(text)
     line, column = rough.place(advice.start)
     return type(error)(
-        _as_written(advice.message),
+        to_script_text(advice.message),
         line=line,
         column=column,
         width=max(1, advice.end - advice.start),
         source=source,
-        hint=advice.hint and _as_written(advice.hint),
+        hint=advice.hint and to_script_text(advice.hint),
     )
-
-
-def _as_written(text: str) -> str:
-    """Text in the form of program text, one character a byte."""
-    return text.encode("utf-8").decode("latin-1")

@@ -1,15 +1,11 @@
-"""What values look like where a program makes text of them: to_str and str_cat, textmsg, sockets.
-
-The two text forms are `urscript.values.str_form` and `log_form`; here is which operation takes which values
-in which form.
-"""
+"""Checks of what to_str and str_cat take and give; the text form itself is `urscript.values.str_form`."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from urscript.errors import ScriptRuntimeError
-from urscript.values import TEXT_LIMIT, Pose, a_type, is_number, log_form, str_form
+from urscript.values import TEXT_LIMIT, Pose, a_type, is_number, str_form
 
 _ALLOWED = "a string, bool, int, float or pose, or a list of bools, ints, floats or poses"
 
@@ -48,19 +44,3 @@ def limited(function: str, text: str) -> str:
             f"{function}: the resulting string has {len(text)} characters, the limit is {TEXT_LIMIT}"
         )
     return text
-
-
-def message_text(s1: Any, s2: Any = "") -> str:
-    """The line that `textmsg(s1, s2)` writes: both texts with nothing between, floats with 6 digits.
-
-    Source: script manual CB3 3.15.4, textmsg; primary interface captures.
-    """
-    return log_form(s1) + log_form(s2)
-
-
-def wire_text(value: Any) -> str:
-    """The characters `socket_send_string` and `socket_send_line` send; each stands for one byte (latin-1).
-
-    Source: field use: numbers go out in decimal, lists as `[a,b,...]`, so in the form of textmsg.
-    """
-    return log_form(value)

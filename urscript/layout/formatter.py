@@ -13,7 +13,6 @@ from typing import Final
 
 from urscript.errors import ScriptSyntaxError
 from urscript.layout.comments import Comment, Piece, Row, read_comments, read_rows
-from urscript.layout.printer import INDENT
 from urscript.source import BLANKS, Source
 from urscript.syntax.parser import parse
 from urscript.syntax.walk import same_tree
@@ -24,6 +23,8 @@ _CLOSERS: Final = frozenset({"RPAR", "RSQB"})
 _NUMBERS: Final = frozenset({"INT", "FLOAT"})
 _CALL_LIKE: Final = frozenset({"function", "thread", "call", "run"})
 """Rules whose bracket belongs to the name before it."""
+
+INDENT: Final = "  "
 
 _CONTINUED: Final = 2 * INDENT
 """How much deeper the rest of a broken statement stands; more than a block, to look different."""

@@ -1,4 +1,4 @@
-"""Tree -> text: the canonical layout of a program, which parses to the same tree.
+"""Tree -> text in the canonical layout, which parses to the same tree; for tests with random trees.
 
 Two blanks a level, one statement a line, only the brackets that are needed. Comments, blank lines and spare
 brackets are not in the tree, so they are not printed; `formatter` keeps them.
@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Final
 
+from urscript.layout.formatter import INDENT
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Block, Expression, Statement
-
-INDENT: Final = "  "
 
 _LEVEL: Final = {"or": 1, "xor": 2, "and": 3, "not": 4, "compare": 5, "+": 6, "-": 6, "*": 7, "/": 7, "%": 7}
 _UNARY: Final = 8
