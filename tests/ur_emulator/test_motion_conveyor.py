@@ -14,21 +14,27 @@ from ur_emulator.commands.programs import StopProgram
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.io.encoders import RANGES, Encoder
 from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.conveyor import CATCH_UP_ACCELERATION, BeltEstimate, CircularConveyor, LinearConveyor
+from ur_emulator.motion.conveyor import (
+    CATCH_UP_ACCELERATION,
+    BeltEstimate,
+    CircularBelt,
+    Conveyor,
+    LinearBelt,
+)
 from ur_emulator.motion.move import Move
 
 PLACE = "p[0.25,-0.25,0.25,2.2,-2.2,0]"
 
 
-class Belt:
+class RunningBelt:
     """A belt that runs at a constant speed, and its encoder with whole ticks."""
 
-    def __init__(self, motion, conveyor, speed, *, density=1000.0, range_id=0, **kwargs):
+    def __init__(self, motion, belt, speed, *, density=1000.0, range_id=0):
         self.motion, self.speed, self.density = motion, speed, density
         self.time = self.way = 0.0
         self.encoder = Encoder()
         self.encoder.feed(range_id)
-        self.conveyor = conveyor(count=lambda: self.encoder.travel, clock=lambda: self.time, **kwargs)
+        self.conveyor = Conveyor(belt, TOOL, lambda: self.encoder.travel, lambda: self.time)
         motion.add_overlay(self.conveyor)
 
     def step(self):
@@ -40,13 +46,7 @@ class Belt:
 
 
 def linear(motion, speed, direction=(0.0, 1.0, 0.0), density=1000.0, **kwargs):
-    return Belt(
-        motion,
-        lambda **io: LinearConveyor(direction, density, TOOL, **io),
-        speed,
-        density=density,
-        **kwargs,
-    )
+    return RunningBelt(motion, LinearBelt(direction, density), speed, density=density, **kwargs)
 
 
 @pytest.mark.parametrize("range_id", [0, 1, 2])
@@ -91,9 +91,9 @@ def test_a_turning_conveyor_carries_the_tool_around_its_axis(rotate_tool):
     motion = ArmMotion(HOME, 20.0)
     centre = (START[0] - 0.05, START[1] - 0.1, 0.0, 0.0, 0.0, 0.4)
     per_turn = 5000.0
-    belt = Belt(
+    belt = RunningBelt(
         motion,
-        lambda **io: CircularConveyor(centre, per_turn, TOOL, rotate_tool=rotate_tool, **io),
+        CircularBelt(centre, per_turn, rotate_tool),
         0.4 / (2 * math.pi),  # turns per second
         density=per_turn,
     )

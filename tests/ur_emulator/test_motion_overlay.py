@@ -20,13 +20,13 @@ class Swing:
     def __init__(self, reach=0.02, rate=2.0):
         self.time, self.reach, self.rate = 0.0, reach, rate
 
-    def displace(self, tool_pose, path, dt):
+    def displace(self, tool_pose, dt):
         self.time += dt
         lift = self.reach * (1.0 - math.cos(self.rate * self.time))
         return (tool_pose[0], tool_pose[1], tool_pose[2] + lift, *tool_pose[3:])
 
 
-def run_to_end(motion, n):
+def run_cycles(motion, n):
     return [motion.step(DT, 1.0) for _ in range(n)]
 
 
@@ -56,7 +56,7 @@ def test_a_move_under_an_overlay_is_displaced_and_the_path_is_not():
 def test_speeds_of_a_displaced_target_are_those_of_its_positions():
     motion = ArmMotion(HOME, 20.0)
     motion.add_overlay(Swing(rate=4.0))
-    targets = run_to_end(motion, 200)
+    targets = run_cycles(motion, 200)
     q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
     central = (q[2:] - q[:-2]) / (2 * DT)
     assert np.abs(central - qd[1:-1]).max() < 0.01 * np.abs(qd).max()
@@ -67,7 +67,7 @@ def test_overlays_act_one_after_the_other():
     swings = Swing(), Swing(reach=0.01, rate=3.0)
     for swing in swings:
         motion.add_overlay(swing)
-    targets = run_to_end(motion, 100)
+    targets = run_cycles(motion, 100)
     lift = sum(s.reach * (1.0 - math.cos(s.rate * s.time)) for s in swings)
     assert TOOL.pose(targets[-1].q)[2] == pytest.approx(START[2] + lift, abs=1e-8)
 
@@ -77,12 +77,12 @@ def test_removal_lets_the_path_go_on_from_where_the_arm_is_and_ramps_it_to_rest(
     swing = Swing()
     motion.add_overlay(swing)
     assert motion.is_moving
-    targets = run_to_end(motion, 90)
+    targets = run_cycles(motion, 90)
     speed = np.abs(targets[-1].qd).max()
     assert speed > 0.01
     motion.remove_overlay(swing)
     assert motion.path is motion.target
-    after = [targets[-1], *run_to_end(motion, 50)]
+    after = [targets[-1], *run_cycles(motion, 50)]
     assert not motion.is_moving
     qd = np.array([t.qd for t in after])
     assert np.abs(np.diff(qd, axis=0)).max() <= 20.0 * DT * 1.001
@@ -94,7 +94,7 @@ def test_a_move_under_way_keeps_the_displacement_of_a_removed_overlay_to_its_end
     swing = Swing()
     motion.add_overlay(swing)
     motion.command("me", move := Move(line(START, at(0.05, 0, 0))))
-    run_to_end(motion, 30)
+    run_cycles(motion, 30)
     motion.remove_overlay(swing)
     targets = [motion.target]
     while motion.is_moving:
@@ -128,14 +128,14 @@ def test_a_stream_goes_on_from_the_displaced_target():
 def test_stops_end_all_overlays(end):
     motion = ArmMotion(HOME, 20.0)
     motion.add_overlay(Swing())
-    run_to_end(motion, 40)
+    run_cycles(motion, 40)
     if end == "stop":
         before = motion.target.qd
         motion.stop(20.0)
         assert np.abs(np.subtract(motion.step(DT, 1.0).qd, before)).max() <= 20.0 * DT * 1.001
     else:
         motion.place(HOME)
-    run_to_end(motion, 30)
+    run_cycles(motion, 30)
     assert not motion.is_moving
     assert motion.target is motion.path
 
@@ -144,7 +144,7 @@ def test_a_changed_tool_does_not_make_the_arm_jump():
     swing = Swing()
     motion = ArmMotion(HOME, 20.0)
     motion.add_overlay(swing)
-    run_to_end(motion, 50)
+    run_cycles(motion, 50)
     before = TOOL.pose(motion.target.q)
     swing.tool = type(TOOL)(TOOL.arm, (0.0, 0.05, 0.1, 0.3, 0.0, 0.0))
     after = TOOL.pose(motion.step(DT, 1.0).q)

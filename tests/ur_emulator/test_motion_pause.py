@@ -219,7 +219,7 @@ class Lift:
     tool = TOOL
     time = 0.0
 
-    def displace(self, tool_pose, path, dt):
+    def displace(self, tool_pose, dt):
         assert dt > 0.0
         self.time += dt
         z = tool_pose[2] + 0.02 * (1.0 - math.cos(2.0 * self.time))

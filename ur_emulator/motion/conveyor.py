@@ -8,11 +8,11 @@ an arm at rest catches up with a running belt.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import copysign, exp, hypot, pi, sqrt
 
 from protocol.pose import Pose, pose_inv, pose_trans
 from ur_emulator.models.robot_model import Vector3
-from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import Tool
 
 # Nothing of this is published; all chosen.
@@ -49,115 +49,107 @@ class BeltEstimate:
         self.speed += (1.0 - decay) ** 2 / dt * innovation
 
 
+@dataclass(frozen=True, slots=True)
+class LinearBelt:
+    """A belt that moves in a straight line.
+
+    Attributes:
+        direction: in the base frame, of any length above 0.
+        density: ticks per metre; below 0 it moves against the direction.
+    """
+
+    direction: Vector3
+    density: float
+
+    def ticks_per_metre(self, tool_pose: Pose) -> float:
+        """Return the ticks that move a tool by a metre, above 0."""
+        return abs(self.density)
+
+    def carry(self, tool_pose: Pose, ticks: float) -> Pose:
+        """Return the pose of a tool after so many ticks."""
+        size = hypot(*self.direction)
+        dx, dy, dz = (ticks * (k / size / self.density) for k in self.direction)
+        x, y, z, rx, ry, rz = tool_pose
+        return (x + dx, y + dy, z + dz, rx, ry, rz)
+
+
+@dataclass(frozen=True, slots=True)
+class CircularBelt:
+    """A table that turns about the z axis of a frame.
+
+    Attributes:
+        centre: the frame, in the base frame.
+        ticks_per_turn: below 0 it turns backwards.
+        rotate_tool: the tool turns with the table.
+    """
+
+    centre: Pose
+    ticks_per_turn: float
+    rotate_tool: bool
+
+    def ticks_per_metre(self, tool_pose: Pose) -> float:
+        """Return the ticks that move a tool there by a metre, above 0."""
+        x, y, *_ = pose_trans(pose_inv(self.centre), tool_pose)
+        return 1.0 / (abs(2.0 * pi / self.ticks_per_turn) * max(hypot(x, y), _LEAST_RADIUS))
+
+    def carry(self, tool_pose: Pose, ticks: float) -> Pose:
+        """Return the pose of a tool after so many ticks."""
+        turn = (0.0, 0.0, 0.0, 0.0, 0.0, ticks * (2.0 * pi / self.ticks_per_turn))
+        x, y, z, *turned = pose_trans(
+            pose_trans(self.centre, turn), pose_trans(pose_inv(self.centre), tool_pose)
+        )
+        rx, ry, rz = turned if self.rotate_tool else tool_pose[3:]
+        return (x, y, z, rx, ry, rz)
+
+
 class Conveyor:
-    """What linear and circular conveyors share: the way of the tool with the belt, in ticks.
+    """The overlay.
 
     Attributes:
         tool: in force when tracking began.
     """
 
-    def __init__(self, tool: Tool, count: Callable[[], float], clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        belt: LinearBelt | CircularBelt,
+        tool: Tool,
+        count: Callable[[], float],
+        clock: Callable[[], float],
+    ) -> None:
         """Begin to track.
 
         Args:
+            belt: that moves the tool.
             tool: that moves with the belt.
             count: gives the ticks of the belt so far, without overflows.
             clock: gives the time [s].
         """
         self.tool = tool
+        self._belt = belt
         self._count = count
         self._clock = clock
         self._origin = count()
         self._estimate = BeltEstimate(0.0, clock())
-        self._carried = 0.0
+        self._carried = 0.0  # way of the tool [ticks]
         self._speed = 0.0
 
-    def displace(self, tool_pose: Pose, path: JointTarget, dt: float) -> Pose:
+    def displace(self, tool_pose: Pose, dt: float) -> Pose:
         """See Overlay."""
         self._estimate.update(self._count() - self._origin, self._clock())
-        self._follow(self._ticks_per_metre(tool_pose), dt)
-        return self._carry(tool_pose, self._carried)
+        self._follow(self._belt.ticks_per_metre(tool_pose), dt)
+        return self._belt.carry(tool_pose, self._carried)
 
     def _follow(self, ticks_per_metre: float, dt: float) -> None:
         """Move the tool's way towards the belt's."""
-        belt = self._estimate
         a = CATCH_UP_ACCELERATION * ticks_per_metre
         deceleration = _APPROACH * a
-        error = belt.position - self._carried
+        error = self._estimate.position - self._carried
         # The speed from which the tool can still stop at the belt's position; linear close to it.
         corner = deceleration / _STIFFNESS
         approach = min(
             sqrt(2.0 * deceleration * abs(error) + corner * corner) - corner, CATCH_UP_SPEED * ticks_per_metre
         )
-        wanted = belt.speed + copysign(approach, error)
+        wanted = self._estimate.speed + copysign(approach, error)
         before = self._speed
         self._speed += min(max(wanted - before, -a * dt), a * dt)
         self._carried += 0.5 * dt * (before + self._speed)
-
-    def _ticks_per_metre(self, tool_pose: Pose) -> float:
-        """Return the ticks that move the tool by a metre, above 0."""
-        raise NotImplementedError
-
-    def _carry(self, tool_pose: Pose, ticks: float) -> Pose:
-        """Return the tool's pose after so many ticks of the belt."""
-        raise NotImplementedError
-
-
-class LinearConveyor(Conveyor):
-    """A belt that moves in a straight line."""
-
-    def __init__(
-        self,
-        direction: Vector3,
-        ticks_per_metre: float,
-        tool: Tool,
-        count: Callable[[], float],
-        clock: Callable[[], float],
-    ) -> None:
-        """Take the direction in the base frame, of any length above 0; ticks below 0 reverse it."""
-        super().__init__(tool, count, clock)
-        size = hypot(*direction)
-        x, y, z = direction
-        self._per_tick = (x / size / ticks_per_metre, y / size / ticks_per_metre, z / size / ticks_per_metre)
-        self._density = abs(ticks_per_metre)
-
-    def _ticks_per_metre(self, tool_pose: Pose) -> float:
-        return self._density
-
-    def _carry(self, tool_pose: Pose, ticks: float) -> Pose:
-        dx, dy, dz = self._per_tick
-        x, y, z, rx, ry, rz = tool_pose
-        return (x + ticks * dx, y + ticks * dy, z + ticks * dz, rx, ry, rz)
-
-
-class CircularConveyor(Conveyor):
-    """A table that turns about the z axis of a frame."""
-
-    def __init__(
-        self,
-        centre: Pose,
-        ticks_per_turn: float,
-        tool: Tool,
-        count: Callable[[], float],
-        clock: Callable[[], float],
-        *,
-        rotate_tool: bool,
-    ) -> None:
-        """Take the frame in the base frame; ticks, below 0 to turn backwards; whether the tool turns."""
-        super().__init__(tool, count, clock)
-        self._centre = centre
-        self._from_centre = pose_inv(centre)
-        self._per_tick = 2.0 * pi / ticks_per_turn
-        self._rotate_tool = rotate_tool
-
-    def _ticks_per_metre(self, tool_pose: Pose) -> float:
-        x, y, *_ = pose_trans(self._from_centre, tool_pose)
-        return 1.0 / (abs(self._per_tick) * max(hypot(x, y), _LEAST_RADIUS))
-
-    def _carry(self, tool_pose: Pose, ticks: float) -> Pose:
-        turn = (0.0, 0.0, 0.0, 0.0, 0.0, ticks * self._per_tick)
-        x, y, z, *turned = pose_trans(
-            pose_trans(self._centre, turn), pose_trans(self._from_centre, tool_pose)
-        )
-        rx, ry, rz = turned if self._rotate_tool else tool_pose[3:]
-        return (x, y, z, rx, ry, rz)

@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 from protocol.pose import Pose, rotvec_to_matrix
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.overlay import apply_shift, shift_between
-from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.task_frame import TaskFrame
 from ur_emulator.motion.tool import Tool
 
@@ -148,7 +147,7 @@ class ForceMode:
         stiff = np.maximum(self._limits, _LEAST_DEVIATION)[~self._chosen]
         self._tightest = float(stiff.min()) if stiff.size else inf
 
-    def displace(self, tool_pose: Pose, path: JointTarget, dt: float) -> Pose:
+    def displace(self, tool_pose: Pose, dt: float) -> Pose:
         """See Overlay."""
         along_path = ZERO6 if self._path_pose is None else shift_between(self._path_pose, tool_pose)
         self._path_pose = tool_pose

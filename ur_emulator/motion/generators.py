@@ -21,12 +21,13 @@ PAUSE_DECELERATION = 4.0
 
 
 class Generator(Protocol):
-    """A motion, cycle by cycle."""
+    """A motion, cycle by cycle.
 
-    @property
-    def done(self) -> bool:
-        """True when the motion has reached its goal."""
-        ...
+    Attributes:
+        done: the motion has reached its goal.
+    """
+
+    done: bool
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Return the target at the end of the next cycle.

@@ -15,22 +15,17 @@ from ur_emulator.motion.tool import Tool, UnreachableError
 
 
 class JointPath(Protocol):
-    """A path of the joints; s is radians of the leading axis or metres of the tool."""
+    """A path of the joints; s is radians of the leading axis or metres of the tool.
 
-    @property
-    def length(self) -> float:
-        """Greatest s."""
-        ...
+    Attributes:
+        length: greatest s.
+        rate: greatest speed when s moves at 1: of the leading axis, or of the tool.
+        bend: greatest acceleration when s moves at a constant 1: of the leading axis, or of the tool.
+    """
 
-    @property
-    def rate(self) -> float:
-        """Greatest speed when s moves at 1: of the leading axis, or of the tool."""
-        ...
-
-    @property
-    def bend(self) -> float:
-        """Greatest acceleration when s moves at a constant 1: of the leading axis, or of the tool."""
-        ...
+    length: float
+    rate: float
+    bend: float
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
         """Return joint angles [rad] and their derivative [rad per unit of s].

@@ -17,21 +17,21 @@ from ur_emulator.motion.tool import Tool, UnreachableError
 
 
 class Overlay(Protocol):
-    """Displaces the tool, cycle by cycle."""
+    """Displaces the tool, cycle by cycle.
 
-    @property
-    def tool(self) -> Tool:
-        """The tool whose pose is displaced; it may change while the overlay is active."""
-        ...
+    Attributes:
+        tool: whose pose is displaced; it may change while the overlay is active.
+    """
 
-    def displace(self, tool_pose: Pose, path: JointTarget, dt: float) -> Pose:
+    tool: Tool
+
+    def displace(self, tool_pose: Pose, dt: float) -> Pose:
         """Return where the tool shall be at the end of the cycle, in the base frame [m, rad].
 
         The first displacement must be close to zero: a step here is a step of the arm.
 
         Args:
             tool_pose: tool along the path at the end of the cycle, displaced by the overlays before this one.
-            path: joint target along the path at the end of the cycle.
             dt: time to advance by [s]; shorter than a cycle, never 0, while a pause ramps down or up.
         """
         ...
@@ -58,7 +58,7 @@ class LastDisplacement:
         self._shift = shift
         self._velocity = velocity
 
-    def displace(self, tool_pose: Pose, path: JointTarget, dt: float) -> Pose:
+    def displace(self, tool_pose: Pose, dt: float) -> Pose:
         """See Overlay."""
         if self._velocity is not ZERO6:
             after = twist_towards(self._velocity, ZERO6, self.LINEAR, self.ANGULAR, dt)
@@ -139,7 +139,7 @@ class OverlayChain:
             pose = pose_trans(flange, tcp)
             previous = self._shifts.get(id(overlay), _NO_SHIFT)[0]
             if share > 0.0:
-                moved = overlay.displace(pose, path, share * dt)
+                moved = overlay.displace(pose, share * dt)
                 shift = shift_between(pose, moved)
                 self._shifts[id(overlay)] = (shift, previous, share * dt)
             else:

@@ -27,25 +27,17 @@ LEAST_LENGTH = 1e-9
 
 
 class PosePath(Protocol):
-    """A path in the space of poses.
+    """A path in the space of poses; `measure` gives the size of its velocities and accelerations.
 
-    Speeds and accelerations of a pose count as `measure` says.
+    Attributes:
+        length: greatest s [m].
+        rate: greatest speed of the pose when s moves at 1; 1 where s is the way itself.
+        bend: greatest acceleration of the pose when s moves at a constant 1 [1/m].
     """
 
-    @property
-    def length(self) -> float:
-        """Greatest s [m]."""
-        ...
-
-    @property
-    def rate(self) -> float:
-        """Greatest speed of the pose when s moves at 1; 1 where s is the way itself."""
-        ...
-
-    @property
-    def bend(self) -> float:
-        """Greatest acceleration of the pose when s moves at a constant 1 [1/m]."""
-        ...
+    length: float
+    rate: float
+    bend: float
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
         """Return the pose at s and its derivative, a twist per unit of s."""

@@ -53,18 +53,18 @@ class Sample(NamedTuple):
     aspect: bool
 
 
-class JointLimit(NamedTuple):
-    """The limits of the joints between two samples.
+class Limits(NamedTuple):
+    """Constant limits on a part of a path, in units of the path.
 
     Attributes:
-        end: where the part ends [m].
-        speed: greatest speed of the tool [m/s].
-        bound: pair (a, b): its acceleration is at most a - b v^2 [m/s^2].
+        end: where the part ends; it begins where the one before it ends.
+        speed: greatest one.
+        bounds: pairs (a, b): the acceleration along the path is at most a - b v^2, for all of them.
     """
 
     end: float
     speed: float
-    bound: tuple[float, float]
+    bounds: tuple[tuple[float, float], ...]
 
 
 def sample_path(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tuple[Sample, ...]:
@@ -103,9 +103,9 @@ def reaches_end(samples: tuple[Sample, ...], end: float, robot: RobotModel) -> b
     )
 
 
-def joint_limits(samples: tuple[Sample, ...], robot: RobotModel) -> tuple[JointLimit, ...]:
+def joint_limits(samples: tuple[Sample, ...], robot: RobotModel) -> tuple[Limits, ...]:
     """Return the limits of the joints between the samples of a path."""
-    found: list[JointLimit] = []
+    found: list[Limits] = []
     for a, b in pairwise(samples):
         way = b.s - a.s
         speed, fastest, bend = float("inf"), 0.0, 0.0
@@ -122,7 +122,7 @@ def joint_limits(samples: tuple[Sample, ...], robot: RobotModel) -> tuple[JointL
         # Where the least speed is too fast, the plan still needs some acceleration.
         bend = min(bend, 0.9 * JOINT_ACCELERATION / speed**2)
         scale = 1.0 / max(fastest, 1e-6)
-        found.append(JointLimit(b.s, speed, (JOINT_ACCELERATION * scale, bend * scale)))
+        found.append(Limits(b.s, speed, ((JOINT_ACCELERATION * scale, bend * scale),)))
     return tuple(found)
 
 

@@ -4,33 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil, inf, sqrt
-from typing import NamedTuple
 
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.blend import Blend
 from ur_emulator.motion.joint_path import JointCurve, JointPath
 from ur_emulator.motion.leg import Leg
-from ur_emulator.motion.path_samples import JOINT_SPEED_SHARE, Sample, joint_limits
+from ur_emulator.motion.path_samples import JOINT_SPEED_SHARE, Limits, Sample, joint_limits
 from ur_emulator.motion.speed_plan import Interval
 
 # Longest interval on a curve, in units of 1 / bend, and the greatest number of intervals between two limits.
 _SHORT, _MOST = 0.25, 32
-
-Bounds = tuple[tuple[float, float], ...]
-
-
-class Limits(NamedTuple):
-    """Constant limits on a part of a path, in units of the path.
-
-    Attributes:
-        end: where the part ends; it begins where the one before it ends.
-        speed: greatest one.
-        bounds: pairs (a, b): the acceleration along the path is at most a - b v^2.
-    """
-
-    end: float
-    speed: float
-    bounds: Bounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +100,7 @@ def _limits(
     found: list[Limits] = []
     for limit in joint_limits(samples, robot):
         slower = min(speed, limit.speed)
-        bounds = (bound,) if _is_weaker(limit.bound, bound, slower) else (bound, limit.bound)
+        bounds = (bound, *(other for other in limit.bounds if not _is_weaker(other, bound, slower)))
         if found and found[-1][1:] == (slower, bounds):
             found.pop()
         found.append(Limits(limit.end, slower, bounds))

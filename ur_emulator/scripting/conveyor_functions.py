@@ -8,7 +8,7 @@ from typing import Any
 
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.io.encoders import Encoders
-from ur_emulator.motion.conveyor import CircularConveyor, Conveyor, LinearConveyor
+from ur_emulator.motion.conveyor import CircularBelt, Conveyor, LinearBelt
 from ur_emulator.motion.generators import StopJ
 from ur_emulator.scripting.script_arm import Cycles, ScriptArm, floats, require_positive
 from urscript.errors import ScriptRuntimeError
@@ -40,17 +40,11 @@ class ProgramConveyor:
         """Return the conveyor builtins."""
         arm, motion = self._arm, self._arm.motion
 
-        def track(conveyor: Conveyor) -> None:
+        def track(belt: LinearBelt | CircularBelt, encoder_index: float) -> None:
             self.end()
-            self._tracked = conveyor
-            motion.add_overlay(conveyor)
-
-        def counter(index: float) -> Callable[[], float]:
-            encoder = self._encoders.encoders[int(index)]
-            return lambda: encoder.travel
-
-        def clock() -> float:
-            return self._clock.time
+            encoder, clock = self._encoders.encoders[int(encoder_index)], self._clock
+            self._tracked = Conveyor(belt, arm.tool, lambda: encoder.travel, lambda: clock.time)
+            motion.add_overlay(self._tracked)
 
         def track_linear(
             thread: object, direction: Pose, ticks_per_meter: float, encoder_index: float
@@ -62,22 +56,14 @@ class ProgramConveyor:
                     f"track_conveyor_linear: direction ({x:g}, {y:g}, {z:g}) leads nowhere, "
                     "give its x, y, z in the base frame"
                 )
-            track(LinearConveyor((x, y, z), float(ticks_per_meter), arm.tool, counter(encoder_index), clock))
+            track(LinearBelt((x, y, z), float(ticks_per_meter)), encoder_index)
 
         def track_circular(
             thread: object, center: Pose, ticks_per_revolution: float, rotate_tool: bool, encoder_index: float
         ) -> None:
             _require_ticks("track_conveyor_circular", "ticks_per_revolution", ticks_per_revolution)
-            track(
-                CircularConveyor(
-                    floats(tuple(center)),
-                    float(ticks_per_revolution),
-                    arm.tool,
-                    counter(encoder_index),
-                    clock,
-                    rotate_tool=bool(rotate_tool),
-                )
-            )
+            belt = CircularBelt(floats(tuple(center)), float(ticks_per_revolution), bool(rotate_tool))
+            track(belt, encoder_index)
 
         def stop(thread: object, a: float) -> Cycles:
             a = a or STOP_DECELERATION  # field programs write 0
