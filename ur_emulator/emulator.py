@@ -24,11 +24,11 @@ from protocol.primary.messages import ReportLevel
 from protocol.ur_types import Ports, RobotMode, SoftwareVersion, simulated_serial
 from ur_emulator.box_log import LogEntry
 from ur_emulator.control.operations import BoxOperations
-from ur_emulator.control.runner import OperationRunner
+from ur_emulator.control.runner import ENDED, OperationRunner
 from ur_emulator.control.step_operation import Context
 from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
-from ur_emulator.errors import EmulatorError
+from ur_emulator.errors import EmulatorError, NotRunningError
 from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robot_generation import CB3, RobotGeneration
 from ur_emulator.models.robots import robot_by_name
@@ -44,7 +44,7 @@ from ur_emulator.servers.dashboard.answers import DashboardAnswers
 from ur_emulator.servers.dashboard.port import DashboardPort
 from ur_emulator.servers.dashboard.reports import BoxReports
 from ur_emulator.servers.modbus.server import ModbusPort
-from ur_emulator.servers.port_set import CONTROL, MODBUS, PortSet, ServedPort
+from ur_emulator.servers.port_set import CONTROL, MODBUS, PortSet
 from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder
 from ur_emulator.servers.programs.intake import ProgramIntake
@@ -52,6 +52,7 @@ from ur_emulator.servers.programs.player import ProgramPlayer
 from ur_emulator.servers.realtime_port import RealtimePort
 from ur_emulator.servers.rtde_port import RtdePort
 from ur_emulator.servers.scripts.sockets import LoopNetwork
+from ur_emulator.servers.tcp.listener import Port
 
 if TYPE_CHECKING:
     from ur_emulator.rack import BoxOptions, BoxRack
@@ -159,20 +160,32 @@ class ControlBox(BoxOperations):
         player = ProgramPlayer(self._access, ProgramFolder(None if programs is None else Path(programs)))
         self._reports = BoxReports(player.folder)
         states = StateEncoder(software.version, controller.state.arm)
-        # In the order in which they hear of a cycle: first those whose clients act on it.
-        ports: dict[str, ServedPort] = {
-            "realtime": RealtimePort(software.version, self._intake),
-            "rtde": RtdePort(software.version, controller, self._box.submit, self._box.announce),
-            "primary": PrimaryPort(software, controller, self._intake, states, all_messages=True),
-            "secondary": PrimaryPort(software, controller, self._intake, states, all_messages=False),
-            "dashboard": DashboardPort(
-                self._access,
-                DashboardAnswers(self._access, player, self._reports, self._shut_down),
-            ),
-            "modbus": ModbusPort(controller, self._box.submit),
-            "realtime_ro": RealtimePort(software.version, None),
-            "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
-            "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),
+        realtime, realtime_ro = (RealtimePort(software.version, intake) for intake in (self._intake, None))
+        rtde = RtdePort(software.version, controller, self._box.submit, self._box.announce)
+        modbus = ModbusPort(controller, self._box.submit)
+        dashboard = DashboardPort(
+            self._access, DashboardAnswers(self._access, player, self._reports, self._shut_down)
+        )
+        primary, secondary, primary_ro, secondary_ro = messengers = tuple(
+            PrimaryPort(software, controller, intake, states, all_messages=all_messages)
+            for intake in (self._intake, None)
+            for all_messages in (True, False)
+        )
+        read_only = (realtime_ro, primary_ro, secondary_ro)
+        self._box.attach(  # first those whose clients act on a cycle
+            (realtime, rtde, primary, secondary, modbus, *read_only, self._access.steps),
+            [port.send_message for port in messengers],
+        )
+        ports: dict[str, Port] = {
+            "realtime": realtime,
+            "rtde": rtde,
+            "primary": primary,
+            "secondary": secondary,
+            "dashboard": dashboard,
+            MODBUS: modbus,
+            "realtime_ro": realtime_ro,
+            "primary_ro": primary_ro,
+            "secondary_ro": secondary_ro,
         }
         self.control_port = 0
         self._facts = {
@@ -190,7 +203,7 @@ class ControlBox(BoxOperations):
         if control_port is not None:
             from ur_emulator.control.http_port import HttpPort
 
-            ports[CONTROL] = HttpPort(self._operations, host)
+            ports[CONTROL] = HttpPort(self._access, self._operations, host)
         self._port_set = PortSet(self._loop, host, self._box, ports)
         self.is_shut_down = False
         self.failure: Exception | None = None
@@ -263,7 +276,6 @@ class ControlBox(BoxOperations):
             raise
         self.control_port = numbers.pop(CONTROL, 0)
         self.ports = dataclasses.replace(self.ports, **{MODBUS: 0, **numbers})
-        self._box.attach(self._operations)
         self._loop.add(self._box)
 
     def _wanted_numbers(self) -> dict[str, int]:
@@ -324,9 +336,9 @@ class ControlBox(BoxOperations):
     def close(self) -> None:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
         self._loop.remove(self._box)
+        self._access.close(NotRunningError(ENDED))
         self._operations.close()
         self._intake.close()
-        self._access.close()
         self._reports.close()
         self._network.close()
         self._port_set.close()

@@ -345,7 +345,7 @@ def test_who_goes_while_it_waits_is_forgotten(box):
     with Http(box) as http:
         for _ in range(1000):
             assert http.ask("GET", "/v1/state")[0] == 200
-            if not box._operations._jobs:
+            if not box._access.steps._under_way:
                 return
     raise AssertionError("they are waited for still")
 

@@ -176,7 +176,7 @@ def test_the_secondary_port_tells_of_nothing():
     kinds = {type(event).__name__ for event in bench.events}
     assert {"ScriptFailed", "TextPrinted", "PopupShown", "ErrorReported", "SafetyModeChanged"} <= kinds
     for event in bench.events:
-        port.say(event)
+        port.send_message(event)
     assert client.sent == ()
 
 

@@ -76,7 +76,7 @@ class PortBench(Bench):
             super().tick(1, *commands)
             commands = ()
             for event in self.events[n_before:]:
-                self.port.say(event)
+                self.port.send_message(event)
             self.port.publish(self.now)
         return self.now
 

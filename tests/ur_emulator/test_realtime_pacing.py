@@ -96,7 +96,7 @@ def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count
     )
     box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None)
     seen = []
-    box.attach(SimpleNamespace(publish=seen.append, say=lambda event: None))
+    box.attach([SimpleNamespace(publish=seen.append)])
     assert box.advance(10.0) == pytest.approx(10.0 + PERIOD)
     assert len(seen) == 1
     deadline = box.advance(10.0 + PERIOD - 0.0003)

@@ -84,7 +84,7 @@ class PortBench(Bench):
             commands = ()
             for port in self.ports:
                 for event in self.events:
-                    port.say(event)
+                    port.send_message(event)
                 port.publish(self.now)
             self.events.clear()
         return self.now

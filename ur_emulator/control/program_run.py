@@ -5,15 +5,16 @@ from __future__ import annotations
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ur_emulator.commands.parameters import Kind, parameter
 from ur_emulator.commands.programs import StartProgram
-from ur_emulator.control.step_operation import Context, StepOperation, Steps
+from ur_emulator.control.step_operation import Context, StepOperation
 from ur_emulator.errors import ArgumentError, RefusedError
 
 if TYPE_CHECKING:
     from protocol.ur_types import SoftwareVersion
+    from ur_emulator.servers.steps import Steps
     from urscript import CompiledProgram
 
 
@@ -33,7 +34,7 @@ class RunProgram(StepOperation[int]):
     file: str | None = parameter("or a file in the folder of programs, as for `load`", default=None)
     result: ClassVar[str] = "`program`: its name, and `tick`: the cycle in which it began"
 
-    def steps(self, context: Context) -> Steps:
+    def steps(self, context: Context) -> Steps[Any]:
         """Compile and start a text, or play a file as the dashboard does; what runs is stopped before."""
         access, player = context.access, context.player
         if (self.script is None) == (self.file is None):

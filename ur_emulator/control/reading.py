@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import LogEntry
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.control.box_state import BoxState, take_state
-from ur_emulator.control.step_operation import Context, StepOperation, Steps
+from ur_emulator.control.step_operation import Context, StepOperation
 from ur_emulator.controller.events import LogAdded
+
+if TYPE_CHECKING:
+    from ur_emulator.servers.steps import Steps
 
 
 class ReadState(StepOperation[BoxState]):
@@ -20,7 +23,7 @@ class ReadState(StepOperation[BoxState]):
     )
     only_reads: ClassVar[bool] = True
 
-    def steps(self, context: Context) -> Steps:
+    def steps(self, context: Context) -> Steps[Any]:
         """Take the state."""
         yield from ()
         return take_state(context.access.controller)
@@ -36,7 +39,7 @@ class ReadLog(StepOperation[tuple[LogEntry, ...]]):
     result: ClassVar[str] = "`entries`, the oldest first, and `next`, to be given as `after` in the next call"
     only_reads: ClassVar[bool] = True
 
-    def steps(self, context: Context) -> Steps:
+    def steps(self, context: Context) -> Steps[Any]:
         """Pick the entries."""
         yield from ()
         log, least = context.access.box_log, ReportLevel[self.level]
@@ -50,7 +53,7 @@ class ReadIdentity(StepOperation[dict[str, Any]]):
     result: ClassVar[str] = "software, robot model, serial number, pace, seed, fidelity, address and ports"
     only_reads: ClassVar[bool] = True
 
-    def steps(self, context: Context) -> Steps:
+    def steps(self, context: Context) -> Steps[Any]:
         """Ask the box."""
         yield from ()
         return context.identity()
@@ -62,7 +65,7 @@ class AddToLog(StepOperation[int]):
     text: str = parameter("the line")
     is_logged: ClassVar[bool] = False
 
-    def steps(self, context: Context) -> Steps:
+    def steps(self, context: Context) -> Steps[Any]:
         """Write it; that needs no cycle."""
         yield from ()
         context.access.announce(LogAdded("Control", self.text))

@@ -1,9 +1,9 @@
-"""StepOperation: an operation that takes no cycle or several, done in steps (see `servers.box_access`)."""
+"""StepOperation: an operation that takes no cycle or several, done in steps (see `servers.steps`)."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +12,7 @@ from ur_emulator.commands.operation import Operation, R_co
 if TYPE_CHECKING:
     from ur_emulator.servers.box_access import BoxAccess
     from ur_emulator.servers.programs.player import ProgramPlayer
-
-Steps = Generator[None, None, Any]
+    from ur_emulator.servers.steps import Steps
 
 
 @dataclass(slots=True)
@@ -37,7 +36,7 @@ class StepOperation(Operation[R_co]):
     """An operation that says itself what it does, step by step."""
 
     @abstractmethod
-    def steps(self, context: Context) -> Steps:
+    def steps(self, context: Context) -> Steps[Any]:
         """Do it; yield for every look at the box.
 
         Returns:

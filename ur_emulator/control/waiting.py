@@ -9,11 +9,12 @@ from protocol.primary.messages import RequestedType
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.control.box_state import BoxState, is_steady, take_state
-from ur_emulator.control.step_operation import Context, StepOperation, Steps
+from ur_emulator.control.step_operation import Context, StepOperation
 from ur_emulator.errors import ArgumentError, WaitTimeoutError
 
 if TYPE_CHECKING:
     from ur_emulator.controller.controller import Controller
+    from ur_emulator.servers.steps import Steps
 
 
 def _has_popup(controller: Controller) -> bool:
@@ -63,7 +64,7 @@ class WaitUntil(StepOperation[BoxState]):
     result: ClassVar[str] = "the state, as `state` gives it"
     is_logged: ClassVar[bool] = False
 
-    def steps(self, context: Context) -> Steps:
+    def steps(self, context: Context) -> Steps[Any]:
         """Look after every cycle."""
         wanted = {name: value for name in CONDITIONS if (value := getattr(self, name)) is not None}
         if not wanted and self.log is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 from protocol.primary.messages import ReportLevel
@@ -16,14 +16,10 @@ from ur_emulator.realtime.pacing import Pacer, RealtimePacer
 
 
 class Publisher(Protocol):
-    """A port that wants snapshots and events."""
+    """What acts after every cycle."""
 
     def publish(self, snapshot: Snapshot) -> None:
         """Send what is due for this cycle."""
-        ...
-
-    def say(self, event: Event) -> None:
-        """Send a message."""
         ...
 
 
@@ -50,7 +46,8 @@ class ServedBox:
         self.log = BoxLog(controller.generation)
         self._pacer = pacer
         self._repeats = not isinstance(pacer, RealtimePacer)
-        self._publishers: list[Publisher] = []
+        self._publishers: tuple[Publisher, ...] = ()
+        self._listeners: tuple[Callable[[Event], None], ...] = ()
         self._commands: list[Command] = []
         self.backlog: set[Any] = set()
         self.on_failure: Callable[[Exception], None] | None = None
@@ -59,9 +56,16 @@ class ServedBox:
         # A cycle is computed and waits for its deadline.
         self._is_held = False
 
-    def attach(self, publisher: Publisher) -> None:
-        """Let a port hear of every cycle."""
-        self._publishers.append(publisher)
+    def attach(
+        self, publishers: Iterable[Publisher], listeners: Iterable[Callable[[Event], None]] = ()
+    ) -> None:
+        """Name who is called.
+
+        Args:
+            publishers: after every cycle, in this order.
+            listeners: with every event, before the cycle that it belongs to is published.
+        """
+        self._publishers, self._listeners = tuple(publishers), tuple(listeners)
 
     def submit(self, command: Command, done: Done | None = None) -> None:
         """Take a command for the next cycle; `done` is told then what has come of it."""
@@ -70,8 +74,8 @@ class ServedBox:
     def announce(self, event: Event) -> None:
         """Publish an event at once, outside of a cycle."""
         self.log.note(event, self.controller.snapshot.tick)
-        for publisher in self._publishers:
-            publisher.say(event)
+        for listener in self._listeners:
+            listener(event)
 
     def notice(self, text: str) -> None:
         """Write into the log that something happened to a client."""

@@ -1,13 +1,8 @@
-"""What a server that acts for an operator may do with a box, and the steps in which it does it.
-
-A step function is a generator: it yields once for every look at the box, `DashboardPort` looks again after
-every cycle, and its return value is what it has come to. So nothing waits for a clock, and what was asked has
-happened when it is answered.
-"""
+"""What a server that acts for an operator may do with a box, in steps (`servers.steps`)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -17,10 +12,12 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.errors import RefusedError
 from ur_emulator.models.software import Software
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.scripting.network import Network
+from ur_emulator.servers.steps import StepRunner, Steps, settle
 
 T = TypeVar("T")
 
@@ -46,13 +43,13 @@ class BoxAccess:
     Attributes:
         identity: names and numbers of the box.
         network: opens sockets that the box dials out with.
-        on_job_done: called in the loop when a job has ended, so that somebody looks before the next cycle.
+        steps: advances what takes several cycles.
     """
 
     def __init__(self, identity: BoxIdentity, box: ServedBox, loop: EventLoop, network: Network) -> None:
         self.identity = identity
         self.network = network
-        self.on_job_done: list[Callable[[], None]] = []
+        self.steps = StepRunner()
         self._box = box
         self._loop = loop
         self._worker: ThreadPoolExecutor | None = None
@@ -87,7 +84,16 @@ class BoxAccess:
 
     # --- steps
 
-    def apply(self, command: Command) -> Generator[None, None, Any]:
+    def start_alone(self, steps: Steps[None]) -> None:
+        """Begin with steps whose result nobody waits for; a refusal stands in the log already."""
+
+        def finished(_: None, error: Exception | None) -> None:
+            if error is not None and not isinstance(error, RefusedError):
+                self.note(f"failed: {error!r}")
+
+        self.steps.start(steps, finished)
+
+    def apply(self, command: Command) -> Steps[Any]:
         """Ask for something, and end after the cycle in which it was applied.
 
         Returns:
@@ -102,7 +108,7 @@ class BoxAccess:
             yield
         return outcome.result()
 
-    def in_worker(self, job: Callable[[], T]) -> Generator[None, None, T]:
+    def in_worker(self, job: Callable[[], T]) -> Steps[T]:
         """Do something that takes longer than a cycle in a thread of its own, one job at a time.
 
         Returns:
@@ -111,28 +117,13 @@ class BoxAccess:
         if self._worker is None:
             self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="dashboard")
         future = self._worker.submit(job)
-        future.add_done_callback(lambda _: self._loop.call_soon_threadsafe(self._tell_of_job))
+        future.add_done_callback(lambda _: self._loop.call_soon_threadsafe(self.steps.advance))
         while not future.done():
             yield
         return future.result()
 
-    def _tell_of_job(self) -> None:
-        for tell in self.on_job_done:
-            tell()
-
-    def close(self) -> None:
-        """End the worker; what is queued is dropped, what is being done comes to nothing."""
+    def close(self, error: Exception) -> None:
+        """End all steps with an error, and the worker: queued jobs are dropped, results are not used."""
+        self.steps.close(error)
         if self._worker is not None:
             self._worker.shutdown(wait=False, cancel_futures=True)
-
-
-def settle(future: Future[Any]) -> Callable[[Any, Exception | None], None]:
-    """Return what makes a result or an error that of a future."""
-
-    def done(result: Any, error: Exception | None) -> None:
-        if error is None:
-            future.set_result(result)
-        else:
-            future.set_exception(error)
-
-    return done

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
 
 from ur_emulator.errors import PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.realtime.served_box import Publisher, ServedBox
+from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.servers.tcp.connection import Connection
 from ur_emulator.servers.tcp.listener import Listener, Port
 from ur_emulator.servers.tcp.reserve import Reserve
@@ -15,17 +14,8 @@ from ur_emulator.servers.tcp.reserve import Reserve
 CONTROL, MODBUS = "control", "modbus"
 
 
-class ServedPort(Port, Publisher, Protocol):
-    """A port with clients that hears of every cycle."""
-
-    @property
-    def clients(self) -> tuple[Connection, ...]:
-        """Who is connected."""
-        ...
-
-
 class PortSet:
-    """The ports of a box by name, in the order in which they hear of a cycle.
+    """The ports of a box by name.
 
     Args:
         loop: watches their sockets.
@@ -37,7 +27,7 @@ class PortSet:
         notices: what a user should know although the box runs, one line each.
     """
 
-    def __init__(self, loop: EventLoop, host: str, box: ServedBox, ports: Mapping[str, ServedPort]) -> None:
+    def __init__(self, loop: EventLoop, host: str, box: ServedBox, ports: Mapping[str, Port]) -> None:
         self._loop = loop
         self._host = host
         self._box = box
@@ -52,7 +42,7 @@ class PortSet:
         return bool(self._listeners)
 
     def open(self, wanted: Mapping[str, int]) -> dict[str, int]:
-        """Listen on all wanted ports, and let all hear of every cycle.
+        """Listen on all wanted ports.
 
         Args:
             wanted: numbers by name; 0 takes a free one, a port that is not named stays closed.
@@ -73,8 +63,6 @@ class PortSet:
                 if name != MODBUS:
                     raise
                 self.notices.append(f"no Modbus server: {error}")
-        for port in self._ports.values():
-            self._box.attach(port)
         return {name: listener.number for name, listener in self._listeners.items()}
 
     def close(self) -> None:
@@ -82,11 +70,8 @@ class PortSet:
         self._reserve.close()
         for listener in self._listeners.values():
             listener.close()
-        for port in self._ports.values():
-            for connection in port.clients:
-                connection.close()
 
-    def _listener(self, name: str, port: ServedPort, number: int) -> Listener:
+    def _listener(self, name: str, port: Port, number: int) -> Listener:
         """Listen; lockstep does not wait for clients of the control API, and they do not fill the log."""
         box = self._box
         backlog = set[Connection]() if name == CONTROL else box.backlog

@@ -5,7 +5,6 @@ from __future__ import annotations
 from protocol.realtime.layout import layout_for_version
 from protocol.script_channel import ScriptChannel
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.tcp.connection import Connection
@@ -24,11 +23,6 @@ class RealtimePort:
         self._encode = layout_for_version(version).encoder()
         self._intake = intake
         self._channels: dict[Connection, ScriptChannel] = {}
-
-    @property
-    def clients(self) -> tuple[Connection, ...]:
-        """Connected clients."""
-        return tuple(self._channels)
 
     def opened(self, connection: Connection) -> None:
         """The stream to this client starts with the next frame; there is no greeting."""
@@ -49,6 +43,3 @@ class RealtimePort:
             frame = self._encode(snapshot)
             for connection in tuple(self._channels):
                 connection.send(frame)
-
-    def say(self, event: Event) -> None:
-        """Nothing is answered on this port; errors appear on the primary port only."""

@@ -60,11 +60,6 @@ class RtdePort:
         self._owners: dict[str, Connection] = {}
         self._behind: dict[_Session, None] = {}
 
-    @property
-    def clients(self) -> tuple[Connection, ...]:
-        """Connected clients."""
-        return tuple(self._sessions)
-
     def opened(self, connection: Connection) -> None:
         """The client speaks first."""
         self._sessions[connection] = _Session(
@@ -138,9 +133,6 @@ class RtdePort:
         if self._behind:
             for session in tuple(self._behind):
                 self._serve(session)
-
-    def say(self, event: Event) -> None:
-        """Nothing is said unasked: clients read one package after a request, whatever it is."""
 
     def _answer(self, connection: Connection, request: object) -> None:
         session = self._sessions[connection]

@@ -1,15 +1,14 @@
 """What the commands of the dashboard do, each in a method; how they are spelt stands in `protocol`.
 
-An answer is a reply, or steps that end in one (see `box_access`). Steps may yield a reply earlier and go on.
+An answer is a reply, or steps that end in one (see `servers.steps`).
 """
 
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import version as package_version
-from typing import TypeVar
 
 from protocol.dashboard.commands import USER_ROLES, DashboardCommand
 from protocol.dashboard.connection import CommandReceived
@@ -23,15 +22,13 @@ from ur_emulator.errors import EmulatorError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.dashboard.reports import BoxFacts, BoxReports
 from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer
+from ur_emulator.servers.steps import Steps
 
 # Name that a simulator gives when nothing is loaded. Source: replies of URSim 3.14 as the public client
 # library expects them.
 UNNAMED = "<unnamed>"
 
-Steps = Generator[str | None, None, str]
-Answer = str | Steps
-Action = Generator[None, None, None]
-T = TypeVar("T")
+Answer = str | Steps[str]
 
 
 class DashboardAnswers:
@@ -110,20 +107,23 @@ class DashboardAnswers:
         loaded = self._player.loaded
         return row.reply(path=loaded.wire_path) if loaded else row.reply("none")
 
-    def _load(self, row: DashboardCommand, name: str, _: str) -> Steps:
-        if not row.replies_when_done(self._access.identity.software.version):
-            if not self._player.folder.has(name):
-                return row.reply("not_found", name=name)
-            yield row.reply(path=self._player.folder.find(name).wire_path)
+    def _load(self, row: DashboardCommand, name: str, _: str) -> Answer:
         loading = self._player.load(name)
-        return (yield from self._loaded(row, loading, name, lambda: _path_of(self._player.loaded)))
+        if row.replies_when_done(self._access.identity.software.version):
+            return self._loaded(row, loading, name, lambda: _path_of(self._player.loaded))
+        if not self._player.folder.has(name):
+            return row.reply("not_found", name=name)
+        self._access.start_alone(loading)
+        return row.reply(path=self._player.folder.find(name).wire_path)
 
-    def _load_installation(self, row: DashboardCommand, name: str, _: str) -> Steps:
+    def _load_installation(self, row: DashboardCommand, name: str, _: str) -> Answer:
         loading = self._player.load_installation(name)
-        return (yield from self._loaded(row, loading, name, lambda: _path_of(self._player.installation)))
+        return self._loaded(row, loading, name, lambda: _path_of(self._player.installation))
 
     @staticmethod
-    def _loaded(row: DashboardCommand, loading: Action, name: str, path: Callable[[], str]) -> Steps:
+    def _loaded(
+        row: DashboardCommand, loading: Steps[None], name: str, path: Callable[[], str]
+    ) -> Steps[str]:
         """Answer when a file is loaded, or is not."""
         try:
             yield from loading
@@ -131,26 +131,23 @@ class DashboardAnswers:
             return row.reply("not_found" if isinstance(refusal, MissingFileRefusal) else "failed", name=name)
         return row.reply(path=path())
 
-    def _done(self, row: DashboardCommand, action: Action) -> Steps:
+    def _done(self, row: DashboardCommand, action: Steps[None]) -> Steps[str]:
         """Answer when an action has come to its end, or, in older software, when it has begun."""
-        waits = row.replies_when_done(self._access.identity.software.version)
         try:
-            for _ in action:
-                if not waits:
-                    break
-                yield None
-            else:
+            if row.replies_when_done(self._access.identity.software.version):
+                yield from action
                 return row.reply("ok")
+            next(action)
+        except StopIteration:
+            return row.reply("ok")
         except RefusedError:
             return row.reply("failed")
-        yield row.reply()
-        with suppress(RefusedError):
-            yield from action
-        return ""
+        self._access.start_alone(action)
+        return row.reply()
 
     # --- the box
 
-    def _applied(self, row: DashboardCommand, command: Command) -> Steps:
+    def _applied(self, row: DashboardCommand, command: Command) -> Steps[str]:
         with suppress(RefusedError):
             yield from self._access.apply(command)
         return row.reply()
@@ -163,12 +160,11 @@ class DashboardAnswers:
             return row.reply("too_early")
         return self._applied(row, UnlockProtectiveStop())
 
-    def _shutdown(self, row: DashboardCommand, _: str, client: str) -> Steps:
+    def _shutdown(self, row: DashboardCommand, _: str, client: str) -> Steps[str]:
         self._access.note(f"Shut down by {client}")
         yield from self._access.apply(PowerOff())
-        yield row.reply()
         self._shut_down()
-        return ""
+        return row.reply()
 
     def _add_to_log(self, row: DashboardCommand, text: str, _: str) -> str:
         if not text:
@@ -184,7 +180,7 @@ class DashboardAnswers:
 
     # --- files
 
-    def _flight_report(self, row: DashboardCommand, kind: str, _: str) -> Steps:
+    def _flight_report(self, row: DashboardCommand, kind: str, _: str) -> Steps[str]:
         facts = self._facts()
         try:
             number = yield from self._access.in_worker(lambda: self._reports.flight_report(kind, facts))
@@ -192,7 +188,7 @@ class DashboardAnswers:
             return row.reply("failed", reason=error)
         return row.reply(id=number)
 
-    def _support_file(self, row: DashboardCommand, directory: str, _: str) -> Steps:
+    def _support_file(self, row: DashboardCommand, directory: str, _: str) -> Steps[str]:
         facts = self._facts()
         try:
             name = yield from self._access.in_worker(lambda: self._reports.support_file(directory, facts))
@@ -200,7 +196,7 @@ class DashboardAnswers:
             return row.reply("failed", reason=error)
         return row.reply(file=name)
 
-    def _save_log(self, row: DashboardCommand, *_: str) -> Steps:
+    def _save_log(self, row: DashboardCommand, *_: str) -> Steps[str]:
         facts = self._facts()
         try:
             path = yield from self._access.in_worker(lambda: self._reports.save_log(facts))

@@ -26,7 +26,6 @@ from protocol.modbus import (
 from ur_emulator.commands.client_writes import WriteModbus
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import Event
 from ur_emulator.controller.modbus.robot_map import PortAddressError, can_write, read_coil, read_register
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.servers.tcp.connection import Connection
@@ -51,11 +50,6 @@ class ModbusPort:
         self._submit = submit
         self._sessions: dict[Connection, _Session] = {}
         self._unfinished: dict[_Session, None] = {}
-
-    @property
-    def clients(self) -> tuple[Connection, ...]:
-        """Connected clients."""
-        return tuple(self._sessions)
 
     def opened(self, connection: Connection) -> None:
         """The client speaks first."""
@@ -84,9 +78,6 @@ class ModbusPort:
                     answer, session.answer = session.answer, None
                     self._send(session, answer)
                 self._serve(session)
-
-    def say(self, event: Event) -> None:
-        """Nothing is said unasked."""
 
     # --- requests
 

@@ -66,11 +66,6 @@ class PrimaryPort:
         if version >= _TOLERANCES_SINCE:
             self._second_greeting += encode_safety_tolerances()
 
-    @property
-    def clients(self) -> tuple[Connection, ...]:
-        """Connected clients."""
-        return tuple(self._channels)
-
     def opened(self, connection: Connection) -> None:
         """Greet: the version message in a segment of its own, the first, long state, then variables."""
         connection.send(self._greeting)
@@ -111,8 +106,8 @@ class PrimaryPort:
             encode = self._states.encode_first if has_started else self._states.encode
             self._send(encode(snapshot), *self._variables.changes(self._now))
 
-    def say(self, event: Event) -> None:
-        """Send a message for an event."""
+    def send_message(self, event: Event) -> None:
+        """Send the message for an event, on the primary port."""
         if not (self._all_messages and self._channels):
             return
         if isinstance(event, ProgramStopped):

@@ -9,12 +9,13 @@ Source: source text of the URCap and of the public client library.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.programs.installation import ExternalControlPc
 from ur_emulator.programs.script_writer import one_line
 from ur_emulator.scripting.network import Network
+from ur_emulator.servers.steps import Steps
 
 REQUEST = b"request_program\n"
 # For so long the box waits for a connection and for the first line [real s]; the first is the URCap's.
@@ -26,7 +27,7 @@ QUIET = 0.1
 
 def request_program(
     network: Network, pc: ExternalControlPc, clock: Callable[[], float] = time.monotonic
-) -> Generator[None, None, str]:
+) -> Steps[str]:
     """Ask a PC for its program, in steps.
 
     Args:

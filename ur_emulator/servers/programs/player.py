@@ -1,11 +1,11 @@
 """The program that is loaded, and what the buttons of PolyScope do with it: load, play, pause, stop.
 
-Every action is a step function (see `box_access`). What cannot be done is refused, and the log says why.
+Every action is done in steps (see `servers.steps`). What cannot be done is refused, and the log says why.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, NoReturn
 
@@ -19,6 +19,7 @@ from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation, load_installation
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.programs.external_control import request_program
+from ur_emulator.servers.steps import Steps
 from urscript import CompiledProgram, compile_program
 from urscript.catalogue import Catalogue, catalogue_for
 from urscript.errors import ScriptError
@@ -34,7 +35,6 @@ _NOT_UP = frozenset(
 )
 _PAUSED = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
 
-Steps = Generator[None, None, None]
 # A program that can be started, or why it cannot.
 Outcome = CompiledProgram | ScriptFailed
 
@@ -81,7 +81,7 @@ class ProgramPlayer:
 
     # --- actions
 
-    def load(self, name: str) -> Steps:
+    def load(self, name: str) -> Steps[None]:
         """Load a program and its installation; what was loaded stays if that fails."""
         what = f"load {name}"
         self._must_be_stopped(what)
@@ -95,7 +95,7 @@ class ProgramPlayer:
         if isinstance(ready, ScriptFailed):
             self._access.note(f"{loaded.file_name} will not start: {ready.log_text or ready.text}")
 
-    def load_installation(self, name: str) -> Steps:
+    def load_installation(self, name: str) -> Steps[None]:
         """Load an installation; the one before stays if that fails."""
         what = f"load installation {name}"
         self._must_be_stopped(what)
@@ -107,7 +107,7 @@ class ProgramPlayer:
             self._refuse(what, error)
         self._access.note(f"Loaded installation: {self.installation.wire_path}")
 
-    def play(self, client: str) -> Steps:
+    def play(self, client: str) -> Steps[None]:
         """Let a paused program go on, or start the loaded one from the top.
 
         Args:
@@ -130,7 +130,7 @@ class ProgramPlayer:
             self._refuse("play", "a program is paused")
         yield from self._access.apply(StartProgram(program))
 
-    def pause(self) -> Steps:
+    def pause(self) -> Steps[None]:
         """Pause the program that plays, and end when the arm rests."""
         if not self.is_running or self.is_paused:
             self._refuse("pause", "no program plays")
@@ -141,7 +141,7 @@ class ProgramPlayer:
         if not self._access.controller.programs.is_running:
             self._refuse("pause", "the program has ended")
 
-    def stop(self) -> Steps:
+    def stop(self) -> Steps[None]:
         """Stop the program, if one is running or paused, and end when the arm rests."""
         if self._access.snapshot.robot_mode in _NOT_UP:
             self._refuse("stop", "the controller is not up")
@@ -181,7 +181,7 @@ class ProgramPlayer:
         loaded = load_program(self.folder, name)
         return loaded, None if loaded.pcs else self._compile(loaded, {})
 
-    def _prepare(self, client: str) -> Generator[None, None, Outcome]:
+    def _prepare(self, client: str) -> Steps[Outcome]:
         """Return the loaded program ready to start; parts that PCs have are fetched now."""
         loaded = self.loaded
         assert loaded is not None

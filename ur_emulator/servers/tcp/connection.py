@@ -31,7 +31,7 @@ class Connection:
     Attributes:
         peer: address of the client, for logs.
         dropped: packages that were dropped because the client did not read.
-        has_ended: the client says no more, see `hear_out`.
+        has_ended: the client has closed its sending side, see `allow_half_close`.
     """
 
     def __init__(
@@ -87,11 +87,11 @@ class Connection:
         """Address of the client without its port."""
         return self.peer.rpartition(":")[0]
 
-    def hear_out(self, on_end: Callable[[Connection], None]) -> None:
-        """Stay open when the client says no more: it may still listen. The owner closes then.
+    def allow_half_close(self, on_end: Callable[[Connection], None]) -> None:
+        """Stay open when the client closes its sending side: it may still read. The owner closes then.
 
         Args:
-            on_end: called once, when that is so.
+            on_end: called once, when that happens.
         """
         self._on_end = on_end
 

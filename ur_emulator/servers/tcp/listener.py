@@ -44,7 +44,12 @@ class Port(Protocol):
 
 
 class Listener:
-    """Accepts the clients of one port."""
+    """Accepts the clients of one port.
+
+    Attributes:
+        number: of the TCP port.
+        connections: to the clients that are connected.
+    """
 
     def __init__(
         self,
@@ -82,14 +87,17 @@ class Listener:
         self._is_out_of_means = False
         self._deaf_until: float | None = None
         self._sock = _listening_socket(host, number)
+        self.connections: dict[Connection, None] = {}
         self.number: int = self._sock.getsockname()[1]
         loop.watch(self._sock, selectors.EVENT_READ, self._accept)
 
     def close(self) -> None:
-        """Stop listening; connected clients stay."""
+        """Stop listening, and close all connections."""
         self._loop.remove(self)
         self._loop.unwatch(self._sock)
         self._sock.close()
+        for connection in tuple(self.connections):
+            connection.close()
 
     def advance(self, now: float) -> float:
         """Listen again when the time has come; called by the loop only while this port is deaf."""
@@ -119,6 +127,7 @@ class Listener:
             except OSError:
                 client.close()  # gone again; some systems say so only now
                 continue
+            self.connections[connection] = None
             self._notice(f"{connection.peer} connected to {self._name} port {self.number}")
             self._port.opened(connection)
 
@@ -137,6 +146,7 @@ class Listener:
             self._notice(f"clients are turned away from {self._name} port {self.number}: {error.strerror}")
 
     def _closed(self, connection: Connection) -> None:
+        del self.connections[connection]
         self._port.closed(connection)
         self._notice(f"{connection.peer} disconnected from {self._name} port {self.number}")
 

@@ -1,0 +1,72 @@
+"""Work that takes several cycles, written as generators, and what advances it.
+
+A generator yields where it has to wait; it is continued after every cycle and when a job of the worker has
+ended. So nothing waits for a clock, and what was asked has happened when it is answered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+from ur_emulator.controller.snapshot import Snapshot
+
+T = TypeVar("T")
+Steps = Generator[None, None, T]
+# Called with the result of the steps, or with the error that ended them.
+Finished = Callable[[Any, Exception | None], None]
+
+
+class StepRunner:
+    """Advances all steps of one box; in the thread of its loop."""
+
+    def __init__(self) -> None:
+        self._under_way: list[tuple[Steps[Any], Finished]] = []
+
+    def start(self, steps: Steps[Any], finished: Finished) -> None:
+        """Begin with steps; `finished` may be called before this returns."""
+        if not _advance(steps, finished):
+            self._under_way.append((steps, finished))
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Go on after a cycle."""
+        if self._under_way:
+            self.advance()
+
+    def advance(self) -> None:
+        """Go on with everything that is under way."""
+        under_way, self._under_way = self._under_way, []
+        self._under_way = [task for task in under_way if not _advance(*task)] + self._under_way
+
+    def close(self, error: Exception) -> None:
+        """End everything; whoever waits is told the error."""
+        under_way, self._under_way = self._under_way, []
+        for steps, finished in under_way:
+            steps.close()
+            finished(None, error)
+
+
+def settle(future: Future[Any]) -> Finished:
+    """Return a function that makes a result or an error that of a future."""
+
+    def finished(result: Any, error: Exception | None) -> None:
+        if error is None:
+            future.set_result(result)
+        else:
+            future.set_exception(error)
+
+    return finished
+
+
+def _advance(steps: Steps[Any], finished: Finished) -> bool:
+    """Take one step; return whether it was the last."""
+    try:
+        next(steps)
+    except StopIteration as end:
+        finished(end.value, None)
+    except Exception as error:
+        finished(None, error)
+    else:
+        return False
+    return True
