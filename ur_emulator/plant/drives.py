@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.calibration import Calibration
 from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, six
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.friction import Friction
 from ur_emulator.plant.hand_guiding import HandGuiding
@@ -32,8 +32,6 @@ from ur_emulator.plant.plant_state import Target
 
 _INTEGRAL_TIME = 0.12  # s; assumed: rest within a few tenths of a second, as arms of this kind settle
 TARGET_MAX = 1e6  # rad, rad/s, rad/s²; far beyond sense, small enough for arithmetic
-
-NO_LOAD: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Drives:
@@ -99,7 +97,7 @@ class Drives:
         self.bias = self._friction.compensation
         self.q_final = path.q_final
         self.coulomb = self._friction.coulomb
-        self.target_moment = self.target_current = NO_LOAD
+        self.target_moment = self.target_current = ZERO6
 
     def set_payload(self, mass: float, cog: Vector3) -> None:
         """Declare the payload to the controller's model: mass [kg], centre in the flange frame [m]."""
@@ -122,7 +120,7 @@ class Drives:
 
     def release(self) -> None:
         """Carry nothing: the brakes do."""
-        self.target_moment = self.target_current = NO_LOAD
+        self.target_moment = self.target_current = ZERO6
 
     def command(self, target: Target) -> bool:
         """Take the target of this cycle.

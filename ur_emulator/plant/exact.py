@@ -17,7 +17,7 @@ from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robot_generation import CB3, RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
-from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX
+from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.plant_state import PlantState, Target
@@ -80,7 +80,7 @@ class ExactPlant(Plant):
                 actual_current=current,
                 joint_voltage=(SUPPLY_VOLTAGE,) * 6,
                 tool_accelerometer=(x, y, z),
-                tcp_force=NO_LOAD,
+                tcp_force=ZERO6,
                 joint_temperatures=self._thermometers.reading,
                 target_current=current,
                 target_moment=moment,

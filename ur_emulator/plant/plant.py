@@ -28,9 +28,9 @@ from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_generation import CB3, RobotGeneration
-from ur_emulator.models.robot_model import RobotModel, Vector3, six
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, six
 from ur_emulator.plant.arm_physics import ArmPhysics
-from ur_emulator.plant.drives import NO_LOAD, TARGET_MAX, Drives
+from ur_emulator.plant.drives import TARGET_MAX, Drives
 from ur_emulator.plant.gear import GearRipple
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.physics import ServoGains
@@ -99,7 +99,7 @@ class Plant:
         self._error = np.zeros(6)
         self._braked = True
         self._saturated_before = self._saturated_now = False
-        self._control_current = NO_LOAD
+        self._control_current = ZERO6
         self._rest = Record()
         self._state: PlantState | None = None
         self.reset(robot.home_q)
@@ -334,7 +334,7 @@ class Plant:
             self._physics.servos.set_free(False)
         self._saturated_before = self._saturated_now = False
         self._error[:] = 0.0
-        self._control_current = NO_LOAD
+        self._control_current = ZERO6
         self._drives.release()
         self._physics.stop()
         self._rest.q[:] = self.q_true
