@@ -1,5 +1,9 @@
-"""Property tests: `make test` runs the same cases every time, `make explore` draws new ones. None looks at a clock."""
+"""Property tests: `make test` runs the same cases every time, `make explore` draws new ones. None looks at a clock.
 
+What exists when all tests are collected is never looked at again by the garbage collector.
+"""
+
+import gc
 import os
 
 from hypothesis import HealthCheck, settings
@@ -8,3 +12,8 @@ _COMMON = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("fixed", _COMMON, derandomize=True)
 settings.register_profile("explore", _COMMON, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
+
+
+def pytest_collection_finish():
+    gc.collect()
+    gc.freeze()

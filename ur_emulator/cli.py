@@ -79,6 +79,7 @@ def serve(
     os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is drawn: no need to look for a display
     from ur_emulator.emulator import ControlBox
     from ur_emulator.errors import EmulatorError
+    from ur_emulator.realtime.interpreter import freeze_existing_objects
 
     try:
         rack = ControlBox.many(
@@ -119,6 +120,7 @@ def serve(
             + (f", control {box.control_port}" if box.control_port else ""),
             flush=True,
         )
+    freeze_existing_objects()
     try:
         rack.serve_forever()
     except EmulatorError as error:

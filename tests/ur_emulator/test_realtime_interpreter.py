@@ -5,7 +5,7 @@ import sys
 import weakref
 
 from ur_emulator import ControlBox
-from ur_emulator.realtime.interpreter import loop_settings
+from ur_emulator.realtime.interpreter import freeze_existing_objects
 
 
 def test_a_box_that_is_gone_leaves_nothing():
@@ -16,20 +16,19 @@ def test_a_box_that_is_gone_leaves_nothing():
     assert gone() is None
 
 
-def test_while_a_loop_runs_the_collector_does_not_look_at_what_was_there_before():
-    assert gc.get_freeze_count() == 0
-    with loop_settings():
-        assert gc.get_freeze_count() > 10_000
-        with loop_settings():
-            pass
-        assert gc.get_freeze_count() > 10_000
-    assert gc.get_freeze_count() == 0
-
-
 def test_a_process_has_its_own_settings_again_after_its_last_box():
     before = gc.get_threshold(), sys.getswitchinterval()
+    frozen = gc.get_freeze_count()
     with ControlBox(pace="lockstep", port_base=None):
         with ControlBox(pace="lockstep", port_base=None):
             assert (gc.get_threshold(), sys.getswitchinterval()) != before
         assert (gc.get_threshold(), sys.getswitchinterval()) != before
     assert (gc.get_threshold(), sys.getswitchinterval()) == before
+    assert gc.get_freeze_count() == frozen
+
+
+def test_a_process_that_only_serves_collects_nothing_of_what_existed_before():
+    before = gc.get_freeze_count()
+    made = [[k] for k in range(10_000)]
+    freeze_existing_objects()
+    assert gc.get_freeze_count() >= before + len(made)

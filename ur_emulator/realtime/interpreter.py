@@ -23,18 +23,16 @@ _before = (gc.get_threshold(), sys.getswitchinterval())
 
 @contextmanager
 def loop_settings() -> Iterator[None]:
-    """Let the collector never look, in this block, at what exists when it begins; take short turns.
+    """Collect rarely and switch threads often in this block.
 
     Blocks of several loops may overlap. When the last one ends, the settings are again what they were before
-    the first, and everything is looked at again: a process that makes many boxes keeps nothing of them.
+    the first.
     """
     global _running_loops, _before
     with _lock:
         if not _running_loops:
             _before = (gc.get_threshold(), sys.getswitchinterval())
         _running_loops += 1
-        gc.collect()
-        gc.freeze()
         gc.set_threshold(*_RARELY)
         sys.setswitchinterval(_SWITCH_INTERVAL)
     try:
@@ -46,7 +44,16 @@ def loop_settings() -> Iterator[None]:
                 thresholds, interval = _before
                 gc.set_threshold(*thresholds)
                 sys.setswitchinterval(interval)
-                gc.unfreeze()
+
+
+def freeze_existing_objects() -> None:
+    """Let the collector never look again at what exists now: for a process that only serves boxes.
+
+    A box in the process of somebody else must not do it: the heap may be large (with 11,000 tests
+    a collection takes a quarter of a second), and its owner may have frozen objects too.
+    """
+    gc.collect()
+    gc.freeze()
 
 
 @contextmanager
