@@ -1,4 +1,4 @@
-"""Hypothesis strategies of syntax trees: every node, in every place where the grammar can put it."""
+"""Hypothesis strategies of syntax trees: every node, in every place where the grammar can put it; words."""
 
 from hypothesis import strategies as st
 from tree_printer import print_expression
@@ -8,7 +8,14 @@ from urscript.syntax import nodes
 VARIABLES = ["a", "b", "c", "type", "time", "p", "_x1"]
 FUNCTIONS = ["f", "g", "sync", "norm", "to_str", "movej"]
 OPERATORS = ["+", "-", "*", "/", "%", "==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"]
-WORDS = ["break", "continue", "halt", "enter_critical", "exit_critical"]
+SIMPLE = ["break", "continue", "halt", "enter_critical", "exit_critical"]
+_WORDS = """
+def sec thread end if elif else while break continue return run kill join halt global local and or xor not
+enter_critical exit_critical True False None ( ) [ ] : , = == != < > <= >= + - * / % . ! x p foo() sync() 1 2.5
+.5 1e3 99999999999 0x1f $ # "s" " ; { } ' \\ ä \x00
+"""
+WORDS = [*_WORDS.split(), "\n"]
+"""For texts that are hardly ever programs."""
 
 variables = st.sampled_from(VARIABLES)
 names = variables.map(nodes.Name)
@@ -72,7 +79,7 @@ short_statements = st.one_of(
     st.builds(nodes.Return, expressions),
     st.builds(nodes.Kill, expressions),
     st.builds(nodes.Join, expressions),
-    st.sampled_from(WORDS).map(nodes.Simple),
+    st.sampled_from(SIMPLE).map(nodes.Simple),
     st.sampled_from(["", '3 "MoveJ"', '12 "Größe" "noBreak"', "def x():"]).map(nodes.Label),
 )
 parameters = st.lists(

@@ -2,10 +2,10 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from lark import Lark
-from test_urscript_lang_properties import functions, statements, threads
+from random_trees import programs, statements
 from tree_printer import print_program
 from typer.testing import CliRunner
 
@@ -52,7 +52,6 @@ def assert_is_canonical(result):
     assert not [line for line in lines if line != line.rstrip(" \t\r")]
 
 
-trees = st.lists(st.one_of(statements, functions, threads), max_size=5).map(tuple)
 comment_texts = st.text(st.characters(max_codepoint=255, exclude_characters="\n"), max_size=6)
 gaps = st.one_of(
     st.sampled_from([" ", "\n", "\t", "\r\n", "\n\n", "\n\n\n\n", "   \n  \n"]),
@@ -65,13 +64,15 @@ gaps = st.one_of(
 )
 
 
-@given(trees)
+@settings(max_examples=50)
+@given(programs)
 def test_what_the_printer_writes_is_canonical(tree):
     text = print_program(tree)
     assert formatted(text) == text
 
 
-@given(trees, st.data())
+@settings(max_examples=50)
+@given(programs, st.data())
 def test_any_blanks_and_comments_between_tokens_leave_the_tree_and_the_comments_as_they_are(tree, data):
     text = data.draw(gaps)
     for token in LEXER.lex(print_program(tree)):
@@ -222,7 +223,9 @@ def test_fmt_of_a_missing_file_is_wrong_use(folder):
     assert call("nowhere.script").exit_code == 2
 
 
-@given(trees, trees)
-def test_same_tree_is_equality(first, second):
-    assert same_tree(first, second) == (first == second)
-    assert same_tree(first, parse(Source(print_program(first))))
+@settings(max_examples=50)
+@given(programs, statements)
+def test_same_tree_is_equality(tree, other):
+    assert same_tree(tree, parse(Source(print_program(tree))))
+    for changed in ((*tree, other), (*tree[:-1], other), (other, *tree[1:])):
+        assert same_tree(tree, changed) == (tree == changed)
