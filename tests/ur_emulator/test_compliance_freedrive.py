@@ -342,7 +342,7 @@ def test_the_form_of_the_e_series_frees_all_axes_or_says_that_it_cannot_block_an
             "freedrive_mode(freeAxes=[1,0,0,0,0,0])",
             ControlMode.POSITION,
             [
-                "freedrive_mode: blocked axes are not modelled, got freeAxes=[1,0,0,0,0,0], allowed is [1,1,1,1,1,1]"
+                "freedrive_mode: blocked axes are not modelled, got freeAxes=[1,0,0,0,0,0]; allowed: [1,1,1,1,1,1]"
             ],
         ),
     ):

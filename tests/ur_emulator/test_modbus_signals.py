@@ -289,23 +289,23 @@ def test_an_own_request_goes_through_the_connection_of_the_signals(bench):
         ),
         (
             'modbus_add_signal("10.0.0.2", 255, 0, 0, "a23456789012345678901")',
-            'modbus_add_signal: "a23456789012345678901" is no signal name, it must have 1 to 20 characters',
+            'modbus_add_signal: "a23456789012345678901" is not a signal name; allowed: 1 to 20 characters',
         ),
         (
             'modbus_add_signal("10.0.0.2", 255, 0, 0, "")',
-            'modbus_add_signal: "" is no signal name, it must have 1 to 20 characters',
+            'modbus_add_signal: "" is not a signal name; allowed: 1 to 20 characters',
         ),
         (
             'modbus_add_signal("", 255, 0, 0, "s")',
-            'modbus_add_signal: "" is no address, write "ip" or "ip:port", port 1 to 65535',
+            'modbus_add_signal: "" is not an address; write "ip" or "ip:port", port 1 to 65535',
         ),
         (
             'modbus_add_signal("10.0.0.2:65536", 255, 0, 0, "s")',
-            'modbus_add_signal: "10.0.0.2:65536" is no address, write "ip" or "ip:port", port 1 to 65535',
+            'modbus_add_signal: "10.0.0.2:65536" is not an address; write "ip" or "ip:port", port 1 to 65535',
         ),
         (
             'modbus_add_signal("10.0.0.2:0", 255, 0, 0, "s")',
-            'modbus_add_signal: "10.0.0.2:0" is no address, write "ip" or "ip:port", port 1 to 65535',
+            'modbus_add_signal: "10.0.0.2:0" is not an address; write "ip" or "ip:port", port 1 to 65535',
         ),
         (
             'modbus_get_signal_status("x", False)',
@@ -321,11 +321,11 @@ def test_an_own_request_goes_through_the_connection_of_the_signals(bench):
         ),
         (
             'modbus_set_output_register("r", 65536, False)',
-            "modbus_set_output_register: 65536 does not fit into a register, allowed are 0 to 65535",
+            "modbus_set_output_register: 65536 does not fit into a register; allowed: 0 to 65535",
         ),
         (
             'modbus_set_output_register("r", -1, False)',
-            "modbus_set_output_register: -1 does not fit into a register, allowed are 0 to 65535",
+            "modbus_set_output_register: -1 does not fit into a register; allowed: 0 to 65535",
         ),
         (
             'modbus_set_output_register("i", 1, False)',
@@ -373,7 +373,7 @@ def test_an_own_request_goes_through_the_connection_of_the_signals(bench):
         ),
         (
             'modbus_send_custom_command("10.0.0.2 ", 1, 6, [1])',
-            'modbus_send_custom_command: "10.0.0.2 " is no address, write "ip" or "ip:port", port 1 to 65535',
+            'modbus_send_custom_command: "10.0.0.2 " is not an address; write "ip" or "ip:port", port 1 to 65535',
         ),
     ],
 )

@@ -57,9 +57,7 @@ def test_run_quiet_prints_texts_only(call):
 def test_run_reports_a_failing_program(call):
     result = call("run", bad="def p():\n  x = [1]\n  y = x[3]\nend\n")
     assert result.exit_code == 1
-    assert (
-        "bad.script:3:7: Runtime error: index 3 is out of range, the valid ones are 0 to 0" in result.output
-    )
+    assert "bad.script:3:7: Runtime error: index 3 is out of range; allowed: 0 to 0" in result.output
 
 
 def test_run_stops_an_endless_program_at_the_limit(call):

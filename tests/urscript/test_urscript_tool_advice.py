@@ -38,16 +38,16 @@ WRONG = {
     ),
     "missing end prog": (
         "def p():\n  textmsg(1)\n",
-        "1:1: Syntax error: this 'def' has no 'end' (write it at the end of the text)",
+        "1:1: Syntax error: this 'def' has no 'end' (add 'end' at the end of the program)",
     ),
     "python indent only": (
         "def p():\n  if True:\n    textmsg(1)\n  else:\n    textmsg(2)\n",
-        "1:1: Syntax error: this 'def' has no 'end' (write it at the end of the text)",
-        "2:3: Syntax error: this 'if' has no 'end' (write it at the end of the text)",
+        "1:1: Syntax error: this 'def' has no 'end' (add 'end' at the end of the program)",
+        "2:3: Syntax error: this 'if' has no 'end' (add 'end' at the end of the program)",
     ),
     "extra end": (
         "def p():\n  textmsg(1)\n  end\nend\n",
-        "3:3: Syntax error: this 'end' closes nothing (take it out)",
+        "3:3: Syntax error: this 'end' has no block (remove it)",
     ),
     "endif": (
         body("if True:", "  sync()", "endif"),
@@ -55,7 +55,7 @@ WRONG = {
     ),
     "end if": (
         body("if True:", "  sync()", "end if"),
-        "4:3: Syntax error: 'end' stands alone, not 'end if' (write end)",
+        "4:3: Syntax error: a block ends with 'end', not 'end if' (write end)",
     ),
     "missing colon if": (
         body("x = 1", "if x == 1", "  textmsg(x)", "end"),
@@ -83,11 +83,11 @@ WRONG = {
     ),
     "assign in if": (
         body("x = 1", "if x = 1:", "  textmsg(x)", "end"),
-        "3:8: Syntax error: '=' assigns, it does not compare (write ==)",
+        "3:8: Syntax error: '=' assigns; it does not compare (write ==)",
     ),
     "double assign": (
         body("a = b = 1"),
-        "2:9: Syntax error: an assignment has no value to assign again (write two assignments)",
+        "2:9: Syntax error: an assignment has no value (write two assignments)",
     ),
     "unknown name": (
         body("speed = 0.1", "movej([0,0,0,0,0,0], v=sped)"),
@@ -113,11 +113,11 @@ WRONG = {
     ),
     "smart quotes": (
         body("textmsg(“hello”)"),
-        '2:11: Lexer exception: “ is no quotation mark (write ")',
+        '2:11: Lexer exception: “ does not delimit a string (write ")',
     ),
     "single quotes": (
         body("textmsg('hello')"),
-        "2:11: Lexer exception: ' is no quotation mark (a text stands between two \")",
+        "2:11: Lexer exception: ' does not delimit a string (write \")",
     ),
     "tabs": (
         "def p():\n\tx = 1\n\ttextmsg(y)\nend\n",
@@ -125,11 +125,11 @@ WRONG = {
     ),
     "nbsp": (
         body("x =\u00a01", "textmsg(x)"),
-        "2:6: Lexer exception: a no-break space means nothing here (write a blank)",
+        "2:6: Lexer exception: unexpected no-break space (write a space)",
     ),
     "degree": (
         body("movej([90°,0,0,0,0,0])"),
-        "2:12: Lexer exception: character '°' has no meaning here",
+        "2:12: Lexer exception: unexpected character '°'",
     ),
     "unclosed paren": (
         body("textmsg(sin(1)", "textmsg(2)"),
@@ -141,7 +141,7 @@ WRONG = {
     ),
     "extra paren": (
         body("textmsg(1))", "textmsg(2)"),
-        "2:13: Syntax error: this ')' closes nothing (take it out)",
+        "2:13: Syntax error: this ')' has no '(' (remove it)",
     ),
     "unclosed bracket": (
         body("movej([0,0,0,0,0,0, a=1)", "textmsg(2)"),
@@ -190,7 +190,7 @@ WRONG = {
     ),
     "pose five": (
         body("movel(p[0.1, 0.2, 0.3, 0, 0])"),
-        "2:9: Syntax error: a pose has six parts, not 5 (write p[x, y, z, rx, ry, rz])",
+        "2:9: Syntax error: a pose has 6 elements, not 5 (write p[x, y, z, rx, ry, rz])",
     ),
     "list comma": (
         body("x = [1, 2 3]", "textmsg(x)"),
@@ -206,7 +206,7 @@ WRONG = {
     ),
     "list of lists trailing": (
         body("x = [1, 2,]", "textmsg(x)"),
-        "2:12: Syntax error: nothing stands behind this ',' (take it out)",
+        "2:12: Syntax error: nothing follows this ',' (remove it)",
     ),
     "print": (
         body('print("hello")'),
@@ -238,8 +238,8 @@ WRONG = {
     ),
     "semicolon": (
         body("x = 1;", "textmsg(x);"),
-        "2:8: Lexer exception: there is no ';' in URScript (take it out, a statement ends where the next one begins)",
-        "3:13: Lexer exception: there is no ';' in URScript (take it out, a statement ends where the next one begins)",
+        "2:8: Lexer exception: there is no ';' in URScript (remove it; statements need no separator)",
+        "3:13: Lexer exception: there is no ';' in URScript (remove it; statements need no separator)",
     ),
     "braces": (
         "def p() {\n  textmsg(1)\n}\n",
@@ -281,7 +281,7 @@ WRONG = {
     ),
     "ternary": (
         body("x = 1 if True else 2", "textmsg(x)"),
-        "2:9: Syntax error: a value has no 'if' in it (write if ...: x = a else: x = b end)",
+        "2:9: Syntax error: URScript has no conditional expressions (write if ...: x = a else: x = b end)",
     ),
     "lambda": (
         body("f = lambda x: x"),
@@ -289,19 +289,19 @@ WRONG = {
     ),
     "fstring": (
         body("x=1", 'textmsg(f"x {x}")'),
-        "3:11: Syntax error: there is no 'f' before a text (write textmsg(text, x) or str_cat(text, x))",
+        "3:11: Syntax error: a string has no prefix 'f' (write textmsg(text, x) or str_cat(text, x))",
     ),
     "escape": (
         body('textmsg("say \\"hi\\"")'),
-        '2:16: Syntax error: there is no \\" in a text, it ends here (leave the quotation marks out)',
+        '2:16: Syntax error: a string cannot contain \\": it ends here (remove the quotation marks)',
     ),
     "string newline": (
         body('textmsg("hello)', "textmsg(2)"),
-        "2:11: Lexer exception: a text without closing '\"' (close it on the same line)",
+        "2:11: Lexer exception: unterminated string: no closing '\"' (close it on the same line)",
     ),
     "hex": (
         body("x = 0xFF", "textmsg(x)"),
-        '2:7: Lexer exception: there are no hexadecimal numbers, got 0xFF (write 255 or to_num("0xFF"))',
+        '2:7: Lexer exception: URScript has no hexadecimal numbers, got 0xFF (write 255 or to_num("0xFF"))',
     ),
     "unit": (
         body("sleep(5s)"),
@@ -309,11 +309,11 @@ WRONG = {
     ),
     "dec comma": (
         body("x = 0,5", "textmsg(x)"),
-        "2:8: Syntax error: the point of a number is '.', not ',' (write 0.5)",
+        "2:8: Syntax error: the decimal separator is '.', not ',' (write 0.5)",
     ),
     "tuple": (
         body("x = (1, 2)", "textmsg(x)"),
-        "2:7: Syntax error: a list stands between [ and ] (write [a, b])",
+        "2:7: Syntax error: a list is written in [ ] (write [a, b])",
     ),
     "unpack": (
         body("a, b = 1, 2"),
@@ -321,13 +321,13 @@ WRONG = {
     ),
     "import": (
         "import math\ndef p():\n  textmsg(math.pi)\nend\n",
-        "1:1: Compile error: name 'import' is not defined (all functions are there, take the line out)",
-        "3:11: Compile error: name 'math' is not defined (functions of mathematics stand alone: sqrt(x), sin(x))",
+        "1:1: Compile error: name 'import' is not defined (all functions are available; remove the line)",
+        "3:11: Compile error: name 'math' is not defined (mathematical functions have no prefix: sqrt(x), sin(x))",
     ),
     "math pi": (
         body("textmsg(pi)", "x = math.sin(1)", "textmsg(x)"),
         "2:11: Compile error: name 'pi' is not defined (write 3.141592653589793)",
-        "3:7: Compile error: name 'math' is not defined (functions of mathematics stand alone: write sin(...))",
+        "3:7: Compile error: name 'math' is not defined (mathematical functions have no prefix: write sin(...))",
     ),
     "len": (
         body("x=[1]", "textmsg(len(x))"),
@@ -335,26 +335,26 @@ WRONG = {
     ),
     "int decl": (
         body("int x = 1", "textmsg(x)"),
-        "2:3: Compile error: name 'int' is not defined (there are no declarations of types: write x = ...)",
+        "2:3: Compile error: name 'int' is not defined (URScript has no type declarations: write x = ...)",
     ),
     "reserved": (
         body("end = 3", "textmsg(end)"),
-        "2:3: Syntax error: 'end' is a word of the language and cannot be a name (choose another name, for example my_end)",
-        "3:11: Syntax error: 'end' is a word of the language and cannot be a name (choose another name, for example my_end)",
+        "2:3: Syntax error: 'end' is a reserved word and cannot be a name (choose another name, for example my_end)",
+        "3:11: Syntax error: 'end' is a reserved word and cannot be a name (choose another name, for example my_end)",
     ),
     "reserved2": (
         body("run = 3", "textmsg(run)"),
-        "2:3: Syntax error: 'run' is a word of the language and cannot be a name (choose another name, for example my_run)",
-        "3:11: Syntax error: 'run' is a word of the language and cannot be a name (choose another name, for example my_run)",
+        "2:3: Syntax error: 'run' is a reserved word and cannot be a name (choose another name, for example my_run)",
+        "3:11: Syntax error: 'run' is a reserved word and cannot be a name (choose another name, for example my_run)",
     ),
     "run def": (
         body("thread t(x):", "  sync()", "end", "run t(1)"),
-        "2:12: Syntax error: a thread takes no parameters (hand values over in global variables)",
-        "5:9: Syntax error: a thread takes no parameters (hand values over in global variables)",
+        "2:12: Syntax error: a thread takes no parameters (pass values in global variables)",
+        "5:9: Syntax error: a thread takes no parameters (pass values in global variables)",
     ),
     "return type": (
         "def p() -> int:\n  textmsg(1)\nend\n",
-        "1:9: Syntax error: a function declares no type (take it out)",
+        "1:9: Syntax error: a function has no return type (remove it)",
     ),
     "function kw": (
         "function p():\n  sync()\nend\n",
@@ -375,8 +375,8 @@ WRONG = {
     ),
     "try": (
         body("try:", "  x = 1", "except:", "  x = 2", "end"),
-        "2:3: Syntax error: there is no 'try' in URScript (an error ends the program, look before you leap)",
-        "4:3: Syntax error: there is no 'except' in URScript (an error ends the program, look before you leap)",
+        "2:3: Syntax error: there is no 'try' in URScript (an error ends the program; check conditions before)",
+        "4:3: Syntax error: there is no 'except' in URScript (an error ends the program; check conditions before)",
     ),
     "def call as value": (
         body("x = get_actual_tcp_pose", "textmsg(x)"),
@@ -450,8 +450,7 @@ def test_all_errors_are_found_in_one_pass_with_their_own_lines():
 
 def test_names_are_looked_up_beside_syntax_errors():
     assert told(body("x = 1;", "if y == 1", "  print(x)", "end")) == [
-        "2:8: Lexer exception: there is no ';' in URScript "
-        "(take it out, a statement ends where the next one begins)",
+        "2:8: Lexer exception: there is no ';' in URScript (remove it; statements need no separator)",
         "3:11: Syntax error: a ':' is missing after '1' (write if y == 1:)",
         "4:5: Compile error: name 'print' is not defined (write textmsg(...))",
     ]

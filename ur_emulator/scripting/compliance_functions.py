@@ -44,8 +44,8 @@ def compliance_functions(
     def freedrive_mode(thread: object, free_axes: Any = (1,) * 6, feature: Any = None) -> None:
         if not all(x == 1 for x in free_axes):
             raise ScriptRuntimeError(
-                f"freedrive_mode: blocked axes are not modelled, got freeAxes={log_form(free_axes)}, "
-                "allowed is [1,1,1,1,1,1]"
+                f"freedrive_mode: blocked axes are not modelled, got freeAxes={log_form(free_axes)}; "
+                "allowed: [1,1,1,1,1,1]"
             )
         if not compliance.is_guided:
             compliance.check_payload(force_sense.unexplained(past.steady_cycles))
@@ -84,8 +84,8 @@ def _force_mode(
                 raise ScriptRuntimeError(f"force_mode: {name} must {allowed}, got {log_form(values)}")
         if max(map(abs, frame)) > MAX_FRAME_DISTANCE:
             raise ScriptRuntimeError(
-                f"force_mode: {log_form(task_frame)} is no task frame, "
-                f"allowed are numbers up to {MAX_FRAME_DISTANCE:g}"
+                f"force_mode: {log_form(task_frame)} is not a valid task frame; "
+                f"allowed: numbers up to {MAX_FRAME_DISTANCE:g}"
             )
         settings = ForceSettings(
             tuple(bool(x) for x in selection_vector),

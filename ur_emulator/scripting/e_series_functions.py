@@ -31,7 +31,9 @@ def e_series_functions(
     def set_tool_communication(thread: object, enabled: bool, baud_rate: int, *line: float) -> None:
         if baud_rate not in BAUD_RATES:
             allowed = ", ".join(map(str, BAUD_RATES))
-            raise ScriptRuntimeError(f"set_tool_communication: baud rate {baud_rate}, allowed are {allowed}")
+            raise ScriptRuntimeError(
+                f"set_tool_communication: baud rate {baud_rate} is not supported; allowed: {allowed}"
+            )
 
     def keep(thread: object, *setting: int) -> None:
         """Take a setting that nothing here depends on; its range is checked with the catalogue."""
@@ -43,7 +45,7 @@ def e_series_functions(
             or min(inertia[:3]) < 0.0
         ):
             raise ScriptRuntimeError(
-                f"set_target_payload: allowed are six moments of inertia up to {MAX_INERTIA:g} kg m^2, "
+                f"set_target_payload: inertia must be six moments of inertia up to {MAX_INERTIA:g} kg m^2, "
                 "the first three not below 0"
             )
         set_payload(thread, m, cog)

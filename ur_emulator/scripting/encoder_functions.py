@@ -21,7 +21,7 @@ def encoder_functions(encoders: Encoders, io: InputOutput) -> Mapping[str, Calla
         if bit is None:
             allowed = ", ".join(map(str, PULSE_INPUTS))
             raise ScriptRuntimeError(
-                f"digital input {number:g} cannot take encoder pulses, allowed are {allowed}"
+                f"digital input {number:g} cannot take encoder pulses; allowed: {allowed}"
             )
         return bit
 
@@ -40,7 +40,7 @@ def encoder_functions(encoders: Encoders, io: InputOutput) -> Mapping[str, Calla
         low, size = RANGES[encoder.range_id]
         if not low <= count < low + size:
             raise ScriptRuntimeError(
-                f"encoder count {count:g} is out of range, allowed are {low} to {low + size - 1}"
+                f"encoder count {count:g} is out of range; allowed: {low} to {low + size - 1}"
             )
         encoder.set_count(float(count))
 
@@ -51,7 +51,7 @@ def encoder_functions(encoders: Encoders, io: InputOutput) -> Mapping[str, Calla
     def set_conveyor(thread: object, count: float, resolution: float) -> None:
         if resolution not in RANGES:
             raise ScriptRuntimeError(
-                f"set_conveyor_tick_count: resolution {resolution:g} does not exist, allowed are 0 to 4"
+                f"set_conveyor_tick_count: resolution {resolution:g} does not exist; allowed: 0 to 4"
             )
         encoder = encoders.encoders[_CONVEYOR]
         if not encoder.is_fed or encoder.range_id != resolution:

@@ -59,8 +59,7 @@ def _domains(io: InputOutput) -> dict[str, Function]:
         if domain is None:
             allowed = ", ".join(map(str, ranges))
             raise ScriptRuntimeError(
-                f"set_analog_inputrange: range {code:g} is not supported on port {port:g}, "
-                f"allowed are {allowed}"
+                f"set_analog_inputrange: range {code:g} is not supported on port {port:g}; allowed: {allowed}"
             )
         line.set_domain(domain)
 
@@ -86,7 +85,7 @@ def _runstates(configuration: IoConfiguration) -> dict[str, Function]:
     def setter(kind: OutputKind, name: str) -> Function:
         def set_runstate(thread: object, output: float, code: float) -> None:
             if code not in tuple(RunState):
-                raise ScriptRuntimeError(f"{name}: state {code:g} does not exist, allowed are 0 to 3")
+                raise ScriptRuntimeError(f"{name}: state {code:g} does not exist; allowed: 0 to 3")
             configuration.set_rule(kind, int(output), RunState(int(code)))
 
         return set_runstate
@@ -118,7 +117,7 @@ def _euromap(euromap: Euromap, configuration: IoConfiguration) -> dict[str, Func
     def port(number: float) -> int:
         if not 0 <= number < N_EUROMAP:
             raise ScriptRuntimeError(
-                f"Euromap67 port {number:g} does not exist, allowed are 0 to {N_EUROMAP - 1}"
+                f"Euromap67 port {number:g} does not exist; allowed: 0 to {N_EUROMAP - 1}"
             )
         return int(number)
 

@@ -63,7 +63,7 @@ def _definitions(modbus: ModbusSignals, network: Network) -> dict[str, Function]
         builtin = "modbus_add_signal"
         if not 0 < len(name) <= MAX_NAME:
             raise ScriptRuntimeError(
-                f'{builtin}: "{name}" is no signal name, it must have 1 to {MAX_NAME} characters'
+                f'{builtin}: "{name}" is not a signal name; allowed: 1 to {MAX_NAME} characters'
             )
         if name not in modbus.signals and len(modbus.signals) >= MAX_SIGNALS:
             raise ScriptRuntimeError(f"{builtin}: there are {MAX_SIGNALS} signals already, delete one first")
@@ -105,7 +105,7 @@ def _values(modbus: ModbusSignals) -> dict[str, Function]:
         builtin = "modbus_set_output_register"
         if not 0 <= value <= WORD_MAX:
             raise ScriptRuntimeError(
-                f"{builtin}: {value} does not fit into a register, allowed are 0 to {WORD_MAX}"
+                f"{builtin}: {value} does not fit into a register; allowed: 0 to {WORD_MAX}"
             )
         _set(builtin, _signal(modbus, builtin, name, SignalType.REGISTER_OUTPUT), int(value))
 
@@ -166,6 +166,6 @@ def _unit_address(builtin: str, text: str) -> UnitAddress:
     port = int(match[2] or DEFAULT_PORT) if match else 0
     if match is None or not 0 < port <= WORD_MAX:
         raise ScriptRuntimeError(
-            f'{builtin}: "{text[:80]}" is no address, write "ip" or "ip:port", port 1 to 65535'
+            f'{builtin}: "{text[:80]}" is not an address; write "ip" or "ip:port", port 1 to 65535'
         )
     return UnitAddress(match[1], port)

@@ -161,7 +161,7 @@ def motion_functions(
         for i, (x, low, high) in enumerate(zip(angles, arm.robot.q_min, arm.robot.q_max, strict=True)):
             if not low <= x <= high:
                 raise ScriptRuntimeError(
-                    f"set_pos: joint {i} cannot be at {x:g} rad, allowed are {low:.4f} to {high:.4f}"
+                    f"set_pos: joint {i} cannot be at {x:g} rad; allowed: {low:.4f} to {high:.4f}"
                 )
         if not place_arm(angles):
             raise ScriptRuntimeError(

@@ -33,7 +33,7 @@ def settings_functions(
         offset = six([float(x) for x in pose])
         if max(map(abs, offset)) > MAX_TCP_OFFSET:
             raise ScriptRuntimeError(
-                f"set_tcp: {log_form(pose)} is no tool, allowed are numbers up to {MAX_TCP_OFFSET:g}"
+                f"set_tcp: {log_form(pose)} is not a valid TCP; allowed: numbers up to {MAX_TCP_OFFSET:g}"
             )
         if tool.payload.at_tcp:
             cog_of(offset[:3])
@@ -43,15 +43,15 @@ def settings_functions(
         x, y, z = map(float, value)
         if max(abs(x), abs(y), abs(z)) > MAX_COG:
             raise ScriptRuntimeError(
-                f"a centre of gravity at {log_form([x, y, z])} m was given, "
-                f"allowed are numbers up to {MAX_COG:g} m from the flange"
+                f"a centre of gravity at {log_form([x, y, z])} m is out of range; "
+                f"allowed: numbers up to {MAX_COG:g} m from the flange"
             )
         return (x, y, z)
 
     def mass_of(mass: float) -> float:
         if not 0.0 <= mass <= robot.payload_max:
             raise ScriptRuntimeError(
-                f"a payload of {mass:g} kg was given, allowed are 0 to {robot.payload_max:g} kg"
+                f"a payload of {mass:g} kg is out of range; allowed: 0 to {robot.payload_max:g} kg"
             )
         return float(mass)
 

@@ -73,8 +73,8 @@ def state_functions(arm: ScriptArm, past: PastCycles, step_time: float) -> Mappi
     def get_actual_joint_positions_history(thread: object, steps: float) -> list[float]:
         if not steps < len(past.q_history):
             raise ScriptRuntimeError(
-                f"get_actual_joint_positions_history: {steps:g} steps back, "
-                f"allowed are 0 to {len(past.q_history) - 1}"
+                f"get_actual_joint_positions_history: {steps:g} steps back; "
+                f"allowed: 0 to {len(past.q_history) - 1}"
             )
         return list(past.q_history[int(steps)])
 

@@ -33,7 +33,7 @@ def foreign_end(problem: Problem) -> Advice | None:
             )
         alone = not _is_elsewhere(second, piece) and _is_elsewhere(third, piece)
         if piece.text == "end" and second.text in WORDS_AFTER_END and alone:
-            message = f"'end' stands alone, not 'end {second.text}'"
+            message = f"a block ends with 'end', not 'end {second.text}'"
             return about(piece, message, "write end", replaced(second, " "), last=second)
     return None
 
@@ -54,7 +54,7 @@ def missing_end(problem: Problem) -> Advice | None:
     following = problem.rough.pieces[index]
     if following.kind == "end":
         edit = Edit(following.end, following.end, f"\n{' ' * opener.indent}end")
-        return about(opener.piece, message, "write it at the end of the text", edit)
+        return about(opener.piece, message, "add 'end' at the end of the program", edit)
     # Behind the last piece before it: there it shifts nothing, and no comment hides it.
     last = problem.rough.pieces[index - 1]
     hint = f"it seems to belong before line {following.line}"
@@ -94,7 +94,7 @@ def extra_end(problem: Problem) -> Advice | None:
             if rough.is_first(index) and rough.indent(piece.line) != opener.indent:
                 wrong = piece
                 break
-    return about(wrong, "this 'end' closes nothing", "take it out", replaced(wrong, " "))
+    return about(wrong, "this 'end' has no block", "remove it", replaced(wrong, " "))
 
 
 def else_if(problem: Problem) -> Advice | None:

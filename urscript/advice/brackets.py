@@ -16,7 +16,8 @@ def closes_nothing(problem: Problem) -> Advice | None:
         return None
     brackets = problem.open_brackets()
     if not brackets:
-        return about(piece, f"this '{piece.text}' closes nothing", "take it out", replaced(piece, " "))
+        message = f"this '{piece.text}' has no '{CLOSERS[piece.text]}'"
+        return about(piece, message, "remove it", replaced(piece, " "))
     opener = brackets[-1]
     right = PAIRS[opener.text]
     if right == piece.text:
@@ -60,7 +61,7 @@ def decimal_comma(problem: Problem) -> Advice | None:
     if before.end != comma.start or comma.end != after.start or "." in before.text + after.text:
         return None
     hint = f"write {before.text}.{after.text}"
-    return about(comma, "the point of a number is '.', not ','", hint, replaced(comma, "."))
+    return about(comma, "the decimal separator is '.', not ','", hint, replaced(comma, "."))
 
 
 def tuples(problem: Problem) -> Advice | None:
@@ -75,7 +76,7 @@ def tuples(problem: Problem) -> Advice | None:
         close = _partner(problem, opener)
         if close is not None:
             edits.append(replaced(close, "]"))
-        return about(opener, "a list stands between [ and ]", "write [a, b]", *edits)
+        return about(opener, "a list is written in [ ]", "write [a, b]", *edits)
     index, head = problem.line_head(comma.line)
     if not brackets and head.kind == "word" and index + 1 == problem.index:
         end = problem.rough.line_start(comma.line) + len(problem.rough.line(comma.line))
@@ -108,11 +109,11 @@ def missing_comma(problem: Problem) -> Advice | None:
         start = problem.rough.line_start(piece.line)
         end = max(before.end, start + problem.rough.line(piece.line).rfind('"') + 1)
         edit = Edit(before.start, end, '""'.ljust(end - before.start))
-        message, hint = 'there is no \\" in a text, it ends here', "leave the quotation marks out"
+        message, hint = 'a string cannot contain \\": it ends here', "remove the quotation marks"
         return Advice(message, hint, before.end - 2, before.end, (edit,))
     if piece.kind == "string" and before.text in ("f", "r", "b") and before.end == piece.start:
-        hint = "write textmsg(text, x) or str_cat(text, x)" if before.text == "f" else "take the letter out"
-        return about(before, f"there is no '{before.text}' before a text", hint, replaced(before, " "))
+        hint = "write textmsg(text, x) or str_cat(text, x)" if before.text == "f" else "remove the letter"
+        return about(before, f"a string has no prefix '{before.text}'", hint, replaced(before, " "))
     return about(piece, f"a ',' is missing before '{piece.text}'", None, Edit(before.end, before.end, ","))
 
 
@@ -121,7 +122,7 @@ def trailing_comma(problem: Problem) -> Advice | None:
     comma = problem.before
     if comma.text != "," or problem.at.text not in CLOSERS:
         return None
-    return about(comma, "nothing stands behind this ','", "take it out", replaced(comma, " "))
+    return about(comma, "nothing follows this ','", "remove it", replaced(comma, " "))
 
 
 def inside_brackets(problem: Problem) -> Advice | None:
@@ -130,9 +131,9 @@ def inside_brackets(problem: Problem) -> Advice | None:
     if problem.starts_line or not problem.open_brackets() or not problem.accepts("COMMA", "RPAR", "RSQB"):
         return None
     if piece.text == ":":
-        return about(piece, "there are no parts x[a:b] and no pairs a: b", "write a while loop")
+        return about(piece, "URScript has no slices x[a:b] and no pairs a: b", "write a while loop")
     if piece.text == "for":
-        return about(piece, "a list is not made by a 'for' in it", "write a while loop")
+        return about(piece, "URScript has no list comprehensions", "write a while loop")
     if piece.text in ("if", "else"):
-        return about(piece, "a value has no 'if' in it", "write if ...: x = a else: x = b end")
+        return about(piece, "URScript has no conditional expressions", "write if ...: x = a else: x = b end")
     return None

@@ -49,7 +49,7 @@ def quotes(problem: Problem) -> Advice | None:
         Edit(start + match.start(), start + match.end(), '"'.ljust(len(match[0])))
         for match in re.finditer(marks, line)
     ]
-    return about(piece, f"{mark} is no quotation mark", SIGNS[mark][1], *edits)
+    return about(piece, f"{mark} does not delimit a string", SIGNS[mark][1], *edits)
 
 
 def sign(problem: Problem) -> Advice | None:
@@ -62,17 +62,13 @@ def sign(problem: Problem) -> Advice | None:
         last = problem.after
         spelt = piece.text + last.text
     if spelt not in SIGNS:
-        message = f"character '{spelt}' has no meaning here"
+        message = f"unexpected character '{spelt}'"
         return about(piece, message, None, replaced(piece, " "), sure=False)
     new, hint = SIGNS[spelt]
     if spelt == "{" and problem.before.text == ":":
         new = " "
     edit = replaced(piece, f" {new} " if new.isalpha() else new, last)
-    what = (
-        f"{INVISIBLE[spelt]} means nothing here"
-        if spelt in INVISIBLE
-        else f"there is no '{spelt}' in URScript"
-    )
+    what = f"unexpected {INVISIBLE[spelt]}" if spelt in INVISIBLE else f"there is no '{spelt}' in URScript"
     return about(piece, what, hint, edit, last=last)
 
 
@@ -87,7 +83,10 @@ def number(problem: Problem) -> Advice | None:
         return about(following, "there is no '\u00b0' in URScript", f"write d2r({text})", edit)
     if re.fullmatch(r"0[xX][0-9a-fA-F]{1,8}", text):
         value = int(text, 16)
-        message, hint = f"there are no hexadecimal numbers, got {text}", f'write {value} or to_num("{text}")'
+        message, hint = (
+            f"URScript has no hexadecimal numbers, got {text}",
+            f'write {value} or to_num("{text}")',
+        )
         return about(piece, message, hint, replaced(piece, str(value)))
     unit = re.fullmatch(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)([A-Za-z]\w*)", text)
     if unit:
@@ -106,7 +105,9 @@ def open_string(problem: Problem) -> Advice | None:
     while n_open and text.endswith(")"):
         text, n_open = text[:-1], n_open - 1
     end = piece.start + len(text)
-    return about(piece, "a text without closing '\"'", "close it on the same line", Edit(end, end, '"'))
+    return about(
+        piece, "unterminated string: no closing '\"'", "close it on the same line", Edit(end, end, '"')
+    )
 
 
 def pose_parts(problem: Problem) -> Advice | None:
@@ -119,7 +120,7 @@ def pose_parts(problem: Problem) -> Advice | None:
         depth += (piece.text in ("(", "[")) - (piece.text in (")", "]"))
         n_parts += piece.text == "," and depth == 1
         if depth == 0:
-            message = f"a pose has six parts, not {n_parts}"
+            message = f"a pose has 6 elements, not {n_parts}"
             filling = ", 0" * (6 - n_parts)
             edits = (Edit(piece.start, piece.start, filling),) if n_parts < 6 else ()
             return about(letter, message, "write p[x, y, z, rx, ry, rz]", *edits, last=piece)

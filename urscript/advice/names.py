@@ -30,9 +30,9 @@ def _hint_for_name(name: str, text: str, column: int) -> str | None:
     if text.lstrip().startswith("--"):
         return "a comment begins with '#'"
     if name in TYPES and (variable := re.match(r"\s+([A-Za-z_]\w*)\s*=", behind)):
-        return f"there are no declarations of types: write {variable[1]} = ..."
+        return f"URScript has no type declarations: write {variable[1]} = ..."
     if name in ("math", "np") and (function := re.match(r"\.(\w+)\s*\(", behind)):
-        return f"functions of mathematics stand alone: write {function[1]}(...)"
+        return f"mathematical functions have no prefix: write {function[1]}(...)"
     if name in STATEMENTS and not text[: column - 1].strip():
         return STATEMENTS[name].hint
     return NAMES.get(name)

@@ -41,7 +41,7 @@ def reserved_word(problem: Problem) -> Advice | None:
         word = before
     else:
         return None
-    message = f"'{word.text}' is a word of the language and cannot be a name"
+    message = f"'{word.text}' is a reserved word and cannot be a name"
     hint = f"choose another name, for example my_{word.text}"
     return about(word, message, hint, replaced(word, "_" * len(word.text)), sure=False)
 
@@ -71,9 +71,9 @@ def assignment_as_value(problem: Problem) -> Advice | None:
         edit = replaced(before, new, piece)
         return about(before, f"there is no '{sign}' in URScript", f"write {new}", edit, last=piece)
     if problem.line_head(piece.line)[1].text in _CONDITIONS:
-        return about(piece, "'=' assigns, it does not compare", "write ==", replaced(piece, "=="))
+        return about(piece, "'=' assigns; it does not compare", "write ==", replaced(piece, "=="))
     if problem.accepts("WHILE"):
-        message = "an assignment has no value to assign again"
+        message = "an assignment has no value"
         return about(piece, message, "write two assignments", replaced(piece, "=="))
     return None
 
@@ -128,7 +128,7 @@ def value_with_if(problem: Problem) -> Advice | None:
     if found is None or problem.line_head(piece.line)[1].text in _CONDITIONS:
         return None
     edit = Edit(start + found.start(), start + len(line), " " * (len(line) - found.start()))
-    message, hint = "a value has no 'if' in it", "write if ...: x = a else: x = b end"
+    message, hint = "URScript has no conditional expressions", "write if ...: x = a else: x = b end"
     return Advice(message, hint, start + found.start(), start + found.end(), (edit,))
 
 
@@ -149,19 +149,22 @@ def function_head(problem: Problem) -> Advice | None:
     line_end = rough.line_start(piece.line) + len(rough.line(piece.line).rstrip())
     if piece.text == "-" and problem.after.text == ">":
         edit = Edit(piece.start, line_end, ":".ljust(line_end - piece.start))
-        return about(piece, "a function declares no type", "take it out", edit, last=problem.after)
+        return about(piece, "a function has no return type", "remove it", edit, last=problem.after)
     word = problem.piece(-2).text
     if piece.text in (":", "{") and word in ("def", "thread", "sec"):
-        message, hint = "a definition has brackets, also without parameters", f"write {word} {before.text}():"
+        message, hint = (
+            "a definition needs parentheses, also without parameters",
+            f"write {word} {before.text}():",
+        )
         return about(before, message, hint, Edit(before.end, before.end, "()"))
     head = problem.line_head(piece.line)[1].text
     if piece.text == ":" and head == "def" and problem.accepts("COMMA", "RPAR"):
         edit = replaced(piece, " ", problem.after)
-        return about(piece, "a parameter declares no type", "take it out", edit, last=problem.after)
+        return about(piece, "a parameter has no type", "remove it", edit, last=problem.after)
     if before.text == "(" and problem.piece(-3).text in ("thread", "run") and piece.text != ")":
         close = rough.text.find(")", piece.start, line_end)
         edit = Edit(piece.start, max(close, piece.end), " ")
-        hint = "hand values over in global variables"
+        hint = "pass values in global variables"
         return about(piece, "a thread takes no parameters", hint, edit, sure=False)
     return None
 

@@ -21,7 +21,7 @@ class ForeignWord(NamedTuple):
 
 
 _COUNT: Final = "write i = 0, then while i < n: ... i = i + 1 end"
-_IMPORT: Final = "all functions are there, take the line out"
+_IMPORT: Final = "all functions are available; remove the line"
 
 STATEMENTS: Final[dict[str, ForeignWord]] = {
     "elseif": ForeignWord("write elif", "elif", True),
@@ -44,11 +44,11 @@ STATEMENTS: Final[dict[str, ForeignWord]] = {
     "match": ForeignWord("write if, elif and else", "if True:"),
     "case": ForeignWord("write if, elif and else"),
     "default": ForeignWord("write else"),
-    "try": ForeignWord("an error ends the program, look before you leap", "if True:"),
-    "except": ForeignWord("an error ends the program, look before you leap", "else:"),
-    "catch": ForeignWord("an error ends the program, look before you leap", "else:"),
-    "finally": ForeignWord("an error ends the program, look before you leap"),
-    "with": ForeignWord("open and close by hand", "if True:"),
+    "try": ForeignWord("an error ends the program; check conditions before", "if True:"),
+    "except": ForeignWord("an error ends the program; check conditions before", "else:"),
+    "catch": ForeignWord("an error ends the program; check conditions before", "else:"),
+    "finally": ForeignWord("an error ends the program; check conditions before"),
+    "with": ForeignWord("call the open and close functions", "if True:"),
     "class": ForeignWord("write functions", "if True:"),
     "import": ForeignWord(_IMPORT),
     "from": ForeignWord(_IMPORT),
@@ -100,8 +100,8 @@ NAMES: Final[dict[str, str]] = {
     "count": "write length(...)",
     "str": "write to_str(...)",
     "string": "write to_str(...)",
-    "int": "write floor(...), ceil(...), or to_num(...) for a text",
-    "float": "write to_num(...) for a text; numbers need no conversion",
+    "int": "write floor(...), ceil(...), or to_num(...) for a string",
+    "float": "write to_num(...) for a string; numbers need no conversion",
     "abs": "write norm(...)",
     "fabs": "write norm(...)",
     "max": "write an if",
@@ -123,11 +123,11 @@ NAMES: Final[dict[str, str]] = {
     "pi": "write 3.141592653589793",
     "PI": "write 3.141592653589793",
     "M_PI": "write 3.141592653589793",
-    "math": "functions of mathematics stand alone: sqrt(x), sin(x)",
-    "np": "functions of mathematics stand alone: sqrt(x), sin(x)",
-    "self": "there are no objects",
-    "this": "there are no objects",
-    "pass": "a block may be empty, take it out",
+    "math": "mathematical functions have no prefix: sqrt(x), sin(x)",
+    "np": "mathematical functions have no prefix: sqrt(x), sin(x)",
+    "self": "URScript has no objects",
+    "this": "URScript has no objects",
+    "pass": "a block may be empty; remove it",
     "wait": "write sleep(...)",
     "delay": "write sleep(...)",
     "usleep": "write sleep(...), in seconds",
@@ -147,7 +147,7 @@ NAMES: Final[dict[str, str]] = {
     "moveL": "write movel(...)",
     "MoveL": "write movel(...)",
     "move": "write movej(...) or movel(...)",
-    **dict.fromkeys(("double", "bool", "char", "auto"), "take it out: x = 1 is enough"),
+    **dict.fromkeys(("double", "bool", "char", "auto"), "remove it: x = 1 is enough"),
     **dict.fromkeys(("import", "from", "include"), _IMPORT),
 }
 """Names that other languages know, and what to write here."""
@@ -170,7 +170,7 @@ SIGNS: Final[dict[str, tuple[str, str]]] = {
     "||": ("or", "write or"),
     "&": ("and", "write and; bits are in integer_to_binary_list(...)"),
     "|": ("or", "write or; bits are in integer_to_binary_list(...)"),
-    ";": (" ", "take it out, a statement ends where the next one begins"),
+    ";": (" ", "remove it; statements need no separator"),
     "{": (":", "a block begins with ':' and ends with 'end'"),
     "}": ("end", "a block begins with ':' and ends with 'end'"),
     "^": ("*", "write pow(a, b)"),
@@ -184,7 +184,7 @@ SIGNS: Final[dict[str, tuple[str, str]]] = {
     "\u2019": ('"', 'write "'),
     "\u00b4": ('"', 'write "'),
     "`": ('"', 'write "'),
-    "'": ('"', 'a text stands between two "'),
+    "'": ('"', 'write "'),
     "\u2013": ("-", "write -"),
     "\u2014": ("-", "write -"),
     "\u2212": ("-", "write -"),
@@ -194,20 +194,20 @@ SIGNS: Final[dict[str, tuple[str, str]]] = {
     "\u2264": ("<=", "write <="),
     "\u2265": (">=", "write >="),
     "\u2260": ("!=", "write !="),
-    "\u00a0": (" ", "write a blank"),
-    "\u202f": (" ", "write a blank"),
-    "\u2009": (" ", "write a blank"),
-    "\u200b": (" ", "take it out"),
-    "\ufeff": (" ", "take it out"),
-    "\\": (" ", "take it out, a statement may go on in the next line"),
+    "\u00a0": (" ", "write a space"),
+    "\u202f": (" ", "write a space"),
+    "\u2009": (" ", "write a space"),
+    "\u200b": (" ", "remove it"),
+    "\ufeff": (" ", "remove it"),
+    "\\": (" ", "remove it; a statement may continue on the next line"),
 }
 """Characters that mean nothing here: what to put in their place, and what to tell."""
 
 INVISIBLE: Final = {
-    "\u00a0": "a no-break space",
-    "\u202f": "a narrow no-break space",
-    "\u2009": "a thin space",
-    "\u200b": "an invisible space",
-    "\ufeff": "a byte order mark",
+    "\u00a0": "no-break space",
+    "\u202f": "narrow no-break space",
+    "\u2009": "thin space",
+    "\u200b": "zero-width space",
+    "\ufeff": "byte order mark",
 }
 """What to call characters that cannot be seen."""

@@ -137,7 +137,7 @@ def _unreachable(block: Block, program: ResolvedProgram) -> Iterator[ScriptWarni
     ended_by = ""
     for statement in block:
         if ended_by and not isinstance(statement, (nodes.Function, nodes.Label, nodes.Declare)):
-            message = f"this is never reached: it stands after {ended_by}"
+            message = f"unreachable code: it follows {ended_by}"
             yield ScriptWarning(UNREACHABLE, message, _first_line(statement), program.source)
             break
         ended_by = ended_by or _end_of(statement)
@@ -155,7 +155,7 @@ def _end_of(statement: Statement) -> str:
             return word
         case nodes.While(condition=condition, body=body):
             endless = constant_truth(condition) is True and not _breaks(body)
-            return "a loop without an end" if endless else ""
+            return "an endless loop" if endless else ""
         case nodes.If(arms=arms, otherwise=otherwise) if otherwise is not None:
             blocks = [*(arm.body for arm in arms), otherwise]
             all_end = all(any(_end_of(inner) for inner in block) for block in blocks)
@@ -210,7 +210,7 @@ def _is_same(first: Expression, second: Expression) -> bool:
 
 
 def _unchecked_reads(program: ResolvedProgram) -> Iterator[ScriptWarning]:
-    """Reads whose numbers are used while element 0 is not looked at and the list goes nowhere as a whole."""
+    """Reads whose numbers are used while element 0 is not read and the list goes nowhere as a whole."""
     numbers_used: set[Variable] = set()
     checked: set[Variable] = set()
     indexed: set[int] = set()
@@ -240,6 +240,6 @@ def _is_read(call: nodes.Call, scope: FunctionScope) -> bool:
 
 
 def _unchecked(call: nodes.Call, what: str, program: ResolvedProgram) -> ScriptWarning:
-    message = f"how many numbers came is never checked: {what} is not looked at"
-    hint = "after a time-out it is 0 and the numbers mean nothing"
+    message = f"the number of received values is never checked: {what} is not read"
+    hint = "after a timeout it is 0 and the values are invalid"
     return ScriptWarning(UNCHECKED_READ, message, call.span, program.source, hint)

@@ -139,7 +139,7 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
         assert scope.node is not None
         span = name_of(scope.node, program.source)
         if scope.parent is not None and scope.parent.functions[scope.name] is not scope:
-            message = f"'{scope.name}' is defined twice here, the last definition counts"
+            message = f"'{scope.name}' is defined twice here; the last definition is used"
             yield ScriptWarning(DEFINED_TWICE, message, span, program.source)
         elif scope not in reached and not scope.name.startswith("_"):
             rule, what = (

@@ -28,7 +28,7 @@ class Rule(NamedTuple):
 UNUSED_GLOBAL: Final = Rule(
     "W101",
     "a global variable is never read",
-    "misspelt elsewhere, or left over; a name with _ in front is exempt",
+    "misspelt elsewhere, or left over; names that begin with _ are exempt",
 )
 UNUSED_LOCAL: Final = Rule("W102", "a local variable is never read", "as W101")
 UNUSED_PARAMETER: Final = Rule("W103", "a parameter is never read", "as W101")
@@ -42,21 +42,21 @@ BUSY_LOOP: Final = Rule(
 UNCHECKED_READ: Final = Rule(
     "W107",
     "the count of a socket read is never checked",
-    "element 0 says how many numbers came; after a time-out the others mean nothing",
+    "element 0 is the number of received values; after a timeout the others are invalid",
 )
 UNREACHABLE: Final = Rule(
-    "W108", "code is never reached", "it stands after return, halt, break, continue or a loop without an end"
+    "W108", "code is never reached", "it follows return, halt, break, continue or an endless loop"
 )
 HIDES_BUILTIN: Final = Rule(
     "W109",
     "a name hides a builtin",
-    "the builtin cannot be called where the name counts, readers take it for it",
+    "the builtin cannot be called in the scope of the name",
 )
 DEAD_BRANCH: Final = Rule(
     "W110", "an elif or else is never reached", "a condition before it is always true, or the same"
 )
 DEFINED_TWICE: Final = Rule(
-    "W111", "a function is defined twice", "the last definition counts, also before it"
+    "W111", "a function is defined twice", "the last definition is used, also by earlier calls"
 )
 RUN_OF_DEF: Final = Rule(
     "W112", "a function is run as a thread", "a controller may refuse it; define it with thread"

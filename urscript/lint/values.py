@@ -56,7 +56,7 @@ def _unused(value: Expression) -> tuple[str, str | None]:
     """What to say about a value that nobody uses."""
     match value:
         case nodes.Binary(operator="==", left=nodes.Name(name=name)):
-            return "this compares, and nothing is done with the result", f"write {name} = ... to assign"
+            return "the result of this comparison is not used", f"write {name} = ... to assign"
         case nodes.Binary(operator="+" | "-" as operator, right=nodes.Prefix(operator=sign)) if (
             sign == operator
         ):

@@ -136,7 +136,8 @@ class _Resolver:
     def _declare_function(self, function: nodes.Function, scope: FunctionScope) -> None:
         if function.kind == "sec":
             self._error(
-                ScriptContextError("a secondary program cannot stand inside another program"), function.span
+                ScriptContextError("a secondary program cannot be defined inside another program"),
+                function.span,
             )
         python_name = f"f{len(self.program.functions)}_{function.name}"
         inner = FunctionScope(function.name, function, scope, function.body, python_name)
@@ -149,7 +150,7 @@ class _Resolver:
         assert scope.node is not None
         for parameter in scope.node.parameters:
             if parameter.name in scope.locals:
-                self._error(ScriptContextError(f"parameter '{parameter.name}' twice"), parameter.span)
+                self._error(ScriptContextError(f"duplicate parameter '{parameter.name}'"), parameter.span)
             scope.locals.add(parameter.name)
         for statement in all_statements(scope.body):
             if not isinstance(statement, (nodes.Assign, nodes.Declare)) or statement.scope == "global":
@@ -219,7 +220,10 @@ class _Resolver:
                     self._expression(index, scope, runs_in)
                 return
             case nodes.IntLiteral(value=value) if value == 2**31:
-                self._error(ScriptSyntaxError("an integer has 32 bits; write a float"), expression.span)
+                self._error(
+                    ScriptSyntaxError("this integer does not fit into 32 bits; write a float"),
+                    expression.span,
+                )
             case nodes.Prefix(operator="-", operand=nodes.IntLiteral()):
                 return
         for part in child_expressions(expression):
@@ -284,7 +288,7 @@ class _Resolver:
             if argument.name is not None:
                 seen_name = True
             elif seen_name:
-                self._error(ScriptSyntaxError("a positional argument after a named one"), argument.span)
+                self._error(ScriptSyntaxError("positional argument after a named argument"), argument.span)
                 return False
         return True
 

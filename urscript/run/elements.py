@@ -29,7 +29,7 @@ def make_list(items: list[Any]) -> Any:
     for item in items:
         if not _are_alike(items[0], item):
             raise ScriptRuntimeError(
-                f"all elements of a list have one type, got {type_name(items[0])} and {type_name(item)}"
+                f"all elements of a list must have one type, got {type_name(items[0])} and {type_name(item)}"
             )
     return items
 
@@ -55,8 +55,8 @@ def _position(index: Any, length: int) -> int:
         raise ScriptRuntimeError(f"an index must be an integer, got {a_type(index)}")
     if not 0 <= index < length:
         if length == 0:
-            raise ScriptRuntimeError(f"index {index} is out of range, the list is empty")
-        raise ScriptRuntimeError(f"index {index} is out of range, the valid ones are 0 to {length - 1}")
+            raise ScriptRuntimeError(f"index {index} is out of range: the list is empty")
+        raise ScriptRuntimeError(f"index {index} is out of range; allowed: 0 to {length - 1}")
     return index
 
 

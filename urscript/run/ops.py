@@ -31,7 +31,7 @@ def add(a: Any, b: Any) -> Any:
     if ta is str and tb is str:
         if len(a) + len(b) > dialect.LONGEST_STRING:
             raise ScriptRuntimeError(
-                f"a string of {len(a) + len(b)} characters, allowed are {dialect.LONGEST_STRING}"
+                f"a string of {len(a) + len(b)} characters; allowed: up to {dialect.LONGEST_STRING}"
             )
         return a + b
     return _spread("+", add, a, b)

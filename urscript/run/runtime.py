@@ -110,7 +110,7 @@ def base_namespace(dialect: Dialect, meter: Meter) -> dict[str, Any]:
     def enter(thread: ScriptThread) -> ScriptThread:
         thread.depth += 1
         if thread.depth > dialect.recursion_limit:
-            raise ScriptRuntimeError(f"functions call themselves more than {dialect.recursion_limit} deep")
+            raise ScriptRuntimeError(f"recursion is deeper than {dialect.recursion_limit} calls")
         return thread
 
     def leave(thread: ScriptThread) -> None:

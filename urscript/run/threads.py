@@ -118,7 +118,7 @@ class Scheduler:
         """
         # Those that end stay in the list until the end of the cycle.
         if len(self.threads) >= MAX_THREADS <= sum(not thread.finished for thread in self.threads):
-            raise ScriptRuntimeError(f"a program may have {MAX_THREADS} threads at the same time")
+            raise ScriptRuntimeError(f"too many threads: a program may have {MAX_THREADS} at the same time")
         self._count += 1
         thread = ScriptThread(self._count, name, parent, _as_body(function))
         thread.budget = self._budget

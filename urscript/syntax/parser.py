@@ -186,9 +186,9 @@ def _unexpected_end(source: Source) -> ScriptSyntaxError:
 def _unexpected_character(error: UnexpectedCharacters, source: Source) -> ScriptLexerError:
     char = source.text[error.pos_in_stream or 0]
     if char == '"':
-        message = "a string without closing '\"' on its line"
+        message = "unterminated string: no closing '\"' on its line"
     elif char.isdigit() or char == ".":
         message = "malformed number"
     else:
-        message = f"character {char!r} has no meaning here"
+        message = f"unexpected character {char!r}"
     return ScriptLexerError(message, line=error.line, column=error.column, source=source)

@@ -104,7 +104,9 @@ class TreeBuilder:
         while isinstance(root, (nodes.Index, nodes.Member)):
             root = root.target
         if not isinstance(root, nodes.Name):
-            raise _wrong("only a variable or an element of one can be assigned to", target.span)
+            raise _wrong(
+                "cannot assign to this expression, only to a variable or an element of one", target.span
+            )
         return nodes.Assign(target, value, span=_cover(items))
 
     def call_for_effect(self, items: list[Any]) -> nodes.Evaluate:
@@ -129,7 +131,7 @@ class TreeBuilder:
             return nodes.Call(callee.name, arguments, span=_cover(items))
         if isinstance(callee, nodes.Member):
             return nodes.MethodCall(callee.target, callee.name, arguments, span=_cover(items))
-        raise _wrong("only a name can be called", callee.span)
+        raise _wrong("cannot call this expression, only a function by its name", callee.span)
 
     def index(self, items: list[Any]) -> nodes.Expression:
         target, indices = items[0], _expressions(items[1:])
@@ -137,9 +139,7 @@ class TreeBuilder:
         if len(indices) == 6 and isinstance(target, nodes.Name) and target.name == "p":
             return nodes.PoseLiteral(indices, span=_cover(items))
         if len(indices) > 2:
-            raise _wrong(
-                f"an index has one or two parts, a pose p[...] six, not {len(indices)}", _cover(items)
-            )
+            raise _wrong(f"an index has 1 or 2 values, a pose p[...] 6, not {len(indices)}", _cover(items))
         return nodes.Index(target, indices, span=_cover(items))
 
     def member(self, items: list[Any]) -> nodes.Member:
@@ -158,7 +158,7 @@ class TreeBuilder:
     def integer(self, items: list[Any]) -> nodes.IntLiteral:
         span = _span(items[0])
         if len(items[0]) > 10 or int(items[0]) > 2**31:
-            raise _wrong("an integer has 32 bits; write a float", span)
+            raise _wrong("this integer does not fit into 32 bits; write a float", span)
         return nodes.IntLiteral(int(items[0]), span=span)
 
     def float_(self, items: list[Any]) -> nodes.FloatLiteral:
