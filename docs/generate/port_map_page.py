@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, PortRow
+from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, MapRow
 
 _INTRODUCTION = """\
 # Modbus TCP
@@ -63,11 +63,11 @@ def render() -> str:
     )
 
 
-def _table(rows: tuple[PortRow, ...]) -> list[str]:
+def _table(rows: tuple[MapRow, ...]) -> list[str]:
     return ["| address | content | access |", "|---|---|---|", *map(_line, rows)]
 
 
-def _line(row: PortRow) -> str:
+def _line(row: MapRow) -> str:
     last = row.first + row.count - 1
     where = f"{row.first}" if last == row.first else f"{row.first} - {last}"
     # What gives no value can be read all the same, as 0.

@@ -8,10 +8,10 @@ from typing import NamedTuple
 from docs.generate.page_parts import table
 from protocol.ur_types import Ports
 
-__all__ = ["ROWS", "PortRow", "render"]
+__all__ = ["ROWS", "MapRow", "render"]
 
 
-class PortRow(NamedTuple):
+class MapRow(NamedTuple):
     """What one port is: its name in `Ports`, what it sends and how often, what it takes, its page."""
 
     name: str
@@ -23,16 +23,16 @@ class PortRow(NamedTuple):
 
 _SCRIPT = "scripts and words"
 
-ROWS: tuple[PortRow, ...] = (
-    PortRow("dashboard", "a line for each command", "on request", "commands, a line each", "dashboard.md"),
-    PortRow("primary", "states, all messages", "10 a second", _SCRIPT, "primary.md"),
-    PortRow("secondary", "states", "10 a second", _SCRIPT, "primary.md"),
-    PortRow("realtime", "frames", "125 a second", _SCRIPT, "realtime.md"),
-    PortRow("rtde", "the variables asked for", "up to 125 a second", "variables", "rtde.md"),
-    PortRow("primary_ro", "as 30001", "10 a second", "nothing", "primary.md"),
-    PortRow("secondary_ro", "as 30002", "10 a second", "nothing", "primary.md"),
-    PortRow("realtime_ro", "as 30003", "125 a second", "nothing", "realtime.md"),
-    PortRow("modbus", "answers", "on request", "Modbus functions 1-6, 15, 16", "modbus.md"),
+ROWS: tuple[MapRow, ...] = (
+    MapRow("dashboard", "a line for each command", "on request", "commands, a line each", "dashboard.md"),
+    MapRow("primary", "states, all messages", "10 a second", _SCRIPT, "primary.md"),
+    MapRow("secondary", "states", "10 a second", _SCRIPT, "primary.md"),
+    MapRow("realtime", "frames", "125 a second", _SCRIPT, "realtime.md"),
+    MapRow("rtde", "the variables asked for", "up to 125 a second", "variables", "rtde.md"),
+    MapRow("primary_ro", "as 30001", "10 a second", "nothing", "primary.md"),
+    MapRow("secondary_ro", "as 30002", "10 a second", "nothing", "primary.md"),
+    MapRow("realtime_ro", "as 30003", "125 a second", "nothing", "realtime.md"),
+    MapRow("modbus", "answers", "on request", "Modbus functions 1-6, 15, 16", "modbus.md"),
 )
 """One row a port of `Ports`."""
 

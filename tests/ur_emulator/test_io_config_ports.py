@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.controller.modbus import robot_map as port_map
-from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, PortAddressError
+from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, MapAddressError
 
 BENCH = Bench()
 
@@ -44,7 +44,7 @@ def test_every_address_of_the_tables_can_be_read(rows, read_one, largest):
 
 @pytest.mark.parametrize("address", [259, 267, 276, 1023, 65535])
 def test_addresses_without_anything(address):
-    with pytest.raises(PortAddressError):
+    with pytest.raises(MapAddressError):
         port_map.read_register(BENCH.controller.state, address)
     bench = Bench()
     texts(bench, f"write_port_register({address}, 1)")

@@ -241,17 +241,17 @@ def test_a_high_input_with_the_action_freedrive_asks_for_it(bench):
     modbus = bench.controller.state.modbus
     run(bench, add("s", 0), 'modbus_set_digital_input_action("s", "freedrive")')
     bench.tick(15)
-    assert not modbus.wants_freedrive
+    assert not modbus.requests_freedrive
     unit(bench).memory[0, 5] = 1
     bench.tick(15)
-    assert modbus.wants_freedrive
+    assert modbus.requests_freedrive
     unit(bench).trouble = "gone"  # nobody knows any more what the input is
     bench.tick(15)
-    assert not modbus.wants_freedrive
+    assert not modbus.requests_freedrive
     unit(bench).trouble = ""
     run(bench, 'modbus_set_digital_input_action("s", "default")')
     bench.tick(15)
-    assert not modbus.wants_freedrive
+    assert not modbus.requests_freedrive
 
 
 # --- own requests

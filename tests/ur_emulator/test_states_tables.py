@@ -97,7 +97,7 @@ def enter(mode):
     bench = moving(fidelity="ideal")
     way_in = WAY_IN[mode]
     if mode is M.RECOVERY:
-        bench.controller.safety.happen(E.RANGE_LEFT)
+        bench.controller.safety.handle(E.RANGE_LEFT)
         bench.controller.state.past.snapshot = bench.now._replace(actual_q=(7.0, *bench.now.actual_q[1:]))
     elif way_in is not None:
         bench.tick(1, COMMANDS[way_in])

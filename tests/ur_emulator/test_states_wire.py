@@ -42,7 +42,7 @@ def test_ports_agree_in_recovery_and_on_the_way_up():
         check_wires(bench)
         bench.tick()
     assert bench.now.robot_mode == RobotMode.RUNNING
-    bench.controller.safety.happen(SafetyEvent.RANGE_LEFT)
+    bench.controller.safety.handle(SafetyEvent.RANGE_LEFT)
     bench.controller.state.past.snapshot = bench.now._replace(safety_mode=int(SafetyMode.RECOVERY))
     assert bench.now.safety_status_bits == 1 << 3
     check_wires(bench)

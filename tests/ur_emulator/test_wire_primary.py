@@ -26,7 +26,7 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
 )
 from ur_emulator.controller import events
-from ur_emulator.controller.safety.limit_checks import hardest_joint
+from ur_emulator.controller.safety.limit_checks import most_loaded_joint
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.software import software_of
@@ -225,7 +225,7 @@ def test_a_collision_names_the_joint_that_strains():
     for joint in range(6):
         strained = list(currents)
         strained[joint] *= -1.1
-        assert hardest_joint(robot, tuple(strained)) == joint
+        assert most_loaded_joint(robot, tuple(strained)) == joint
 
 
 def test_every_word_of_the_table_is_known_to_the_box():

@@ -1,1 +1,1 @@
-"""What clients, people and tests ask of the box: one frozen record each, with what it does."""
+"""Commands of clients, people and tests: one frozen record each, with its effect."""

@@ -1,4 +1,4 @@
-"""Obstacles around the arm: checked when they are made, so that nothing absurd reaches the physics."""
+"""Obstacles around the arm: sizes and poses are checked before they reach the physics."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FARTHEST, SMALLEST, LARGEST = 5.0, 0.001, 5.0
 
 
 class AddObstacle(CommandOperation):
-    """Put a fixed obstacle somewhere; one of the same name gives way."""
+    """Put a fixed obstacle somewhere; one of the same name is replaced."""
 
     name: str = parameter("to remove it by")
     shape: Shape = parameter("what it is; a plane has no end")

@@ -1,4 +1,4 @@
-"""Operation: what can be done to a box, or asked of it, as a frozen dataclass that declares all of it.
+"""Operation: an operation of the control API, declared as a frozen dataclass.
 
 The first sentence of its docstring is its sentence; its fields are its parameters (`parameter`); they are
 checked when the record is made. Methods of `ControlBox`, the HTTP API, `ur-emulator ctl` and docs/control.md
@@ -64,11 +64,11 @@ class CommandOperation(Operation[int]):
 
     @abstractmethod
     def apply(self, box: Box) -> Result:
-        """Do it.
+        """Apply the operation.
 
         Returns:
             What the result holds beside `tick`, if anything.
 
         Raises:
-            RefusedError: the state of the box stands against it.
+            RefusedError: the state of the box does not allow it.
         """

@@ -44,7 +44,7 @@ class ClosePopup(CommandOperation):
 
 @dataclass(frozen=True, slots=True)
 class ShowPopup:
-    """Show a popup for which nobody waits; it stays until it is closed."""
+    """Show a popup that does not block a program; it stays until it is closed."""
 
     text: str
 

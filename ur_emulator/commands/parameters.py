@@ -213,7 +213,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _is_text(value: Any, most: int) -> bool:
-    """A lone surrogate is no text: nothing can send it on."""
+    """Text with a lone surrogate cannot be encoded."""
     return isinstance(value, str) and len(value) <= most and not any("\ud800" <= c <= "\udfff" for c in value)
 
 

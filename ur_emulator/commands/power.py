@@ -1,4 +1,4 @@
-"""Power, brakes, and who moves the arm: the buttons of the initialisation screen and their words."""
+"""Power, brakes and freedrive: the buttons of the initialisation screen, and their text commands."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class ReleaseBrakes(CommandOperation):
     """Go to RUNNING, powering on first if need be."""
 
     def apply(self, box: Box) -> None:
-        box.state.compliance.end_guiding_by_client()
+        box.state.compliance.end_freedrive_by_client()
         _give_power(box, ModeCommand.BRAKE_RELEASE)
 
 
@@ -37,7 +37,7 @@ class StartFreedrive:
     """Go into freedrive, as `set robotmode freedrive` asks; `set robotmode run` ends it."""
 
     def apply(self, box: Box) -> None:
-        box.state.compliance.guide(by_client=True)
+        box.state.compliance.start_freedrive(by_client=True)
 
 
 def _give_power(box: Box, command: ModeCommand) -> None:

@@ -1,4 +1,4 @@
-"""What a hand does to the flange: push it, or hold something on it that nobody has declared.
+"""External forces on the flange, and a payload that no program has declared.
 
 No client of a real box can send these; they are for tests and for people at the emulator.
 """
@@ -10,7 +10,7 @@ from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box
 from ur_emulator.models.robot_model import Vector3
 
-# What an arm is made to stand: the largest force limit of the safety settings [N], about a tool's length [m].
+# The largest force limit of the safety settings [N]; about the length of a tool [m].
 MAX_FORCE, MAX_LEVER = 250.0, 0.3
 
 

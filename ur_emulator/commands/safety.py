@@ -74,7 +74,7 @@ class UnlockProtectiveStop(CommandOperation):
             raise RefusedError(
                 f"there is no protective stop to unlock: the safety mode is {safety.mode.name}"
             )
-        box.safety.happen(SafetyEvent.UNLOCK)
+        box.safety.handle(SafetyEvent.UNLOCK)
 
 
 class TriggerViolation(CommandOperation):
@@ -84,7 +84,7 @@ class TriggerViolation(CommandOperation):
 
     def apply(self, box: Box) -> None:
         box.state.events.append(ErrorReported(0, 0, ReportLevel.VIOLATION, self.text))
-        box.safety.happen(SafetyEvent.VIOLATION)
+        box.safety.handle(SafetyEvent.VIOLATION)
 
 
 class TriggerFault(CommandOperation):
@@ -94,14 +94,14 @@ class TriggerFault(CommandOperation):
 
     def apply(self, box: Box) -> None:
         box.state.events.append(ErrorReported(0, 0, ReportLevel.FAULT, self.text))
-        box.safety.happen(SafetyEvent.FAULT)
+        box.safety.handle(SafetyEvent.FAULT)
 
 
 class RestartSafety(CommandOperation):
     """Restart the safety system; the power is off then."""
 
     def apply(self, box: Box) -> None:
-        box.safety.happen(SafetyEvent.RESTART)
+        box.safety.handle(SafetyEvent.RESTART)
 
 
 # --- what no operation of the control API does
@@ -180,4 +180,4 @@ class PressButton:
     def apply(self, box: Box) -> None:
         box.state.operator.press(self.button.value, self.pressed)
         if self.button is Button.TEACH:
-            box.state.compliance.press(self.pressed)
+            box.state.compliance.press_teach_button(self.pressed)

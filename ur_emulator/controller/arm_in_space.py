@@ -13,13 +13,13 @@ from ur_emulator.models.robot_model import Vector6
 
 
 class ArmInSpace:
-    """What follows from the joints of one cycle; it does not depend on when it is asked for.
+    """What follows from the joints of one cycle; the result does not depend on when it is read.
 
     Args:
         arm: the controller's kinematics.
         target: angles and speeds of the joints' set-point, (6,) each.
         actual: measured ones.
-        wrench: what the box feels at the flange, base axes [N, Nm].
+        wrench: at the flange, base axes [N, Nm].
         tcp: tool centre point in the flange frame; None for the flange itself.
     """
 
@@ -43,14 +43,14 @@ class ArmInSpace:
 
     @property
     def target(self) -> CartesianState:
-        """Where the target lies."""
+        """Pose, twist and elbow at the target."""
         if self._target is None:
             self._target = self._arm.state(*self._target_joints, self._tcp)
         return self._target
 
     @property
     def actual(self) -> CartesianState:
-        """Where the measured joints are."""
+        """Pose, twist and elbow at the measured joints."""
         if self._actual is None:
             self._actual = self._arm.state(*self._actual_joints, self._tcp)
         return self._actual

@@ -1,8 +1,8 @@
-"""What the input variables of RTDE do in the box. Names and types stand in `protocol.rtde.fields`.
+"""What the input variables of RTDE do in the box. Names and types are in `protocol.rtde.fields`.
 
 A register is written at once. Variables that act together, a mask and its values, act whenever one of them
-is written, with the last values of the others; what a mask leaves out is never looked at, since clients
-leave it uninitialised.
+is written, with the last values of the others; values outside a mask are ignored, since clients
+do not initialise them.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class ClientInputs:
         io: the lines that they switch.
         registers: the input registers.
         speed: the speed slider.
-        watchdogs: are told what was written.
-        clock: when.
+        watchdogs: of programs over these variables.
+        clock: time of a write.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ def _set_speed_slider(inputs: ClientInputs) -> None:
 
 
 def _keep(inputs: ClientInputs) -> None:
-    """Nothing acts on the value; it is kept for a script to enable."""
+    """Only keep the value: a script can enable its use."""
 
 
 _DIGITAL_GROUPS = (
@@ -121,7 +121,7 @@ _DIGITAL_GROUPS = (
     ("configurable", CONFIGURABLE_SHIFT, N_CONFIGURABLE),
     ("tool", TOOL_SHIFT, N_TOOL),
 )
-# What to do when a variable that is no register has been written.
+# What a write to a variable that is not a register does.
 _ACTS: dict[str, Callable[[ClientInputs], None]] = {
     "speed_slider_mask": _set_speed_slider,
     "speed_slider_fraction": _set_speed_slider,

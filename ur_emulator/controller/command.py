@@ -1,4 +1,4 @@
-"""What the controller is asked: commands, applied in order at the beginning of a cycle.
+"""Commands: what clients and people ask of the controller. They are applied in order as a cycle begins.
 
 A command is any record that can be applied to the parts of a box; those that clients, people and tests use
 are in `ur_emulator.commands`.
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from ur_emulator.controller.state import ControllerState
     from ur_emulator.plant.plant import Plant
 
-# What a command has to tell; most have nothing.
+# Values that a command returns; most return none.
 Result = Mapping[str, Any] | None
-# Told in the cycle in which a command was applied what has come of it: its result, or why it was refused.
+# Called in the cycle in which a command was applied, with its result or its refusal.
 Done = Callable[[Result, RefusedError | None], None]
 
 
@@ -35,7 +35,7 @@ class Box(Protocol):
         plant: the arm and what surrounds it.
         push: what pushes the flange.
         programs: what runs.
-        safety: is asked before power, brakes and programs.
+        safety: safety events, and their effects on arm, program and power.
     """
 
     state: ControllerState
@@ -50,19 +50,23 @@ class Command(Protocol):
     """Something that is done to a box at the beginning of a cycle."""
 
     def apply(self, box: Box) -> Result:
-        """Do it; a `RefusedError` says why not."""
+        """Apply the command.
+
+        Raises:
+            RefusedError: the state of the box does not allow it.
+        """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Submitted:
-    """A command of somebody who wants to know what has come of it."""
+    """A command whose sender gets the result."""
 
     command: Command
     done: Done
 
     def apply(self, box: Box) -> Result:
-        """Apply the command and hand back its result or its refusal."""
+        """Apply the command and call `done` with its result or its refusal."""
         try:
             result = self.command.apply(box)
         except RefusedError as refusal:
@@ -73,5 +77,5 @@ class Submitted:
 
 
 def inform(state: ControllerState, text: str) -> None:
-    """Tell clients and log why something is not done."""
+    """Report to clients and log why something is not done."""
     state.events.append(ErrorReported(0, 0, ReportLevel.INFO, text))

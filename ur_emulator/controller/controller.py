@@ -60,10 +60,9 @@ from ur_emulator.plant.exact import ExactPlant
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.plant_state import PlantState
 
-# A box that serves has booted a minute ago [s]: clients distrust a controller clock below 40 s (public client
-# library).
+# Controller time at start [s]: a public client library does not trust a controller clock below 40 s.
 BOOT_TIME = 60.0
-# After the last activity the arm gets this time to come to rest before time may stand still [s].
+# Time after the last activity until the simulation may pause in lockstep, so that the arm comes to rest [s].
 SETTLE_TIME = 0.2
 
 
@@ -103,8 +102,8 @@ class Controller:
         self._saturated_s = 0.0
         self._settle = 0
         self._settle_cycles = generation.cycles(SETTLE_TIME)
-        # A protective stop can be unlocked after a while; time must not stand still before that. Two cycles
-        # more: the one in which it happens counts, and the delay must have passed, not be about to.
+        # Time must not pause before a protective stop can be unlocked. Two cycles more: the cycle of the stop
+        # counts, and the delay must have passed.
         self._unlock_cycles = generation.cycles(UNLOCK_DELAY) + 2
         motion = ArmMotion(q, robot.stop_deceleration)
         self.state = _make_state(
@@ -132,7 +131,7 @@ class Controller:
 
     @property
     def is_active(self) -> bool:
-        """True while the box is busy or the arm settles: why time passes in lockstep."""
+        """True while the box is busy or the arm settles: in lockstep time passes only then."""
         return self._settle > 0 or self.is_busy
 
     @property
@@ -149,14 +148,14 @@ class Controller:
 
     @property
     def waits_outside(self) -> bool:
-        """True while a script waits for something that only the outside can bring."""
+        """True while a script waits for data from outside the box."""
         return self.programs.waits_outside
 
     def tick(self, commands: Iterable[Command]) -> Snapshot:
         """Advance one control cycle.
 
         Args:
-            commands: what was asked since the last cycle, in order of arrival.
+            commands: those since the last cycle, in order of arrival.
 
         Returns:
             The state at the end of the cycle.
@@ -168,7 +167,7 @@ class Controller:
         if was_pushing:
             self.push.step()
         for command in commands:
-            with suppress(RefusedError):  # who wants to know has submitted it with `done`
+            with suppress(RefusedError):  # `Submitted` has reported it
                 command.apply(self)
         self._step_modes()
         self._step_scripts()
@@ -179,7 +178,7 @@ class Controller:
         sensed = self.plant.sense()
         self._watch(sensed, control, running)
         settings = state.error_settings
-        if settings.pause_codes and settings.asks_for_pause(state.events[n_events:]):
+        if settings.pause_codes and settings.must_pause(state.events[n_events:]):
             self.programs.pause()
         was_active = was_active or (control is _BY_HAND and any(target.qd))
         self._settle = max(self._settle - 1, self._settle_cycles if was_active else 0)
@@ -190,7 +189,7 @@ class Controller:
     # --- the parts of a cycle, in their order
 
     def _step_modes(self) -> None:
-        """Robot mode and safety mode; watchdogs, encoders and Modbus signals, which scripts will look at."""
+        """Robot mode and safety mode; watchdogs, encoders and Modbus signals, which scripts read next."""
         state = self.state
         state.mode.step()
         if state.mode.mode is not self._mode:
@@ -208,14 +207,14 @@ class Controller:
             state.modbus.step(state.clock.tick)
 
     def _step_scripts(self) -> None:
-        """All threads of all programs, and what they have asked of the box."""
+        """All threads of all programs, and the effects of their requests."""
         state = self.state
         self.programs.step()
         if state.requests.take_power_off():
             self.safety.cut_power()
         payload = state.tool.payload
         if payload is not self._payload:
-            # What a program declares is taken to be really there: the arm carries it from now on.
+            # The plant carries the payload that programs declare.
             self._payload = payload
             self.plant.set_payload(payload.mass, payload.cog)
 
@@ -226,10 +225,10 @@ class Controller:
         if compliance.is_on or state.io_configuration.input_actions or state.modbus.signals:
             control = compliance.step()
         target = self._next_target() if running else state.motion.step(self.period_s, state.speed.slider)
-        return control, compliance.follow_hand() if control is _BY_HAND else target
+        return control, compliance.freedrive_target() if control is _BY_HAND else target
 
     def _watch(self, sensed: PlantState, control: ControlMode, running: bool) -> None:
-        """Stop the arm if what the sensors say breaks a limit, or somebody has asked for it."""
+        """Stop the arm if the measured state violates a limit, or a stop was requested."""
         state = self.state
         self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
         stop_requested = state.requests.take_protective_stop()
@@ -260,7 +259,7 @@ class Controller:
     # --- stops
 
     def _next_target(self) -> JointTarget:
-        """Advance the motion; an invalid set-point never reaches the joints: they brake before it."""
+        """Advance the motion; an invalid set-point is replaced by a protective stop."""
         state, before = self.state, self.state.motion.target
         scale = state.speed.step(state.motion, self.period_s)
         try:
@@ -280,7 +279,7 @@ class Controller:
         state = self.state
         self._settle = self._unlock_cycles
         state.events.append(violation.error)
-        self.safety.happen(SafetyEvent.PROTECTIVE_STOP)
+        self.safety.handle(SafetyEvent.PROTECTIVE_STOP)
         if violation.blocked:
             state.motion.place(actual_q)
             self.plant.rest_trim()

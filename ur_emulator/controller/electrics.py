@@ -1,7 +1,7 @@
-"""Temperatures and currents of box and tool that follow from a snapshot: nothing is remembered here.
+"""Temperatures and currents of box and tool as functions of a snapshot.
 
 Nothing in the notes gives numbers, so all of them are chosen: outputs drive the inputs of a PLC, the tool is
-a resistor, the box warms up after it was switched on. They are worked out when somebody asks.
+a resistor, the box warms up after it was switched on. They are computed when a port reads them.
 """
 
 from __future__ import annotations

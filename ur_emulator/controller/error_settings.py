@@ -1,4 +1,4 @@
-"""What programs have said about errors and limits. Some of it is only kept: this box has no use for it.
+"""What programs have set up about errors and limits. Some settings are only kept: they have no effect here.
 
 Source: URScript manual CB3 3.15, module motion.
 """
@@ -20,7 +20,7 @@ DEVIATION_CODE = 174
 
 @dataclass(slots=True)
 class ErrorSettings:
-    """Settings of `pause_on_error_code` and its kin.
+    """Settings of `pause_on_error_code` and related builtins.
 
     Attributes:
         pause_codes: (code, argument or None for any) at which the program pauses.
@@ -57,8 +57,8 @@ class ErrorSettings:
         """Keep the joint positions of `reset_revolution_counter` [rad]."""
         self.revolution_reference = q
 
-    def asks_for_pause(self, events: Iterable[Event]) -> bool:
-        """True when one of the events is an error code at which the program wants to be paused."""
+    def must_pause(self, events: Iterable[Event]) -> bool:
+        """True when one of the events is an error code at which the program is to be paused."""
         return any(
             isinstance(event, ErrorReported)
             and not self.pause_codes.isdisjoint(((event.code, None), (event.code, event.argument)))

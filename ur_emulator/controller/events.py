@@ -1,4 +1,4 @@
-"""What the controller has to say beside its state: frozen records that ports and log turn into messages."""
+"""Events of the controller: frozen records that ports and log turn into messages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class ProgramStarted:
 
     Attributes:
         name: of its `def`, or of the function called by a one-line program.
-        run: for those who want to look at its variables.
+        run: gives access to its variables.
     """
 
     name: str
@@ -26,21 +26,21 @@ class ProgramStarted:
 
 @dataclass(frozen=True, slots=True)
 class ProgramStopped:
-    """A primary program ended, by itself or not."""
+    """A primary program ended or was stopped."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramPaused:
-    """The primary program stands still, and so does the arm."""
+    """The primary program is paused, and the arm is at rest."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramResumed:
-    """A paused program goes on."""
+    """A paused program continues."""
 
     name: str
 
@@ -54,14 +54,14 @@ class TextPrinted:
 
 @dataclass(frozen=True, slots=True)
 class ScriptFailed:
-    """A program did not compile or died.
+    """A program did not compile, or a run-time error ended it.
 
     Attributes:
         line: 1-based line in the text as sent, the `def` line being 1.
         column: 1-based column.
-        text: as the controller words it on the wire.
+        text: as the controller sends it.
         secondary: the program was a `sec`: only logged, the primary program goes on.
-        log_text: as its log words it; "" if it is the same.
+        log_text: as its log has it; "" if it is the same.
     """
 
     line: int
@@ -90,17 +90,17 @@ class SafetyModeChanged:
 
 @dataclass(frozen=True, slots=True)
 class RobotModeChanged:
-    """The robot mode changed; only the log says so, the states show it anyway."""
+    """The robot mode changed; for the log; the robot state shows it too."""
 
     robot_mode: int
 
 
 @dataclass(frozen=True, slots=True)
 class LogAdded:
-    """Somebody else wrote into the log.
+    """A server or a client added a line to the log.
 
     Attributes:
-        source: who, as in `Dashboard`.
+        source: part that added it, such as `Dashboard`.
         text: the line.
     """
 
@@ -152,12 +152,12 @@ Event = (
 
 
 class EventQueue(list[Event]):
-    """Messages in their order; everybody may append, the loop takes them once a cycle."""
+    """Events in their order; all parts append, the loop takes them once a cycle."""
 
     __slots__ = ()
 
     def take(self) -> list[Event]:
-        """Return the messages since the last call and forget them."""
+        """Return the events since the last call and remove them."""
         events = list(self)
         self.clear()
         return events

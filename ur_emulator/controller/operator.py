@@ -1,6 +1,6 @@
 """What programs ask of the operator: values, and popups to be closed; and the buttons of the pendant.
 
-Nobody stands there: a client answers.
+There is no person at the box: a client answers.
 
 Answers come as `AnswerRequest` and `ClosePopup` of `ur_emulator.commands.operator`.
 """
@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from protocol.primary.messages import RequestedType
 from urscript.values import INT_MAX, INT_MIN, to_script_text
 
-# Popups for which nobody waits: older ones than the last so many are forgotten.
+# Number of popups that are kept of those that do not block a program.
 MAX_SHOWN = 20
 
 Answer = bool | int | float | str
 
 
 def _as_asked(kind: RequestedType, value: Answer) -> Answer | None:
-    """Return an answer as the program gets it, None if it does not fit the question."""
+    """Return an answer as the program gets it, None if its type is not the one that was asked for."""
     match kind, value:
         case RequestedType.BOOLEAN, bool():
             return value
@@ -37,11 +37,11 @@ def _as_asked(kind: RequestedType, value: Answer) -> Answer | None:
 
 @dataclass(slots=True)
 class OperatorRequest:
-    """A question that stands on the screen.
+    """A question on the screen.
 
     Attributes:
         request_id: number of it, from 1.
-        kind: what it wants; NONE is a popup, which wants to be closed.
+        kind: type of the answer; NONE is a popup, which is to be closed.
         text: of the question.
         answer: what was answered; None so far.
         is_answered: it was answered, or the popup closed.
@@ -74,15 +74,15 @@ class Operator:
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Texts of popups for which nobody waits, the oldest first."""
+        """Texts of popups that do not block a program, the oldest first."""
         return tuple(self._shown)
 
     def press(self, button: int, pressed: bool) -> None:
-        """Press a button of the pendant, a bit of RobotStatusBits, or let it go."""
+        """Press a button of the pendant, a bit of RobotStatusBits, or release it."""
         self.buttons = self.buttons | button if pressed else self.buttons & ~button
 
     def show(self, text: str) -> None:
-        """Show a popup for which nobody waits; it stays, also without power, until it is closed."""
+        """Show a popup that does not block a program; it stays, also without power, until it is closed."""
         self._shown.append(text)
 
     def ask(self, kind: RequestedType, text: str) -> OperatorRequest:

@@ -1,4 +1,4 @@
-"""PastCycles: what the last cycles have come to, as scripts and ports read it."""
+"""PastCycles: the results of the last cycles, as scripts and ports read them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ HISTORY_TIME = 1.0
 
 
 class PastCycles:
-    """The last snapshot, and what is counted from cycle to cycle. The controller writes it, once a cycle.
+    """The last snapshot and counts over the last cycles. The controller writes it, once a cycle.
 
     Attributes:
         snapshot: state at the end of the last cycle; what scripts see as "actual" during the present one.
         q_history: measured joint positions of the last cycles [rad], the newest first.
-        steady_cycles: for how many cycles the target has stood still.
+        steady_cycles: number of cycles for which the target has not moved.
     """
 
     __slots__ = ("q_history", "snapshot", "steady_cycles")

@@ -1,4 +1,4 @@
-"""Programs: what the controller needs of the programs that run on it. `scripting` provides it."""
+"""Programs: the interface of the controller to the programs that run on it. `scripting` implements it."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class Programs(Protocol):
 
     @property
     def has_work(self) -> bool:
-        """True while any program wants cycles, and in the cycle in which one ended."""
+        """True while any program needs cycles, and in the cycle in which one ended."""
         ...
 
     @property
     def waits_outside(self) -> bool:
-        """True when a program cannot go on before something comes from outside the box."""
+        """True when a program waits for data from outside the box."""
         ...
 
     @property

@@ -1,4 +1,4 @@
-"""What a cycle has come to, as a snapshot: the records of target, sensors and box one after the other."""
+"""The snapshot of a cycle: the records of target, sensors and box one after the other."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ def make_snapshot(
 
     Args:
         state: after commands, scripts, motion and safety.
-        programs: for what runs, and where.
+        programs: for the program state and line.
         target: set-point at the end of the cycle.
-        sensed: what the box reads from its arm.
+        sensed: measured state of the arm.
     """
     arm, clock, sensor, wrench = state.arm, state.clock, state.force_sense.sensor, sensed.tcp_force
     if sensor is not None:
         wrench = sensor.wrench_at_flange(state.client_inputs.get(VARIABLE, ZERO6), arm.fk(sensed.actual_q))
-    wrench = state.force_sense.take(wrench)
+    wrench = state.force_sense.measure(wrench)
     tcp = state.tool.tcp_offset
     space = ArmInSpace(
         arm,

@@ -1,4 +1,4 @@
-"""The robot mode as a table: which command leads where, through which modes, and how long each lasts.
+"""The robot mode as a table: commands, the modes that each passes through, and the duration of each.
 
 Source: UR dashboard server documents (power on, brake release) and the public client library's tests: power
 on goes POWER_OFF -> POWER_ON -> IDLE within 5 s, brake release IDLE -> BACKDRIVE -> RUNNING, and no
@@ -22,7 +22,7 @@ PASSING_TIME = {
 
 
 class ModeCommand(Enum):
-    """What may change the robot mode."""
+    """Commands that change the robot mode."""
 
     BOOT = "boot"
     ASK_TO_CONFIRM = "change safety settings"
@@ -107,7 +107,7 @@ JOINT_VECTORS = {modes: (int(joint),) * 6 for modes, joint in JOINT_MODES.items(
 
 
 class RobotModeMachine:
-    """The robot mode and the way it is still to go."""
+    """The robot mode, and the modes that it still passes through."""
 
     def __init__(self, mode: RobotMode, period_s: float) -> None:
         self.mode = mode
@@ -117,11 +117,11 @@ class RobotModeMachine:
 
     @property
     def is_changing(self) -> bool:
-        """True while the mode is on its way to another one."""
+        """True while more modes follow."""
         return bool(self._ahead)
 
     def command(self, command: ModeCommand) -> None:
-        """Start the way that the table gives for `command`; nothing happens if it gives none."""
+        """Start the transition that the table gives for `command`; without one nothing changes."""
         way = TRANSITIONS.get((self.mode, command))
         if way is not None:
             self._enter(way[0], list(way[1:]))

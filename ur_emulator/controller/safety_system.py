@@ -1,6 +1,6 @@
-"""What safety events come to: the mode changes as the tables say, and arm, program and power follow.
+"""SafetySystem: applies safety events: the mode changes, and arm, program and power follow.
 
-The tables are in `safety/modes.py`. In cycles in which nothing of this goes on nobody asks here: `is_busy`.
+The tables are in `safety/modes.py`. `is_busy` is false in cycles in which nothing has to be done here.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.path_motion import SCALING_RATE
 from ur_emulator.plant.plant_state import PlantState
 
-# The drives follow their targets by 30 to 50 ms; the brakes wait for them, but no longer than the second [s].
+# The drives lag behind their targets by 30 to 50 ms. The brakes wait for them, at most the second time [s].
 BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
 
 
 class SafetySystem:
-    """Acts on the safety state, and on everything that has to follow.
+    """Applies safety events to the safety state, and its effects to arm, program and power.
 
     Attributes:
-        inputs: buttons and inputs, which are pressed and set here.
-        is_busy: `step` and `find_violation` want their turn in every cycle.
+        inputs: safety buttons and inputs.
+        is_busy: `step` and `find_violation` must be called in every cycle.
     """
 
     def __init__(self, state: ControllerState, programs: Programs) -> None:
         self._state = state
         self._programs = programs
-        self.inputs = SafetyInputs(self.happen)
+        self.inputs = SafetyInputs(self.handle)
         self._cut_after: int | None = None
         self._rests_since: int | None = None
         self._is_waiting = False
@@ -54,8 +54,8 @@ class SafetySystem:
         self.inputs.assign(pair, function)
         self._update()
 
-    def happen(self, event: SafetyEvent) -> None:
-        """Let an event take place."""
+    def handle(self, event: SafetyEvent) -> None:
+        """Apply an event."""
         state, safety = self._state, self._state.safety
         before = safety.mode
         was_stopping = self.is_stopping
@@ -76,22 +76,22 @@ class SafetySystem:
         state.mode.command(ModeCommand.POWER_OFF)
         state.motion.stop(state.robot.stop_deceleration)
         state.motion.place(state.past.snapshot.actual_q)
-        self.happen(SafetyEvent.POWERED_OFF)
+        self.handle(SafetyEvent.POWERED_OFF)
 
     def check_range(self) -> None:
-        """Look at the joints when the brakes have opened."""
+        """Check the joint ranges when the brakes have opened."""
         if not self._is_in_range():
-            self.happen(SafetyEvent.RANGE_LEFT)
+            self.handle(SafetyEvent.RANGE_LEFT)
 
     # --- cycle
 
     def step(self) -> None:
-        """Do at the start of a cycle what is due."""
+        """Begin a cycle."""
         state = self._state
         if self.inputs.assigned:
             self.inputs.step(state.io.digital_in)
         if state.safety.has(SafetyMode.RECOVERY) and self._is_in_range():
-            self.happen(SafetyEvent.RANGE_KEPT)
+            self.handle(SafetyEvent.RANGE_KEPT)
         if self._cut_after is not None:
             if any(state.motion.target.qd):
                 self._rests_since = None
@@ -105,11 +105,11 @@ class SafetySystem:
         self._update()
 
     def find_violation(self, sensed: PlantState) -> Violation | None:
-        """Return what the arm has done wrong beside what is always looked at, or None."""
+        """Return a violation of the limits of this safety mode, or None."""
         limiter, dt = self._state.speed.limiter, self._state.clock.period_s
         return None if limiter is None else limiter.find_violation(sensed.actual_qd, dt)
 
-    # --- what follows
+    # --- effects
 
     def _react(self, before: SafetyMode) -> None:
         state, mode = self._state, self._state.safety.mode
@@ -136,7 +136,7 @@ class SafetySystem:
                 self._programs.resume()
 
     def _wait(self) -> None:
-        """Let program and arm stand still until the mode ends; what was paused before stays so."""
+        """Pause program and arm until the mode ends; a program that was paused before stays paused."""
         state, programs = self._state, self._programs
         hard = 0.0 if state.error_settings.transition_hardness else state.robot.stop_deceleration
         if not programs.is_running:

@@ -1,6 +1,6 @@
-"""ControllerState: the parts of a controller, each with the methods by which it changes.
+"""ControllerState: the parts of a controller, each with its own methods to change it.
 
-The record itself never changes. Scripts, commands and ports get the parts that they act on.
+The record itself is frozen. Scripts, commands and ports get the parts that they act on.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class ControllerState:
         arm: kinematics of the arm, with the calibration that the controller knows.
         seed: of everything random in the box.
         clock: control cycles, and those of programs.
-        motion: where the joints are asked to go, and by whom.
+        motion: targets of the joints, and the thread that moves them.
         place_arm: puts the resting arm at joint angles [rad]; False where it would touch something.
         mode: robot mode, and the modes on the way to another one.
         safety: causes of safety modes, and the mode that they lead to.
@@ -55,11 +55,11 @@ class ControllerState:
         watchdogs: of the running program over RTDE inputs.
         encoders: of conveyors.
         modbus: signals of other units that programs have added.
-        modbus_map: what the robot's own Modbus map keeps.
+        modbus_map: words of the robot's own Modbus map.
         compliance: force mode, and hand guiding.
-        force_sense: zero and recent past of the wrench.
+        force_sense: zero and history of the wrench.
         operator: what programs ask of the operator, and the buttons that are pressed.
-        error_settings: what programs have said about errors.
+        error_settings: what programs have set up about errors.
         requests: stops that programs and clients have asked for in this cycle.
         past: snapshot of the last cycle, and joint positions before it.
         events: messages of this cycle, in order, for ports and log.

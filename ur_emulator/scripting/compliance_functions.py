@@ -1,4 +1,4 @@
-"""Builtins that let the arm give way: force mode, hand guiding, and what is felt of contacts."""
+"""Builtins for force mode, freedrive and contacts."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from ur_emulator.scripting.script_arm import ScriptArm
 from urscript.errors import ScriptRuntimeError
 from urscript.values import log_form
 
-# No task frame is further away [m]: beyond, poses lose their digits.
+# Greatest distance of a task frame [m]: beyond it poses lose precision.
 MAX_FRAME_DISTANCE = 100.0
 
 
 def compliance_functions(
     arm: ScriptArm, compliance: Compliance, force_sense: ForceSense, past: PastCycles
 ) -> Mapping[str, Callable[..., Any]]:
-    """Return the builtins for force mode, hand guiding and contacts.
+    """Return the builtins for force mode, freedrive and contacts.
 
     Args:
-        arm: that gives way.
-        compliance: what they ask for.
-        force_sense: what is felt.
-        past: where the arm is.
+        arm: that they act on.
+        compliance: gets their requests.
+        force_sense: the measured wrench.
+        past: measured positions.
     """
 
     def end_freedrive_mode(thread: object) -> None:
-        compliance.end_guiding_by_program()
+        compliance.end_freedrive_by_program()
 
     def freedrive_unchecked(thread: object) -> None:
-        compliance.guide(by_program=True)
+        compliance.start_freedrive(by_program=True)
 
     def freedrive_mode(thread: object, free_axes: Any = (1,) * 6, feature: Any = None) -> None:
         if not all(x == 1 for x in free_axes):
@@ -47,8 +47,8 @@ def compliance_functions(
                 f"freedrive_mode: blocked axes are not modelled, got freeAxes={log_form(free_axes)}; "
                 "allowed: [1,1,1,1,1,1]"
             )
-        if not compliance.is_guided:
-            compliance.check_payload(force_sense.unexplained(past.steady_cycles))
+        if not compliance.is_in_freedrive:
+            compliance.check_payload(force_sense.residual(past.steady_cycles))
         freedrive_unchecked(thread)
 
     def tool_contact(thread: object, direction: Any) -> int:

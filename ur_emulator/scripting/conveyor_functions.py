@@ -15,8 +15,8 @@ from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import NEXT_CYCLE
 from urscript.values import Pose
 
-# Encoders beyond have a tick for an atom, or none for the whole robot.
-FEWEST_TICKS, MOST_TICKS = 1e-3, 1e9
+# Range of the resolution of an encoder [ticks per metre or revolution].
+MIN_TICKS, MAX_TICKS = 1e-3, 1e9
 # Deceleration where a program gives none [rad/s^2]. Source: URScript manual, stop_conveyor_tracking.
 STOP_DECELERATION = 20.0
 
@@ -31,7 +31,7 @@ class ProgramConveyor:
         self._tracked: Conveyor | None = None
 
     def end(self) -> None:
-        """Track no more; the arm ramps to rest."""
+        """End the tracking; the arm ramps to rest."""
         if self._tracked is not None:
             self._arm.motion.remove_overlay(self._tracked)
             self._tracked = None
@@ -87,8 +87,7 @@ class ProgramConveyor:
 
 
 def _require_ticks(function: str, name: str, value: float) -> None:
-    if not FEWEST_TICKS <= abs(value) <= MOST_TICKS:
+    if not MIN_TICKS <= abs(value) <= MAX_TICKS:
         raise ScriptRuntimeError(
-            f"{function}: {name} must be {FEWEST_TICKS:g} to {MOST_TICKS:g}, or as much below 0, "
-            f"got {value:g}"
+            f"{function}: {name} must be {MIN_TICKS:g} to {MAX_TICKS:g}, or as much below 0, got {value:g}"
         )

@@ -1,4 +1,4 @@
-"""Builtins that programs exported from an e-Series begin with, for boxes that pretend to run its software.
+"""Builtins that programs exported from an e-Series begin with, for boxes that report its software version.
 
 The tool's connector has no serial line and no switchable outputs here: its settings are checked and kept.
 """
@@ -36,7 +36,7 @@ def e_series_functions(
             )
 
     def keep(thread: object, *setting: int) -> None:
-        """Take a setting that nothing here depends on; its range is checked with the catalogue."""
+        """Accept a setting without effect; the catalogue checks its range."""
 
     def set_target_payload(thread: object, m: float, cog: Any, inertia: Any, *transition: float) -> None:
         if (

@@ -9,7 +9,7 @@ from ur_emulator.controller.io.encoders import PULSE_INPUTS, RANGES, Decoder, En
 from ur_emulator.controller.io.lines import InputOutput
 from urscript.errors import ScriptRuntimeError
 
-# The encoder that the old forms speak of.
+# The encoder of the old forms.
 _CONVEYOR = 0
 
 

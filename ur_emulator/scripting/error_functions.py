@@ -1,4 +1,4 @@
-"""Builtins about errors, limits and the end of it all: most are only kept as configuration."""
+"""Builtins about errors and limits, most of which only keep a setting, and `powerdown`."""
 
 from __future__ import annotations
 

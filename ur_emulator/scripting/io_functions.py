@@ -27,7 +27,7 @@ _DIGITAL_GROUPS = (
     ("configurable", CONFIGURABLE_SHIFT, N_CONFIGURABLE),
     ("tool", TOOL_SHIFT, N_TOOL),
 )
-# The deprecated get_digital_in(n) and its kin: 0..7 standard, 8..9 tool.
+# Lines of the deprecated get_digital_in(n) and related builtins: 0..7 standard, 8..9 tool.
 _DEPRECATED_BITS = (*range(N_STANDARD), TOOL_SHIFT, TOOL_SHIFT + 1)
 
 

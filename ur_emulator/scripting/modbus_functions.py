@@ -94,7 +94,7 @@ def _values(modbus: ModbusSignals) -> dict[str, Function]:
         signal = _signal(modbus, builtin, name)
         if not signal.frequency:
             modbus.refresh(signal)
-        _must_be_well(builtin, signal)
+        _require_answers(builtin, signal)
         return bool(signal.value) if signal.type.is_digital else signal.value
 
     def set_output_signal(thread: object, name: str, value: bool, is_secondary: bool) -> None:
@@ -111,7 +111,7 @@ def _values(modbus: ModbusSignals) -> dict[str, Function]:
 
     def _set(builtin: str, signal: ModbusSignal, value: int) -> None:
         modbus.set_output(signal, value)
-        _must_be_well(builtin, signal)
+        _require_answers(builtin, signal)
 
     return {
         "modbus_get_signal_status": get_signal_status,
@@ -156,7 +156,7 @@ def _signal(modbus: ModbusSignals, builtin: str, name: str, wanted: SignalType |
     return signal
 
 
-def _must_be_well(builtin: str, signal: ModbusSignal) -> None:
+def _require_answers(builtin: str, signal: ModbusSignal) -> None:
     if signal.trouble:
         raise ScriptRuntimeError(f'{builtin}: signal "{signal.name}" is lost: {signal.trouble}')
 

@@ -1,4 +1,4 @@
-"""Moves from waypoint to waypoint: each takes the arm for its thread, or joins the move it blends out of."""
+"""Moves from waypoint to waypoint: each moves the arm for its thread, or joins the move that blends into it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TOOL_DEFAULTS = (1.2, 0.25)  # m/s^2, m/s
 OVERLAPPING_BLENDS = ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blends")
 
 # A program with waypoints close together may command so many moves in one cycle.
-MOST_PER_CYCLE = 4
+MAX_PER_CYCLE = 4
 
 
 def motion_functions(
@@ -48,7 +48,7 @@ def motion_functions(
         Args:
             thread: that moves.
             make: makes the leg for joint angles and tool pose at its start.
-            may_overlap: nothing is said of a waypoint that is left out.
+            may_overlap: no warning about a waypoint that is left out.
         """
         move = motion.move_of(thread)
         if move is not None and move.returned and not move.done:
@@ -62,7 +62,7 @@ def motion_functions(
                     if not may_overlap:
                         events.append(OVERLAPPING_BLENDS)
                     move.n_joined += 1
-                    if may_overlap or move.n_joined >= MOST_PER_CYCLE:
+                    if may_overlap or move.n_joined >= MAX_PER_CYCLE:
                         yield NEXT_CYCLE
                     return
             while not move.done:
@@ -84,7 +84,7 @@ def motion_functions(
         """Wait until a move's instruction returns; with waypoints close together perhaps in this cycle."""
         if move.done:
             yield NEXT_CYCLE
-        while not move.open or (move.n_joined >= MOST_PER_CYCLE and not move.done):
+        while not move.open or (move.n_joined >= MAX_PER_CYCLE and not move.done):
             yield NEXT_CYCLE
         move.returned = True
 
@@ -181,7 +181,7 @@ def motion_functions(
 def _limits(
     function: str, a: float, v: float, t: float, r: float, defaults: tuple[float, float]
 ) -> tuple[float, float]:
-    """Acceleration and speed to use: a time counts before them, so that 0 is allowed beside it."""
+    """Acceleration and speed to use: a time has priority, so that they may be 0 beside it."""
     if t > 0.0:
         a, v = a or defaults[0], v or defaults[1]
     _require_limits(function, a, v, t, r)

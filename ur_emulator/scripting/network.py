@@ -1,4 +1,4 @@
-"""What the script functions need of the network; the servers provide it, tests provide a fake."""
+"""Interfaces of the script functions to the network; the servers implement them, tests have a fake."""
 
 from __future__ import annotations
 

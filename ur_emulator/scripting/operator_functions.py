@@ -1,4 +1,4 @@
-"""Builtins that speak to the operator: popups, requests for values. A client answers in their place."""
+"""Builtins for popups and requests for values. A client answers instead of an operator."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from ur_emulator.controller.modbus import robot_map
-from ur_emulator.controller.modbus.robot_map import PortAddressError
+from ur_emulator.controller.modbus.robot_map import MapAddressError
 from ur_emulator.controller.state import ControllerState
 from urscript.errors import ScriptRuntimeError
 
@@ -24,7 +24,7 @@ def port_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
     def access(function: Callable[..., T], address: float, *value: int | bool) -> T:
         try:
             return function(state, int(address), *value)
-        except PortAddressError as error:
+        except MapAddressError as error:
             raise ScriptRuntimeError(str(error)) from None
 
     def read_port_register(thread: object, address: float) -> int:

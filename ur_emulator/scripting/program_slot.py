@@ -17,7 +17,7 @@ from urscript import CompiledProgram, ProgramStatus, RunningProgram
 
 # Looked up once: a cycle asks for them several times.
 _PLAYING, _PAUSED = ProgramState.PLAYING, ProgramState.PAUSED
-# States in which the threads of a program do not have their turn.
+# States in which the threads of a program do not run.
 _STANDS_STILL = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
 
 
@@ -58,7 +58,7 @@ class ProgramSlot:
 
     @property
     def has_work(self) -> bool:
-        """True while any program wants cycles, and in the cycle in which one ended."""
+        """True while any program needs cycles, and in the cycle in which one ended."""
         if self._primary is None:
             return self._ran or bool(self._secondaries)
         return self._phase is not _PAUSED or bool(self._secondaries)
@@ -85,7 +85,7 @@ class ProgramSlot:
 
     @property
     def waits_outside(self) -> bool:
-        """True when a program cannot go on before something comes from outside the box."""
+        """True when a program waits for data from outside the box."""
         return self._primary is not None and self._phase is _PLAYING and self._primary.waits_outside
 
     # --- commands
@@ -110,7 +110,7 @@ class ProgramSlot:
         self._state.motion.stop(self._state.robot.stop_deceleration)
 
     def pause(self, deceleration: float = 0.0) -> None:
-        """Let the primary program stand still, and the arm come to rest on its path.
+        """Pause the primary program; the arm comes to rest on its path.
 
         Args:
             deceleration: of the leading axis, if that is faster than the usual ramp [rad/s^2].
@@ -159,7 +159,7 @@ class ProgramSlot:
                 self._end()
 
     def _may_run(self) -> bool:
-        """Go on towards a pause or out of it; return whether the threads have their turn in this cycle."""
+        """Advance towards a pause or out of it; return whether the threads run in this cycle."""
         state = self._state
         is_new = self._phase_since == state.clock.tick
         if self._phase is ProgramState.PAUSING and not is_new and state.motion.is_paused:

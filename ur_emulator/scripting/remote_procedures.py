@@ -17,7 +17,7 @@ from urscript.run.waits import Blocked
 from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type, to_script_text
 
 _POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
-# The method that a handle answers itself.
+# The method that does not call the server.
 _CLOSE = "closeXMLRPCClientConnection"
 
 

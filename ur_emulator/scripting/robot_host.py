@@ -78,7 +78,7 @@ class RobotHost:
         self._state.events.append(TextPrinted(text))
 
     def thread_ended(self, thread: object) -> None:
-        """Take the arm from a thread that ended or was killed."""
+        """Stop the motion of a thread that ended or was killed."""
         self._state.motion.release(thread)
 
     def program_ended(self) -> None:

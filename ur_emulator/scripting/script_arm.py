@@ -1,4 +1,4 @@
-"""ScriptArm: the arm as the builtins that move it see it, and what they demand of their arguments."""
+"""ScriptArm: the parts of the controller that move an arm, for builtins; and checks of their arguments."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from ur_emulator.motion.path_motion import OwnershipError
 from ur_emulator.motion.tool import Tool
 from urscript.errors import ScriptRuntimeError
 
-# What a motion builtin is to the interpreter: a generator that yields once per cycle it lasts.
+# A motion builtin is a generator that yields once for each cycle that it lasts.
 Cycles = Generator[Any, None, None]
 
-# With less than this [SI units] no arm moves in a lifetime, and squares of it leave the floats.
-LEAST_LIMIT = 1e-9
+# Smallest limit [SI units]: squares of smaller ones underflow.
+MIN_LIMIT = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class ScriptArm:
     Attributes:
         robot: numbers of the arm.
         model: kinematics of the arm.
-        motion: where the joints are asked to go, and by which thread.
+        motion: targets of the joints, and the thread that moves them.
         settings: TCP and payload.
     """
 
@@ -57,12 +57,12 @@ class ScriptArm:
 
 
 def require_positive(function: str, **limits: float) -> None:
-    """Raise a runtime error for a limit that is not above 0, or not by anything that counts."""
+    """Raise a runtime error for a limit that is not above 0, or too small to have an effect."""
     for name, value in limits.items():
         if not value > 0.0:
             raise ScriptRuntimeError(f"{function}: {name} must be above 0, got {value:g}")
-        if value < LEAST_LIMIT:
-            raise ScriptRuntimeError(f"{function}: {name} must be at least {LEAST_LIMIT:g}, got {value:g}")
+        if value < MIN_LIMIT:
+            raise ScriptRuntimeError(f"{function}: {name} must be at least {MIN_LIMIT:g}, got {value:g}")
 
 
 def floats(values: Sequence[float]) -> Vector6:

@@ -1,4 +1,4 @@
-"""Builtins that change what the controller assumes or ask it for something: TCP, payload, stops."""
+"""Builtins for TCP, payload and gravity, and the protective stop."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ur_emulator.models.robot_model import RobotModel, Vector3, six
 from urscript.errors import ScriptRuntimeError
 from urscript.values import log_form
 
-# No tool is longer than this [m], no rotation vector either [rad]; beyond, poses would lose all their digits.
+# Greatest length of a tool [m] and of its rotation vector [rad]: beyond it poses lose precision.
 MAX_TCP_OFFSET = 100.0
-# No payload has its centre of gravity further away than this from the flange along an axis [m]; far beyond,
-# the simulated arm would have no numbers left.
+# Greatest distance of a centre of gravity from the flange along an axis [m]: far beyond it the simulation
+# diverges.
 MAX_COG = 1.0
 
 
@@ -24,7 +24,7 @@ def settings_functions(
     """Return the builtins for TCP, payload and gravity, and the protective stop.
 
     Args:
-        robot: says how much the arm carries.
+        robot: has the greatest payload.
         tool: what they set.
         requests: get the protective stop.
     """

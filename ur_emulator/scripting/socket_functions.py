@@ -1,7 +1,7 @@
-"""Socket builtins: the program is the TCP client. Reads block their thread only, and fail by value.
+"""Socket builtins: the program is the TCP client. Reads block their thread only; a failure is a return value.
 
 Timeouts are robot time, counted in cycles. Shapes of the results after a failure: URScript manual CB3 3.15,
-socket_read_binary_integer and its kin ([0, -1, -1, ...], [0, nan, nan, ...], "").
+socket_read_binary_integer and related builtins ([0, -1, -1, ...], [0, nan, nan, ...], "").
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from urscript.values import log_form
 OPEN_TIMEOUT = 2.0
 # Longest text that a string read returns [bytes]. Source: later edition of the manual, socket_read_string.
 MAX_STRING = 1024
-# A text that grows past this without an end is not a line any more; the read fails and the bytes are dropped.
+# Longest text without an end [bytes]: beyond it the read fails and the bytes are dropped.
 MAX_INBOX = 1 << 20
 
 Function = Callable[..., Any]
@@ -67,7 +67,7 @@ class ProgramSockets:
         old = self._sockets.pop(name, None)
         if old is not None:
             old.close()
-        # Known from the first moment: a program that is killed meanwhile closes it.
+        # Stored before it is open: a program that is killed meanwhile closes it.
         socket = self._sockets[name] = self._network.open(address, int(port))
         expired = self._timer(OPEN_TIMEOUT)
         if socket.is_connecting:
@@ -146,12 +146,12 @@ class ProgramSockets:
         return data
 
     def _take_fixed(self, name: str, timeout: float, size: int) -> Generator[Blocked, None, bytes | None]:
-        """As `_take`, for a message of a fixed size: a stream of commands passes here every cycle."""
+        """As `_take`, for a message of a fixed size: command streams read one every cycle."""
         socket, clock = self._sockets.get(name), self._clock
         if socket is None:
             return None
         inbox = socket.inbox
-        # Nothing to read is nothing that could come: it ends with the time-out.
+        # A read of no bytes never succeeds: it ends with the time-out.
         enough = min(size, MAX_INBOX + 1) if size > 0 else MAX_INBOX + 1
         if len(inbox) < enough and socket.is_open:
             end = clock.program_tick + math.ceil(timeout / clock.period_s) if timeout > 0.0 else math.inf

@@ -9,7 +9,7 @@ from typing import Any
 from ur_emulator.motion.generators import SpeedJ, StopJ, Streamed
 from ur_emulator.motion.servo_j import ServoJ
 from ur_emulator.motion.speed_l import SpeedL, StopL
-from ur_emulator.scripting.script_arm import LEAST_LIMIT, Cycles, ScriptArm, floats, require_positive
+from ur_emulator.scripting.script_arm import MIN_LIMIT, Cycles, ScriptArm, floats, require_positive
 from urscript.run.waits import NEXT_CYCLE
 
 
@@ -23,7 +23,7 @@ def speed_functions(arm: ScriptArm, step_time: float) -> Mapping[str, Callable[.
     motion = arm.motion
 
     def stream(thread: object, generator: Streamed, t: float | None) -> Cycles:
-        """Keep a motion alive for the time t [s], or until it has got where it should."""
+        """Renew a motion for the time t [s], or until it is done."""
         arm.take(thread, generator)
         if t is not None and t > 0.0:
             # Exactly one cycle for t = step time, whatever the rounding of the division.
@@ -41,7 +41,7 @@ def speed_functions(arm: ScriptArm, step_time: float) -> Mapping[str, Callable[.
             yield NEXT_CYCLE
 
     def speedj(thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
-        if not a >= LEAST_LIMIT:
+        if not a >= MIN_LIMIT:
             a = _limit("speedj", t, a=a)
         return stream(thread, SpeedJ(floats(qd), a), t)
 
@@ -72,11 +72,11 @@ def speed_functions(arm: ScriptArm, step_time: float) -> Mapping[str, Callable[.
 def _limit(function: str, t: float | None, **limit: float) -> float:
     """The acceleration to use.
 
-    A stream whose speed does not change asks for none at all, or for what rounding has left of it. Source:
+    A stream whose speed does not change asks for zero acceleration, or for a rounding error of it. Source:
     splines of the maker's driver script. Without a time such a command would never be done.
     """
     ((_, value),) = limit.items()
-    if t is not None and t > 0.0 and 0.0 <= value < LEAST_LIMIT:
-        return LEAST_LIMIT
+    if t is not None and t > 0.0 and 0.0 <= value < MIN_LIMIT:
+        return MIN_LIMIT
     require_positive(function, **limit)
     return value

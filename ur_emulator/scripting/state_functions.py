@@ -24,7 +24,7 @@ def state_functions(arm: ScriptArm, past: PastCycles, step_time: float) -> Mappi
 
     Args:
         arm: with its settings.
-        past: what the last cycle has come to.
+        past: snapshot of the last cycle, and positions before it.
         step_time: duration of a cycle [s].
     """
     model, motion, settings = arm.model, arm.motion, arm.settings

@@ -1,4 +1,4 @@
-"""Builtins about what clients write through RTDE: watchdogs, and an external force sensor."""
+"""Builtins for RTDE inputs: watchdogs, and an external force sensor."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Force and compliance: the wrench that the box reads, what pushes the flange, force mode, hand guiding."""
+"""Force and compliance: the measured wrench, external pushes, force mode, freedrive."""

@@ -1,10 +1,9 @@
-"""Compliance: who lets the arm give way, and how it is driven therefore: by position, by force, by hand.
+"""Compliance: freedrive and force mode: who has requested them, and the control mode that follows.
 
-Hand guiding ("freedrive", "teach mode") may be asked for by the program, by a client's word or by inputs that
-are set up for it; force mode by the program. Both are modes of the robot, not of the thread that asked.
+Freedrive (also "teach mode") is requested by the program, by a client or by inputs that are set up for it;
+force mode by the program. Both are modes of the robot, not of the thread that has requested them.
 Source: URScript manual CB3 3.15: freedrive_mode, teach_mode, force_mode, set_*_digital_input_action. Chosen:
-an input acts once no move is under way, with or without a program; hand guiding takes the place of force
-mode.
+an input acts once no move is under way, with or without a program; freedrive replaces force mode.
 """
 
 from __future__ import annotations
@@ -25,25 +24,25 @@ from ur_emulator.motion.force_mode import ForceMode
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
 
-# A wrench that nobody expects when hand guiding begins is a wrong payload or a push: beyond this, which is
-# twice the stated precision of the estimate [N].
+# An external force above this when freedrive begins means a wrong payload or a push [N]. It is twice the
+# stated precision of the estimate.
 UNEXPECTED_FORCE = 20.0
 
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 class Compliance:
-    """Who has asked for what.
+    """Requests for freedrive and force mode.
 
     Attributes:
-        mode: how the arm is driven in this cycle.
-        by_program: a program asks for hand guiding.
-        by_client: the word `set robotmode freedrive` does.
-        by_input: an input or the teach button does, and it is granted.
-        force_mode: the overlay while a program is in force mode.
+        mode: control mode of this cycle.
+        by_program: a program has requested freedrive.
+        by_client: `set robotmode freedrive` has.
+        by_input: an input or the teach button has, and it acts.
+        force_mode: the overlay of force mode; None without it.
         force_damping: as programs have set it, for a force mode to come; 0..1.
         force_gain_scaling: likewise, 0..2.
-        is_on: there is something to look after in every cycle.
+        is_on: `step` must be called in every cycle.
     """
 
     def __init__(
@@ -60,8 +59,8 @@ class Compliance:
             motion: of the arm; force mode is an overlay of it, a guided arm its place.
             mode: compliance ends when it is not RUNNING.
             safety: compliance ends when it stops the arm.
-            inputs: may ask for hand guiding.
-            past: where the arm is.
+            inputs: may request freedrive.
+            past: measured positions.
         """
         self._motion = motion
         self._robot_mode = mode
@@ -77,37 +76,37 @@ class Compliance:
         self._is_teach_pressed = False
 
     @property
-    def is_guided(self) -> bool:
-        """True while somebody's wish for hand guiding is granted."""
+    def is_in_freedrive(self) -> bool:
+        """True while the arm is in freedrive."""
         return self.by_program or self.by_client or self.by_input
 
-    # --- wishes
+    # --- requests
 
-    def guide(self, *, by_program: bool = False, by_client: bool = False) -> None:
-        """Let the arm be guided by hand from this cycle on."""
+    def start_freedrive(self, *, by_program: bool = False, by_client: bool = False) -> None:
+        """Start freedrive in this cycle."""
         self.by_program = self.by_program or by_program
         self.by_client = self.by_client or by_client
         self.is_on = True
 
-    def press(self, pressed: bool) -> None:
-        """Press the teach button or let it go: it acts as an input that is set up for hand guiding."""
+    def press_teach_button(self, pressed: bool) -> None:
+        """Press or release the teach button: it acts as an input that is set up for freedrive."""
         self._is_teach_pressed = pressed
         self.is_on = True
 
     def check_payload(self, wrench: Vector6) -> None:
-        """Refuse hand guiding with a protective stop if something unexpected acts at its beginning.
+        """Stop protectively when freedrive begins while an unexpected force acts.
 
         Args:
-            wrench: that nothing explains, at the flange [N, Nm].
+            wrench: external one, at the flange [N, Nm].
         """
         self._is_refused = hypot(*wrench[:3]) > UNEXPECTED_FORCE
 
-    def end_guiding_by_program(self) -> None:
-        """End the hand guiding that the program has asked for."""
+    def end_freedrive_by_program(self) -> None:
+        """End the freedrive that the program has requested."""
         self.by_program = False
 
-    def end_guiding_by_client(self) -> None:
-        """End the hand guiding that a client has asked for."""
+    def end_freedrive_by_client(self) -> None:
+        """End the freedrive that a client has requested."""
         self.by_client = False
 
     def set_force_damping(self, damping: float) -> None:
@@ -119,7 +118,7 @@ class Compliance:
         self.force_gain_scaling = scaling
 
     def begin_force(self, force_mode: ForceMode) -> None:
-        """Go into force mode; hand guiding by the program ends: what is commanded last counts."""
+        """Go into force mode; freedrive by the program ends."""
         self.end_force()
         self.by_program = False
         self.force_mode = force_mode
@@ -133,23 +132,23 @@ class Compliance:
             self.force_mode = None
 
     def program_ended(self) -> None:
-        """End what the program has asked for."""
+        """End freedrive and force mode of the program."""
         self.by_program = False
         self.end_force()
 
     # --- cycle
 
     def step(self) -> ControlMode:
-        """Return how the arm is driven in this cycle, after the scripts have had their turn."""
+        """Return the control mode of this cycle, after the scripts have run."""
         motion = self._motion
         if self._robot_mode.mode is not RobotMode.RUNNING or self._safety.is_stopped:
             self.by_program = self.by_client = self.by_input = False
             self.end_force()
         else:
-            wanted = self._is_teach_pressed or self._inputs.asks_for_freedrive()
+            wanted = self._is_teach_pressed or self._inputs.requests_freedrive()
             self.by_input = wanted and (self.by_input or not motion.is_moving)
         was_guided = self.mode is ControlMode.TEACH
-        if self.is_guided:
+        if self.is_in_freedrive:
             self.end_force()
             self.mode = ControlMode.TEACH
         else:
@@ -165,10 +164,10 @@ class Compliance:
         self.is_on = self.mode is not ControlMode.POSITION or self._is_teach_pressed
         return self.mode
 
-    def follow_hand(self) -> JointTarget:
-        """Return what counts as the target of an arm that is guided by hand: where it is.
+    def freedrive_target(self) -> JointTarget:
+        """Return the target of an arm in freedrive: its measured position.
 
-        Moves are not followed. They take their time on paper, and end with the guiding.
+        Moves have no effect on the arm. They take their time, and end with freedrive.
         """
         snapshot = self._past.snapshot
         if not self._motion.is_moving:
@@ -176,7 +175,7 @@ class Compliance:
         return JointTarget(snapshot.actual_q, snapshot.actual_qd)
 
     def find_violation(self, robot: RobotModel, sensed: PlantState) -> Violation | None:
-        """Return what a compliant arm has done wrong in this cycle, or None.
+        """Return a violation by a compliant arm in this cycle, or None.
 
         Args:
             robot: limits of the arm.
@@ -218,7 +217,7 @@ WRONG_PAYLOAD = Violation(
 def _guided_too_far(robot: RobotModel, sensed: PlantState) -> Violation | None:
     """Codes C150 and C191 from the maker's list; that they lead to a protective stop is chosen.
 
-    A joint that is outside its range already may be guided back.
+    A joint outside its range may be moved back.
     """
     for i, (q, qd) in enumerate(zip(sensed.actual_q, sensed.actual_qd, strict=True)):
         if (q > robot.q_max[i] and qd > 0.0) or (q < robot.q_min[i] and qd < 0.0):

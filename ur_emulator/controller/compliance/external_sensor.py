@@ -1,8 +1,8 @@
 """A force sensor at the flange whose readings come through the RTDE input `external_force_torque`.
 
 Source: URScript manual CB3 3.15, ft_rtde_input_enable: the reading is a wrench at the sensor's measuring
-point, in the axes of the flange. Chosen: it is taken as the external wrench as it is; mass and centre of
-gravity of the sensor are kept, but no weight is subtracted.
+point, in the axes of the flange. Chosen: the reading is the external wrench; mass and centre of
+gravity of the sensor are kept, but its weight is not subtracted.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class ExternalSensor:
     lever_sign: float = 1.0
 
     def wrench_at_flange(self, reading: Vector6, flange_pose: Vector6) -> Vector6:
-        """Return the wrench at the flange in base axes [N, Nm] for a reading; nonsense counts as zero."""
+        """Return the wrench at the flange in base axes [N, Nm] for a reading; zero if it is not finite."""
         if not all(map(math.isfinite, reading)):
             return ZERO6
         fx, fy, fz, mx, my, mz = reading

@@ -1,4 +1,4 @@
-"""What pushes the flange: a force from outside, for a while or until the next one."""
+"""FlangePush: an external force on the flange, for a time or until the next one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _NOTHING: Vector3 = (0.0, 0.0, 0.0)
 
 
 class FlangePush:
-    """Pushes an arm and counts the cycles of a push that ends by itself.
+    """Applies an external force and counts the cycles of one with a duration.
 
     Args:
         plant: the arm.
@@ -25,7 +25,7 @@ class FlangePush:
 
     @property
     def will_end(self) -> bool:
-        """True while a push lasts that ends by itself."""
+        """True during a push with a duration."""
         return self._cycles_left > 0
 
     def begin(self, force: Vector3, point: Vector3, duration: float | None) -> None:
@@ -34,14 +34,14 @@ class FlangePush:
         Args:
             force: in base axes [N]; zero ends the push before.
             point: where it acts, in the flange frame [m].
-            duration: for so long [s]; None until the next push.
+            duration: of the push [s]; None: until the next one.
         """
         n_cycles = 0 if duration is None else round(duration / self._period_s)
         self._plant.push(force if duration is None or n_cycles else _NOTHING, point)
         self._cycles_left = n_cycles
 
     def step(self) -> None:
-        """Count a cycle of a push that lasts for a while; end it after the last."""
+        """Count a cycle of a push with a duration; end it after the last."""
         self._cycles_left -= 1
         if not self._cycles_left:
             self._plant.push(_NOTHING)

@@ -1,1 +1,1 @@
-"""What comes in and goes out: digital and analogue lines, registers, watchdogs, encoders, Modbus."""
+"""Inputs and outputs: digital and analogue lines, registers, watchdogs, encoders, Modbus."""

@@ -1,4 +1,4 @@
-"""How lines and registers are set up: what an input does, what an output does when programs start and stop.
+"""Configuration of lines and registers: actions of inputs, and outputs that follow the program.
 
 Source: URScript manual CB3 3.15, module ioconfiguration.
 """
@@ -42,12 +42,12 @@ _INPUT_SHIFT = {
 
 @dataclass(slots=True)
 class IoConfiguration:
-    """What programs have set up; it stays when they end.
+    """What programs have configured; it stays when they end.
 
     Attributes:
         io: the lines.
         registers: the general purpose registers.
-        modbus: signals of other units, which have their actions and rules with them.
+        modbus: signals of other units, with actions and rules of their own.
         input_actions: (group, index) to the action, where it is not the default.
         program_runs: a primary program runs.
     """
@@ -60,22 +60,22 @@ class IoConfiguration:
     _rules: dict[tuple[OutputKind, int], RunState] = field(default_factory=dict)
 
     def set_input_action(self, group: str, index: int, action: str) -> None:
-        """Remember what an input does beside being read."""
+        """Set the action of an input."""
         if action == DEFAULT_ACTION:
             self.input_actions.pop((group, index), None)
         else:
             self.input_actions[group, index] = action
 
     def clear_input_actions(self) -> None:
-        """Let all inputs do nothing beside being read."""
+        """Remove the actions of all inputs."""
         self.input_actions.clear()
 
-    def asks_for_freedrive(self) -> bool:
+    def requests_freedrive(self) -> bool:
         """True while a line that is set up for it, or a signal of another unit, is high."""
         for (group, index), action in self.input_actions.items():
             if action == FREEDRIVE_ACTION and self._is_high(group, index):
                 return True
-        return self.modbus.wants_freedrive
+        return self.modbus.requests_freedrive
 
     def _is_high(self, group: str, index: int) -> bool:
         if group == "gp_boolean":

@@ -49,7 +49,7 @@ class Encoder:
         is_fed: a program sets its count.
         count: present one [ticks].
         range_id: key of RANGES.
-        travel: ticks gone in all, without wraps; goes on when the counting is set up anew.
+        travel: sum of all ticks, without wraps; it continues when the encoder is set up again.
     """
 
     decoder: Decoder = Decoder.OFF
@@ -78,12 +78,12 @@ class Encoder:
         self.count = 0.0
 
     def set_count(self, count: float) -> None:
-        """Take a count that a program feeds; it has gone the shorter way round."""
+        """Set the count from a program; the difference is taken the shorter way round."""
         self.travel += self.unwind(count - self.count)
         self.count = count
 
     def step(self, digital_in: int) -> None:
-        """Look at the inputs once."""
+        """Read the inputs once."""
         now, before = self._read(digital_in), self._last
         self._last = now
         match self.decoder:
@@ -131,7 +131,7 @@ class Encoders:
         self._find_decoding()
 
     def step(self, digital_in: int) -> None:
-        """Count what has come on the inputs in this cycle."""
+        """Count the pulses of this cycle."""
         for encoder in self.decoding:
             encoder.step(digital_in)
 

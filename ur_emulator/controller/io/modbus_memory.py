@@ -1,4 +1,4 @@
-"""MapMemory: what the robot's Modbus map keeps of its own, beside the state that it shows."""
+"""MapMemory: the words of the robot's Modbus map that are not part of the state of the box."""
 
 from __future__ import annotations
 
@@ -28,5 +28,5 @@ class MapMemory:
         self.words[offset] = word
 
     def latch_clock(self, tick: int) -> None:
-        """Remember a time, in cycles."""
+        """Store a time, in cycles."""
         self.latched_tick = tick

@@ -1,8 +1,8 @@
 """The Modbus signals that programs have added: what each stands for, its value, and when it is due.
 
 A signal lives until it is deleted, replaced by one of the same name, or the controller ends. It is refreshed
-at its frequency in robot time; the connection to its unit is somebody else's (`ModbusUnit`), takes its own
-time and never holds a cycle up. An output is read until a program sets it and is written from then on: at
+at its frequency in robot time; the connection to its unit (`ModbusUnit`) belongs to the servers, works in
+real time and never delays a cycle. An output is read until a program sets it and is written from then on: at
 once when its value changes, and at its frequency.
 Source: URScript manual CB3 3.15, module interfaces; UR3 user manual CB3, section "MODBUS client I/O setup".
 That a changed output goes out at once: chosen.
@@ -70,15 +70,15 @@ class ModbusSignal:
         unit: where its unit listens.
         slave: number of the unit behind that address, 0 to 255.
         address: of the coil or register, 0 to 65535.
-        type: what stands there.
+        type: what it is.
         sequential: the unit takes one request at a time.
         frequency: how often it is refreshed [Hz]; 0 only on demand.
-        action: what a digital input does beside being read.
+        action: action of a digital input.
         rule: what an output does when programs start and stop.
         value: last one known: of the unit, or what a program has set; 0 before.
         output: what a program has set, to be written; None while the signal is only read.
-        trouble: why there has been no valid answer for too long; empty while all is well. The unit's to set.
-        due: tick of the next refresh; broken, so that any frequency is kept on average.
+        trouble: why there has been no valid answer for too long; empty while answers come. The unit sets it.
+        due: tick of the next refresh; with a fraction, so that any frequency is kept on average.
     """
 
     name: str
@@ -109,15 +109,15 @@ class ModbusUnit(Protocol):
     """The connection to a unit, shared by its signals. All calls return at once."""
 
     def want(self, signal: ModbusSignal) -> None:
-        """Write the signal's output, or read its value if it has none, as soon as that is possible."""
+        """Write the signal's output, or read its value if it has none, as soon as possible."""
         ...
 
     def forget(self, signal: ModbusSignal) -> None:
-        """Do nothing more for a signal."""
+        """Drop a signal."""
         ...
 
     def send(self, slave: int, function_code: int, data: bytes) -> None:
-        """Send a request whose answer nobody reads; it is lost if the unit cannot be reached."""
+        """Send a request and ignore the answer; the request is lost if the unit cannot be reached."""
         ...
 
     def release(self) -> None:
@@ -135,7 +135,7 @@ class ModbusSignals:
 
     def add(self, signal: ModbusSignal, open_unit: Callable[[UnitAddress], ModbusUnit]) -> None:
         """Add a signal; one of the same name is replaced, its value stays if it stands for the same thing."""
-        # The new one first: a unit that both share stays connected.
+        # The new signal first: a unit that both share stays connected.
         if signal.unit not in self._units:
             self._units[signal.unit] = open_unit(signal.unit)
         old = self.signals.pop(signal.name, None)
@@ -152,16 +152,16 @@ class ModbusSignals:
             self._drop(signal)
 
     def step(self, tick: int) -> None:
-        """Ask for what is due in this cycle."""
+        """Request the signals that are due in this cycle."""
         for signal in self.signals.values():
             if signal.frequency and tick >= signal.due:
                 interval = self._rate / signal.frequency
-                # Of requests that were missed one is owed at most.
+                # Of requests that were missed at most one is made up for.
                 signal.due = (signal.due if tick - signal.due < interval else tick) + interval
                 self.refresh(signal)
 
     def refresh(self, signal: ModbusSignal) -> None:
-        """Ask for a signal now."""
+        """Request a signal now."""
         self._units[signal.unit].want(signal)
 
     def set_output(self, signal: ModbusSignal, value: int) -> None:
@@ -177,7 +177,7 @@ class ModbusSignals:
         self._follow(signal, program_runs)
 
     def follow(self, program_runs: bool) -> None:
-        """A program has started or ended: set the outputs that follow it."""
+        """Set the outputs that follow the program, which has started or ended."""
         for signal in self.signals.values():
             self._follow(signal, program_runs)
 
@@ -189,7 +189,7 @@ class ModbusSignals:
         function_code: int,
         data: bytes,
     ) -> None:
-        """Send a request of the program's own making."""
+        """Send a request that the program has composed."""
         if unit in self._units:
             self._units[unit].send(slave, function_code, data)
         else:
@@ -198,7 +198,7 @@ class ModbusSignals:
             passing.release()
 
     @property
-    def wants_freedrive(self) -> bool:
+    def requests_freedrive(self) -> bool:
         """True while a digital input with the action "freedrive" is high, and its unit answers."""
         return any(s.action == FREEDRIVE_ACTION and s.value and not s.trouble for s in self.signals.values())
 

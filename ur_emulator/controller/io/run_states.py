@@ -1,4 +1,4 @@
-"""What outputs do when programs start and stop: the codes, and the level that each asks for.
+"""Outputs that follow the program: the codes of set_runstate_*, and the level of each.
 
 Source: URScript manual CB3 3.15, module ioconfiguration.
 """
@@ -26,5 +26,5 @@ _WHEN_STOPPED = {
 
 
 def level(rule: RunState, program_runs: bool) -> bool | None:
-    """Return the level that an output takes (True is high); None leaves it alone."""
+    """Return the level of an output (True is high); None does not change it."""
     return (_WHEN_RUNNING if program_runs else _WHEN_STOPPED).get(rule)

@@ -1,7 +1,7 @@
 """Watchdogs of programs over RTDE inputs: a variable that is late pauses or ends the program.
 
 Source: URScript manual CB3 3.15, rtde_set_watchdog. Chosen: a minimum frequency of 0 removes the watchdog;
-time is robot time; a paused program is not watched, and its watchdogs begin anew when it goes on.
+time is robot time; a paused program is not watched, and its watchdogs restart when it continues.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ class LateInput(NamedTuple):
 
     Attributes:
         report: the message about it.
-        action: what its watchdog asks for, PAUSE or STOP.
+        action: of its watchdog, PAUSE or STOP.
     """
 
     report: ErrorReported
     action: WatchdogAction
 
 
-# What the message says about the program.
+# State of the program, for the message.
 _CONSEQUENCE = {WatchdogAction.PAUSE: "paused", WatchdogAction.STOP: "stopped"}
 
 
@@ -71,12 +71,12 @@ class Watchdogs:
         """
         self._watches.pop(variable, None)
         if min_frequency > 0.0 and action is not WatchdogAction.IGNORE:
-            # A hair less, lest rounding make one cycle more of a whole number of them.
+            # A little less, so that rounding does not add a cycle to a whole number of cycles.
             cycles = max(1, math.ceil(1.0 / (min_frequency * self._period_s) - 1e-9))
             self._watches[variable] = _Watch(cycles, action, tick)
 
     def written(self, names: Iterable[str], tick: int) -> None:
-        """Take note of variables that a client has written."""
+        """Restart the watchdogs of variables that a client has written."""
         for name in names:
             watch = self._watches.get(name)
             if watch is not None:
@@ -107,5 +107,5 @@ class Watchdogs:
         return found
 
     def clear(self) -> None:
-        """Forget all: the program has ended."""
+        """Remove all watchdogs: the program has ended."""
         self._watches.clear()

@@ -1,7 +1,7 @@
 """The robot's Modbus map as two tables: registers and coils, read from and written to the controller's state.
 
-Scripts reach it with `read_port_register` and its kin, Modbus clients by port 502. To add an address: add a
-row. Registers are words of 16 bits, signed values in two's complement.
+Scripts reach it with `read_port_register` and related builtins, Modbus clients by port 502. To add an
+address, add a row. Registers are words of 16 bits, signed values in two's complement.
 Source: UR "Modbus server" article and its register table (protocol notes, section 9). Joint angles count up
 from 0 to one turn, the turns beside them: UR forum, thread 641. Analogue levels are taken as parts of
 the range of their domain, and the clock as the time since the controller started: chosen.
@@ -49,12 +49,12 @@ from ur_emulator.controller.state import ControllerState
 TURN = 2.0 * math.pi
 
 
-class PortAddressError(LookupError):
-    """There is nothing at an address of the map."""
+class MapAddressError(LookupError):
+    """The map has nothing at this address."""
 
 
 @dataclass(frozen=True, slots=True)
-class PortRow:
+class MapRow:
     """Neighbouring addresses of one kind.
 
     Attributes:
@@ -72,20 +72,20 @@ class PortRow:
     write: Writer | None = None
 
 
-def _analog_rows(first: int, what: str, lines: str, *, is_output: bool) -> tuple[PortRow, ...]:
+def _analog_rows(first: int, what: str, lines: str, *, is_output: bool) -> tuple[MapRow, ...]:
     """Two lines, each a level and then a domain."""
     return tuple(
         row
         for i in (0, 1)
         for row in (
-            PortRow(
+            MapRow(
                 first + 2 * i,
                 1,
                 f"{what} {i}, part of its range",
                 analog_level(lines, i),
                 set_analog_level(lines, i) if is_output else None,
             ),
-            PortRow(
+            MapRow(
                 first + 2 * i + 1,
                 1,
                 f"its domain, {what} {i}: 0 current, 1 voltage",
@@ -96,76 +96,76 @@ def _analog_rows(first: int, what: str, lines: str, *, is_output: bool) -> tuple
     )
 
 
-REGISTERS: tuple[PortRow, ...] = (
-    PortRow(0, 1, "digital inputs, bits 0-7 standard, 8-9 tool", lambda s, i: box_word(s.io.digital_in)),
-    PortRow(1, 1, "digital outputs, same bits", lambda s, i: box_word(s.io.digital_out),
+REGISTERS: tuple[MapRow, ...] = (
+    MapRow(0, 1, "digital inputs, bits 0-7 standard, 8-9 tool", lambda s, i: box_word(s.io.digital_in)),
+    MapRow(1, 1, "digital outputs, same bits", lambda s, i: box_word(s.io.digital_out),
             write_bits(box_bit, N_BOX_BITS)),
-    PortRow(2, 1, "outputs to set", None, write_bits(box_bit, N_BOX_BITS, True)),
-    PortRow(3, 1, "outputs to clear", None, write_bits(box_bit, N_BOX_BITS, False)),
+    MapRow(2, 1, "outputs to set", None, write_bits(box_bit, N_BOX_BITS, True)),
+    MapRow(3, 1, "outputs to clear", None, write_bits(box_bit, N_BOX_BITS, False)),
     *_analog_rows(4, "analogue input", "analog_in", is_output=False),
     *_analog_rows(8, "tool analogue input", "tool_analog_in", is_output=False),
     *_analog_rows(16, "analogue output", "analog_out", is_output=True),
-    PortRow(20, 1, "tool supply, V", lambda s, i: s.io.tool_voltage, write_tool_voltage),
-    PortRow(21, 1, "tool inputs", lambda s, i: tool_word(s.io.digital_in)),
-    PortRow(22, 1, "tool outputs", lambda s, i: tool_word(s.io.digital_out), write_bits(tool_bit, N_TOOL)),
-    PortRow(24, 2, "Euromap67 inputs", lambda s, i: s.io.euromap.inputs >> 16 * i),
-    PortRow(26, 2, "Euromap67 outputs", lambda s, i: s.io.euromap.outputs >> 16 * i),
-    PortRow(28, 2, "Euromap67 supply, V and mA; none connected"),
-    PortRow(30, 1, "configurable inputs", lambda s, i: configurable(s.io.digital_in)),
-    PortRow(31, 1, "configurable outputs", lambda s, i: configurable(s.io.digital_out),
+    MapRow(20, 1, "tool supply, V", lambda s, i: s.io.tool_voltage, write_tool_voltage),
+    MapRow(21, 1, "tool inputs", lambda s, i: tool_word(s.io.digital_in)),
+    MapRow(22, 1, "tool outputs", lambda s, i: tool_word(s.io.digital_out), write_bits(tool_bit, N_TOOL)),
+    MapRow(24, 2, "Euromap67 inputs", lambda s, i: s.io.euromap.inputs >> 16 * i),
+    MapRow(26, 2, "Euromap67 outputs", lambda s, i: s.io.euromap.outputs >> 16 * i),
+    MapRow(28, 2, "Euromap67 supply, V and mA; none connected"),
+    MapRow(30, 1, "configurable inputs", lambda s, i: configurable(s.io.digital_in)),
+    MapRow(31, 1, "configurable outputs", lambda s, i: configurable(s.io.digital_out),
             write_bits(configurable_bit, N_CONFIGURABLE)),
-    PortRow(32, 1, "configurable outputs to set", None, write_bits(configurable_bit, N_CONFIGURABLE, True)),
-    PortRow(33, 1, "configurable outputs to clear", None,
+    MapRow(32, 1, "configurable outputs to set", None, write_bits(configurable_bit, N_CONFIGURABLE, True)),
+    MapRow(33, 1, "configurable outputs to clear", None,
             write_bits(configurable_bit, N_CONFIGURABLE, False)),
-    PortRow(34, 94, "reserved"),
-    PortRow(FIRST_GENERAL, N_GENERAL, "general purpose", lambda s, i: s.modbus_map.words[i], write_general),
-    PortRow(256, 2, "software version, major and minor", lambda s, i: s.modbus_map.version[i]),
-    PortRow(258, 1, "robot mode", lambda s, i: s.past.snapshot.robot_mode),
-    PortRow(260, 6, "flags, see the coils", flag),
-    PortRow(266, 1, "safety mode", lambda s, i: s.past.snapshot.safety_mode),
-    PortRow(270, 6, "joint angle within its turn, mrad",
+    MapRow(34, 94, "reserved"),
+    MapRow(FIRST_GENERAL, N_GENERAL, "general purpose", lambda s, i: s.modbus_map.words[i], write_general),
+    MapRow(256, 2, "software version, major and minor", lambda s, i: s.modbus_map.version[i]),
+    MapRow(258, 1, "robot mode", lambda s, i: s.past.snapshot.robot_mode),
+    MapRow(260, 6, "flags, see the coils", flag),
+    MapRow(266, 1, "safety mode", lambda s, i: s.past.snapshot.safety_mode),
+    MapRow(270, 6, "joint angle within its turn, mrad",
             lambda s, i: s.past.snapshot.actual_q[i] % TURN * 1e3),
-    PortRow(280, 6, "joint velocity, mrad/s", of_snapshot(lambda snap: snap.actual_qd, 1e3)),
-    PortRow(290, 6, "joint current, mA", of_snapshot(lambda snap: snap.actual_current, 1e3)),
-    PortRow(300, 6, "joint temperature, degree C", of_snapshot(lambda snap: snap.joint_temperatures)),
-    PortRow(310, 6, "joint mode", of_snapshot(lambda snap: snap.joint_mode)),
-    PortRow(320, 6, "turns of the joint", lambda s, i: s.past.snapshot.actual_q[i] // TURN),
-    PortRow(400, 3, "TCP in base, 0.1 mm", of_snapshot(lambda snap: snap.actual_tcp_pose[:3], 1e4)),
-    PortRow(403, 3, "its rotation vector, mrad", of_snapshot(lambda snap: snap.actual_tcp_pose[3:], 1e3)),
-    PortRow(410, 6, "TCP speed, mm/s and mrad/s", of_snapshot(lambda snap: snap.actual_tcp_speed, 1e3)),
-    PortRow(420, 6, "TCP offset, mm and mrad", of_snapshot(lambda snap: snap.tcp_offset, 1e3)),
-    PortRow(450, 1, "robot current, mA", lambda s, i: s.past.snapshot.actual_robot_current * 1e3),
-    PortRow(451, 1, "I/O current, mA", lambda s, i: s.past.snapshot.io_current * 1e3),
-    PortRow(768, 1, "tool mode", lambda s, i: s.past.snapshot.tool_mode),
-    PortRow(769, 1, "tool temperature, degree C: that of the last joint",
+    MapRow(280, 6, "joint velocity, mrad/s", of_snapshot(lambda snap: snap.actual_qd, 1e3)),
+    MapRow(290, 6, "joint current, mA", of_snapshot(lambda snap: snap.actual_current, 1e3)),
+    MapRow(300, 6, "joint temperature, degree C", of_snapshot(lambda snap: snap.joint_temperatures)),
+    MapRow(310, 6, "joint mode", of_snapshot(lambda snap: snap.joint_mode)),
+    MapRow(320, 6, "turns of the joint", lambda s, i: s.past.snapshot.actual_q[i] // TURN),
+    MapRow(400, 3, "TCP in base, 0.1 mm", of_snapshot(lambda snap: snap.actual_tcp_pose[:3], 1e4)),
+    MapRow(403, 3, "its rotation vector, mrad", of_snapshot(lambda snap: snap.actual_tcp_pose[3:], 1e3)),
+    MapRow(410, 6, "TCP speed, mm/s and mrad/s", of_snapshot(lambda snap: snap.actual_tcp_speed, 1e3)),
+    MapRow(420, 6, "TCP offset, mm and mrad", of_snapshot(lambda snap: snap.tcp_offset, 1e3)),
+    MapRow(450, 1, "robot current, mA", lambda s, i: s.past.snapshot.actual_robot_current * 1e3),
+    MapRow(451, 1, "I/O current, mA", lambda s, i: s.past.snapshot.io_current * 1e3),
+    MapRow(768, 1, "tool mode", lambda s, i: s.past.snapshot.tool_mode),
+    MapRow(769, 1, "tool temperature, degree C: that of the last joint",
             lambda s, i: s.past.snapshot.tool_temperature),
-    PortRow(770, 1, "tool current, mA", lambda s, i: s.past.snapshot.tool_output_current * 1e3),
-    PortRow(1024, 1, "state of the user interface, reserved"),
-    PortRow(2048, 1, "write anything to latch the clock", None, latch_clock),
-    PortRow(2049, 5, "latched clock: ms, s, min, h, day", clock),
+    MapRow(770, 1, "tool current, mA", lambda s, i: s.past.snapshot.tool_output_current * 1e3),
+    MapRow(1024, 1, "state of the user interface, reserved"),
+    MapRow(2048, 1, "write anything to latch the clock", None, latch_clock),
+    MapRow(2049, 5, "latched clock: ms, s, min, h, day", clock),
 )  # fmt: skip
 
-COILS: tuple[PortRow, ...] = (
-    PortRow(0, 16, "digital inputs, 0-7 standard, 8-9 tool", in_bit),
-    PortRow(16, 16, "digital outputs, same order", out_bit, write_bit(box_bit, N_BOX_BITS)),
-    PortRow(32, 16, "output to set", None, write_bit(box_bit, N_BOX_BITS, True)),
-    PortRow(48, 16, "output to clear", None, write_bit(box_bit, N_BOX_BITS, False)),
-    PortRow(64, N_EUROMAP, "Euromap67 inputs", lambda s, i: s.io.euromap.read_input(i)),
-    PortRow(96, N_EUROMAP, "Euromap67 outputs", lambda s, i: s.io.euromap.read_output(i)),
-    PortRow(128, 8, "configurable inputs", lambda s, i: configurable(s.io.digital_in) >> i & 1),
-    PortRow(136, 8, "configurable outputs", lambda s, i: configurable(s.io.digital_out) >> i & 1,
+COILS: tuple[MapRow, ...] = (
+    MapRow(0, 16, "digital inputs, 0-7 standard, 8-9 tool", in_bit),
+    MapRow(16, 16, "digital outputs, same order", out_bit, write_bit(box_bit, N_BOX_BITS)),
+    MapRow(32, 16, "output to set", None, write_bit(box_bit, N_BOX_BITS, True)),
+    MapRow(48, 16, "output to clear", None, write_bit(box_bit, N_BOX_BITS, False)),
+    MapRow(64, N_EUROMAP, "Euromap67 inputs", lambda s, i: s.io.euromap.read_input(i)),
+    MapRow(96, N_EUROMAP, "Euromap67 outputs", lambda s, i: s.io.euromap.read_output(i)),
+    MapRow(128, 8, "configurable inputs", lambda s, i: configurable(s.io.digital_in) >> i & 1),
+    MapRow(136, 8, "configurable outputs", lambda s, i: configurable(s.io.digital_out) >> i & 1,
             write_bit(configurable_bit, N_CONFIGURABLE)),
-    PortRow(144, 8, "configurable output to set", None, write_bit(configurable_bit, N_CONFIGURABLE, True)),
-    PortRow(152, 8, "configurable output to clear", None,
+    MapRow(144, 8, "configurable output to set", None, write_bit(configurable_bit, N_CONFIGURABLE, True)),
+    MapRow(152, 8, "configurable output to clear", None,
             write_bit(configurable_bit, N_CONFIGURABLE, False)),
-    PortRow(260, 6, "power on, protective and emergency stop, teach and power button, any stop", flag),
-    PortRow(300, N_BOOLEAN, "general purpose input booleans",
+    MapRow(260, 6, "power on, protective and emergency stop, teach and power button, any stop", flag),
+    MapRow(300, N_BOOLEAN, "general purpose input booleans",
             lambda s, i: s.registers.inputs.booleans[i], write_gp_input),
-    PortRow(500, N_BOOLEAN, "general purpose output booleans", lambda s, i: s.registers.outputs.booleans[i]),
+    MapRow(500, N_BOOLEAN, "general purpose output booleans", lambda s, i: s.registers.outputs.booleans[i]),
 )  # fmt: skip
 
 
-def _by_address(rows: tuple[PortRow, ...]) -> dict[int, PortRow]:
+def _by_address(rows: tuple[MapRow, ...]) -> dict[int, MapRow]:
     return {address: row for row in rows for address in range(row.first, row.first + row.count)}
 
 
@@ -173,10 +173,10 @@ _REGISTER_AT = _by_address(REGISTERS)
 _COIL_AT = _by_address(COILS)
 
 
-def _row(rows: dict[int, PortRow], what: str, address: int) -> PortRow:
+def _row(rows: dict[int, MapRow], what: str, address: int) -> MapRow:
     row = rows.get(address)
     if row is None:
-        raise PortAddressError(f"there is no {what} {address} in the robot's Modbus map")
+        raise MapAddressError(f"there is no {what} {address} in the robot's Modbus map")
     return row
 
 
@@ -184,7 +184,7 @@ def read_register(state: ControllerState, address: int) -> int:
     """Return a register, 0 to 65535.
 
     Raises:
-        PortAddressError: there is none at this address.
+        MapAddressError: there is none at this address.
     """
     row = _row(_REGISTER_AT, "register", address)
     return 0 if row.read is None else round(row.read(state, address - row.first)) & WORD_MAX
@@ -194,7 +194,7 @@ def write_register(state: ControllerState, address: int, value: int) -> bool:
     """Write a register, of which the low 16 bits count; False if it can only be read.
 
     Raises:
-        PortAddressError: there is none at this address.
+        MapAddressError: there is none at this address.
     """
     return _write(_row(_REGISTER_AT, "register", address), state, address, value & WORD_MAX)
 
@@ -203,7 +203,7 @@ def read_coil(state: ControllerState, address: int) -> bool:
     """Return a coil.
 
     Raises:
-        PortAddressError: there is none at this address.
+        MapAddressError: there is none at this address.
     """
     row = _row(_COIL_AT, "bit", address)
     return row.read is not None and bool(row.read(state, address - row.first))
@@ -213,7 +213,7 @@ def write_coil(state: ControllerState, address: int, value: bool) -> bool:
     """Write a coil; False if it can only be read.
 
     Raises:
-        PortAddressError: there is none at this address.
+        MapAddressError: there is none at this address.
     """
     return _write(_row(_COIL_AT, "bit", address), state, address, value)
 
@@ -231,7 +231,7 @@ def write_range(state: ControllerState, is_coils: bool, first: int, values: Iter
             _write((_COIL_AT if is_coils else _REGISTER_AT)[address], state, address, value & WORD_MAX)
 
 
-def _write(row: PortRow, state: ControllerState, address: int, value: int) -> bool:
+def _write(row: MapRow, state: ControllerState, address: int, value: int) -> bool:
     if row.write is None:
         return False
     row.write(state, address - row.first, value)

@@ -1,6 +1,6 @@
-"""Buttons and inputs of the safety system: they are held, and become events when they change.
+"""Buttons and inputs of the safety system: their states, and the events of their changes.
 
-A function may be asked for by command and by configurable inputs at once; it ends when nobody asks any more.
+Commands and configurable inputs may activate a function at the same time; it ends when none of them does.
 Source: UR3/CB3 user manual, safety I/O: low is the safe state, both channels of a pair are looked at. That a
 pair whose channels differ is no fault is chosen.
 """
@@ -35,7 +35,7 @@ _RELEASED = {
 
 
 class SafetyInputs:
-    """Who holds what.
+    """Which functions are active, and by whom.
 
     Attributes:
         assigned: pairs of configurable inputs that are set up.
@@ -109,7 +109,7 @@ class SafetyInputs:
             self._reset_was_high = None
 
     def step(self, digital_in: int) -> None:
-        """Look at the lines that are set up."""
+        """Read the inputs that are set up."""
         high = dict.fromkeys(self.assigned.values(), True)
         for pair, function in self.assigned.items():
             lines = digital_in >> (CONFIGURABLE_SHIFT + 2 * pair) & 3

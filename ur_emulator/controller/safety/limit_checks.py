@@ -1,6 +1,6 @@
 """What stops the arm by itself: limit checks, and the protective stop they lead to.
 
-Pure: `find_invalid_setpoint` looks at what the joints are asked next, `find_violation` at what they did.
+Pure: `find_invalid_setpoint` checks the next set-point, `find_violation` the measured state.
 Sources: joint limits and torque limits of the robot model; C153 "position deviates from path" and C204
 "invalid setpoints" from user reports. The thresholds of the deviation are not published; those here are the
 proposal of the arm's notes.
@@ -21,7 +21,7 @@ from ur_emulator.plant.plant_state import PlantState
 
 # A joint this far from its (delayed) target is blocked or pushed [rad].
 MAX_POSITION_DEVIATION = 0.15
-# A joint whose drive gives all it has for this long cannot follow [s].
+# A drive at its torque limit for longer than this cannot follow [s].
 MAX_SATURATION_TIME = 0.1
 # A target above the rated joint speed by more than rounding is an invalid set-point.
 SPEED_TOLERANCE = 1.0 + 1e-6
@@ -45,10 +45,10 @@ def _stop(code: int, argument: int, text: str, *, blocked: bool = False) -> Viol
 
 
 class SetpointCheck:
-    """Looks at each set-point before the joints get it.
+    """Checks each set-point before the joints get it.
 
-    Joint ranges are kept with the way that a protective stop needs, so that the arm comes to rest within
-    them. A joint that is outside already, because something pushed it, may move back.
+    Joint ranges include the distance that a protective stop needs, so that the arm comes to rest within
+    them. A joint outside its range, because something pushed it, may move back.
 
     Args:
         robot: limits of the arm.
@@ -59,7 +59,7 @@ class SetpointCheck:
         self._robot = robot
         self._period_s = period_s
         self._braking = 0.5 / robot.stop_deceleration
-        # Below these no joint can be beyond a limit of its own: most set-points need no closer look.
+        # Below these no joint can exceed its own limit: most set-points need no check joint by joint.
         self._safe_speed = min(robot.qd_max)
         self._safe_reach = min(*robot.q_max, *(-low for low in robot.q_min))
 
@@ -119,12 +119,12 @@ UNREACHABLE_PATH = _stop(
 )
 
 
-def hardest_joint(robot: RobotModel, currents: tuple[float, ...]) -> int:
-    """Return the number of the joint whose drive asks for most of its torque.
+def most_loaded_joint(robot: RobotModel, currents: tuple[float, ...]) -> int:
+    """Return the joint whose drive needs the greatest part of its torque.
 
     Args:
         robot: torque constants and limits of the arm.
-        currents: that the drives ask for [A], (6,).
+        currents: of the drives [A], (6,).
     """
     efforts = [
         abs(current) * constant / limit
@@ -134,11 +134,11 @@ def hardest_joint(robot: RobotModel, currents: tuple[float, ...]) -> int:
 
 
 def find_violation(robot: RobotModel, sensed: PlantState, saturated_s: float) -> Violation | None:
-    """Return what the arm has done wrong in this cycle, or None.
+    """Return a violation by the measured state, or None.
 
     Args:
         robot: torque constants and limits of the arm.
-        sensed: what the box reads from its arm.
+        sensed: measured state of the arm.
         saturated_s: for how long a drive has been at its torque limit without a break [s].
     """
     errors = sensed.position_error
@@ -146,7 +146,7 @@ def find_violation(robot: RobotModel, sensed: PlantState, saturated_s: float) ->
         i = next(i for i, error in enumerate(errors) if abs(error) > MAX_POSITION_DEVIATION)
         return _stop(153, i, f"Protective stop: position deviates from path: {JOINT_NAMES[i]}", blocked=True)
     if saturated_s > MAX_SATURATION_TIME:
-        joint = hardest_joint(robot, sensed.joint_control_output)
+        joint = most_loaded_joint(robot, sensed.joint_control_output)
         text = f"Protective stop: Collision detected by joint: {JOINT_NAMES[joint]}"
         return _stop(157, joint, text, blocked=True)
     return None

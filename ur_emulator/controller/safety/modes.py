@@ -1,4 +1,4 @@
-"""The safety modes as tables: what may happen to the safety system, and what each mode does to the box.
+"""The safety modes as tables: safety events, and the effects of each mode.
 
 Every mode but NORMAL has a cause of its own: a button that is pressed, an input, or something that has
 happened and stays until somebody deals with it. Several causes may stand at a time; the mode is that of the
@@ -21,7 +21,7 @@ from protocol.ur_types import SafetyMode as Mode
 
 
 class ArmEffect(Enum):
-    """What happens to the arm when a mode begins."""
+    """Effect on the arm when a mode begins."""
 
     NOTHING = "moves"
     SLOW = "moves, with limited joint speeds"
@@ -31,7 +31,7 @@ class ArmEffect(Enum):
 
 
 class ProgramEffect(Enum):
-    """What happens to the primary program when a mode begins."""
+    """Effect on the primary program when a mode begins."""
 
     NOTHING = "runs"
     PAUSE_FOR_A_WHILE = "paused, goes on when the mode ends"
@@ -128,7 +128,7 @@ WATCHED_MODES = frozenset(row.mode for row in MODES if _RANK[row.mode] > _RANK[M
 
 
 class SafetyEvent(Enum):
-    """What may happen to the safety system."""
+    """Events of the safety system."""
 
     PROTECTIVE_STOP = "protective stop"
     UNLOCK = "unlock protective stop"

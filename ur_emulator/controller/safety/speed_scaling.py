@@ -3,8 +3,8 @@
 In these modes the time on the path runs slower, so that no joint exceeds its limit.
 
 Sources: recovery mode 30 deg/s, tolerance 1.15 deg/s and 0.5 s until the limits of reduced mode hold: UR3 and
-UR5/CB3 user manuals. The defaults of the joint speeds in reduced mode were not at hand: half the rated ones
-are chosen, and that the controller slows down instead of stopping.
+UR5/CB3 user manuals. The default joint speeds of reduced mode are not known: half the rated ones are chosen,
+and that the controller slows down instead of stopping.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class SpeedLimiter:
         Args:
             limits: of the joints [rad/s].
             scale: in force until now.
-            hard: slow down as fast as a stop would, else as gently as after a touch of the speed slider.
+            hard: slow down with the deceleration of a stop, else with the rate of the speed slider.
         """
         self.scale = scale
         self._limits = limits
@@ -56,11 +56,11 @@ class SpeedLimiter:
         self._exceeded_s = 0.0
 
     def step(self, motion: ArmMotion, slider: float, dt: float) -> float:
-        """Return the scale for the next cycle; the path is slowed down as the limits need it.
+        """Return the scale for the next cycle; the path is slowed down to keep the limits.
 
         Args:
             motion: of the arm; the rate of its scaling is set.
-            slider: what the speed slider asks for, 0..1.
+            slider: speed slider, 0..1.
             dt: duration of a cycle [s].
         """
         target = motion.target
@@ -77,7 +77,7 @@ class SpeedLimiter:
         return scale
 
     def share(self, slider: float) -> float:
-        """Return what the limits leave of the speed that the slider asks for, 0..1."""
+        """Return the part of the slider's speed that the limits allow, 0..1."""
         return min(1.0, self.scale / slider) if slider > 0.0 else 1.0
 
     def find_violation(self, actual_qd: Vector6, dt: float) -> Violation | None:
@@ -98,7 +98,7 @@ class SpeedLimiter:
 
 
 class SpeedScaling:
-    """How fast the time on the path runs, as the speed slider and the safety mode want it.
+    """Rate of the time on the path, by speed slider and safety mode.
 
     Attributes:
         slider: speed slider, 0..1.
@@ -125,5 +125,5 @@ class SpeedScaling:
 
     @property
     def share(self) -> float:
-        """What the limits leave of the speed that the slider asks for, 0..1."""
+        """Part of the slider's speed that the limits allow, 0..1."""
         return 1.0 if self.limiter is None else self.limiter.share(self.slider)

@@ -1,4 +1,4 @@
-"""The two words of status bits that RTDE publishes, as functions of the modes. Nothing is remembered here."""
+"""The two words of status bits that RTDE publishes, as functions of the modes."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from protocol.modbus import (
 from ur_emulator.commands.client_writes import WriteModbus
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.modbus.robot_map import PortAddressError, can_write, read_coil, read_register
+from ur_emulator.controller.modbus.robot_map import MapAddressError, can_write, read_coil, read_register
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.servers.tcp.connection import Connection
 
@@ -107,7 +107,7 @@ class ModbusPort:
                 session.answer = encode_frame(frame.transaction, frame.unit, encode_answer(request))
                 session.written_at = self._controller.snapshot.tick
                 return
-        except PortAddressError:
+        except MapAddressError:
             pdu = encode_exception(frame.pdu[0], ExceptionCode.ILLEGAL_DATA_ADDRESS)
         except ModbusRequestError as error:
             pdu = encode_exception(frame.pdu[0], error.code)
