@@ -1,4 +1,4 @@
-"""Moves from waypoint to waypoint: each moves the arm for its thread, or joins the move that blends into it."""
+"""Moves from waypoint to waypoint: each moves the arm for its thread, or joins the move before it."""
 
 from __future__ import annotations
 
