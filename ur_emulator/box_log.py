@@ -11,11 +11,14 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
+from typing import TYPE_CHECKING
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller import events
-from ur_emulator.models.robot_generation import RobotGeneration
+
+if TYPE_CHECKING:
+    from ur_emulator.models.robot_generation import RobotGeneration
 
 # The log forgets the oldest beyond this many entries, and cuts what is longer than this many characters.
 MAX_ENTRIES = 5000

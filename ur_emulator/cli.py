@@ -35,8 +35,12 @@ def _program() -> None:
 def serve(
     robot: Annotated[str, typer.Option(help="Type of the arm.")] = "ur3",
     version: Annotated[
-        str, typer.Option(help="Software the box runs; decides packet layouts and builtins.")
-    ] = "3.15.8",
+        str | None,
+        typer.Option(
+            help="Software the box runs; decides packet layouts and builtins.",
+            show_default="the usual one of the arm's generation",
+        ),
+    ] = None,
     host: Annotated[
         str, typer.Option(help="Address to listen on; 127.0.0.1 keeps other machines out.")
     ] = "127.0.0.1",
@@ -112,7 +116,8 @@ def serve(
         sys.stderr.write(f"ur-emulator: {notices[0]}{others}\n")
     for k, box in enumerate(rack):
         print(
-            f"{robot.upper()} CB3 {version} ready at {box.host}, {pace}, {fidelity}, "
+            f"{robot.upper()} {box.generation.name} {version or box.generation.default_version} "
+            f"ready at {box.host}, {pace}, {fidelity}, "
             f"seed {seed + k}, serial {box.serial_number}: "
             f"dashboard {box.ports.dashboard}, primary {box.ports.primary}, "
             f"secondary {box.ports.secondary}, realtime {box.ports.realtime}, rtde {box.ports.rtde}"

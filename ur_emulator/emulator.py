@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Self, Unpack
 
 from protocol.errors import LocalProtocolError
 from protocol.primary.messages import ReportLevel
-from protocol.ur_types import Ports, RobotMode, SoftwareVersion, simulated_serial
+from protocol.ur_types import Ports, RobotMode, simulated_serial
 from ur_emulator.box_log import LogEntry
 from ur_emulator.control.operations import BoxOperations
 from ur_emulator.control.runner import ENDED, OperationRunner
@@ -30,9 +30,8 @@ from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError, NotRunningError
 from ur_emulator.models.fidelity import fidelity_by_name
-from ur_emulator.models.robot_generation import CB3, RobotGeneration
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.models.software import software_of
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.realtime.event_loop import WAKE_UP, EventLoop
 from ur_emulator.realtime.loop_runner import LoopRunner
@@ -57,7 +56,6 @@ from ur_emulator.servers.tcp.listener import Port
 if TYPE_CHECKING:
     from ur_emulator.rack import BoxOptions, BoxRack
 
-DEFAULT_VERSION = CB3.default_version
 MAX_PORT = 65535
 
 
@@ -67,6 +65,7 @@ class ControlBox(BoxOperations):
     What can be done to it beside connecting a client stands in `BoxOperations`.
 
     Attributes:
+        generation: that of its arm: control cycle, software and what comes with it.
         host: address that it listens on.
         ports: numbers of its ports; that for Modbus is 0 if it is not open.
         control_port: number of the port for the control API over HTTP, 0 if it is not open.
@@ -79,7 +78,7 @@ class ControlBox(BoxOperations):
     def __init__(
         self,
         robot: str = "ur3",
-        version: str = DEFAULT_VERSION,
+        version: str | None = None,
         host: str = "127.0.0.1",
         pace: str | Pace = Pace.REALTIME,
         speed: float = 1.0,
@@ -91,13 +90,13 @@ class ControlBox(BoxOperations):
         *,
         loop: EventLoop | None = None,
         phase: float = 0.0,
-        generation: RobotGeneration = CB3,
+        generation: RobotGeneration | None = None,
     ) -> None:
         """Assemble the box; nothing listens before it is started.
 
         Args:
             robot: type of the arm, "ur3".
-            version: software that the box pretends to run; decides layouts and builtins.
+            version: software that the box pretends to run; decides layouts and builtins. None: the usual one.
             host: address to listen on; other machines can reach the box only through an address of theirs.
             pace: "realtime" or "lockstep".
             speed: how many times as fast as real time (realtime pace only).
@@ -109,14 +108,17 @@ class ControlBox(BoxOperations):
                 None: none.
             loop: shared with other boxes, see `BoxRack`, which runs it; None gives the box its own.
             phase: which part of a period its cycles lie after those of the first box of the loop.
-            generation: of the robot: control cycle, physics step, software.
+            generation: in place of that of the arm.
 
         Raises:
             EmulatorError: an argument is not among the allowed ones.
         """
         model = robot_by_name(robot)
-        asked = _parse_version(version, generation)
-        software = software_of(asked, generation.builds)
+        if generation is not None:
+            model = dataclasses.replace(model, generation=generation)
+        self.generation = generation = model.generation
+        asked = generation.parse_version(generation.default_version if version is None else version)
+        software = generation.software(asked)
         imperfections = fidelity_by_name(fidelity)
         named_pace = _parse_pace(pace)
         if not 0.0 < speed < math.inf:
@@ -154,14 +156,14 @@ class ControlBox(BoxOperations):
             make_pacer(named_pace, controller.period_s, speed, phase, WAKE_UP if self._owns_loop else 0.0),
             self._loop.expect_soon,
         )
-        self._intake = ProgramIntake(self._loop, software.version, self._box.submit, self._box.announce)
+        self._intake = ProgramIntake(self._loop, software.catalogue, self._box.submit, self._box.announce)
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         player = ProgramPlayer(self._access, ProgramFolder(None if programs is None else Path(programs)))
         self._reports = BoxReports(player.folder)
-        states = StateEncoder(software.version, controller.state.arm)
-        realtime, realtime_ro = (RealtimePort(software.version, intake) for intake in (self._intake, None))
-        rtde = RtdePort(software.version, controller, self._box.submit, self._box.announce)
+        states = StateEncoder(software, controller.state.arm)
+        realtime, realtime_ro = (RealtimePort(software.realtime, intake) for intake in (self._intake, None))
+        rtde = RtdePort(software, controller, self._box.submit, self._box.announce)
         modbus = ModbusPort(controller, self._box.submit)
         dashboard = DashboardPort(
             self._access, DashboardAnswers(self._access, player, self._reports, self._shut_down)
@@ -344,19 +346,6 @@ class ControlBox(BoxOperations):
         self._port_set.close()
         if self._owns_loop:
             self._loop.close()
-
-
-def _parse_version(text: str, generation: RobotGeneration) -> SoftwareVersion:
-    try:
-        version = SoftwareVersion.parse(text)
-    except Exception as error:
-        raise EmulatorError(str(error)) from None
-    if version.major != generation.major:
-        raise EmulatorError(
-            f"version {text} given: this box is a {generation.name}, its software is {generation.major}.x, "
-            f"for example {generation.default_version}"
-        )
-    return version
 
 
 def _standard_ports(base: int) -> Ports:

@@ -34,7 +34,7 @@ class BoxOptions(TypedDict, total=False):
     """Arguments of one `ControlBox`."""
 
     robot: str
-    version: str
+    version: str | None
     host: str
     pace: str | Pace
     speed: float

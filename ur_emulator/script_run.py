@@ -21,7 +21,6 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import ArgumentError
 from ur_emulator.models.fidelity import fidelity_by_name
-from ur_emulator.models.robot_generation import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.program_slot import ProgramSlot
@@ -73,7 +72,7 @@ class ScriptBox:
             model,
             fidelity_by_name(fidelity),
             seed,
-            partial(ProgramSlot, network=LoopNetwork(self._loop, CB3.period_s)),
+            partial(ProgramSlot, network=LoopNetwork(self._loop, model.generation.period_s)),
             version=(software[0], software[1]),
         )
         self._answers = deque(answers)

@@ -13,7 +13,7 @@ from math import ceil
 from random import Random
 from typing import Any, Final, NamedTuple
 
-from urscript.catalogue import CB3_3_15, Builtin, Catalogue, Generation, TimeClass
+from urscript.catalogue import CB3_3_15, STEP_TIME, Builtin, Catalogue, TimeClass
 from urscript.program import CompiledProgram, ProgramStatus, RunningProgram
 from urscript.run.host import HostFunction
 from urscript.run.threads import ScriptThread
@@ -55,7 +55,7 @@ class RecordingHost:
     Attributes:
         cycle: Control cycles run so far by `run`.
         calls: Calls with an effect on a robot, in order.
-        step_time: Length of a control cycle in s: 0.008 on a CB3, 0.002 on later generations.
+        step_time: Length of a control cycle in s, that of the catalogue's generation.
         messages: Texts of textmsg, in order.
         sockets: Peers by socket name; socket_open succeeds for these names only.
         q: Joint positions (rad) that moves reach and getters report.
@@ -72,7 +72,7 @@ class RecordingHost:
         on_call: Callable[[RecordedCall], None] | None = None,
     ) -> None:
         self.cycle = 0
-        self.step_time = 0.008 if catalogue.version.generation is Generation.CB3 else 0.002
+        self.step_time = STEP_TIME[catalogue.version.generation]
         self.calls: list[RecordedCall] = []
         self.messages: list[str] = []
         self.ended_threads: list[ScriptThread] = []

@@ -11,7 +11,7 @@ from docs.generate.page_parts import MARKS, example, table
 from protocol.capture import RtdeDecoder
 from protocol.rtde.client_connection import RtdeClientConnection
 from protocol.rtde.codec import MAX_NAMES_SIZE
-from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField
+from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField, input_fields, output_fields
 from protocol.rtde.messages import Request, RequestProtocolVersion, RtdePackageType, SetupOutputs, Start
 from protocol.rtde.server_connection import MAX_REQUEST_SIZE, RtdeServerConnection
 from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
@@ -125,7 +125,9 @@ def _bits(name: str, bits: type[RobotStatusBits] | type[SafetyStatusBits]) -> It
 def _example() -> str:
     """A session as `decode` prints it; the robot's side is our own."""
     names = ("timestamp", "actual_q", "safety_status")
-    pc, robot = RtdeClientConnection(), RtdeServerConnection(SoftwareVersion(3, 15, 8))
+    version = SoftwareVersion(3, 15, 8)
+    pc = RtdeClientConnection()
+    robot = RtdeServerConnection(version, output_fields(version), input_fields(version))
     requests: tuple[Request, ...] = (RequestProtocolVersion(2), SetupOutputs(names, 10.0), Start())
     sent = b""
     for request in requests:

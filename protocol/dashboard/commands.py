@@ -1,7 +1,7 @@
 """The dashboard server's commands as CB3 has them: names, reply texts, first versions.
 
-One row a command. A reply is chosen by its key and filled in: `find("load").reply("ok",
-path="/programs/a.urp")`. What a command does to the robot and when it fails is the box's business.
+One row a command. A reply is chosen by its key and filled in: `row.reply("ok", path="/programs/a.urp")`.
+What a command does to the robot and when it fails is the box's business.
 
 Sources: UR "Dashboard Server, port 29999" (support page, CB series) and "Dashboard Server Remote Control
 Interface e-Series" (2022) for the wording; first versions from UR's client library; where the two documents
@@ -10,7 +10,7 @@ differ, what that library's tests expect of a CB3 3.14/3.15 simulator.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -22,7 +22,7 @@ __all__ = [
     "GREETING",
     "USER_ROLES",
     "DashboardCommand",
-    "find",
+    "commands_of",
     "match_command",
     "unknown_command_reply",
 ]
@@ -148,28 +148,27 @@ COMMANDS: tuple[DashboardCommand, ...] = (
 USER_ROLES = ("PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED")
 """What `setUserRole` accepts."""
 
-_BY_NAME = {command.name: command for command in COMMANDS}
-_LONGEST_NAME = max(len(command.name.split()) for command in COMMANDS)
+# A name has at most so many words.
+_MOST_WORDS = 4
 
 
-def find(name: str) -> DashboardCommand:
-    """The row of a command; raises LocalProtocolError for a name that is not in the table."""
-    try:
-        return _BY_NAME[name]
-    except KeyError:
-        raise LocalProtocolError(f"there is no dashboard command {name!r}") from None
+def commands_of(
+    version: SoftwareVersion, table: Iterable[DashboardCommand] = COMMANDS
+) -> Mapping[str, DashboardCommand]:
+    """The commands of a table that software `version` knows, by name."""
+    return MappingProxyType({command.name: command for command in table if command.since <= version})
 
 
-def match_command(line: str, version: SoftwareVersion) -> tuple[DashboardCommand, str] | None:
-    """The command that a line is, and its argument; None if software `version` would not understand it.
+def match_command(line: str, known: Mapping[str, DashboardCommand]) -> tuple[DashboardCommand, str] | None:
+    """The command that a line is, and its argument; None if no known command is.
 
     The longest name wins, so `load installation x` is not a program called `installation x`. Names are
     case-sensitive; the argument runs to the end of the line and may hold blanks.
     """
-    words = line.split(None, _LONGEST_NAME)
-    for count in range(min(len(words), _LONGEST_NAME), 0, -1):
-        command = _BY_NAME.get(" ".join(words[:count]))
-        if command is None or version < command.since:
+    words = line.split(None, _MOST_WORDS)
+    for count in range(min(len(words), _MOST_WORDS), 0, -1):
+        command = known.get(" ".join(words[:count]))
+        if command is None:
             continue
         rest = line.split(None, count)[count:]
         argument = rest[0].strip() if rest else ""

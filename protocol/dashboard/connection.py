@@ -12,12 +12,12 @@ RemoteProtocolError close the connection.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
 from protocol.dashboard.commands import GREETING, DashboardCommand, match_command, unknown_command_reply
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.ur_types import SoftwareVersion
 
 __all__ = [
     "MAX_LINE",
@@ -58,11 +58,11 @@ class DashboardConnection:
     """One connection, as the robot sees it.
 
     Args:
-        version: software of the robot; it decides which commands there are.
+        commands: those that the robot's software knows, by name.
     """
 
-    def __init__(self, version: SoftwareVersion) -> None:
-        self._version = version
+    def __init__(self, commands: Mapping[str, DashboardCommand]) -> None:
+        self._commands = commands
         self._buffer = bytearray()
         self._lines: deque[str] = deque()
         self._waiting = 0
@@ -98,7 +98,7 @@ class DashboardConnection:
         line = self._lines.popleft()
         self._waiting = max(0, self._waiting - len(line) - 1) if self._lines else 0
         self._unanswered.append(line)
-        matched = match_command(line, self._version)
+        matched = match_command(line, self._commands)
         return CommandReceived(*matched) if matched else UnknownCommand(line, unknown_command_reply(line))
 
     def greet(self) -> bytes:

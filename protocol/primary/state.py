@@ -11,7 +11,7 @@ Source: UR "Primary/Secondary Client Interface" (2021); order and sizes from cap
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
@@ -79,11 +79,20 @@ def encode_sub_package(record: type[SubPackage], source: Any, version: SoftwareV
     return encode_package(record.SUB_TYPE, codec_for(record, version, present).encode(source))
 
 
-def encode_state(records: Iterable[SubPackage], version: SoftwareVersion) -> bytes:
+def encode_state(
+    records: Iterable[SubPackage],
+    version: SoftwareVersion,
+    sub_packages: Sequence[type[SubPackage]] = SUB_PACKAGES,
+) -> bytes:
     """A whole robot state package.
 
     Records may come in any order; those that software `version` does not have are left out. For the
     sub-packages that belong into a state see `state_types`.
+
+    Args:
+        records: one of each sub-package.
+        version: software of the controller.
+        sub_packages: of its generation, in the order of the wire.
 
     Raises:
         LocalProtocolError: two records of one type, a record without table, a value that does not fit, or
@@ -102,7 +111,7 @@ def encode_state(records: Iterable[SubPackage], version: SoftwareVersion) -> byt
         PackageType.ROBOT_STATE,
         b"".join(
             encode_sub_package(record, given[record], version)
-            for record in SUB_PACKAGES
+            for record in sub_packages
             if record in given and record.SINCE.covers(version)
         ),
     )

@@ -10,7 +10,7 @@ frame's attributes are slices. Nothing here knows what the values mean; see `rea
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from types import MappingProxyType
 from typing import Any
@@ -29,6 +29,7 @@ __all__ = [
     "SNAPSHOT_FIELDS",
     "RealtimeFrame",
     "RealtimeLayout",
+    "frame_size",
     "layout_for_size",
     "layout_for_version",
 ]
@@ -210,8 +211,17 @@ def layout_for_version(version: SoftwareVersion) -> RealtimeLayout:
     Raises:
         LocalProtocolError: no controller software has that version.
     """
-    sizes = [size for first, size in VERSIONS if first <= version]
-    released = {first.major for first, _ in VERSIONS}
-    if not sizes or (version.major not in released and version.major < max(released)):
+    return layout_for_size(frame_size(version))
+
+
+def frame_size(version: SoftwareVersion, sizes: Sequence[tuple[SoftwareVersion, int]] = VERSIONS) -> int:
+    """Bytes of the frames that a controller with this software sends.
+
+    Raises:
+        LocalProtocolError: no controller software has that version.
+    """
+    known = [size for first, size in sizes if first <= version]
+    released = {first.major for first, _ in sizes}
+    if not known or (version.major not in released and version.major < max(released)):
         raise LocalProtocolError(f"no controller software {version}: use 3.0 to 3.15, 5.0 or later")
-    return layout_for_size(sizes[-1])
+    return known[-1]

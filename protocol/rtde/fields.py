@@ -283,14 +283,16 @@ INPUTS: tuple[RtdeField, ...] = (
 
 
 @cache
-def output_fields(version: SoftwareVersion) -> Mapping[str, RtdeField]:
+def output_fields(
+    version: SoftwareVersion, table: tuple[RtdeField, ...] = OUTPUTS
+) -> Mapping[str, RtdeField]:
     """Outputs that a box with software `version` answers, by name."""
     return MappingProxyType(
-        {field.name: field for field in OUTPUTS if field.origin and field.since.covers(version)}
+        {field.name: field for field in table if field.origin and field.since.covers(version)}
     )
 
 
 @cache
-def input_fields(version: SoftwareVersion) -> Mapping[str, RtdeField]:
+def input_fields(version: SoftwareVersion, table: tuple[RtdeField, ...] = INPUTS) -> Mapping[str, RtdeField]:
     """Inputs that software `version` has, by name."""
-    return MappingProxyType({field.name: field for field in INPUTS if field.since.covers(version)})
+    return MappingProxyType({field.name: field for field in table if field.since.covers(version)})

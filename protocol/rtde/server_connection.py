@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde.codec import MAX_NAMES_SIZE, data_header, decode_message, encode_message, take_package
-from protocol.rtde.fields import RtdeField, input_fields, output_fields
+from protocol.rtde.fields import RtdeField
 from protocol.rtde.messages import (
     VERSIONS,
     DataPackage,
@@ -72,7 +72,9 @@ class RtdeServerConnection:
     """One connection, as the robot sees it.
 
     Args:
-        version: software of the robot; it decides which variables there are.
+        version: software of the robot, told to clients that ask.
+        outputs: variables that a client can subscribe to, by name.
+        inputs: variables that a client can write, by name.
 
     Attributes:
         protocol_version: 1 until another one is agreed on.
@@ -81,8 +83,15 @@ class RtdeServerConnection:
         frequency: data packages a second that were asked for last [Hz]; None for the full rate.
     """
 
-    def __init__(self, version: SoftwareVersion) -> None:
+    def __init__(
+        self,
+        version: SoftwareVersion,
+        outputs: Mapping[str, RtdeField],
+        inputs: Mapping[str, RtdeField],
+    ) -> None:
         self._software = version
+        self._known_outputs = outputs
+        self._known_inputs = inputs
         self._buffer = bytearray()
         self._unanswered: Request | None = None
         self._output_ids = 0
@@ -171,7 +180,7 @@ class RtdeServerConnection:
 
     def _set_up_outputs(self, request: SetupOutputs) -> SetupOutputsReply:
         """Replace the output recipe. One that is refused takes no id, and nothing is sent until the next."""
-        fields, types = _look_up(request.names, output_fields(self._software), ())
+        fields, types = _look_up(request.names, self._known_outputs, ())
         is_v1 = self.protocol_version == 1
         self.frequency = request.frequency
         self._encoder = None
@@ -185,7 +194,7 @@ class RtdeServerConnection:
 
     def _set_up_inputs(self, request: SetupInputs, in_use: Collection[str]) -> SetupInputsReply:
         """Add an input recipe. One that is refused takes no id."""
-        fields, types = _look_up(request.names, input_fields(self._software), in_use)
+        fields, types = _look_up(request.names, self._known_inputs, in_use)
         recipe_id = len(self.input_recipes) + 1
         if not fields or recipe_id > _LAST_ID:
             return SetupInputsReply(types, 0)

@@ -32,6 +32,7 @@ from protocol.rtde.recipe import snapshot_encoder  # noqa: E402
 from protocol.ur_types import SoftwareVersion  # noqa: E402
 from ur_emulator import ControlBox  # noqa: E402
 from ur_emulator.controller.modbus.robot_map import read_register  # noqa: E402
+from ur_emulator.models.cb3 import CB3  # noqa: E402
 from ur_emulator.servers.primary.event_messages import message_for  # noqa: E402
 from ur_emulator.servers.primary.robot_state import StateEncoder  # noqa: E402
 from urscript.program import check_program  # noqa: E402
@@ -49,7 +50,7 @@ class Bytes:
         self._controller = controller
         self._realtime = layout_for_version(VERSION).encoder()
         self._data = snapshot_encoder(tuple(output_fields(VERSION).values()), b"")
-        self._states = StateEncoder(VERSION, controller.state.arm)
+        self._states = StateEncoder(CB3.software(VERSION), controller.state.arm)
         self._hash.update(self._states.encode_first(controller.snapshot))
 
     def take(self, snapshot, events):

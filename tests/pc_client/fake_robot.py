@@ -26,6 +26,7 @@ from protocol.primary.messages import (
 from protocol.primary.setup import ConfigurationData
 from protocol.primary.state import encode_state
 from protocol.realtime.layout import SNAPSHOT_FIELDS, layout_for_version
+from protocol.rtde.fields import input_fields, output_fields
 from protocol.rtde.server_connection import RtdeServerConnection
 from protocol.ur_types import Ports, RobotType, SoftwareVersion
 from protocol.velocity_stream import VelocityMode
@@ -150,7 +151,9 @@ class FakeRobot:
         elif kind == "rtde":
             if self.payload is None:
                 raise DriverError(f"{host}:{port} refuses the connection")
-            pipe.rtde = RtdeServerConnection(self.version)
+            pipe.rtde = RtdeServerConnection(
+                self.version, output_fields(self.version), input_fields(self.version)
+            )
         elif kind == "dashboard":
             pipe.incoming.append(b"Connected: Universal Robots Dashboard Server\n")
         return pipe

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from protocol.dashboard.commands import COMMANDS, find, match_command, unknown_command_reply
+from protocol.dashboard.commands import COMMANDS, commands_of, match_command, unknown_command_reply
 from protocol.dashboard.connection import (
     MAX_LINE,
     MAX_WAITING,
@@ -18,6 +18,7 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.ur_types import SoftwareVersion
 
 V3_15 = SoftwareVersion(3, 15, 8)
+KNOWN = commands_of(V3_15)
 
 
 def events(connection, data, step=None):
@@ -31,14 +32,14 @@ def events(connection, data, step=None):
 
 @pytest.mark.parametrize("step", [1, None])
 def test_a_session(step):
-    robot = DashboardConnection(V3_15)
+    robot = DashboardConnection(KNOWN)
     assert robot.greet() == b"Connected: Universal Robots Dashboard Server\n"
 
     received = events(robot, b"robotmode\nload my program.urp\nquit\n", step)
     assert received == [
-        CommandReceived(find("robotmode"), ""),
-        CommandReceived(find("load"), "my program.urp"),
-        CommandReceived(find("quit"), ""),
+        CommandReceived(KNOWN["robotmode"], ""),
+        CommandReceived(KNOWN["load"], "my program.urp"),
+        CommandReceived(KNOWN["quit"], ""),
     ]
     answers = robot.reply(received[0].command.reply(mode="RUNNING"))
     answers += robot.reply(received[1].command.reply("not_found", name=received[1].argument))
@@ -66,8 +67,8 @@ def test_a_session(step):
     ],
 )
 def test_lines_that_are_commands(line, name, argument):
-    (event,) = events(DashboardConnection(V3_15), line.encode() + b"\n")
-    assert event == CommandReceived(find(name), argument)
+    (event,) = events(DashboardConnection(KNOWN), line.encode() + b"\n")
+    assert event == CommandReceived(KNOWN[name], argument)
 
 
 @pytest.mark.parametrize(
@@ -75,20 +76,26 @@ def test_lines_that_are_commands(line, name, argument):
     ["brake_release", "PLAY", "play now", "get", "power", "", "is in remote control", "\x00\xff", "loadx"],
 )
 def test_lines_that_are_not(line):
-    robot = DashboardConnection(V3_15)
+    robot = DashboardConnection(KNOWN)
     (event,) = events(robot, line.encode("latin-1") + b"\n")
     assert event == UnknownCommand(line, f"could not understand: '{line}'")
     assert robot.reply(event.answer) == unknown_command_reply(line).encode("latin-1") + b"\n"
 
 
 def test_older_software_knows_fewer_commands():
-    assert match_command("get serial number", SoftwareVersion(3, 11)) is None
-    assert match_command("get serial number", SoftwareVersion(3, 12)) == (find("get serial number"), "")
-    old = {command.name for command in COMMANDS if match_command(command.name, SoftwareVersion(3, 0))}
+    assert match_command("get serial number", commands_of(SoftwareVersion(3, 11))) is None
+    assert match_command("get serial number", commands_of(SoftwareVersion(3, 12))) == (
+        KNOWN["get serial number"],
+        "",
+    )
+    old = set(commands_of(SoftwareVersion(3, 0)))
     assert {"play", "power on", "brake release"} <= old
     assert not {"unlock protective stop", "restart safety", "saveLog"} & old
     # without the command of 3.2, the line is a program's name
-    assert match_command("load installation x", SoftwareVersion(3, 1)) == (find("load"), "installation x")
+    assert match_command("load installation x", commands_of(SoftwareVersion(3, 1))) == (
+        KNOWN["load"],
+        "installation x",
+    )
 
 
 # What URCL's and ur_rtde's tests compare replies with (whole line).
@@ -140,16 +147,18 @@ def test_replies_are_what_clients_compare_with():
 
 def test_a_reply_needs_a_known_key_and_its_values():
     assert (
-        find("unlock protective stop").reply("too_early").startswith("Cannot unlock protective stop until 5s")
+        KNOWN["unlock protective stop"]
+        .reply("too_early")
+        .startswith("Cannot unlock protective stop until 5s")
     )
     with pytest.raises(LocalProtocolError, match="'play' has no reply 'nope': use ok, failed"):
-        find("play").reply("nope")
+        KNOWN["play"].reply("nope")
     with pytest.raises(LocalProtocolError, match=r"'Robotmode: \{mode\}' of 'robotmode' needs 'mode'"):
-        find("robotmode").reply()
+        KNOWN["robotmode"].reply()
 
 
 def test_one_reply_a_command_one_line_a_reply():
-    robot = DashboardConnection(V3_15)
+    robot = DashboardConnection(KNOWN)
     with pytest.raises(LocalProtocolError, match="answers nothing"):
         robot.reply("Stopped")
     robot.receive_data(b"stop\n")
@@ -162,8 +171,8 @@ def test_one_reply_a_command_one_line_a_reply():
 @pytest.mark.parametrize("data", [b"x" * (MAX_LINE + 1), b"x" * (MAX_LINE + 1) + b"\nplay\n"])
 def test_endless_lines_are_refused(data):
     with pytest.raises(RemoteProtocolError, match="more than"):
-        DashboardConnection(V3_15).receive_data(data)
-    robot = DashboardConnection(V3_15)
+        DashboardConnection(KNOWN).receive_data(data)
+    robot = DashboardConnection(KNOWN)
     robot.receive_data(b"play\n")
     robot.next_event()
     with pytest.raises(LocalProtocolError, match="longer than"):
@@ -171,7 +180,7 @@ def test_endless_lines_are_refused(data):
 
 
 def test_lines_that_wait_are_bounded_and_count_no_more_when_they_are_answered():
-    robot = DashboardConnection(V3_15)
+    robot = DashboardConnection(KNOWN)
     lines = b"robotmode\n" * (MAX_WAITING // 10)
     for _ in range(3):
         for start in range(0, len(lines), 65_536):
@@ -185,7 +194,7 @@ def test_lines_that_wait_are_bounded_and_count_no_more_when_they_are_answered():
 
 def test_which_software_answers_when_it_is_done():
     for name, since in {"load": (3, 3), "play": (3, 3), "stop": (3, 3), "pause": (3, 3)}.items():
-        row = find(name)
+        row = KNOWN[name]
         assert row.replies_when_done(SoftwareVersion(*since))
         assert not row.replies_when_done(SoftwareVersion(3, 2, 9))
-    assert not find("power on").replies_when_done(V3_15)
+    assert not KNOWN["power on"].replies_when_done(V3_15)

@@ -13,6 +13,7 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde import messages as M
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.codec import MAX_NAMES_SIZE, encode_message
+from protocol.rtde.fields import input_fields, output_fields
 from protocol.rtde.server_connection import MAX_REQUEST_SIZE, InputReceived, RtdeServerConnection
 from protocol.rtde.states import TRANSITIONS, RtdeState, cycles_per_package
 from protocol.ur_types import SoftwareVersion
@@ -25,7 +26,10 @@ class Pair:
     """Both ends without a network."""
 
     def __init__(self, version=2):
-        self.robot, self.pc = RtdeServerConnection(V3_15), RtdeClientConnection()
+        self.robot, self.pc = (
+            RtdeServerConnection(V3_15, output_fields(V3_15), input_fields(V3_15)),
+            RtdeClientConnection(),
+        )
         if version == 2:
             assert self.ask(M.RequestProtocolVersion(2)) == M.RequestProtocolVersionReply(True)
 
@@ -134,7 +138,7 @@ def test_a_request_must_be_answered_before_the_next_event(pair):
 
 
 def test_a_pipelined_version_request_decides_how_the_next_package_is_read():
-    robot = RtdeServerConnection(V3_15)
+    robot = RtdeServerConnection(V3_15, output_fields(V3_15), input_fields(V3_15))
     robot.receive_data(
         encode_message(M.RequestProtocolVersion(2), M.Role.PC, 1)
         + encode_message(M.SetupOutputs(("timestamp",), 50.0), M.Role.PC, 2)
@@ -283,7 +287,7 @@ def test_data_of_the_wrong_size_as_ur_rtde_sends_it(pair):
 
 @given(st.binary(max_size=200), st.integers(1, 50))
 def test_no_bytes_do_more_than_end_the_connection(data, step):
-    robot = RtdeServerConnection(V3_15)
+    robot = RtdeServerConnection(V3_15, output_fields(V3_15), input_fields(V3_15))
     robot.receive_data(b"\0\5V\0\2\0\x17Iinput_int_register_0")
     for start in range(0, len(data), step):
         robot.receive_data(data[start : start + step])

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde import messages as M
 from protocol.rtde.codec import HEADER_SIZE, MAX_NAMES_SIZE, data_header, decode_message, encode_message
-from protocol.rtde.fields import OUTPUTS
+from protocol.rtde.fields import OUTPUTS, input_fields, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.rtde.server_connection import RtdeServerConnection
 from protocol.rtde.types import RtdeType
@@ -88,7 +88,9 @@ REQUESTS = [row for row in PACKAGES if row[0] is PC and type(row[2]) in M.REQUES
 @pytest.mark.parametrize("trailing", [b"", b"\0", b"\0\3S"])
 @pytest.mark.parametrize(("sender", "version", "message", "golden"), REQUESTS)
 def test_read_from_a_stream_bytewise_and_with_trailing_data(sender, version, message, golden, step, trailing):
-    connection = RtdeServerConnection(SoftwareVersion(3, 15))
+    connection = RtdeServerConnection(
+        SoftwareVersion(3, 15), output_fields(SoftwareVersion(3, 15)), input_fields(SoftwareVersion(3, 15))
+    )
     connection.protocol_version = version
     data = bytes.fromhex(golden) + trailing
     found = []

@@ -14,6 +14,7 @@ from protocol.primary.state import encode_state
 from protocol.rtde import messages as R
 from protocol.rtde.client_connection import RtdeClientConnection
 from protocol.rtde.codec import data_header, encode_message
+from protocol.rtde.fields import input_fields, output_fields
 from protocol.rtde.server_connection import RtdeServerConnection
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
@@ -24,7 +25,10 @@ NAMES = ("timestamp", "actual_q")
 
 def robot_says(*requests, version=2):
     """Everything a robot answers, and one data package."""
-    pc, robot = RtdeClientConnection(), RtdeServerConnection(VERSION)
+    pc, robot = (
+        RtdeClientConnection(),
+        RtdeServerConnection(VERSION, output_fields(VERSION), input_fields(VERSION)),
+    )
     data = b""
     for request in requests:
         robot.receive_data(pc.send(request))

@@ -6,7 +6,7 @@ import pytest
 from box_support import MessageReader, connect
 from dashboard_support import Dashboard, write_programs
 
-from protocol.dashboard.commands import COMMANDS, match_command
+from protocol.dashboard.commands import COMMANDS, commands_of, match_command
 from protocol.primary.messages import PopupMessage
 from protocol.ur_types import RobotMode, SoftwareVersion
 from ur_emulator.commands.safety import TriggerProtectiveStop
@@ -291,7 +291,7 @@ def test_older_software_knows_fewer_commands(folder, version):
             for line, reply in zip(lines, dashboard.ask_all(*lines), strict=True)
             if "understand" in reply
         ]
-    assert unknown == [line for line in lines if match_command(line, software) is None]
+    assert unknown == [line for line in lines if match_command(line, commands_of(software)) is None]
     assert bool(unknown) is (software < (3, 13))
 
 

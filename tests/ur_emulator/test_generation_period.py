@@ -12,7 +12,7 @@ from protocol.primary.layout import RobotModeData
 from ur_emulator import ControlBox
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.errors import EmulatorError
-from ur_emulator.models.robot_generation import CB3
+from ur_emulator.models.cb3 import CB3
 
 # Control cycle and physics step [us].
 CYCLES = [(8_000, 2_000), (4_000, 2_000), (4_000, 1_000), (2_000, 2_000)]

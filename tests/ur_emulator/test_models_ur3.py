@@ -27,7 +27,7 @@ def test_limits_are_the_published_ones():
     assert UR3.qd_max == (pi, pi, pi, 2 * pi, 2 * pi, 2 * pi)
     assert UR3.q_min == (-2 * pi,) * 6
     assert UR3.q_max == (2 * pi,) * 6
-    assert (UR3.robot_type, UR3.robot_subtype, UR3.box_type) == (3, 2, 6)
+    assert (UR3.robot_type, UR3.generation.robot_subtype, UR3.box_type) == (3, 2, 6)
 
 
 def test_reach_of_the_geometry_fits_the_data_sheet():

@@ -18,7 +18,7 @@ from protocol.primary.state import RobotState
 from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
-from ur_emulator.models.software import software_of
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder
 
@@ -156,10 +156,10 @@ def test_the_secondary_port_tells_of_nothing():
 
     bench, client = Bench(), Client()
     port = PrimaryPort(
-        software_of(VERSION),
+        CB3.software(VERSION),
         bench.controller,
         None,
-        StateEncoder(VERSION, bench.controller.state.arm),
+        StateEncoder(CB3.software(VERSION), bench.controller.state.arm),
         all_messages=False,
     )
     port.opened(client)

@@ -19,7 +19,7 @@ from protocol.primary.values import TypedValue, ValueType
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.commands.programs import StopProgram
-from ur_emulator.models.software import software_of
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.servers.primary.label_reporter import LabelReporter, parse_label
 from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder
@@ -63,10 +63,10 @@ class PortBench(Bench):
     def __init__(self, version=VERSION, *, all_messages=True):
         super().__init__(fidelity="ideal")
         self.port = PrimaryPort(
-            software_of(version),
+            CB3.software(version),
             self.controller,
             None,
-            StateEncoder(version, self.controller.state.arm),
+            StateEncoder(CB3.software(version), self.controller.state.arm),
             all_messages=all_messages,
         )
 

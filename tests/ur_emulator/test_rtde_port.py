@@ -7,6 +7,7 @@ from rtde_support import input_package
 from protocol.rtde import messages as M
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.ur_types import SoftwareVersion
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.servers.rtde_port import RtdePort
 
 V3_15 = SoftwareVersion(3, 15, 8)
@@ -60,7 +61,7 @@ class PortBench(Bench):
     def __init__(self):
         super().__init__(fidelity="ideal")
         self.commands = []
-        self.port = RtdePort(V3_15, self.controller, self.commands.append)
+        self.port = RtdePort(CB3.software(V3_15), self.controller, self.commands.append)
 
     def tick(self, n=1, *commands):
         for _ in range(n):

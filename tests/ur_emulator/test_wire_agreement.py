@@ -12,7 +12,7 @@ from protocol.rtde.fields import output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
-from ur_emulator.models.robot_generation import CB3
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.servers.primary.robot_state import StateEncoder
 
 V3_15 = SoftwareVersion(3, 15, 8)
@@ -31,7 +31,7 @@ def moments():
     layout = layout_for_version(V3_15)
     frame, rtde = layout.encoder(), snapshot_encoder(FIELDS, b"")
     recipe = Recipe((f.name for f in FIELDS), (f.type for f in FIELDS))
-    states = StateEncoder(V3_15, story.controller.state.arm)
+    states = StateEncoder(CB3.software(V3_15), story.controller.state.arm)
     names = [f.name for f in FIELDS]
     return [
         (

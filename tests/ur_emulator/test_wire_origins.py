@@ -12,6 +12,7 @@ from protocol.rtde.fields import OUTPUTS, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import ValueOrigin, wire_fields
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.servers.primary.robot_state import StateEncoder
 
 V3_15 = SoftwareVersion(3, 15, 8)
@@ -59,7 +60,7 @@ def test_every_column_of_a_frame_is_what_the_table_says(story):
 
 @pytest.mark.parametrize("version", [V3_15, SoftwareVersion(3, 2), SoftwareVersion(5, 12)])
 def test_every_field_of_a_state_is_what_the_table_says(story, version):
-    encoder = StateEncoder(version, story.controller.state.arm)
+    encoder = StateEncoder(CB3.software(version), story.controller.state.arm)
     states = [decode_package(encoder.encode_first(s), version).sub_packages for s, _ in story.moments]
     for record, *sent in zip(state_types(version, first=True), *states, strict=True):
         for field in wire_fields(record):

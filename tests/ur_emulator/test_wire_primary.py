@@ -28,8 +28,8 @@ from ur_emulator.commands.safety import (
 from ur_emulator.controller import events
 from ur_emulator.controller.safety.limit_checks import most_loaded_joint
 from ur_emulator.models.calibration import calibrated_dh
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.models.software import software_of
 from ur_emulator.servers.primary.event_messages import message_for
 from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder, dexterity, setup_records
@@ -68,9 +68,9 @@ class PortBench(Bench):
         super().__init__(**kwargs)
         self.version = version
         self.taken = []
-        states = StateEncoder(version, self.controller.state.arm)
+        states = StateEncoder(CB3.software(version), self.controller.state.arm)
         self.primary, self.secondary, self.primary_ro, self.secondary_ro = self.ports = [
-            PrimaryPort(software_of(version), self.controller, intake, states, all_messages=every)
+            PrimaryPort(CB3.software(version), self.controller, intake, states, all_messages=every)
             for intake in (self, None)
             for every in (True, False)
         ]

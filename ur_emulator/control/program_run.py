@@ -13,9 +13,9 @@ from ur_emulator.control.step_operation import Context, StepOperation
 from ur_emulator.errors import ArgumentError, RefusedError
 
 if TYPE_CHECKING:
-    from protocol.ur_types import SoftwareVersion
     from ur_emulator.servers.steps import Steps
     from urscript import CompiledProgram
+    from urscript.catalogue import Catalogue
 
 
 class RunProgram(StepOperation[int]):
@@ -46,21 +46,20 @@ class RunProgram(StepOperation[int]):
             yield from player.play("127.0.0.1")
             name = access.controller.programs.name
         else:
-            job = partial(_compile, str(self.script), access.identity.software.version)
+            job = partial(_compile, str(self.script), access.identity.software.catalogue)
             program: CompiledProgram = yield from access.in_worker(job)
             yield from access.apply(StartProgram(program))
             name = program.name
         return {"program": name, "tick": access.snapshot.tick}
 
 
-def _compile(text: str, version: SoftwareVersion) -> CompiledProgram:
+def _compile(text: str, catalogue: Catalogue) -> CompiledProgram:
     """Compile a program; in the worker."""
     # The command line loads this module, too: nothing heavy at its top.
     from urscript import compile_program
-    from urscript.catalogue import catalogue_for
     from urscript.errors import ScriptError
 
     try:
-        return compile_program(text, catalogue=catalogue_for(version))
+        return compile_program(text, catalogue=catalogue)
     except ScriptError as error:
         raise ArgumentError(f"the program does not compile: {error.log_text or error.wire_text}") from None

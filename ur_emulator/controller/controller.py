@@ -50,8 +50,9 @@ from ur_emulator.controller.tool_settings import ToolSettings
 from ur_emulator.errors import RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.robot_generation import CB3, RobotGeneration
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.target import JointTarget

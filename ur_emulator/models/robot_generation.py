@@ -1,19 +1,34 @@
-"""What a generation of robots has in common: the control cycle and the software; CB3 is one record.
+"""RobotGeneration: all that the arms of a generation have in common, as one record; `cb3.py` is one.
 
-Everything else in the box takes times in seconds, and cycles from here.
+The box asks its arm for its generation and never which one it is: times are seconds and become cycles here,
+and ports and compiler get the tables of a software version from here. This module holds no numbers.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
+from functools import cache
 
+from protocol.dashboard.commands import DashboardCommand, commands_of
+from protocol.errors import LocalProtocolError
+from protocol.primary.framing import SubPackage
+from protocol.realtime.columns import RealtimeColumn
+from protocol.realtime.layout import RealtimeLayout, frame_size
+from protocol.rtde.fields import RtdeField, input_fields, output_fields
+from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
-from ur_emulator.models.software import CB3_BUILDS, Builds
+from ur_emulator.models.software import Software
+from urscript.catalogue import Builtin, Catalogue, Version
+
+# First version, build and date of each row, the oldest first; software between two rows has the build and the
+# date of the earlier one.
+Builds = tuple[tuple[SoftwareVersion, int, datetime], ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotGeneration:
-    """Numbers of a generation.
+    """One generation; its tables hold what any of its software versions has.
 
     Attributes:
         name: as people write it, "CB3".
@@ -21,7 +36,15 @@ class RobotGeneration:
         substep_us: physics step [us].
         major: first number of its software versions.
         default_version: what a box runs if the user names none.
-        builds: first version, build and date of each row, oldest first.
+        builds: which version has which build.
+        robot_subtype: code in the primary interface's configuration data.
+        dashboard: commands of the dashboard server.
+        realtime: columns of the frames on port 30003.
+        frame_sizes: first version of each size of these frames.
+        sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
+        rtde_outputs: variables that a client can subscribe to.
+        rtde_inputs: variables that a client can write.
+        builtins: of URScript.
 
     Raises:
         ModelError: the control cycle is no whole multiple of the physics step, or no part of a second.
@@ -33,6 +56,14 @@ class RobotGeneration:
     major: int
     default_version: str
     builds: Builds
+    robot_subtype: int
+    dashboard: tuple[DashboardCommand, ...]
+    realtime: tuple[RealtimeColumn, ...]
+    frame_sizes: tuple[tuple[SoftwareVersion, int], ...]
+    sub_packages: tuple[type[SubPackage], ...]
+    rtde_outputs: tuple[RtdeField, ...]
+    rtde_inputs: tuple[RtdeField, ...]
+    builtins: tuple[Builtin, ...]
 
     def __post_init__(self) -> None:
         if self.substep_us <= 0 or self.period_us <= 0 or self.period_us % self.substep_us:
@@ -68,12 +99,39 @@ class RobotGeneration:
         """Return the seconds of so many cycles, without an accumulated rounding error."""
         return tick * self.period_us / 1e6
 
+    def parse_version(self, text: str) -> SoftwareVersion:
+        """Return a version of this generation's software from its text.
 
-CB3 = RobotGeneration(
-    name="CB3",
-    period_us=8_000,
-    substep_us=2_000,
-    major=3,
-    default_version="3.15.8",
-    builds=CB3_BUILDS,
-)
+        Raises:
+            ModelError: the text is no version, or one of another generation.
+        """
+        try:
+            version = SoftwareVersion.parse(text)
+        except LocalProtocolError as error:
+            raise ModelError(str(error)) from None
+        if version.major != self.major:
+            raise ModelError(
+                f"version {text} given: this box is a {self.name}, its software is {self.major}.x, "
+                f"for example {self.default_version}"
+            )
+        return version
+
+    def software(self, version: SoftwareVersion) -> Software:
+        """Return a version of the software, with its part of every table; a build number above 0 stays."""
+        return _software(self, version)
+
+
+@cache
+def _software(generation: RobotGeneration, version: SoftwareVersion) -> Software:
+    _, build, built = [row for row in generation.builds if row[0] <= version][-1]
+    size = frame_size(version, generation.frame_sizes)
+    return Software(
+        version=version._replace(build=version.build or build),
+        built=built,
+        dashboard=commands_of(version, generation.dashboard),
+        realtime=RealtimeLayout(tuple(it for it in generation.realtime if it.since_size <= size)),
+        sub_packages=generation.sub_packages,
+        rtde_outputs=output_fields(version, generation.rtde_outputs),
+        rtde_inputs=input_fields(version, generation.rtde_inputs),
+        catalogue=Catalogue(Version.of(version), generation.builtins),
+    )

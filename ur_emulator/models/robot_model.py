@@ -12,6 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ur_emulator.models.robot_generation import RobotGeneration
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
@@ -76,6 +80,7 @@ class RobotModel:
     Attributes:
         name: as on the command line, e.g. "ur3".
         title: as people write it, e.g. "UR3".
+        generation: which one it is of: control cycle, software.
         dh: six nominal rows.
         links: six moving links.
         base_hull: capsules of the fixed base in the base frame.
@@ -98,13 +103,13 @@ class RobotModel:
         payload_max: rated payload [kg].
         reach: rated reach [m].
         robot_type: code in the primary interface's configuration data.
-        robot_subtype: code in the primary interface's configuration data.
         box_type: code of the control box, as above.
         home_q: a pose clear of the table, away from singularities [rad].
     """
 
     name: str
     title: str
+    generation: RobotGeneration
     dh: tuple[DhRow, DhRow, DhRow, DhRow, DhRow, DhRow]
     links: tuple[Link, Link, Link, Link, Link, Link]
     base_hull: tuple[Capsule, ...]
@@ -126,6 +131,5 @@ class RobotModel:
     payload_max: float
     reach: float
     robot_type: int
-    robot_subtype: int
     box_type: int
     home_q: Vector6

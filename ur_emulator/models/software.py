@@ -1,50 +1,47 @@
-"""The software of a box: version, build number and date, the same on every port that tells them."""
+"""Software: one version of a generation's software, what the box says of it and what it has on its ports."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 from protocol.ur_types import SoftwareVersion
 
+if TYPE_CHECKING:
+    from protocol.dashboard.commands import DashboardCommand
+    from protocol.primary.framing import SubPackage
+    from protocol.realtime.layout import RealtimeLayout
+    from protocol.rtde.fields import RtdeField
+    from urscript.catalogue import Catalogue
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Software:
-    """What a box says of its software.
+    """One version of the software; `RobotGeneration.software` makes it.
 
     Attributes:
         version: four numbers; the last is the build.
         built: when; in the time of the box.
+        dashboard: commands of the dashboard server, by name.
+        realtime: layout of the frames on port 30003.
+        sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
+        rtde_outputs: variables that a client can subscribe to, by name.
+        rtde_inputs: variables that a client can write, by name.
+        catalogue: the builtins of URScript.
     """
 
     version: SoftwareVersion
     built: datetime
+    dashboard: Mapping[str, DashboardCommand]
+    realtime: RealtimeLayout
+    sub_packages: tuple[type[SubPackage], ...]
+    rtde_outputs: Mapping[str, RtdeField]
+    rtde_inputs: Mapping[str, RtdeField]
+    catalogue: Catalogue
 
     @property
     def day(self) -> str:
         """The date as the dashboard writes it, "Nov 30 2021"."""
         return self.built.strftime("%b %d %Y")
-
-
-# First version, build and date of each row, the oldest first.
-Builds = tuple[tuple[SoftwareVersion, int, datetime], ...]
-
-# Software between two rows has the build and the date of the earlier row.
-CB3_BUILDS: Builds = (
-    (SoftwareVersion(3, 0), 15547, datetime(2014, 6, 1)),  # build: public issues name 3.0.15547; date chosen
-    (SoftwareVersion(3, 2), 19171, datetime(2016, 1, 1)),  # chosen
-    (SoftwareVersion(3, 3), 60, datetime(2016, 7, 8, 16, 7, 20)),  # capture of 3.3.1
-    (SoftwareVersion(3, 10), 76000, datetime(2019, 5, 3, 6, 39)),  # date: capture of 3.10.0; build chosen
-    (SoftwareVersion(3, 15), 106339, datetime(2021, 11, 30)),  # 3.15.8; date of its manual, time chosen
-)
-
-
-def software_of(version: SoftwareVersion, builds: Builds = CB3_BUILDS) -> Software:
-    """Return what a box with a software version tells.
-
-    Args:
-        version: as the user gave it; a build number above 0 stays.
-        builds: first version, build and date of each row, oldest first.
-    """
-    _, build, built = [row for row in builds if row[0] <= version][-1]
-    return Software(version._replace(build=version.build or build), built)

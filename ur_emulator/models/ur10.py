@@ -17,11 +17,13 @@ from __future__ import annotations
 
 from math import pi
 
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
 
 UR10 = RobotModel(
     name="ur10",
     title="UR10",
+    generation=CB3,
     # A. The vendor's "a" and "d" in metres.
     dh=(
         DhRow(a=0.0, d=0.1273, alpha=pi / 2),
@@ -90,7 +92,6 @@ UR10 = RobotModel(
     payload_max=10.0,  # UR10 data sheet
     reach=1.3,
     robot_type=2,  # client interface sheet, configuration data
-    robot_subtype=2,
     box_type=5,
     # Elbow up, tool forward and 45 degrees down, flange at about (.8, 0, .45) m.
     home_q=(0.2250, -1.8005, -1.8700, -0.2692, 1.4124, 1.7312),

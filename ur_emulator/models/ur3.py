@@ -16,11 +16,13 @@ from __future__ import annotations
 
 from math import pi
 
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
 
 UR3 = RobotModel(
     name="ur3",
     title="UR3",
+    generation=CB3,
     # A. The vendor's "a" and "d" in metres.
     dh=(
         DhRow(a=0.0, d=0.1519, alpha=pi / 2),
@@ -96,7 +98,6 @@ UR3 = RobotModel(
     payload_max=3.0,  # UR3 data sheet
     reach=0.5,
     robot_type=3,  # client interface sheet, configuration data
-    robot_subtype=2,
     box_type=6,
     # Elbow-up branch over the middle of the recommended work box, flange at about (.35, 0, .25) m.
     home_q=(0.3944, -1.7645, -2.0996, -0.1030, 1.2950, 1.8570),

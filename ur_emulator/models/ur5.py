@@ -18,11 +18,13 @@ from __future__ import annotations
 
 from math import pi
 
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
 
 UR5 = RobotModel(
     name="ur5",
     title="UR5",
+    generation=CB3,
     # A. The vendor's "a" and "d" in metres.
     dh=(
         DhRow(a=0.0, d=0.089159, alpha=pi / 2),
@@ -91,7 +93,6 @@ UR5 = RobotModel(
     payload_max=5.0,  # UR5 data sheet
     reach=0.85,
     robot_type=1,  # client interface sheet, configuration data
-    robot_subtype=2,
     box_type=4,
     # Elbow up, tool forward and 45 degrees down, flange at about (.55, 0, .35) m.
     home_q=(0.2238, -1.7062, -1.8784, -0.3550, 1.4132, 1.7304),

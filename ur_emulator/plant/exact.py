@@ -13,9 +13,10 @@ import mujoco
 
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError, RefusedError
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
-from ur_emulator.models.robot_generation import CB3, RobotGeneration
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles

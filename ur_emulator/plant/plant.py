@@ -24,10 +24,11 @@ from numpy.typing import NDArray
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
 from ur_emulator.models.calibration import calibrated_dh, draw_calibration
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.random_streams import random_stream
-from ur_emulator.models.robot_generation import CB3, RobotGeneration
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, six
 from ur_emulator.plant.arm_physics import ArmPhysics
 from ur_emulator.plant.drives import TARGET_MAX, Drives

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from protocol.realtime.layout import layout_for_version
+from protocol.realtime.layout import RealtimeLayout
 from protocol.script_channel import ScriptChannel
-from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.tcp.connection import Connection
@@ -13,14 +12,14 @@ from ur_emulator.servers.tcp.connection import Connection
 class RealtimePort:
     """Streams realtime frames."""
 
-    def __init__(self, version: SoftwareVersion, intake: ProgramIntake | None) -> None:
+    def __init__(self, layout: RealtimeLayout, intake: ProgramIntake | None) -> None:
         """Prepare the encoder.
 
         Args:
-            version: decides the layout of the frames.
+            layout: of the frames.
             intake: takes script text; None makes the port read-only.
         """
-        self._encode = layout_for_version(version).encoder()
+        self._encode = layout.encoder()
         self._intake = intake
         self._channels: dict[Connection, ScriptChannel] = {}
 

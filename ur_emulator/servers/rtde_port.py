@@ -12,12 +12,12 @@ from protocol.rtde.messages import RtdeTextMessage, SetupInputs, SetupOutputs
 from protocol.rtde.server_connection import InputReceived, RtdeServerConnection
 from protocol.rtde.states import cycles_per_package
 from protocol.rtde.types import TextLevel
-from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.client_writes import WriteInputs
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.models.software import Software
 from ur_emulator.servers.tcp.connection import Connection
 
 # Sender of text messages.
@@ -38,7 +38,7 @@ class RtdePort:
 
     def __init__(
         self,
-        version: SoftwareVersion,
+        software: Software,
         controller: Controller,
         submit: Callable[[Command], None],
         announce: Callable[[Event], None] = lambda event: None,
@@ -46,12 +46,12 @@ class RtdePort:
         """Prepare for clients.
 
         Args:
-            version: given to clients that ask; decides which variables there are.
+            software: told to clients that ask; decides which variables there are.
             controller: told when a client wants the script line, otherwise left alone.
             submit: takes a command for the next cycle.
             announce: takes what clients want in the log.
         """
-        self._version = version
+        self._software = software
         self._controller = controller
         self._submit = submit
         self._announce = announce
@@ -62,9 +62,9 @@ class RtdePort:
 
     def opened(self, connection: Connection) -> None:
         """The client speaks first."""
-        self._sessions[connection] = _Session(
-            connection, RtdeServerConnection(self._version), self._controller.generation.cycle_rate
-        )
+        software = self._software
+        protocol = RtdeServerConnection(software.version, software.rtde_outputs, software.rtde_inputs)
+        self._sessions[connection] = _Session(connection, protocol, self._controller.generation.cycle_rate)
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Answer requests in order, hand inputs on; what is no RTDE ends the connection."""

@@ -5,12 +5,13 @@ One table module for each chapter of the script manual; `catalogue_for(version)`
 
 from .catalogue import ALL_ROWS, CB3_3_15, Catalogue, catalogue_for
 from .types import REQUIRED, Builtin, BuiltinArray, ModuleVariable, Param, ParamType, Support, TimeClass
-from .versions import Generation, PerGeneration, Version
+from .versions import STEP_TIME, Generation, PerGeneration, Version
 
 __all__ = [
     "ALL_ROWS",
     "CB3_3_15",
     "REQUIRED",
+    "STEP_TIME",
     "Builtin",
     "BuiltinArray",
     "Catalogue",

@@ -6,7 +6,7 @@ dropped or its signature changed, until which. This module only compares; it kno
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
@@ -18,6 +18,14 @@ class Generation(Enum):
     CB3 = "CB3"
     E_SERIES = "e-Series"
     POLYSCOPE_X = "PolyScope X"
+
+
+STEP_TIME: Mapping[Generation, float] = {
+    Generation.CB3: 0.008,
+    Generation.E_SERIES: 0.002,
+    Generation.POLYSCOPE_X: 0.002,
+}
+"""Length of a control cycle [s]. Source: script manuals, get_steptime."""
 
 
 class Version(NamedTuple):

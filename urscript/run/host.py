@@ -22,7 +22,7 @@ class Host(Protocol):
     """A robot, as seen by a running program."""
 
     step_time: float
-    """Length of a control cycle in s: 0.008 on a CB3."""
+    """Length of a control cycle in s."""
 
     def builtins(self) -> Mapping[str, HostFunction]:
         """The effects this robot offers, by URScript name; asked once for each program start.

@@ -41,7 +41,7 @@ class DashboardPort:
     def opened(self, connection: Connection) -> None:
         """Send the greeting line; a client that has closed its sending side still gets its answers."""
         connection.allow_half_close(self.ended)
-        session = _Session(DashboardConnection(self._access.identity.software.version))
+        session = _Session(DashboardConnection(self._access.identity.software.dashboard))
         self._sessions[connection] = session
         connection.send(session.lines.greet())
 

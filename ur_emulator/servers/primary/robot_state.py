@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -32,7 +33,6 @@ from protocol.ur_types import (
     ProgramState,
     RobotMode,
     SafetyMode,
-    SoftwareVersion,
 )
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety.modes import EMERGENCY_MODES, MOVING_MODES
@@ -41,6 +41,7 @@ from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.robot_model import DhRow, RobotModel
+from ur_emulator.models.software import Software
 
 # Largest joint acceleration in the configuration data; the CB3 value is unknown, this is the one of a UR5e
 # capture.
@@ -152,14 +153,14 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
 class StateEncoder:
     """Encodes states for all ports of a box: each snapshot once, however many ports ask for it."""
 
-    def __init__(self, version: SoftwareVersion, arm: ArmModel) -> None:
+    def __init__(self, software: Software, arm: ArmModel) -> None:
         """Prepare what stays.
 
         Args:
-            version: decides sizes and contents.
+            software: decides sizes and contents.
             arm: the controller's kinematics.
         """
-        self._version = version
+        self._software = software
         self._arm = arm
         self._checksum = safety_checksum(arm.robot)
         dh = calibrated_dh(arm.robot, arm.calibration)
@@ -170,13 +171,16 @@ class StateEncoder:
     def encode(self, snapshot: Snapshot) -> bytes:
         """Return the state package of a snapshot."""
         if snapshot is not self._snapshot:
-            self._package = encode_state(self._records(snapshot), self._version)
+            self._package = self._encode(self._records(snapshot))
             self._snapshot = snapshot
         return self._package
 
     def encode_first(self, snapshot: Snapshot) -> bytes:
         """Return the longer state, which also tells of kinematics and configuration."""
-        return encode_state((*self._records(snapshot), *self._setup), self._version)
+        return self._encode((*self._records(snapshot), *self._setup))
+
+    def _encode(self, records: Iterable[SubPackage]) -> bytes:
+        return encode_state(records, self._software.version, self._software.sub_packages)
 
     def _records(self, snapshot: Snapshot) -> tuple[SubPackage, ...]:
         return state_records(snapshot, self._checksum, dexterity(self._arm, snapshot))
@@ -212,6 +216,6 @@ def setup_records(
             masterboard_version=SIMULATED_MASTERBOARD,
             controller_box_type=robot.box_type,
             robot_type=robot.robot_type,
-            robot_sub_type=robot.robot_subtype,
+            robot_sub_type=robot.generation.robot_subtype,
         ),
     )

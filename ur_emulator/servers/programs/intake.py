@@ -13,7 +13,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 from protocol.primary.messages import ReportLevel
 from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptItem
-from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes, StartFreedrive
 from ur_emulator.commands.programs import (
     PauseProgram,
@@ -29,7 +28,7 @@ from ur_emulator.errors import ArgumentError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.interpreter import collection_put_off
 from urscript import compile_program
-from urscript.catalogue import catalogue_for
+from urscript.catalogue import Catalogue
 from urscript.courtesy import giving_way
 from urscript.errors import ScriptError, ScriptTypeError
 from urscript.syntax.parser import prepare
@@ -62,7 +61,7 @@ class ProgramIntake:
     def __init__(
         self,
         loop: EventLoop,
-        version: SoftwareVersion,
+        catalogue: Catalogue,
         submit: Callable[[Command], None],
         announce: Callable[[Event], None],
     ) -> None:
@@ -70,12 +69,12 @@ class ProgramIntake:
 
         Args:
             loop: results come back in its thread.
-            version: of the controller software; decides which builtins exist.
+            catalogue: the builtins of the software.
             submit: takes a command for the next cycle.
             announce: takes an event that needs no cycle, such as a syntax error.
         """
         self._loop = loop
-        self._catalogue = catalogue_for(version)
+        self._catalogue = catalogue
         self._submit = submit
         self._announce = announce
         prepare()  # now, so that the first program does not pay for it in the middle of a stream

@@ -21,7 +21,6 @@ from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.programs.external_control import request_program
 from ur_emulator.servers.steps import Steps
 from urscript import CompiledProgram, compile_program
-from urscript.catalogue import Catalogue, catalogue_for
 from urscript.errors import ScriptError
 
 if TYPE_CHECKING:
@@ -60,7 +59,7 @@ class ProgramPlayer:
         self.loaded: LoadedProgram | None = None
         self.installation: Installation | None = None
         self._ready: Outcome | None = None
-        self._catalogue: Catalogue = catalogue_for(access.identity.software.version)
+        self._catalogue = access.identity.software.catalogue
 
     # --- state
 

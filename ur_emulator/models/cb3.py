@@ -1,0 +1,38 @@
+"""The CB3 generation: UR3, UR5 and UR10 with software 3.x."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from protocol.dashboard.commands import COMMANDS
+from protocol.primary.layout import SUB_PACKAGES
+from protocol.realtime.columns import COLUMNS, VERSIONS
+from protocol.rtde.fields import INPUTS, OUTPUTS
+from protocol.ur_types import SoftwareVersion
+from ur_emulator.models.robot_generation import Builds, RobotGeneration
+from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
+
+_BUILDS: Builds = (
+    (SoftwareVersion(3, 0), 15547, datetime(2014, 6, 1)),  # build: public issues name 3.0.15547; date chosen
+    (SoftwareVersion(3, 2), 19171, datetime(2016, 1, 1)),  # chosen
+    (SoftwareVersion(3, 3), 60, datetime(2016, 7, 8, 16, 7, 20)),  # capture of 3.3.1
+    (SoftwareVersion(3, 10), 76000, datetime(2019, 5, 3, 6, 39)),  # date: capture of 3.10.0; build chosen
+    (SoftwareVersion(3, 15), 106339, datetime(2021, 11, 30)),  # 3.15.8; date of its manual, time chosen
+)
+
+CB3 = RobotGeneration(
+    name=Generation.CB3.value,
+    period_us=round(STEP_TIME[Generation.CB3] * 1e6),
+    substep_us=2_000,
+    major=3,
+    default_version="3.15.8",
+    builds=_BUILDS,
+    robot_subtype=2,
+    dashboard=COMMANDS,
+    realtime=COLUMNS,
+    frame_sizes=VERSIONS,
+    sub_packages=SUB_PACKAGES,
+    rtde_outputs=OUTPUTS,
+    rtde_inputs=INPUTS,
+    builtins=ALL_ROWS,
+)
