@@ -68,6 +68,9 @@ class ExactPlant(Plant):
         self._physics.q[:] = self._q
         self._physics.qd[:] = self._qd
 
+    def run_ahead(self) -> None:
+        """Do nothing: where this arm is depends on the target alone."""
+
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
         if self._state is None:

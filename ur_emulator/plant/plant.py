@@ -5,6 +5,9 @@ and physics in sub-steps -> a record of true values -> sensors. The plant knows 
 safety; it does what it is told or raises `PlantError`. It reads no clock, and its only chance comes from the
 seed: equal seeds and equal targets give bit-identical states.
 
+Where the dead time is at least a cycle, no target acts within its own cycle: the arm can move before the
+target is known (`run_ahead`), while a client works on it. What acts on the arm meanwhile takes that back.
+
 The arm has three ways to be driven (`ControlMode`): by position; by position with the slow outer loop of the
 servos at rest, for the contacts of force mode; and guided by hand, where no joint holds a position.
 
@@ -103,6 +106,8 @@ class Plant:
         self._control_current = ZERO6
         self._rest = Record()
         self._state: PlantState | None = None
+        # The next cycle has run, but was not kept.
+        self._is_ahead = False
         self.reset(robot.home_q)
 
     # --- state for tests and for the control API ---
@@ -110,33 +115,39 @@ class Plant:
     @property
     def obstacles(self) -> Obstacles:
         """What stands around the arm."""
+        self._take_back()
         return self._physics.obstacles
 
     @property
     def q_true(self) -> NDArray[np.float64]:
         """True joint angles (6,) now [rad]; no real controller knows them."""
+        self._take_back()
         self._gear.evaluate(self._physics.q)
         return self._physics.q + self._gear.error
 
     @property
     def qd_true(self) -> NDArray[np.float64]:
         """True joint speeds (6,) now [rad/s]."""
+        self._take_back()
         self._gear.evaluate(self._physics.q)
         return self._physics.qd * (1.0 + self._gear.slope)
 
     @property
     def n_contacts(self) -> int:
         """Number of contact points of the arm with itself, its base or the table."""
+        self._take_back()
         return self._physics.n_contacts
 
     @property
     def flange_position(self) -> NDArray[np.float64]:
         """True position of the flange (3,) in the base frame [m], at the start of the last sub-step."""
+        self._take_back()
         return self._physics.flange_position.copy()
 
     @property
     def contact_wrench(self) -> NDArray[np.float64]:
         """What table and base press on the arm (6,), at the flange in base axes [N, Nm]: the truth."""
+        self._take_back()
         return self._physics.contact_wrench
 
     def reset(self, q: Sequence[float]) -> None:
@@ -149,6 +160,7 @@ class Plant:
         if angles.shape != (6,) or not np.isfinite(angles).all():
             raise PlantError(f"joint angles {list(q)} given: six finite numbers are needed")
         self.cycle = 0
+        self._take_back()
         self._physics.place(self._gear.motor_position(angles))
         self._sensors.reset()
         self._engage_brakes()
@@ -171,6 +183,7 @@ class Plant:
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
+        self._take_back()
         self._physics.loads.declare(mass, cog)
         self._drives.set_payload(mass, cog)
 
@@ -186,6 +199,7 @@ class Plant:
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
+        self._take_back()
         self._physics.loads.hang(mass, cog)
 
     def rest_trim(self) -> None:
@@ -205,6 +219,7 @@ class Plant:
         Raises:
             PlantError: when a number is not finite.
         """
+        self._take_back()
         self._physics.loads.push(force, point)
 
     # --- the cycle ---
@@ -239,8 +254,31 @@ class Plant:
                 f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
                 cycle=self.cycle,
             )
-        self._run()
+        if self._is_ahead:
+            self._drives.advance()  # again, for the current that is expected at the target
+        else:
+            self._run()
+        self._is_ahead = False
         self._keep()
+
+    def run_ahead(self) -> None:
+        """Let the arm move for the next cycle already, if nothing that is unknown yet acts on it.
+
+        `step` does what is left then; its results are the same to the last bit.
+        """
+        drives = self._drives
+        if not (drives.target_acts_later and self._state) or self._braked or self._is_ahead:
+            return
+        if self._mode is not ControlMode.TEACH and not self._physics.loads.is_felt:
+            self._physics.remember()
+            self._run()
+            self._is_ahead = True
+
+    def _take_back(self) -> None:
+        """Undo `run_ahead`."""
+        if self._is_ahead:
+            self._is_ahead = False
+            self._physics.take_back()
 
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
@@ -310,6 +348,7 @@ class Plant:
 
     def _switch(self, mode: ControlMode, target: Target) -> None:
         """Change the way that the arm is driven, without a jump of the torques."""
+        self._take_back()
         was_guided, self._mode = self._mode is ControlMode.TEACH, mode
         self._physics.servos.set_free(mode is ControlMode.TEACH)
         if was_guided:
@@ -320,6 +359,7 @@ class Plant:
 
     def _stand_still(self) -> None:
         """Let a cycle pass with the brakes on."""
+        self._take_back()
         if not self._braked:
             self._engage_brakes()
         self._records[0].values[:] = self._rest.values

@@ -152,6 +152,7 @@ class ServedBox:
             if self._repeats and self.is_active:
                 if not self.waits_outside:
                     return now  # the next cycle may follow at once, after the sockets have had their turn
+                self.controller.plant.run_ahead()
                 self._expect_soon()
             return self._pacer.next_call(now)
         # While time stands still, every port repeats itself at its own rate, in real seconds: clients take
