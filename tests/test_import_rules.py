@@ -21,7 +21,7 @@ MAY_IMPORT = {
 EFFECTS = {"socket", "threading", "time", "selectors", "select", "subprocess", "asyncio"}
 MAY_HAVE_EFFECTS = {
     "protocol": {"live.py"},
-    "ur_emulator": {"realtime", "servers", "control", "emulator.py", "cli.py", "pytest_plugin.py"},
+    "ur_emulator": {"realtime", "servers", "control", "box.py", "cli.py", "pytest_plugin.py"},
     "pc_client": {"driver", "experiment", "commands", "sweep", "executors.py", "cli.py"},
 }
 # Inside a package: each part imports those before it, also for types only; those on one line import each other.
@@ -39,7 +39,10 @@ BOX_ORDER = (
     {"realtime"},
     {"servers"},
     {"control"},
-    {"emulator", "rack"},
+    {"box_options"},
+    {"box"},
+    {"rack"},
+    {"emulator"},
     {"__main__", "cli", "descriptor_limit", "pytest_plugin", "script_robots", "script_run"},
 )
 CONTROLLER_ORDER = (

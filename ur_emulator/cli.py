@@ -18,8 +18,8 @@ import typer
 from protocol.errors import ProtocolError
 
 if TYPE_CHECKING:
+    from ur_emulator.box import Box
     from ur_emulator.box_log import LogEntry
-    from ur_emulator.emulator import ControlBox
 
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None
@@ -154,7 +154,7 @@ def _print_entry(prefix: str, entry: LogEntry) -> None:
         sys.stderr.flush()
 
 
-def _write_ready_file(path: Path, rack: Sequence[ControlBox]) -> None:
+def _write_ready_file(path: Path, rack: Sequence[Box]) -> None:
     """Write the file in one step, so that whoever waits for it never reads half of it.
 
     It says of the first box what most readers look for, and of all boxes, the first included, in `boxes`.

@@ -7,8 +7,8 @@
     with BoxRack([{"host": "127.0.0.2"}, {"host": "127.0.0.3", "fidelity": "poor"}]) as boxes:
         ...
 
-The boxes know nothing of each other; an error ends the box in which it came up, the
-others go on. In real time they take turns: their cycles are spread over the period.
+The boxes know nothing of each other; an error in a cycle ends its box, the others go on. In real time their
+cycles are spread over the period.
 """
 
 from __future__ import annotations
@@ -16,36 +16,21 @@ from __future__ import annotations
 import ipaddress
 from collections.abc import Iterable, Sequence
 from functools import partial
-from os import PathLike
-from types import TracebackType
-from typing import Self, TypedDict, overload
+from typing import overload
 
-from ur_emulator.emulator import ControlBox
+from ur_emulator.box import Box
+from ur_emulator.box_options import BoxOptions
 from ur_emulator.errors import EmulatorError
-from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.realtime.event_loop import WAKE_UP, EventLoop
 from ur_emulator.realtime.loop_runner import LoopRunner
 from ur_emulator.realtime.pacing import Pace
 
-# A slip of the keyboard must not fill the memory: each box takes some 15 MB.
+# A typing error must not fill the memory: each box takes some 15 MB.
 MAX_BOXES = 200
+_LOCKSTEP = (Pace.LOCKSTEP, Pace.LOCKSTEP.value)
 
 
-class BoxOptions(TypedDict, total=False):
-    """Arguments of one `ControlBox`."""
-
-    robot: str
-    version: str | None
-    host: str
-    pace: str | Pace
-    speed: float
-    seed: int
-    fidelity: str
-    port_base: int | None
-    programs: str | PathLike[str] | None
-    control_port: int | None
-
-
-class BoxRack(Sequence[ControlBox]):
+class BoxRack(Sequence[Box], LoopRunner):
     """Boxes that share a loop; a sequence of them."""
 
     def __init__(self, options: Iterable[BoxOptions]) -> None:
@@ -61,23 +46,23 @@ class BoxRack(Sequence[ControlBox]):
         if not 1 <= len(every) <= MAX_BOXES:
             raise EmulatorError(f"{len(every)} boxes asked for: a rack holds 1 to {MAX_BOXES}")
         self._loop = EventLoop(precise=any(o.get("pace") not in _LOCKSTEP for o in every))
-        self._runner = LoopRunner(self._loop, self._close)
+        # Several boxes would compute at each other's deadlines.
+        lead = WAKE_UP if len(every) == 1 else 0.0
         try:
             self._boxes = tuple(
-                ControlBox(**o, loop=self._loop, phase=k / len(every)) for k, o in enumerate(every)
+                Box(**o, loop=self._loop, phase=k / len(every), lead=lead) for k, o in enumerate(every)
             )
         except BaseException:
             self._loop.close()
             raise
         for box in self._boxes:
-            box.on_shut_down = partial(self._end, box)
-            box.fail_alone(partial(self._end, box))
+            box.on_end = partial(self._end, box)
 
     @overload
-    def __getitem__(self, index: int) -> ControlBox: ...
+    def __getitem__(self, index: int) -> Box: ...
     @overload
-    def __getitem__(self, index: slice) -> Sequence[ControlBox]: ...
-    def __getitem__(self, index: int | slice) -> ControlBox | Sequence[ControlBox]:
+    def __getitem__(self, index: slice) -> Sequence[Box]: ...
+    def __getitem__(self, index: int | slice) -> Box | Sequence[Box]:
         return self._boxes[index]
 
     def __len__(self) -> int:
@@ -93,53 +78,23 @@ class BoxRack(Sequence[ControlBox]):
             for box in self._boxes:
                 box.listen()
         except EmulatorError:
-            self._close()
+            self.close()
             raise
 
-    def serve_forever(self) -> None:
-        """Run in the calling thread until `stop`; the ports must be open.
-
-        An error that ended one of the boxes is raised after the others have ended.
-        """
-        self._runner.run()
-        failure = self._failure_of_a_box()
-        if failure is not None:
-            raise failure
-
-    def stop(self) -> None:
-        """Let the loop end, from any thread."""
-        self._runner.stop()
-
-    def __enter__(self) -> Self:
-        """Open the ports and run the loop in a thread."""
-        self.listen()
-        self._runner.start("box-rack")
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End the loop; an error that ended it or one of the boxes earlier is raised here."""
-        failure = self._runner.finish() or self._failure_of_a_box()
-        if failure is not None and error is None:
-            raise failure
-
-    def _failure_of_a_box(self) -> Exception | None:
-        return next((box.failure for box in self._boxes if box.failure is not None), None)
-
-    def _end(self, box: ControlBox) -> None:
-        """Close a box that was switched off or has failed; after the last one the rack has nothing to do."""
-        box.close()
-        if all(other.is_shut_down or other.failure is not None for other in self._boxes):
-            self.stop()
-
-    def _close(self) -> None:
+    def close(self) -> None:
+        """Close all boxes and the loop."""
         for box in self._boxes:
             box.close()
         self._loop.close()
 
+    def _failure(self) -> Exception | None:
+        return next((box.failure for box in self._boxes if box.failure is not None), None)
 
-_LOCKSTEP = (Pace.LOCKSTEP, Pace.LOCKSTEP.value)
+    def _end(self, box: Box) -> None:
+        """Close a box that was switched off or has failed; after the last one the rack has nothing to do."""
+        box.close()
+        if all(other.is_shut_down or other.failure is not None for other in self._boxes):
+            self.stop()
 
 
 def counted_up(count: int, options: BoxOptions) -> list[BoxOptions]:

@@ -131,9 +131,10 @@ class FuzzBox:
         # Most of the time would go into compiling the same programs again and again.
         box._intake._translate = lru_cache(maxsize=300)(box._intake._translate)
         box._access._worker = _AtOnce()
-        box.on_shut_down = lambda: None
+        box.on_end = lambda: None
         self.served, self.pacer = box._box, _Pacer()
         self.served._pacer = self.pacer
+        self.served._on_failure = _raise
         self.controller = self.served.controller
         self.controller.programs._network = FakeNetwork()
         self.ports = box._port_set._ports
@@ -164,7 +165,6 @@ class FuzzBox:
         for wires in self.hostile.values():
             for wire in tuple(wires):
                 wire.connection.close()
-        self.box._owns_loop = True
         self.box.close()
 
     # --- steps
@@ -457,3 +457,7 @@ def run(rng, folder, n_cases, **options):
 
 def _known_clients(port):
     return set(port._sessions if hasattr(port, "_sessions") else port._channels)
+
+
+def _raise(error):
+    raise error

@@ -110,7 +110,7 @@ def test_boxes_in_real_time_take_turns_within_a_period():
         False,
     ]
     assert [pacer.next_call(10.0) for pacer in pacers] == pytest.approx([10.008, 10.002, 10.004, 10.006])
-    rack._close()
+    rack.close()
 
 
 def test_boxes_may_differ():
@@ -175,15 +175,6 @@ def test_a_box_that_compiles_is_closed_without_waiting_for_it():
         may_end.set()
 
 
-def test_a_box_of_a_rack_is_not_started_by_itself():
-    rack = ControlBox.many(2, port_base=None)
-    with pytest.raises(EmulatorError, match="start the rack"), rack[0]:
-        pass
-    with pytest.raises(EmulatorError, match="start the rack"):
-        rack[1].serve_forever()
-    rack._close()
-
-
 @own_addresses
 def test_a_taken_port_of_one_box_leaves_no_port_open():
     base = free_port_base()
@@ -220,7 +211,7 @@ def test_what_cannot_be_counted_is_one_line(count, options, words):
 def test_one_box_may_have_any_host():
     rack = ControlBox.many(1, host="localhost", port_base=None)
     assert rack[0].host == "localhost"
-    rack._close()
+    rack.close()
 
 
 @own_addresses

@@ -431,7 +431,7 @@ def test_a_box_without_its_modbus_port_serves_all_others_and_says_so(monkeypatch
 
 def test_the_command_says_so_in_one_line(monkeypatch):
     forbid_low_ports(monkeypatch)
-    monkeypatch.setattr(rack.BoxRack, "serve_forever", rack.BoxRack._close)
+    monkeypatch.setattr(rack.BoxRack, "serve_forever", rack.BoxRack.close)
     result = CliRunner().invoke(cli.app, ["serve", "--pace", "lockstep"])
     assert result.exit_code == 0
     assert result.stderr.startswith("ur-emulator: no Modbus server: port 502 on 127.0.0.1 needs privileges")

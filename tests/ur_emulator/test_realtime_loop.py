@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from ur_emulator.errors import EmulatorError
 from ur_emulator.realtime import loop_runner
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.loop_runner import LoopRunner
@@ -54,13 +55,29 @@ def test_a_socket_that_was_closed_in_the_same_turn_is_not_called(pairs, number_i
     assert len(called) == 1
 
 
+class BareRunner(LoopRunner):
+    """A loop without boxes."""
+
+    def __init__(self, *services):
+        self._loop = EventLoop()
+        for service in services:
+            self._loop.add(service)
+
+    def listen(self):
+        pass
+
+    def close(self):
+        self._loop.close()
+
+    def _failure(self):
+        return None
+
+
 def test_a_loop_that_does_not_end_is_an_error(monkeypatch):
     monkeypatch.setattr(loop_runner, "_JOIN_TIMEOUT", 0.0)
     may_end = threading.Event()
-    loop = EventLoop()
-    loop.add(SimpleNamespace(advance=lambda now: may_end.wait(20.0)))
-    runner = LoopRunner(loop, loop.close)
-    runner.start("stuck")
-    assert "its ports are still open; end the process" in str(runner.finish())
+    runner = BareRunner(SimpleNamespace(advance=lambda now: may_end.wait(20.0)))
+    with pytest.raises(EmulatorError, match="its ports are still open; end the process"), runner:
+        pass
     may_end.set()
     runner._thread.join()

@@ -94,7 +94,7 @@ def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count
     controller = Controller(
         robot_by_name("ur3"), fidelity_by_name("exact"), 0, partial(ProgramSlot, network=None)
     )
-    box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None)
+    box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None, pytest.fail)
     seen = []
     box.attach([SimpleNamespace(publish=seen.append)])
     assert box.advance(10.0) == pytest.approx(10.0 + PERIOD)

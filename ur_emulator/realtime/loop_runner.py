@@ -1,9 +1,11 @@
-"""Runs a loop, in the calling thread or in one of its own, and cleans up after it."""
+"""Runs a loop, in the calling thread or in one of its own, and closes everything after it."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import Self
 
 from ur_emulator.errors import EmulatorError
 from ur_emulator.realtime.event_loop import EventLoop
@@ -11,55 +13,71 @@ from ur_emulator.realtime.event_loop import EventLoop
 _JOIN_TIMEOUT = 10.0  # s
 
 
-class LoopRunner:
-    """The life of a loop: it runs once, then everything in it is closed."""
+class LoopRunner(ABC):
+    """The life of boxes that share a loop: it runs once, then all of them are closed."""
 
-    def __init__(self, loop: EventLoop, close: Callable[[], None]) -> None:
-        """Prepare.
+    _loop: EventLoop
+    _thread: threading.Thread | None = None
+    _loop_failure: BaseException | None = None
 
-        Args:
-            loop: what runs.
-            close: called in the loop's thread after its last turn, whatever ended it.
+    @abstractmethod
+    def listen(self) -> None:
+        """Open all ports."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close everything, the loop too; in the thread of the loop after its last turn."""
+
+    @abstractmethod
+    def _failure(self) -> Exception | None:
+        """Return the error that has ended a box, if there is one."""
+
+    def serve_forever(self) -> None:
+        """Run in the calling thread until `stop`; the ports must be open.
+
+        An error that has ended the loop or a box is raised at the end.
         """
-        self._loop = loop
-        self._close = close
-        self._thread: threading.Thread | None = None
-        self._failure: BaseException | None = None
-
-    def run(self) -> None:
-        """Run in the calling thread until `stop`; an error that ends the loop is raised here."""
-        try:
-            self._loop.run()
-        finally:
-            self._close()
-
-    def start(self, name: str) -> None:
-        """Run in a thread of its own, called `name`."""
-        self._loop.is_running = True
-        self._thread = threading.Thread(target=self._run_and_keep_failure, name=name, daemon=True)
-        self._thread.start()
+        self._run()
+        failure = self._failure()
+        if failure is not None:
+            raise failure
 
     def stop(self) -> None:
         """Let the loop end, from any thread."""
         self._loop.stop()
 
-    def finish(self) -> BaseException | None:
-        """Stop the loop, wait for its thread; return the error that had ended it earlier, if one had.
+    def __enter__(self) -> Self:
+        """Open the ports and run the loop in a thread."""
+        self.listen()
+        self._loop.is_running = True
+        self._thread = threading.Thread(target=self._run_in_thread, name="control-box", daemon=True)
+        self._thread.start()
+        return self
 
-        A loop that does not end in time is such an error: its ports are still open.
-        """
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the loop; an error that ended it or a box earlier is raised here."""
         self.stop()
         if self._thread is not None:
             self._thread.join(_JOIN_TIMEOUT)
             if self._thread.is_alive():
-                return EmulatorError(
+                self._loop_failure = EmulatorError(
                     f"the loop of the box did not end within {_JOIN_TIMEOUT:g} s: its ports are still open; "
                     "end the process"
                 )
-        return self._failure
+        failure = self._loop_failure or self._failure()
+        if failure is not None and error is None:
+            raise failure
 
-    def _run_and_keep_failure(self) -> None:
+    def _run(self) -> None:
         try:
-            self.run()
+            self._loop.run()
+        finally:
+            self.close()
+
+    def _run_in_thread(self) -> None:
+        try:
+            self._run()
         except BaseException as failure:
-            self._failure = failure
+            self._loop_failure = failure

@@ -30,16 +30,22 @@ class ServedBox:
         controller: the box without its ports.
         log: of everything that was said.
         backlog: the connections that have not read all they were sent; they keep themselves up to date in it.
-        on_failure: told of the error that has ended a cycle, where the loop has other boxes to go on with.
     """
 
-    def __init__(self, controller: Controller, pacer: Pacer, expect_soon: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        controller: Controller,
+        pacer: Pacer,
+        expect_soon: Callable[[], None],
+        on_failure: Callable[[Exception], None],
+    ) -> None:
         """Take over a controller.
 
         Args:
             controller: the box without its ports.
             pacer: decides when it ticks.
-            expect_soon: told when a script waits for bytes that a client is about to send.
+            expect_soon: called when a script waits for bytes that a client is about to send.
+            on_failure: called with the error that has ended a cycle; there will be no further one.
         """
         self._expect_soon = expect_soon
         self.controller = controller
@@ -50,7 +56,7 @@ class ServedBox:
         self._listeners: tuple[Callable[[Event], None], ...] = ()
         self._commands: list[Command] = []
         self.backlog: set[Any] = set()
-        self.on_failure: Callable[[Exception], None] | None = None
+        self._on_failure = on_failure
         self._given_up: set[Any] = set()
         self._last_frame = -math.inf
         # A cycle is computed and waits for its deadline.
@@ -126,14 +132,12 @@ class ServedBox:
     def advance(self, now: float) -> float:
         """Tick if it is time to, or repeat the last frame if time stands still; return the next deadline.
 
-        What fails in it ends the loop, or only this box where somebody wants to be told of it.
+        An error in it ends this box, not the loop, which may have others.
         """
-        if self.on_failure is None:
-            return self._advance(now)
         try:
             return self._advance(now)
         except Exception as error:
-            self.on_failure(error)
+            self._on_failure(error)
             return math.inf
 
     def _advance(self, now: float) -> float:
