@@ -18,7 +18,6 @@ from ur_emulator.commands.programs import (
 )
 from ur_emulator.commands.safety import (
     AssignSafetyInput,
-    Button,
     ChangeSafetySettings,
     ConfirmSafety,
     PressButton,
@@ -30,7 +29,6 @@ from ur_emulator.commands.safety import (
     SafeguardStop,
     UnlockProtectiveStop,
 )
-from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.controller.safety.modes import MOVING_MODES, ROW
 from urscript import compile_program
 
@@ -58,11 +56,11 @@ ANYTHING = (
     ResetSafeguard(),
     ChangeSafetySettings(),
     ConfirmSafety(),
-    PressButton(Button.TEACH, True),
-    PressButton(Button.TEACH, False),
-    AssignSafetyInput(0, SafetyInput.EMERGENCY_STOP),
-    AssignSafetyInput(0, SafetyInput.REDUCED),
-    AssignSafetyInput(0, None),
+    PressButton("teach", True),
+    PressButton("teach", False),
+    AssignSafetyInput(0, "emergency stop"),
+    AssignSafetyInput(0, "reduced"),
+    AssignSafetyInput(0, "none"),
 )
 # What wakes an arm up, three times as likely: else most boxes would sleep.
 LIKELY = (*ANYTHING, *3 * (ReleaseEmergencyStop(), RestartSafety(), SafeguardStop(False)))
@@ -150,8 +148,8 @@ class AnyBox(RuleBasedStateMachine):
     def the_way_back_is_always_open(self):
         """Whatever has happened: release, close, restart, confirm, release the brakes; then programs run."""
         for command in (
-            AssignSafetyInput(0, None),
-            PressButton(Button.TEACH, False),
+            AssignSafetyInput(0, "none"),
+            PressButton("teach", False),
             ReleaseEmergencyStop(),
             RequireSafeguardReset(False),
             SafeguardStop(False),

@@ -13,7 +13,6 @@ from ur_emulator.commands.power import PowerOn, ReleaseBrakes, StartFreedrive
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram
 from ur_emulator.commands.safety import (
     AssignSafetyInput,
-    Button,
     ChangeSafetySettings,
     ConfirmSafety,
     PressButton,
@@ -31,7 +30,6 @@ from ur_emulator.commands.safety import (
 )
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
-from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.controller.safety.speed_scaling import (
     RECOVERY_SPEED,
     REDUCED_SHARE,
@@ -125,7 +123,7 @@ def test_a_stop_on_the_way_up_cuts_the_power(ticks):
 
 def test_two_buttons_must_both_be_released():
     bench = moving()
-    bench.tick(1, AssignSafetyInput(0, SafetyInput.EMERGENCY_STOP))
+    bench.tick(1, AssignSafetyInput(0, "emergency stop"))
     assert bench.now.safety_mode == SafetyMode.SYSTEM_EMERGENCY_STOP
     bench.tick(BRAKING, PRESS)
     assert bench.now.safety_mode == SafetyMode.ROBOT_EMERGENCY_STOP
@@ -150,8 +148,8 @@ def test_an_emergency_stop_in_freedrive_ends_it():
 def test_unknown_kinds_and_pairs_are_refused():
     with pytest.raises(EmulatorError, match="allowed is robot or system"):
         PressEmergencyStop("red")
-    with pytest.raises(EmulatorError, match="allowed are 0 to 3"):
-        AssignSafetyInput(4, None)
+    with pytest.raises(EmulatorError, match="allowed is 0 to 3"):
+        AssignSafetyInput(4, "none")
 
 
 # --- safeguard
@@ -205,7 +203,7 @@ def test_with_a_reset_button_closing_is_not_enough():
 
 def test_a_reset_input_resets_on_its_rising_edge():
     bench = moving()
-    bench.tick(1, RequireSafeguardReset(True), AssignSafetyInput(1, SafetyInput.SAFEGUARD_RESET))
+    bench.tick(1, RequireSafeguardReset(True), AssignSafetyInput(1, "safeguard reset"))
     bench.tick(50, OPEN)
     bench.tick(5, CLOSE)
     assert bench.now.safety_mode == SafetyMode.SAFEGUARD_STOP
@@ -397,10 +395,10 @@ def test_the_scale_of_an_arm_at_rest_is_that_of_the_slider():
 
 def test_the_teach_button_guides_by_hand_and_is_told():
     bench = Bench()
-    bench.tick(5, PressButton(Button.TEACH, True), PressButton(Button.POWER, True))
+    bench.tick(5, PressButton("teach", True), PressButton("power", True))
     assert bench.now.robot_status_bits & 0b1100 == 0b1100
     assert bench.now.control_mode == 1
-    bench.tick(5, PressButton(Button.TEACH, False))
+    bench.tick(5, PressButton("teach", False))
     assert bench.now.robot_status_bits & 0b1100 == 0b1000
     assert bench.now.control_mode == 0
 

@@ -17,7 +17,7 @@ from ur_emulator.commands.programs import (
 )
 from ur_emulator.commands.push import Push
 from ur_emulator.commands.safety import (
-    Button,
+    BUTTON_BITS,
     PressButton,
     PressEmergencyStop,
     ReducedMode,
@@ -157,7 +157,7 @@ class Story(Bench):
         self.tick(3, WriteInputs(tuple(values.items())))
 
     def be_guided(self):
-        for button in Button:
+        for button in BUTTON_BITS:
             self.tick(3, PressButton(button, True))
             self.tick(3, PressButton(button, False))
         self.run(INPUT_ACTION)

@@ -1,12 +1,10 @@
-"""What people and wiring do to the safety system and to the pendant.
+"""Effects of people and of wiring on the safety system and the pendant.
 
-No client of a real box can send most of these; they are for tests and for people at the emulator.
+Clients of a real box cannot send most of these; they are for tests and for people at the emulator.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import Enum
 from typing import Literal
 
 from protocol.primary.messages import ReportLevel
@@ -19,7 +17,7 @@ from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.robot_mode import ModeCommand
 from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, SafetyInput
 from ur_emulator.controller.safety.modes import SafetyEvent
-from ur_emulator.errors import ArgumentError, RefusedError
+from ur_emulator.errors import RefusedError
 
 
 class PressEmergencyStop(CommandOperation):
@@ -104,80 +102,65 @@ class RestartSafety(CommandOperation):
         box.safety.handle(SafetyEvent.RESTART)
 
 
-# --- what no operation of the control API does
+class RequireSafeguardReset(CommandOperation):
+    """Set up whether a closed safeguard also needs a reset before the program continues."""
 
-
-@dataclass(frozen=True, slots=True)
-class RequireSafeguardReset:
-    """Set up whether a safeguard that was closed needs a reset too, or lets the program go on at once."""
-
-    required: bool
+    required: bool = parameter("a reset is needed")
 
     def apply(self, box: Box) -> None:
         box.safety.inputs.require_reset(self.required)
 
 
-@dataclass(frozen=True, slots=True)
-class ResetSafeguard:
-    """Press the safeguard's reset button; it counts once the safeguard is closed."""
+class ResetSafeguard(CommandOperation):
+    """Press the reset button of the safeguard; it has an effect once the safeguard is closed."""
 
     def apply(self, box: Box) -> None:
         box.safety.inputs.reset()
 
 
-@dataclass(frozen=True, slots=True)
-class AssignSafetyInput:
-    """Set up configurable inputs 2 * pair and 2 * pair + 1 as a safety input; None frees them.
+class AssignSafetyInput(CommandOperation):
+    """Set up a pair of configurable inputs as a safety input, or as plain inputs again.
 
     Safety inputs have two channels: one that is low is enough to stop.
-
-    Raises:
-        ArgumentError: there is no such pair.
     """
 
-    pair: int
-    function: SafetyInput | None
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.pair < N_INPUT_PAIRS:
-            raise ArgumentError(f"input pair {self.pair} given: allowed are 0 to {N_INPUT_PAIRS - 1}")
+    pair: int = parameter("inputs 2 * pair and 2 * pair + 1", low=0, high=N_INPUT_PAIRS - 1)
+    function: Literal["emergency stop", "reduced", "safeguard reset", "none"] = parameter("of the pair")
 
     def apply(self, box: Box) -> None:
-        box.safety.assign_input(self.pair, self.function)
+        box.safety.assign_input(self.pair, None if self.function == "none" else SafetyInput(self.function))
 
 
-@dataclass(frozen=True, slots=True)
-class ChangeSafetySettings:
-    """Touch the safety settings: the power goes off and CONFIRM_SAFETY begins."""
+class ChangeSafetySettings(CommandOperation):
+    """Change the safety settings: the power goes off and the robot mode becomes CONFIRM_SAFETY."""
 
     def apply(self, box: Box) -> None:
         box.safety.cut_power()
         box.state.mode.command(ModeCommand.ASK_TO_CONFIRM)
 
 
-@dataclass(frozen=True, slots=True)
-class ConfirmSafety:
+class ConfirmSafety(CommandOperation):
     """Confirm the safety settings, as `confirm user safety parameters` does."""
 
     def apply(self, box: Box) -> None:
         box.state.mode.command(ModeCommand.CONFIRM)
 
 
-class Button(Enum):
-    """Buttons of the pendant, beside the emergency stop, with their bits of the robot status."""
+Button = Literal["teach", "power"]
+# Bits of the robot status by the buttons of the pendant, beside the emergency stop.
+BUTTON_BITS: dict[Button, int] = {
+    "teach": RobotStatusBits.TEACH_BUTTON_PRESSED,
+    "power": RobotStatusBits.POWER_BUTTON_PRESSED,
+}
 
-    TEACH = int(RobotStatusBits.TEACH_BUTTON_PRESSED)
-    POWER = int(RobotStatusBits.POWER_BUTTON_PRESSED)
 
+class PressButton(CommandOperation):
+    """Press or release a button of the pendant; the teach button requests freedrive."""
 
-@dataclass(frozen=True, slots=True)
-class PressButton:
-    """Press a button of the pendant, or let it go; the teach button asks for hand guiding."""
-
-    button: Button
-    pressed: bool
+    button: Button = parameter("which button")
+    pressed: bool = parameter("pressed, or released")
 
     def apply(self, box: Box) -> None:
-        box.state.operator.press(self.button.value, self.pressed)
-        if self.button is Button.TEACH:
+        box.state.operator.press(BUTTON_BITS[self.button], self.pressed)
+        if self.button == "teach":
             box.state.compliance.press_teach_button(self.pressed)

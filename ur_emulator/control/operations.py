@@ -22,9 +22,15 @@ from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetSpeedSlider, StopProgram
 from ur_emulator.commands.push import AttachPayload, Push
 from ur_emulator.commands.safety import (
+    AssignSafetyInput,
+    ChangeSafetySettings,
+    ConfirmSafety,
+    PressButton,
     PressEmergencyStop,
     ReducedMode,
     ReleaseEmergencyStop,
+    RequireSafeguardReset,
+    ResetSafeguard,
     RestartSafety,
     SafeguardStop,
     TriggerFault,
@@ -131,6 +137,11 @@ class BoxOperations:
     trigger_violation = method(TriggerViolation)
     trigger_fault = method(TriggerFault)
     restart_safety = method(RestartSafety)
+    require_safeguard_reset = method(RequireSafeguardReset)
+    reset_safeguard = method(ResetSafeguard)
+    assign_safety_input = method(AssignSafetyInput)
+    change_safety_settings = method(ChangeSafetySettings)
+    confirm_safety = method(ConfirmSafety)
     # --- power
     power_on = method(PowerOn)
     power_off = method(PowerOff)
@@ -142,6 +153,7 @@ class BoxOperations:
     resume_program = method(ResumeProgram)
     set_speed = method(SetSpeedSlider)
     # --- the operator
+    press_button = method(PressButton)
     answer = method(AnswerRequest)
     close_popups = method(ClosePopup)
     add_to_log = method(AddToLog)

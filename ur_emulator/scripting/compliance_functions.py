@@ -122,9 +122,7 @@ def _force_mode(
         "force_mode": force_mode,
         "end_force_mode": lambda thread: compliance.end_force(),
         "force_mode_set_damping": lambda thread, damping: compliance.set_force_damping(float(damping)),
-        "force_mode_set_gain_scaling": lambda thread, scaling: compliance.set_force_gain_scaling(
-            float(scaling)
-        ),
+        "force_mode_set_gain_scaling": set_gain_scaling,
         "force_mode_get_damping": lambda thread: compliance.force_damping,
         "force_mode_get_gain_scaling": lambda thread: compliance.force_gain_scaling,
     }

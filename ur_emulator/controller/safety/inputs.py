@@ -41,8 +41,8 @@ class SafetyInputs:
         assigned: pairs of configurable inputs that are set up.
     """
 
-    def __init__(self, happen: Callable[[SafetyEvent], None]) -> None:
-        self._happen = happen
+    def __init__(self, handle: Callable[[SafetyEvent], None]) -> None:
+        self._handle = handle
         self.assigned: dict[int, SafetyInput] = {}
         self._pressed: set[tuple[str, str]] = set()
         self._reducing: set[str] = set()
@@ -54,7 +54,7 @@ class SafetyInputs:
     def press(self, kind: str, who: str = "command") -> None:
         """Press an emergency stop: "robot" or "system"."""
         self._pressed.add((kind, who))
-        self._happen(_PRESSED[kind])
+        self._handle(_PRESSED[kind])
 
     def release(self, who: str = "command") -> None:
         """Release those that `who` has pressed; the others stay."""
@@ -62,7 +62,7 @@ class SafetyInputs:
         held = {kind for kind, _ in self._pressed}
         for kind, event in _RELEASED.items():
             if kind not in held:
-                self._happen(event)
+                self._handle(event)
 
     # --- safeguard
 
@@ -70,27 +70,27 @@ class SafetyInputs:
         """Open or close the safeguard."""
         self._is_open = is_open
         if is_open:
-            self._happen(SafetyEvent.SAFEGUARD_OPENED)
+            self._handle(SafetyEvent.SAFEGUARD_OPENED)
         elif not self._needs_reset:
-            self._happen(SafetyEvent.SAFEGUARD_RESTORED)
+            self._handle(SafetyEvent.SAFEGUARD_RESTORED)
 
     def require_reset(self, required: bool) -> None:
         """Set up whether closing is enough."""
         self._needs_reset = required
         if not self._is_open and not required:
-            self._happen(SafetyEvent.SAFEGUARD_RESTORED)
+            self._handle(SafetyEvent.SAFEGUARD_RESTORED)
 
     def reset(self) -> None:
         """Press the reset button."""
         if not self._is_open:
-            self._happen(SafetyEvent.SAFEGUARD_RESTORED)
+            self._handle(SafetyEvent.SAFEGUARD_RESTORED)
 
     # --- reduced mode
 
     def reduce(self, active: bool, who: str = "command") -> None:
         """Switch reduced mode on or off."""
         (self._reducing.add if active else self._reducing.discard)(who)
-        self._happen(SafetyEvent.REDUCED_ON if self._reducing else SafetyEvent.REDUCED_OFF)
+        self._handle(SafetyEvent.REDUCED_ON if self._reducing else SafetyEvent.REDUCED_OFF)
 
     # --- configurable inputs
 
