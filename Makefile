@@ -3,6 +3,11 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# A file is one process's; those with slow tests come first (tests/conftest.py), so that no core waits at the end.
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+
+# The tests start some hundred processes: they shall find compiled modules, whatever the environment says.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: ablation pictures help setup demo draw explore test check check-static bench format docs clean
@@ -28,10 +33,10 @@ draw: $(STAMP) ## drawings of people on the emulated arm: extracted, executed, c
 	$(BIN)/python examples/draw.py
 
 test: $(STAMP) ## all tests, in as many processes as there are cores, at most four
-	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
+	$(PYTEST)
 
 explore: $(STAMP) ## the property tests with new random cases (make test draws the same ones every time)
-	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile -m hypothesis
+	HYPOTHESIS_PROFILE=explore $(PYTEST) -m hypothesis
 
 check-static: $(STAMP)
 	$(BIN)/ruff check .
@@ -39,7 +44,7 @@ check-static: $(STAMP)
 	$(BIN)/mypy
 
 check: check-static ## lint, types, fast tests
-	$(BIN)/python -m pytest -m "not slow" --numprocesses auto --maxprocesses 4 --dist loadfile
+	$(PYTEST) -m "not slow"
 
 bench: $(STAMP) ## measure speed, lateness, memory; writes bench/results.json
 	$(BIN)/python -m bench
@@ -56,3 +61,4 @@ pictures: $(STAMP) ## draw the pictures of docs/contact.md (needs off-screen Ope
 
 clean: ## remove what the targets made
 	rm -rf $(VENV) out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,6 +1,7 @@
 """Property tests: `make test` runs the same cases every time, `make explore` draws new ones. None looks at a clock.
 
-What exists when all tests are collected is never looked at again by the garbage collector.
+Files with slow tests come first, so that none is left for the end when the others are done. What exists when all
+tests are collected is never looked at again by the garbage collector.
 """
 
 import gc
@@ -12,6 +13,11 @@ _COMMON = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("fixed", _COMMON, derandomize=True)
 settings.register_profile("explore", _COMMON, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
+
+
+def pytest_collection_modifyitems(items):
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
 
 
 def pytest_collection_finish():

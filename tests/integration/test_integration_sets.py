@@ -17,7 +17,7 @@ def table(ur_client, box, out, *options):
 
 @pytest.mark.slow
 def test_preview_follows_the_paper_set_far_better_than_the_paper(standard_box, ur_client, tmp_path):
-    data = table(ur_client, standard_box, tmp_path / "out", "--controller", "preview")
+    data = table(ur_client, standard_box, tmp_path / "out", "--controller", "preview", "--repeat", "1")
     assert [row["name"] for row in data["rows"]] == library_names("paper")
     assert data["mean_snr_db"]["lognormal"] >= 35.0
     assert data["mean_snr_db"]["uniform"] >= 30.0

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+import ur_emulator.emulator  # noqa: F401 - numpy cannot be loaded a second time, as pytester would
 from ur_emulator.pytest_plugin import OPTIONS, _own_addresses
 from ur_emulator.rack import BoxOptions
 
@@ -13,13 +14,16 @@ pytest_plugins = ["pytester"]
 
 @pytest.fixture
 def suite(pytester, monkeypatch):
-    """Run the tests of a text in a process of their own."""
+    """Run the tests of a text, those in parallel in a process of their own."""
     monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
     monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
 
     def run(text, *words):
         pytester.makepyfile(text)
-        return pytester.runpytest_subprocess("-p", "no:cacheprovider", *words, timeout=100)
+        options = ["-p", "no:cacheprovider", *words]
+        if "-n" in words:
+            return pytester.runpytest_subprocess(*options, timeout=100)
+        return pytester.runpytest_inprocess(*options)
 
     return run
 
