@@ -2,7 +2,8 @@
 
 import resource
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from functools import partial
 
 import pytest
 from integration_support import (
@@ -39,22 +40,21 @@ def bystander(box):
     thread.join()
 
 
-def recorded(out, seed, *, watched=False):
-    with ControlBox(pace="lockstep", port_base=free_port_base(), seed=seed) as box:
-        if watched:
-            with bystander(box):
-                done = command("pc_client", "run", "uniform_4_1", *at(box), "--repeat", "1", "--out", out)
-        else:
-            done = command("pc_client", "run", "uniform_4_1", *at(box), "--repeat", "1", "--out", out)
+def recorded(run, out, seed, *, watched=False):
+    with (
+        ControlBox(pace="lockstep", port_base=free_port_base(), seed=seed) as box,
+        bystander(box) if watched else nullcontext(),
+    ):
+        done = run("run", "uniform_4_1", *at(box), "--repeat", "1", "--out", out)
     assert done.code == 0, done.err
     return (out / "uniform_4_1_r1.mcap").read_bytes()
 
 
 @pytest.mark.slow
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path):
-    first = recorded(tmp_path / "a", 7)
-    assert recorded(tmp_path / "b", 7, watched=True) == first
-    other = load_recording_of(tmp_path / "c", recorded(tmp_path / "c", 8))
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(ur_client, tmp_path):
+    first = recorded(partial(command, "pc_client"), tmp_path / "a", 7)
+    assert recorded(ur_client, tmp_path / "b", 7, watched=True) == first
+    other = load_recording_of(tmp_path / "c", recorded(ur_client, tmp_path / "c", 8))
     ours = load_recording_of(tmp_path / "a", first)
     assert other.n_rows == pytest.approx(ours.n_rows, abs=20)
     assert (other.column("actual_q")[:100] != ours.column("actual_q")[:100]).any()

@@ -9,7 +9,6 @@ import signal
 import time
 from contextlib import contextmanager
 
-import pytest
 from integration_support import Frames, at, finish, send, serving, start
 
 from pc_client.recording.loader import load_recording
@@ -29,8 +28,8 @@ def stopped(process):
         process.send_signal(signal.SIGCONT)
 
 
-def recording(folder, who):
-    """Run a short movement, in which one process is stopped; returns the bytes of its recording."""
+def recording(folder, *who):
+    """Run a short movement, in which processes are stopped one after the other; returns the bytes of its recording."""
     folder.mkdir()
     out = folder / "out"
     path = out / "uniform_4_1_r1.mcap"
@@ -39,8 +38,8 @@ def recording(folder, who):
         with Frames(box) as frames:
             frames.until(lambda f: abs(f.target_qd).max() > 0.1 and path.exists())
         processes = {"client": client, "box": box.process}
-        if who in processes:
-            with stopped(processes[who]):
+        for name in who:
+            with stopped(processes[name]):
                 time.sleep(STOPPED)
                 assert not load_recording(path).complete
         done = finish(client)
@@ -48,14 +47,8 @@ def recording(folder, who):
     return path.read_bytes()
 
 
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory):
-    return recording(tmp_path_factory.mktemp("undisturbed") / "run", None)
-
-
-@pytest.mark.parametrize("who", ["client", "box"])
-def test_a_process_that_is_stopped_in_a_movement_changes_no_byte(tmp_path, undisturbed, who):
-    assert recording(tmp_path / "run", who) == undisturbed
+def test_a_process_that_is_stopped_in_a_movement_changes_no_byte(tmp_path):
+    assert recording(tmp_path / "stopped", "client", "box") == recording(tmp_path / "undisturbed")
 
 
 def test_a_client_that_reads_nothing_for_a_while_is_waited_for_and_loses_nothing(lockstep_box):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from pc_client.errors import MovementError
 from pc_client.movements import Movement, generate_movement, library_names, load_movement
@@ -49,8 +48,8 @@ def test_a_stroke_of_the_arcs_ends_where_the_speed_is_least(name: str) -> None:
 def test_a_ur3_can_do_it(name: str) -> None:
     """Every check of planning: reach, one branch, singularities, speeds, accelerations, clearances."""
     report = plan_movement(load_movement(name)).report
-    assert report.joint_speed.value < 0.5 * report.joint_speed.limit
-    assert report.joint_acceleration.value < 0.5 * report.joint_acceleration.limit
+    assert report.joint_speed.value < 1.2  # rad/s
+    assert report.joint_acceleration.value < 4.2  # rad/s^2
 
 
 @pytest.mark.parametrize("name", PAPER + ARCS)
@@ -64,59 +63,6 @@ def test_begins_and_ends_at_rest_in_the_box_within_the_speed(name: str) -> None:
     assert UR3_BOX.contains(movement.sample(t).p)
     assert 0.05 < movement.speed(t).max() < 0.30
     assert 5.0 < movement.duration < 15.0
-
-
-@pytest.mark.parametrize("name", PAPER + ARCS)
-def test_joints_stay_far_below_their_limits(name: str) -> None:
-    """With the nominal UR3 of its data sheet, tool at RPY(0, 3/4 pi, 0), by Newton steps along the path."""
-    movement = load_movement(name)
-    t = np.arange(0.0, movement.duration, 0.01)
-    motion = movement.motion(t)
-    q = np.radians([22.6, -101.1, -120.3, -5.9, 74.2, 106.4])
-    centre = UR3_BOX.centre
-    for share in np.linspace(0.0, 1.0, 10):
-        q = solve_position((1.0 - share) * centre + share * motion.p[0], q)
-    qd = np.empty((len(t), 6))
-    for index, (p, v) in enumerate(zip(motion.p, motion.v, strict=True)):
-        q = solve_position(p, q)
-        qd[index] = np.linalg.solve(tool_jacobian(q)[0], np.concatenate((v, np.zeros(3))))
-    assert np.abs(qd).max() < 1.2
-    assert np.abs(np.gradient(qd, t, axis=0)).max() < 4.2
-
-
-def tool_jacobian(q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Jacobian of the flange, linear part first, and its pose (4, 4), from the UR3's DH table."""
-    a = (0.0, -0.24365, -0.21325, 0.0, 0.0, 0.0)
-    d = (0.1519, 0.0, 0.0, 0.11235, 0.08535, 0.0819)
-    sin_alpha, cos_alpha = (1.0, 0.0, 0.0, 1.0, -1.0, 0.0), (0.0, 1.0, 1.0, 0.0, 0.0, 1.0)
-    pose, axes = np.eye(4), []
-    for i in range(6):
-        axes.append((pose[:3, 2].copy(), pose[:3, 3].copy()))
-        c, s, ca, sa = math.cos(q[i]), math.sin(q[i]), cos_alpha[i], sin_alpha[i]
-        pose = pose @ np.array(
-            [
-                [c, -s * ca, s * sa, a[i] * c],
-                [s, c * ca, -c * sa, a[i] * s],
-                [0.0, sa, ca, d[i]],
-                [0.0, 0.0, 0.0, 1.0],
-            ]
-        )
-    J = np.column_stack([np.concatenate((np.cross(z, pose[:3, 3] - p), z)) for z, p in axes])
-    return J, pose
-
-
-def solve_position(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
-    h = math.sqrt(0.5)
-    wanted = np.array([[-h, 0.0, h], [0.0, 1.0, 0.0], [-h, 0.0, -h]])
-    for _ in range(12):
-        J, pose = tool_jacobian(q)
-        turn = wanted @ pose[:3, :3].T
-        rotation = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-        error = np.concatenate((p - pose[:3, 3], rotation))
-        if np.abs(error).max() < 1e-10:
-            return q
-        q = q + np.linalg.solve(J, error)
-    raise AssertionError(f"no joint angles for {p}")
 
 
 @pytest.mark.parametrize("name", PAPER + ARCS)
