@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from urscript.advice import check_for_people, explained
+from urscript.advice import check_with_advice, with_advice
 from urscript.commands.run_command import run
 from urscript.commands.support import (
     STANDARD_INPUT,
@@ -59,7 +59,7 @@ def check(
     ignored = _codes(ignore or ())
     found: list[tuple[str, ScriptError]] = []
     for file in files:
-        errors, warnings = check_for_people(read_program(file), catalogue=catalogue, name=shown_name(file))
+        errors, warnings = check_with_advice(read_program(file), catalogue=catalogue, name=shown_name(file))
         found += [(str(file), error) for error in errors]
         found += [(str(file), warning) for warning in warnings if warning.rule.code not in ignored]
     if as_json:
@@ -104,7 +104,7 @@ def fmt(
         try:
             formatted = format_program(source)
         except ScriptSyntaxError as wrong:
-            error = explained(wrong)
+            error = with_advice(wrong)
             diagnostics.append(diagnostic_of(error, str(file)))
             if not as_json:
                 typer.echo(as_utf8(error.render()), err=True)

@@ -7,7 +7,7 @@ from random_trees import WORDS, programs
 from tree_printer import print_program
 from typer.testing import CliRunner
 
-from urscript.advice import check_for_people
+from urscript.advice import check_with_advice
 from urscript.advice.checking import RULES, advise, first_syntax_error
 from urscript.cli import app
 from urscript.errors import ScriptSyntaxError
@@ -20,7 +20,7 @@ def body(*lines):
 
 
 def told(text):
-    return [as_utf8(error.headline()).removeprefix("a:") for error in check_for_people(text, name="a")[0]]
+    return [as_utf8(error.headline()).removeprefix("a:") for error in check_with_advice(text, name="a")[0]]
 
 
 WRONG = {
@@ -461,7 +461,7 @@ def test_names_of_what_had_to_be_left_out_are_not_missed():
 
 
 def test_carets_stand_below_characters_of_several_bytes():
-    (error,), _ = check_for_people(body('textmsg("\u00e4\u00f6\u00fc", y)'))
+    (error,), _ = check_with_advice(body('textmsg("\u00e4\u00f6\u00fc", y)'))
     assert as_utf8(error.render()).split("\n")[1:] == [
         '      textmsg("\u00e4\u00f6\u00fc", y)',
         "                     ^",
@@ -485,7 +485,7 @@ elseif for in then do && || += ++ // /* 5s 1,5 lambda \u201c \xe2\x80\x9c \xb0 -
 
 
 def assert_tells(text):
-    errors, _ = check_for_people(text)
+    errors, _ = check_with_advice(text)
     assert bool(errors) == bool(check_program(text)[0])
     n_lines = text.count("\n") + 1
     for error in errors:
@@ -521,6 +521,6 @@ def test_a_program_with_something_cut_out_is_told_about(tree, data):
 @given(programs)
 def test_a_program_without_syntax_errors_meets_no_rule(tree):
     text = print_program(tree)
-    assert [item.message for item in check_for_people(text)[0]] == [
+    assert [item.message for item in check_with_advice(text)[0]] == [
         item.message for item in check_program(text)[0]
     ]

@@ -1,15 +1,15 @@
-"""Errors in the words of somebody who knows what was meant: `urscript check`.
+"""Syntax and name errors with explanations and repairs: `urscript check`.
 
 | module | holds |
 |---|---|
-| `checking` | the way in: all errors of a text, the order of the rules |
-| `problem`, `rough_tokens` | what a rule sees and gives |
+| `checking` | the entry point: all errors of a text, the order of the rules |
+| `problem`, `tokens` | what a rule gets and returns |
 | `characters`, `brackets`, `blocks`, `statements`, `names` | the rules |
-| `words` | what other languages write, as tables |
+| `words` | words and symbols of other languages, as tables |
 
-A rule may look at anything and must not raise; programs without errors never meet one.
+A rule must not raise; programs without errors never reach one.
 """
 
-from urscript.advice.checking import check_for_people, explained
+from urscript.advice.checking import check_with_advice, with_advice
 
-__all__ = ["check_for_people", "explained"]
+__all__ = ["check_with_advice", "with_advice"]

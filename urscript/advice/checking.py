@@ -1,7 +1,7 @@
-"""All errors of a program for people: each with the place where one would look, and what to write.
+"""All errors of a program with explanations: each at its cause, with what to write instead.
 
-The parser says where it noticed an error, which is what a controller reports. Here rules look at the text
-around that place, say what was meant, and repair a copy of the text so that the next error can be found.
+The parser says where it detected an error, which is what a controller reports. The rules look at the text
+around that place, explain the error, and repair a copy of the text so that the parser can find the next one.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from urscript.advice import blocks, brackets, characters, statements
-from urscript.advice.names import tells_of_line, with_hint
+from urscript.advice.names import concerns_whole_line, with_hint
 from urscript.advice.problem import Advice, Problem, Rule
-from urscript.advice.rough_tokens import RoughText
+from urscript.advice.tokens import TokenizedText
 from urscript.catalogue import CB3_3_15, Catalogue
 from urscript.errors import ScriptCompileError, ScriptNameError, ScriptSyntaxError
 from urscript.lint.rules import ScriptWarning
@@ -28,25 +28,25 @@ RULES: Final[tuple[Rule, ...]] = (
     characters.comment,
     statements.foreign_statement,
     characters.number,
-    characters.open_string,
-    characters.sign,
-    characters.pose_parts,
-    statements.walrus,
-    statements.anonymous_function,
+    characters.unterminated_string,
+    characters.symbol,
+    characters.pose_elements,
+    statements.colon_assignment,
+    statements.lambda_expression,
     blocks.else_if,
-    statements.in_place,
-    statements.doubled_operator,
+    statements.augmented_assignment,
+    statements.foreign_operator,
     statements.function_head,
     statements.reserved_word,
     brackets.decimal_comma,
     brackets.trailing_comma,
     brackets.inside_brackets,
-    statements.value_with_if,
-    brackets.closes_nothing,
-    brackets.never_closed,
+    statements.conditional_expression,
+    brackets.unmatched_closer,
+    brackets.unclosed_bracket,
     statements.comparison_chain,
     statements.word_operator,
-    statements.assignment_as_value,
+    statements.assignment_in_expression,
     brackets.tuples,
     brackets.missing_comma,
     blocks.foreign_end,
@@ -55,62 +55,62 @@ RULES: Final[tuple[Rule, ...]] = (
     blocks.extra_end,
     blocks.missing_end,
 )
-"""In the order they are asked; the first that knows what was meant counts."""
+"""In order of priority: the first rule that returns an advice is used."""
 
 MAX_ERRORS: Final = 20
 _MAX_REPAIRS: Final = 60
-_MAX_READ: Final = 2_000_000
-"""Characters to parse in all: every repair costs one more pass over the text."""
+_MAX_PARSED: Final = 2_000_000
+"""Most characters to parse in total: each repair costs one more pass over the text."""
 
 
-def check_for_people(
+def check_with_advice(
     text: str, *, catalogue: Catalogue = CB3_3_15, name: str = "<program>"
 ) -> tuple[Sequence[ScriptCompileError], Sequence[ScriptWarning]]:
-    """As `program.check_program`, in words for the author of the program.
+    """As `program.check_program`, with explanations.
 
-    Names are looked up beside syntax errors too, as far as the text could be repaired.
+    If a program with syntax errors could be repaired, its names are checked too.
     """
     source = Source(as_bytes(text), name)
-    mending = _mend(source)
-    if mending.text is not None:
-        errors, warnings = check_program(mending.text, catalogue=catalogue, name=name)
-        if not mending.found:
-            return [with_hint(error) for error in _one_for_each(errors)], warnings
-        mending.add_names(errors)
-    return mending.found, ()
+    repair = _repair_text(source)
+    if repair.text is not None:
+        errors, warnings = check_program(repair.text, catalogue=catalogue, name=name)
+        if not repair.found:
+            return [with_hint(error) for error in _one_per_line(errors)], warnings
+        repair.add_names(errors)
+    return repair.found, ()
 
 
-def _one_for_each(errors: Sequence[ScriptCompileError]) -> Iterator[ScriptCompileError]:
-    """The errors without those on lines that another one has told all of."""
-    told = 0
+def _one_per_line(errors: Sequence[ScriptCompileError]) -> Iterator[ScriptCompileError]:
+    """The errors without those on lines that an earlier error explains as a whole."""
+    explained_line = 0
     for error in errors:
-        if error.line != told:
+        if error.line != explained_line:
             yield error
-            told = error.line if tells_of_line(error) else 0
+            explained_line = error.line if concerns_whole_line(error) else 0
 
 
 @dataclass(slots=True)
-class _Mending:
-    """What was found while a text was repaired.
+class _Repair:
+    """A text under repair, and its errors.
 
     Attributes:
         source: The text as it was written.
-        text: What it has become; None if something could not be repaired.
+        text: The repaired text; None if something could not be repaired.
         found: The errors, by line, one a line at most.
-        doubtful: Names that may be unknown only because what makes them was left out.
+        uncertain_names: Names that may be undefined only because a repair removed their definition.
     """
 
     source: Source
     text: str | None
     found: list[ScriptCompileError] = field(default_factory=list)
-    doubtful: set[str] = field(default_factory=set)
+    uncertain_names: set[str] = field(default_factory=set)
 
     def add(self, errors: Sequence[ScriptCompileError]) -> None:
-        """Keep one error a line: more are most often echoes of the first."""
+        """Keep one error a line: others are mostly consequences of the first."""
         n_lines = self.source.text.count("\n") + 1
         for error in errors:
             if error.line > n_lines:
-                continue  # in an `end` that was put behind the text
+                continue  # in an `end` that was added after the text
             if len(self.found) < MAX_ERRORS and all(error.line != other.line for other in self.found):
                 # Repairs leave the lines where they are.
                 error.source = self.source
@@ -118,45 +118,45 @@ class _Mending:
         self.found.sort(key=lambda error: (error.line, error.column))
 
     def add_names(self, errors: Sequence[ScriptCompileError]) -> None:
-        """Keep what is unknown for another reason than a repair."""
+        """Keep the errors of names that no repair has caused."""
         for error in errors:
-            if not isinstance(error, ScriptNameError) or error.name not in self.doubtful:
+            if not isinstance(error, ScriptNameError) or error.name not in self.uncertain_names:
                 error.source = self.source
                 self.add([with_hint(error)])
 
-    def repair(self, text: str, advice: Advice, line: int) -> str:
-        """The text with the edits of an advice about `line`."""
-        if not advice.sure:
-            self.doubtful.update(re.findall(r"[A-Za-z_]\w*", self.source.line(line)))
+    def edit(self, text: str, advice: Advice, line: int) -> str:
+        """The text after the edits of an advice for `line`."""
+        if not advice.exact:
+            self.uncertain_names.update(re.findall(r"[A-Za-z_]\w*", self.source.line(line)))
         for edit in sorted(advice.edits, reverse=True):
             text = text[: edit.start] + edit.new + text[edit.end :]
         return text
 
 
-def _mend(source: Source) -> _Mending:
-    """Find the syntax errors one after the other, each in the text without those before."""
+def _repair_text(source: Source) -> _Repair:
+    """Find the syntax errors one by one, each after the repair of those before."""
     text = source.text
-    mending = _Mending(source, None)
-    for _ in range(min(_MAX_REPAIRS, 1 + _MAX_READ // (1 + len(text)))):
+    repair = _Repair(source, None)
+    for _ in range(min(_MAX_REPAIRS, 1 + _MAX_PARSED // (1 + len(text)))):
         error = first_syntax_error(Source(text, source.name))
         if error is None:
-            mending.text = text
-            return mending
+            repair.text = text
+            return repair
         advice = advise(text, error)
         if advice is None:
-            mending.add([error])
+            repair.add([error])
             break
-        told = _told(advice, error, text, source)
-        mending.add([told])
-        if not advice.edits or len(mending.found) >= MAX_ERRORS:
+        explained = _error_from(advice, error, text, source)
+        repair.add([explained])
+        if not advice.edits or len(repair.found) >= MAX_ERRORS:
             break
-        text = mending.repair(text, advice, told.line)
-    mending.add(find_syntax_errors(Source(text, source.name)))
-    return mending
+        text = repair.edit(text, advice, explained.line)
+    repair.add(find_syntax_errors(Source(text, source.name)))
+    return repair
 
 
 def first_syntax_error(source: Source) -> ScriptSyntaxError | None:
-    """What the parser says of a text; None if it is right."""
+    """The first syntax error of a text, or None."""
     try:
         parse(source)
     except ScriptSyntaxError as error:
@@ -167,30 +167,30 @@ def first_syntax_error(source: Source) -> ScriptSyntaxError | None:
 
 
 def advise(text: str, error: ScriptSyntaxError) -> Advice | None:
-    """What the first rule says that knows the error; None if no rule does."""
-    rough = RoughText(text)
-    offset = rough.offset(error.line, error.column)
-    index = rough.piece_at(offset)
+    """The advice of the first rule that applies, or None."""
+    tokenized = TokenizedText(text)
+    offset = tokenized.offset(error.line, error.column)
+    index = tokenized.token_at(offset)
     if error.unexpected == "$END":
-        index = len(rough.pieces) - 1
-    problem = Problem(rough, error, index)
+        index = len(tokenized.tokens) - 1
+    problem = Problem(tokenized, error, index)
     return next((advice for rule in RULES if (advice := rule(problem)) is not None), None)
 
 
-def explained(error: ScriptCompileError) -> ScriptCompileError:
-    """One error as `check_for_people` words it."""
+def with_advice(error: ScriptCompileError) -> ScriptCompileError:
+    """An error with its explanation, as `check_with_advice` gives it."""
     source = error.source
     if source is None:
         return error
     if isinstance(error, ScriptSyntaxError):
         advice = advise(source.text, error)
-        return error if advice is None else _told(advice, error, source.text, source)
+        return error if advice is None else _error_from(advice, error, source.text, source)
     return with_hint(error)
 
 
-def _told(advice: Advice, error: ScriptSyntaxError, text: str, source: Source) -> ScriptSyntaxError:
-    rough = RoughText(text)
-    line, column = rough.place(advice.start)
+def _error_from(advice: Advice, error: ScriptSyntaxError, text: str, source: Source) -> ScriptSyntaxError:
+    tokenized = TokenizedText(text)
+    line, column = tokenized.place(advice.start)
     return type(error)(
         to_script_text(advice.message),
         line=line,

@@ -9,7 +9,7 @@ from urscript.errors import ScriptCompileError, ScriptNameError, ScriptTypeError
 
 
 def with_hint(error: ScriptCompileError) -> ScriptCompileError:
-    """The error, with a better hint and place where they are known; the error itself is changed."""
+    """Improve the hint and the place of an error where possible; returns the same error."""
     text = error.source.line(error.line) if error.source else ""
     if isinstance(error, ScriptNameError):
         error.hint = _hint_for_name(error.name, text, error.column) or error.hint
@@ -18,8 +18,8 @@ def with_hint(error: ScriptCompileError) -> ScriptCompileError:
     return error
 
 
-def tells_of_line(error: ScriptCompileError) -> bool:
-    """Whether the error is about all of its line: other names in it are echoes."""
+def concerns_whole_line(error: ScriptCompileError) -> bool:
+    """Whether the error concerns all of its line, so that other errors in it are consequences."""
     text = error.source.line(error.line).lstrip() if error.source else ""
     head = re.match(r"\w*", text)
     return text.startswith("--") or (head is not None and head[0] in STATEMENTS.keys() | TYPES)

@@ -1,4 +1,4 @@
-"""What a rule gets, a `Problem`, and what it gives, an `Advice`."""
+"""What a rule gets, a `Problem`, and what it returns, an `Advice`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from urscript.advice.rough_tokens import CLOSERS, PAIRS, Piece, RoughText
+from urscript.advice.tokens import CLOSERS, PAIRS, Token, TokenizedText
 from urscript.errors import ScriptSyntaxError
 
 
@@ -19,15 +19,15 @@ class Edit(NamedTuple):
 
 
 class Advice(NamedTuple):
-    """A syntax error in the words of somebody who knows what was meant.
+    """An explanation of a syntax error, and its repair.
 
     Attributes:
         message: What is wrong.
         hint: What to write; None if the message says it.
-        start: Offset where a person would look.
-        end: Offset behind what is underlined.
-        edits: What makes the text right as far as this goes, so that the next error can be looked for.
-        sure: The repaired text means what was meant; if not, names of that line may be missing elsewhere.
+        start: Offset of the first character that is underlined.
+        end: Offset after the last one.
+        edits: The repair, so that the parser can find the next error.
+        exact: The repair keeps the meaning; if not, names of that line may be undefined elsewhere.
     """
 
     message: str
@@ -35,20 +35,20 @@ class Advice(NamedTuple):
     start: int
     end: int
     edits: tuple[Edit, ...] = ()
-    sure: bool = True
+    exact: bool = True
 
 
-def about(
-    first: Piece, message: str, hint: str | None, *edits: Edit, last: Piece | None = None, sure: bool = True
+def advice_at(
+    first: Token, message: str, hint: str | None, *edits: Edit, last: Token | None = None, exact: bool = True
 ) -> Advice:
-    """Advice that underlines a piece, or all from `first` to `last`."""
-    return Advice(message, hint, first.start, (last or first).end, edits, sure)
+    """Advice that underlines a token, or the text from `first` to `last`."""
+    return Advice(message, hint, first.start, (last or first).end, edits, exact)
 
 
-def replaced(piece: Piece, new: str, last: Piece | None = None) -> Edit:
-    """Other text in place of a piece, or of all from it to `last`; what stands behind it stays in place."""
-    end = (last or piece).end
-    return Edit(piece.start, end, new.ljust(end - piece.start))
+def replacement(token: Token, new: str, last: Token | None = None) -> Edit:
+    """Replace a token, or the text from it to `last`; padded, so that what follows keeps its column."""
+    end = (last or token).end
+    return Edit(token.start, end, new.ljust(end - token.start))
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,59 +56,59 @@ class Problem:
     """The first syntax error of a text.
 
     Attributes:
-        rough: The text.
-        error: As the parser words it.
-        index: The piece at its place.
+        tokenized: The text.
+        error: The parser's error.
+        index: Index of the token at the error.
     """
 
-    rough: RoughText
+    tokenized: TokenizedText
     error: ScriptSyntaxError
     index: int
 
     @property
-    def at(self) -> Piece:
-        """The piece that cannot stand where it is."""
-        return self.rough.pieces[self.index]
+    def token(self) -> Token:
+        """The unexpected token."""
+        return self.tokenized.tokens[self.index]
 
     @property
-    def before(self) -> Piece:
-        """The piece before it; itself at the start of the text."""
-        return self.piece(-1)
+    def previous(self) -> Token:
+        """The token before it; itself at the start of the text."""
+        return self.neighbor(-1)
 
     @property
-    def after(self) -> Piece:
-        """The piece behind it."""
-        return self.piece(1)
+    def following(self) -> Token:
+        """The token after it; itself at the end of the text."""
+        return self.neighbor(1)
 
-    def piece(self, distance: int) -> Piece:
-        """The piece so many places on or back, or the last or first one."""
-        pieces = self.rough.pieces
-        return pieces[max(0, min(self.index + distance, len(pieces) - 1))]
+    def neighbor(self, distance: int) -> Token:
+        """The token at a distance, negative before it; limited to the first and last token."""
+        tokens = self.tokenized.tokens
+        return tokens[max(0, min(self.index + distance, len(tokens) - 1))]
 
     @property
     def starts_line(self) -> bool:
-        """Nothing stands before it on its line: what is missing is missing on a line above."""
-        return self.rough.is_first(self.index) or self.at.kind == "end"
+        """It is the first token of its line: what is missing belongs to a line above."""
+        return self.tokenized.is_first(self.index) or self.token.kind == "end"
 
-    def line_head(self, line: int) -> tuple[int, Piece]:
-        """Index and piece of the first one of a line."""
-        index = self.rough.piece_at(self.rough.line_start(line))
-        return index, self.rough.pieces[index]
+    def line_head(self, line: int) -> tuple[int, Token]:
+        """Index and first token of a line."""
+        index = self.tokenized.token_at(self.tokenized.line_start(line))
+        return index, self.tokenized.tokens[index]
 
     def accepts(self, *terminals: str) -> bool:
-        """Whether one of these could stand there."""
+        """Whether the parser expects one of these."""
         return not self.error.accepted.isdisjoint(terminals)
 
-    def open_brackets(self) -> list[Piece]:
-        """The brackets of the statement that are open before it, the innermost last."""
-        found: list[Piece] = []
-        for piece in self.rough.pieces[: self.index]:
-            if piece.kind == "sign" and piece.text in PAIRS:
-                found.append(piece)
-            elif piece.kind == "sign" and piece.text in CLOSERS:
-                if found and found[-1].text == CLOSERS[piece.text]:
+    def open_brackets(self) -> list[Token]:
+        """The open brackets of the statement before it, the innermost last."""
+        found: list[Token] = []
+        for token in self.tokenized.tokens[: self.index]:
+            if token.kind == "symbol" and token.text in PAIRS:
+                found.append(token)
+            elif token.kind == "symbol" and token.text in CLOSERS:
+                if found and found[-1].text == CLOSERS[token.text]:
                     found.pop()
-            elif piece.text in _STATEMENT_WORDS and piece.kind == "word":
+            elif token.text in _STATEMENT_WORDS and token.kind == "word":
                 found.clear()
         return found
 

@@ -1,4 +1,4 @@
-"""What people write who know other languages, and what URScript has instead: tables only."""
+"""Words and symbols of other languages, and what URScript has instead: tables only."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from typing import Final, NamedTuple
 
 
 class ForeignWord(NamedTuple):
-    """A word that begins a statement elsewhere.
+    """A word that begins a statement in another language.
 
     Attributes:
         hint: What to write here.
-        new: What may stand in its place, so that the rest of the text can be checked: a word, or, ending in
-            ":", a whole head of a block; empty: the line is left out.
-        sure: The text then means what was meant.
+        new: Replacement with which the rest of the text can be checked: a word, or, ending in ":", the
+            whole head of a block; empty: the line is removed.
+        exact: The replacement keeps the meaning.
     """
 
     hint: str
     new: str = ""
-    sure: bool = False
+    exact: bool = False
 
 
 _COUNT: Final = "write i = 0, then while i < n: ... i = i + 1 end"
@@ -61,10 +61,10 @@ STATEMENTS: Final[dict[str, ForeignWord]] = {
 BLOCK_ENDS: Final = frozenset(
     {"endif", "endwhile", "endfor", "enddef", "endfunction", "endthread", "endloop", "fi", "done", "wend"}
 )
-"""Words that close a block elsewhere."""
+"""Words that end a block in other languages."""
 
 WORDS_AFTER_END: Final = frozenset({"if", "while", "def", "thread", "for", "function", "sec"})
-"""Words that stand behind `end` elsewhere."""
+"""Words that follow `end` in other languages."""
 
 OPERATORS: Final[dict[str, tuple[str, str]]] = {
     "**": ("*", "write pow(a, b)"),
@@ -72,7 +72,7 @@ OPERATORS: Final[dict[str, tuple[str, str]]] = {
     "=>": (">=", "write >="),
     "=<": ("<=", "write <="),
 }
-"""Operators of two signs: what to put in their place, and what to tell."""
+"""Operators of two symbols: replacement and hint."""
 
 WORD_OPERATORS: Final[dict[str, tuple[str, str]]] = {
     "is": ("==", "write =="),
@@ -81,14 +81,14 @@ WORD_OPERATORS: Final[dict[str, tuple[str, str]]] = {
     "mod": ("%", "write %"),
     "div": ("/", "write floor(a / b)"),
 }
-"""Operators that are words."""
+"""Operators that are words: replacement and hint."""
 
 RESERVED: Final = frozenset(
     {"def", "sec", "thread", "end", "if", "elif", "else", "while", "break", "continue", "halt", "return"}
     | {"enter_critical", "exit_critical", "join", "kill", "run", "global", "local"}
     | {"or", "xor", "and", "not", "None", "True", "False", "true", "false"}
 )
-"""Words of the language, which cannot be names."""
+"""Reserved words."""
 
 NAMES: Final[dict[str, str]] = {
     "print": "write textmsg(...)",
@@ -150,12 +150,12 @@ NAMES: Final[dict[str, str]] = {
     **dict.fromkeys(("double", "bool", "char", "auto"), "remove it: x = 1 is enough"),
     **dict.fromkeys(("import", "from", "include"), _IMPORT),
 }
-"""Names that other languages know, and what to write here."""
+"""Names of other languages: hint."""
 
 TYPES: Final = frozenset(
     {"int", "float", "double", "bool", "boolean", "string", "char", "auto", "var", "let", "const"}
 )
-"""Words before a name that is declared elsewhere."""
+"""Words before the name in a declaration of another language."""
 
 KEYWORDS: Final[dict[str, str]] = {
     **dict.fromkeys(("acc", "accel", "acceleration"), "a"),
@@ -163,9 +163,9 @@ KEYWORDS: Final[dict[str, str]] = {
     **dict.fromkeys(("time", "duration"), "t"),
     **dict.fromkeys(("radius", "blend", "blend_radius"), "r"),
 }
-"""Names of arguments that people guess, and what they are called here."""
+"""Guessed names of arguments: the name in URScript."""
 
-SIGNS: Final[dict[str, tuple[str, str]]] = {
+SYMBOLS: Final[dict[str, tuple[str, str]]] = {
     "&&": ("and", "write and"),
     "||": ("or", "write or"),
     "&": ("and", "write and; bits are in integer_to_binary_list(...)"),
@@ -201,7 +201,7 @@ SIGNS: Final[dict[str, tuple[str, str]]] = {
     "\ufeff": (" ", "remove it"),
     "\\": (" ", "remove it; a statement may continue on the next line"),
 }
-"""Characters that mean nothing here: what to put in their place, and what to tell."""
+"""Characters without meaning in URScript: replacement and hint."""
 
 INVISIBLE: Final = {
     "\u00a0": "no-break space",
@@ -210,4 +210,4 @@ INVISIBLE: Final = {
     "\u200b": "zero-width space",
     "\ufeff": "byte order mark",
 }
-"""What to call characters that cannot be seen."""
+"""Names of characters that cannot be seen."""

@@ -23,7 +23,7 @@ Predicate = Callable[[Any], bool]
 
 _SHOWN_TEXT = 40
 # Numbers beyond this are no length, time or angle of a robot; their products would leave the floats.
-_MOST = 1e15
+_LARGEST = 1e15
 
 
 def _is_int(value: Any) -> bool:
@@ -120,12 +120,12 @@ def _is_finite(value: Any) -> bool:
     return all(map(isfinite, value)) if isinstance(value, (list, Pose)) else isfinite(value)
 
 
-def _is_moderate(value: Any) -> bool:
+def _is_bounded(value: Any) -> bool:
     """Like `_is_finite`, and not absurd either."""
     if isinstance(value, (list, Pose)):
         # NaN slips through a maximum, not through a sum.
-        return not value or (isfinite(sum(value)) and max(map(abs, value)) <= _MOST)
-    return bool(-_MOST <= value <= _MOST)
+        return not value or (isfinite(sum(value)) and max(map(abs, value)) <= _LARGEST)
+    return bool(-_LARGEST <= value <= _LARGEST)
 
 
 def _must_be_finite(builtin: Builtin, param: Param) -> bool:
@@ -144,8 +144,8 @@ def explain(builtin: Builtin, param: Param, value: Any) -> ScriptRuntimeError:
     """The error for an argument that a check refused."""
     if not fits(param.type, value):
         return type_error(builtin.name, param.name, param.type, value)
-    if _must_be_finite(builtin, param) and not _is_moderate(value):
-        allowed = f"in the range {-_MOST:g} to {_MOST:g}" if _is_finite(value) else "finite"
+    if _must_be_finite(builtin, param) and not _is_bounded(value):
+        allowed = f"in the range {-_LARGEST:g} to {_LARGEST:g}" if _is_finite(value) else "finite"
     elif param.choices:
         allowed = "one of " + ", ".join(map(str, param.choices))
     elif param.low is not None and param.high is not None:
@@ -177,7 +177,7 @@ def _accepts(builtin: Builtin, param: Param) -> Predicate | None:
             return may_be_left_out
         if not of_type(value):
             return False
-        if needs_finite and not _is_moderate(value):
+        if needs_finite and not _is_bounded(value):
             return False
         return not is_ranged or _is_in_range(param, value)
 
@@ -189,7 +189,7 @@ _NUMBER_TYPES = frozenset({int, float})
 
 
 def _is_plain_number(value: Any) -> bool:
-    return type(value) in _NUMBER_TYPES and bool(-_MOST <= value <= _MOST)
+    return type(value) in _NUMBER_TYPES and bool(-_LARGEST <= value <= _LARGEST)
 
 
 def _is_plain_six(value: Any) -> bool:
@@ -198,7 +198,7 @@ def _is_plain_six(value: Any) -> bool:
         type(value) is list
         and len(value) == 6
         and _NUMBER_TYPES.issuperset(map(type, value))
-        and hypot(*value) <= _MOST
+        and hypot(*value) <= _LARGEST
     )
 
 

@@ -1,4 +1,4 @@
-"""Which argument of a call fills which parameter, decided from the shape of the call alone.
+"""Which argument of a call fills which parameter, decided from the form of the call alone.
 
 The compiler calls `static_bind` once for each call in a program; at run time nothing is left to decide.
 
@@ -21,14 +21,14 @@ Slot = tuple[Literal["arg"], int] | tuple[Literal["kw"], str] | tuple[Literal["d
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
-    """What a call of a function must look like; builtins and functions of a program alike.
+class CallSignature:
+    """The signature of a function, builtin or of a program.
 
     Attributes:
         function: name of the function.
         names: of its parameters, in order.
         optional: those that have a default.
-        hint: what to say to people beside the error.
+        hint: added to the error.
     """
 
     function: str
@@ -46,25 +46,27 @@ class Shape:
         seen = set(self.names[:n_positional])
         for keyword in keywords:
             if keyword not in self.names:
-                raise self._misfit(f"{self.function}() got an unexpected keyword argument '{keyword}'")
+                raise self._type_error(f"{self.function}() got an unexpected keyword argument '{keyword}'")
             if keyword in seen:
-                raise self._misfit(f"{self.function}() got multiple values for keyword argument '{keyword}'")
+                raise self._type_error(
+                    f"{self.function}() got multiple values for keyword argument '{keyword}'"
+                )
             seen.add(keyword)
         given = n_positional + len(keywords)
         if n_positional > len(self.names) or given < len(self.names) - len(self.optional):
             raise self._wrong_count(given)
         for name in self.names[n_positional:]:
             if name not in seen and name not in self.optional:
-                raise self._misfit(f"{self.function}() missing required argument '{name}'")
+                raise self._type_error(f"{self.function}() missing required argument '{name}'")
 
     def _wrong_count(self, given: int) -> ScriptTypeError:
         most = len(self.names)
         least = most - len(self.optional)
         between = "" if least == most else f"{least} or " if least == most - 1 else f"{least} to "
         arguments = "argument" if most == 1 else "arguments"
-        return self._misfit(f"{self.function} takes exactly {between}{most} {arguments} ({given} given)")
+        return self._type_error(f"{self.function} takes exactly {between}{most} {arguments} ({given} given)")
 
-    def _misfit(self, message: str) -> ScriptTypeError:
+    def _type_error(self, message: str) -> ScriptTypeError:
         return ScriptTypeError(message, hint=self.hint)
 
 
@@ -86,7 +88,9 @@ def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str
         return []
     names = [param.name for param in builtin.params]
     optional = {param.name for param in builtin.params if not param.is_required}
-    Shape(builtin.name, names, optional, f"use {builtin.signature}").check(n_positional, keyword_names)
+    CallSignature(builtin.name, names, optional, f"use {builtin.signature}").check(
+        n_positional, keyword_names
+    )
     slots: list[Slot] = []
     for index, param in enumerate(builtin.params):
         if index < n_positional:

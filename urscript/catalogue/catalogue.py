@@ -40,7 +40,7 @@ ALL_ROWS: tuple[Builtin, ...] = (
 )
 
 
-_MOST_SHAPES = 10_000
+_MOST_CALL_FORMS = 10_000
 
 
 class Catalogue:
@@ -110,7 +110,7 @@ class Catalogue:
         slots = self._slots.get(shape)
         if slots is None:
             # A program has few shapes, the catalogue is for all programs: do not let it grow for ever.
-            if len(self._slots) > _MOST_SHAPES:
+            if len(self._slots) > _MOST_CALL_FORMS:
                 self._slots.clear()
             slots = self._slots[shape] = static_bind(self._by_name[name], n_positional, keyword_names)
         return slots

@@ -1,6 +1,6 @@
-"""Which moves a program makes: when each begins, where it leads, how long the program spends in it.
+"""Records the moves of a program: start, arguments, duration.
 
-A program is watched by running it on a host whose motion builtins are wrapped; nothing else is slower.
+The program runs on a host whose motion builtins are wrapped; everything else runs at its usual speed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from urscript.run.threads import ScriptThread
 from urscript.run.waits import Wait
 
 STREAMS: Final = frozenset({"speedj", "speedl", "servoj", "servoc"})
-"""Builtins that are called again every few cycles: calls that follow one another are one move."""
+"""Builtins that are called again every few cycles: consecutive calls are one move."""
 
 
 @dataclass(slots=True)
@@ -67,7 +67,7 @@ class MoveWatch:
         clock: Callable[[], float],
         on_move: Callable[[WatchedMove], None],
     ) -> None:
-        """Args: the program; length of a cycle (s); robot time (s); who is told of each move that ended."""
+        """Args: the program; length of a cycle (s); robot time (s); called with each move that has ended."""
         inherited = {item.name: getattr(program, item.name) for item in fields(program)}
         self.program: CompiledProgram = _WatchedProgram(**inherited, watch=self)
         self._clock = clock
@@ -76,7 +76,7 @@ class MoveWatch:
         self._streams: dict[ScriptThread, WatchedMove] = {}
 
     def flush(self, *, all_streams: bool = True) -> None:
-        """Tell of the streams that have ended, or of all of them."""
+        """Report the streams that have ended, or all of them."""
         for thread, stream in list(self._streams.items()):
             if all_streams or self._clock() - stream.end > self._gap:
                 del self._streams[thread]

@@ -1,4 +1,4 @@
-"""`urscript run`: a program on an emulated robot, or on one that only writes down what it is told."""
+"""`urscript run`: run a program on an emulated robot, or on a host that only records its calls."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from urscript.advice import explained
+from urscript.advice import with_advice
 from urscript.catalogue import Catalogue
 from urscript.commands.move_watch import MoveWatch
-from urscript.commands.run_story import JsonStory, Story, TextStory
+from urscript.commands.run_output import JsonOutput, RunOutput, TextOutput
 from urscript.commands.support import AsJson, Software, catalogue_of, read_program, show, shown_name
 from urscript.commands.tracing import LineTracer, TracedLine
 from urscript.errors import ScriptCompileError
@@ -37,7 +37,7 @@ def run(
     robot: Annotated[
         str | None,
         typer.Option(
-            help="Arm to run it on, e.g. ur3; none only writes down what it is told.",
+            help="Arm to run it on, e.g. ur3; none only records the calls.",
             show_default="the first that is installed",
         ),
     ] = None,
@@ -57,25 +57,25 @@ def run(
     trace: Annotated[
         bool, typer.Option("--trace", help="Show each line before it is executed: cycle, thread, line.")
     ] = False,
-    trace_lines: Annotated[int, typer.Option(help="Lines after which --trace falls silent.", min=1)] = 1000,
+    trace_lines: Annotated[int, typer.Option(help="Lines after which --trace stops.", min=1)] = 1000,
 ) -> None:
     """Run a program on an emulated robot, as fast as it goes; exit 1 if it is wrong or fails."""
     if trace and as_json:
         raise typer.BadParameter("--trace shows lines, --json one document: choose one")
     catalogue = catalogue_of(software)
     source = Source(read_program(file), shown_name(file))
-    story: Story = JsonStory(source, str(file)) if as_json else TextStory(source, quiet=quiet)
+    output: RunOutput = JsonOutput(source, str(file)) if as_json else TextOutput(source, quiet=quiet)
     make = _find_robot(robot, fidelity, seed, catalogue, answer or ())
     try:
         program = compile_program(source.text, catalogue=catalogue, name=source.name)
     except ScriptCompileError as error:
-        story.wrong(explained(error))
+        output.compile_error(with_advice(error))
         raise typer.Exit(1) from None
     n_lines = trace_lines if trace else 0
     if make is None:
-        status = _run_without_robot(program, catalogue, limit, story, n_lines)
+        status = _run_without_robot(program, catalogue, limit, output, n_lines)
     else:
-        status = _run_on(make(), program, limit, story, n_lines)
+        status = _run_on(make(), program, limit, output, n_lines)
     if EXIT_CODES[status]:
         raise typer.Exit(EXIT_CODES[status])
 
@@ -83,7 +83,7 @@ def run(
 def _find_robot(
     name: str | None, fidelity: str | None, seed: int, catalogue: Catalogue, answers: Sequence[str]
 ) -> Callable[[], ScriptRobot] | None:
-    """What makes the robot of that name, or the usual one; None for none."""
+    """A function that makes the robot of that name, or the first one installed; None for no robot."""
     if name == NO_ROBOT:
         return None
     makers = find_makers()
@@ -114,34 +114,34 @@ def _require_known(fidelity: str | None, maker: RobotMaker) -> None:
 
 
 def _run_on(
-    robot: ScriptRobot, program: CompiledProgram, limit: float, story: Story, trace_lines: int
+    robot: ScriptRobot, program: CompiledProgram, limit: float, output: RunOutput, trace_lines: int
 ) -> RunStatus:
-    watch = MoveWatch(program, robot.step_time, lambda: robot.time, story.move)
+    watch = MoveWatch(program, robot.step_time, lambda: robot.time, output.move)
 
     def report(report: Report) -> None:
         watch.flush(all_streams=False)
-        story.report(report)
+        output.report(report)
 
     with _tracer(program, lambda: round(robot.time / robot.step_time), trace_lines):
         end = robot.run(watch.program, limit, report)
     watch.flush()
-    story.end(end.status, end.robot_time, robot.title, end)
+    output.end(end.status, end.robot_time, robot.title, end)
     return end.status
 
 
 def _run_without_robot(
-    program: CompiledProgram, catalogue: Catalogue, limit: float, story: Story, trace_lines: int
+    program: CompiledProgram, catalogue: Catalogue, limit: float, output: RunOutput, trace_lines: int
 ) -> RunStatus:
     def seconds() -> float:
         return host.cycle * host.step_time
 
-    def tell_call(call: RecordedCall) -> None:
-        story.call(seconds(), call.thread, call.name, call.arguments)
+    def report_call(call: RecordedCall) -> None:
+        output.call(seconds(), call.thread, call.name, call.arguments)
 
-    def tell_text(text: str) -> None:
-        story.report(Report(seconds(), ReportKind.TEXT, text))
+    def report_text(text: str) -> None:
+        output.report(Report(seconds(), ReportKind.TEXT, text))
 
-    host = RecordingHost(catalogue=catalogue, on_message=tell_text, on_call=tell_call)
+    host = RecordingHost(catalogue=catalogue, on_message=report_text, on_call=report_call)
     status = RunStatus.FINISHED
     try:
         with _tracer(program, lambda: host.cycle, trace_lines):
@@ -153,16 +153,16 @@ def _run_without_robot(
             status = RunStatus.FAILED
             error = running.error
             failure = Report(seconds(), ReportKind.FAILURE, error.message, error.line, error.column)
-            story.report(failure)
+            output.report(failure)
         elif running.status is ProgramStatus.RUNNING:
             status = RunStatus.RUNNING
             running.kill()
-    story.end(status, seconds(), "no robot", None)
+    output.end(status, seconds(), "no robot", None)
     return status
 
 
 def _tracer(program: CompiledProgram, cycle: Callable[[], int], limit: int) -> AbstractContextManager[Any]:
-    """Shows up to `limit` lines while they are executed; none for 0."""
+    """Prints up to `limit` lines while they are executed; none for 0."""
     if not limit:
         return nullcontext()
 

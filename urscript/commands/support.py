@@ -30,7 +30,7 @@ def catalogue_of(software: str) -> Catalogue:
 
 
 def shown_name(file: Path) -> str:
-    """What people know a program by."""
+    """The name of a program in messages."""
     return "<stdin>" if file == STANDARD_INPUT else str(file)
 
 
@@ -50,7 +50,7 @@ def echo_json(**document: Any) -> None:
 
 
 def show(text: str, *, error: bool = False) -> None:
-    """A line of a running program; whoever has read enough of them (`| head`) ends the run."""
+    """Print a line of a running program; a closed pipe (`| head`) ends the run."""
     try:
         typer.echo(as_utf8(text), err=error)
     except BrokenPipeError:

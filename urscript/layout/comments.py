@@ -1,7 +1,7 @@
-"""Text -> rows of tokens with the comments between them: what the tree leaves out and a formatter needs.
+"""Text -> logical lines of tokens, and the comments between them: what a formatter needs beside the tree.
 
-A row is what stands on one line of the canonical layout: a short statement, the head of a block up to its
-colon, `else:`, `end`. Comments are nothing but what is left between two tokens besides blanks.
+A logical line is one line of the canonical layout: a short statement, the head of a block up to its colon,
+`else:`, `end`. A comment is what stands between two tokens besides spaces.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Comment(NamedTuple):
         return self.position + len(self.text)
 
 
-class Piece(NamedTuple):
+class RuleToken(NamedTuple):
     """One token and the rule of the grammar it stands in."""
 
     token: Token
@@ -62,16 +62,16 @@ class Piece(NamedTuple):
         return self.token.end_pos or 0
 
 
-class Row(NamedTuple):
+class LogicalLine(NamedTuple):
     """The tokens of one line of the canonical layout, and how many blocks it stands in."""
 
     level: int
-    pieces: tuple[Piece, ...]
+    tokens: tuple[RuleToken, ...]
 
 
-def read_rows(source: Source) -> list[Row]:
-    """The rows of a program that `parser.parse` accepts."""
-    return list(_rows(_concrete_parser().parse(source.text)))
+def read_logical_lines(source: Source) -> list[LogicalLine]:
+    """The logical lines of a program that `parser.parse` accepts."""
+    return list(_logical_lines(_concrete_parser().parse(source.text)))
 
 
 def read_comments(text: str, start: int, end: int) -> list[Comment]:
@@ -99,30 +99,30 @@ def _concrete_parser() -> Lark:
 _COMPOUND: Final = frozenset({"function", "thread", "if_", "elif_", "while_"})
 
 
-def _rows(program: Tree[Any]) -> Iterator[Row]:
-    """The rows from top to bottom; with a stack of its own: programs nest deeper than Python calls."""
+def _logical_lines(program: Tree[Any]) -> Iterator[LogicalLine]:
+    """The lines from top to bottom; no recursion, because programs nest deeper than Python calls."""
     stack: list[tuple[int, str, Any]] = [(-1, "start", program.children[0])]
-    head: list[Piece] = []
+    head: list[RuleToken] = []
     while stack:
         level, parent, item = stack.pop()
         rule = str(getattr(item, "data", ""))
         if rule == "block":
             if head:
-                yield Row(level, tuple(head))
+                yield LogicalLine(level, tuple(head))
                 head = []
             stack.extend((level + 1, rule, part) for part in reversed(item.children))
         elif rule in _COMPOUND:
             stack.extend((level, rule, part) for part in reversed(item.children))
         elif parent == "block":
-            yield Row(level, tuple(_pieces(item, parent)))
+            yield LogicalLine(level, tuple(_tokens(item, parent)))
         else:
-            head.extend(_pieces(item, parent))
+            head.extend(_tokens(item, parent))
             if head and head[-1].kind == "END":
-                yield Row(level, tuple(head))
+                yield LogicalLine(level, tuple(head))
                 head = []
 
 
-def _pieces(item: Any, parent: str) -> Iterator[Piece]:
+def _tokens(item: Any, parent: str) -> Iterator[RuleToken]:
     """The tokens of a short statement, or of a part of a longer one, in the order of the text."""
     stack: list[tuple[str, Any]] = [(parent, item)]
     while stack:
@@ -130,4 +130,4 @@ def _pieces(item: Any, parent: str) -> Iterator[Piece]:
         if hasattr(part, "data"):
             stack.extend((str(part.data), inner) for inner in reversed(part.children))
         elif part is not None:
-            yield Piece(part, rule)
+            yield RuleToken(part, rule)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from urscript.errors import ScriptSyntaxError
-from urscript.layout.comments import Comment, Piece, Row, read_comments, read_rows
+from urscript.layout.comments import Comment, LogicalLine, RuleToken, read_comments, read_logical_lines
 from urscript.source import BLANKS, Source
 from urscript.syntax.parser import parse
 from urscript.syntax.walk import same_tree
@@ -41,7 +41,7 @@ def format_program(source: Source) -> str:
     """
     tree = parse(source)
     try:
-        formatted = _render(_Layout(source.text).lines(read_rows(source)))
+        formatted = _render(_Layout(source.text).lines(read_logical_lines(source)))
         unchanged = same_tree(parse(Source(formatted, source.name)), tree)
     except RecursionError:
         message = "the program is nested too deeply"
@@ -52,8 +52,8 @@ def format_program(source: Source) -> str:
 
 
 @dataclass(slots=True)
-class _Line:
-    """A line to be: code, a comment, both, or neither (a blank line)."""
+class _PhysicalLine:
+    """A line of the output: code, a comment, both, or neither (a blank line)."""
 
     indent: str = ""
     code: str = ""
@@ -61,24 +61,26 @@ class _Line:
 
 
 class _Layout:
-    """Sets rows into lines, with the comments and blank lines that stand between them in `text`."""
+    """Makes physical lines of logical ones, with the comments and blank lines between them in `text`."""
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._made: list[_Line] = []
+        self._lines: list[_PhysicalLine] = []
         self._end = 0
 
-    def lines(self, rows: list[Row]) -> list[_Line]:
+    def lines(self, logical_lines: list[LogicalLine]) -> list[_PhysicalLine]:
         """The lines of a whole program."""
-        for row in rows:
-            first = row.pieces[0]
+        for logical in logical_lines:
+            first = logical.tokens[0]
             for comment in self._comments_until(first.start):
-                self._place(comment, INDENT * _comment_level(comment, row, self._column(first.start)))
+                self._add_comment(
+                    comment, INDENT * _comment_level(comment, logical, self._column(first.start))
+                )
             self._keep_blank_line(first.start)
-            self._set(row)
+            self._add(logical)
         for comment in self._comments_until(len(self._text)):
-            self._place(comment, "")
-        return self._made
+            self._add_comment(comment, "")
+        return self._lines
 
     def _comments_until(self, position: int) -> list[Comment]:
         return read_comments(self._text, self._end, position)
@@ -86,114 +88,116 @@ class _Layout:
     def _column(self, position: int) -> int:
         return position - self._text.rfind("\n", 0, position)
 
-    def _place(self, comment: Comment, indent: str) -> None:
+    def _add_comment(self, comment: Comment, indent: str) -> None:
         """A comment behind the line before it, or on a line of its own."""
         if comment.follows_code:
-            self._made[-1].comment = comment.text
+            self._lines[-1].comment = comment.text
         else:
             self._keep_blank_line(comment.position)
-            self._made.append(_Line(indent, comment=comment.text))
+            self._lines.append(_PhysicalLine(indent, comment=comment.text))
         self._end = comment.end
 
     def _keep_blank_line(self, position: int) -> None:
-        if self._made and self._text.count("\n", self._end, position) > 1:
-            self._made.append(_Line())
+        if self._lines and self._text.count("\n", self._end, position) > 1:
+            self._lines.append(_PhysicalLine())
 
-    def _set(self, row: Row) -> None:
-        """One row, on one line unless it was broken at a good place or has comments inside."""
-        indent = INDENT * row.level
-        line = _Line(indent)
-        self._made.append(line)
-        before: Piece | None = None
+    def _add(self, logical: LogicalLine) -> None:
+        """Add one logical line; it breaks only at allowed places where the author broke it, and at comments."""
+        indent = INDENT * logical.level
+        line = _PhysicalLine(indent)
+        self._lines.append(line)
+        before: RuleToken | None = None
         opened: list[int] = []  # for each open bracket the line it stands in
-        for piece in row.pieces:
-            if piece.kind in _CLOSERS:
+        for token in logical.tokens:
+            if token.kind in _CLOSERS:
                 opened.pop()
             if before is not None:
-                comments = self._comments_until(piece.start)
-                deeper = _CONTINUED * (len(set(opened)) if opened or piece.kind in _CLOSERS else 1)
+                comments = self._comments_until(token.start)
+                deeper = _CONTINUED * (len(set(opened)) if opened or token.kind in _CLOSERS else 1)
                 # On the wire only the first line and the last `end` of a program may start in column 1.
                 deeper = deeper or ("" if indent else INDENT)
                 for comment in comments:
                     if not comment.follows_code:
-                        self._made.append(_Line(indent + (deeper or _CONTINUED), comment=comment.text))
+                        self._lines.append(
+                            _PhysicalLine(indent + (deeper or _CONTINUED), comment=comment.text)
+                        )
                     else:
-                        self._made[-1].comment = comment.text
-                if comments or (_may_break(before, piece) and self._is_broken(before, piece)):
-                    line = _Line(indent + deeper)
-                    self._made.append(line)
-                elif _stand_apart(before, piece):
+                        self._lines[-1].comment = comment.text
+                if comments or (_may_break(before, token) and self._is_broken(before, token)):
+                    line = _PhysicalLine(indent + deeper)
+                    self._lines.append(line)
+                elif _needs_space(before, token):
                     line.code += " "
-            if piece.kind in _OPENERS:
-                opened.append(len(self._made))
-            line.code += _spelling(piece)
-            self._end = piece.end
-            before = piece
+            if token.kind in _OPENERS:
+                opened.append(len(self._lines))
+            line.code += _spelling(token)
+            self._end = token.end
+            before = token
 
-    def _is_broken(self, before: Piece, piece: Piece) -> bool:
-        return "\n" in self._text[before.end : piece.start]
+    def _is_broken(self, before: RuleToken, token: RuleToken) -> bool:
+        return "\n" in self._text[before.end : token.start]
 
 
-def _comment_level(comment: Comment, row: Row, column: int) -> int:
-    """How deep a comment before `row` stands: before `end` it belongs to the block that ends.
+def _comment_level(comment: Comment, logical: LogicalLine, column: int) -> int:
+    """The level of a comment before `logical`: before `end` it belongs to the block that ends.
 
     Before `elif` and `else` it belongs to the block that ends if it is indented more than the word.
     """
-    first = row.pieces[0].kind
+    first = logical.tokens[0].kind
     ends_block = first == "END" or (first in ("ELIF", "ELSE") and comment.column > column)
-    return row.level + ends_block
+    return logical.level + ends_block
 
 
-def _spelling(piece: Piece) -> str:
-    if piece.kind == "LABEL":
-        text = piece.token[1:].strip(BLANKS)
+def _spelling(token: RuleToken) -> str:
+    if token.kind == "LABEL":
+        text = token.token[1:].strip(BLANKS)
         return f"$ {text}" if text else "$"
-    return str(piece.token)
+    return str(token.token)
 
 
-def _is_sign(piece: Piece) -> bool:
-    return piece.rule == "prefix" and piece.kind != "NOT"
+def _is_sign(token: RuleToken) -> bool:
+    return token.rule == "prefix" and token.kind != "NOT"
 
 
-def _is_operator(piece: Piece) -> bool:
-    return piece.kind in _OPERATORS and piece.rule != "prefix"
+def _is_operator(token: RuleToken) -> bool:
+    return token.kind in _OPERATORS and token.rule != "prefix"
 
 
-def _may_break(before: Piece, piece: Piece) -> bool:
+def _may_break(before: RuleToken, token: RuleToken) -> bool:
     """Whether a line break of the author between two tokens is kept."""
-    if before.kind in _OPENERS and piece.kind in _CLOSERS:
+    if before.kind in _OPENERS and token.kind in _CLOSERS:
         return False
     return (
         before.kind == "COMMA"
         or before.kind in _OPENERS
-        or piece.kind in _CLOSERS
+        or token.kind in _CLOSERS
         or _is_operator(before)
-        or _is_operator(piece)
+        or _is_operator(token)
     )
 
 
-def _stand_apart(before: Piece, piece: Piece) -> bool:
+def _needs_space(before: RuleToken, token: RuleToken) -> bool:
     """Whether a blank stands between two tokens of a line."""
-    kind = piece.kind
+    kind = token.kind
     if kind == "DOT":
         return before.kind in _NUMBERS  # or the dot would become part of the number
     if kind in ("COMMA", "COLON") or kind in _CLOSERS or before.kind == "DOT" or before.kind in _OPENERS:
         return False
     if _is_sign(before):
         return False
-    if kind == "LPAR" and piece.rule in _CALL_LIKE:
+    if kind == "LPAR" and token.rule in _CALL_LIKE:
         return False
-    if kind == "LSQB" and piece.rule == "index":
+    if kind == "LSQB" and token.rule == "index":
         return False
-    return "EQUAL" not in (kind, before.kind) or not (_binds_name(piece) or _binds_name(before))
+    return "EQUAL" not in (kind, before.kind) or not (_binds_name(token) or _binds_name(before))
 
 
-def _binds_name(piece: Piece) -> bool:
+def _binds_name(token: RuleToken) -> bool:
     """Whether it is the `=` of a named argument or of a default."""
-    return piece.kind == "EQUAL" and piece.rule in ("named_argument", "param")
+    return token.kind == "EQUAL" and token.rule in ("named_argument", "param")
 
 
-def _render(lines: list[_Line]) -> str:
+def _render(lines: list[_PhysicalLine]) -> str:
     """The text of `lines`, comments behind neighbouring lines aligned."""
     result: list[str] = []
     start = 0
@@ -213,7 +217,7 @@ def _render(lines: list[_Line]) -> str:
     return "".join(result)
 
 
-def _is_aligned(line: _Line) -> bool:
+def _is_aligned(line: _PhysicalLine) -> bool:
     return bool(line.code and line.comment) and len(line.indent) + _width(line.code) <= ALIGNED_WIDTH
 
 

@@ -19,7 +19,7 @@ from urscript.syntax.nodes import Expression
 from urscript.values import Pose
 
 
-class Literal(NamedTuple):
+class KnownValue(NamedTuple):
     """What is known of a value before the program runs.
 
     Attributes:
@@ -60,21 +60,21 @@ def _arguments(
 
 
 def _refused(builtin: Builtin, param: Param, argument: Expression) -> str | None:
-    literal = _literal(argument)
-    if literal is None:
+    known = _known_value(argument)
+    if known is None:
         return None
-    if literal.whole:
+    if known.whole:
         try:
-            compile_check(replace(builtin, params=(param,)))([literal.value])
+            compile_check(replace(builtin, params=(param,)))([known.value])
         except ScriptRuntimeError as error:
             return error.message
         return None
-    if fits(param.type, literal.value):
+    if fits(param.type, known.value):
         return None
-    return type_error(builtin.name, param.name, param.type, literal.value).message
+    return type_error(builtin.name, param.name, param.type, known.value).message
 
 
-def _literal(expression: Expression) -> Literal | None:
+def _known_value(expression: Expression) -> KnownValue | None:
     """What is known of an expression; None if nothing is."""
     match expression:
         case (
@@ -83,19 +83,19 @@ def _literal(expression: Expression) -> Literal | None:
             | nodes.BoolLiteral(value=value)
             | nodes.StringLiteral(value=value)
         ):
-            return Literal(value, True)
+            return KnownValue(value, True)
         case nodes.Prefix(
             operator="-" | "+" as sign, operand=nodes.IntLiteral() | nodes.FloatLiteral() as number
         ):
-            return Literal(-number.value if sign == "-" else number.value, True)
+            return KnownValue(-number.value if sign == "-" else number.value, True)
         case nodes.ListLiteral(items=items) | nodes.PoseLiteral(items=items):
-            parts = [_literal(item) for item in items]
+            parts = [_known_value(item) for item in items]
             if any(isinstance(item, nodes.ListLiteral) for item in items):
                 return None  # a matrix
             values = [0 if part is None else part.value for part in parts]
             whole = all(part is not None and part.whole for part in parts)
             if isinstance(expression, nodes.ListLiteral):
-                return Literal(values, whole)
+                return KnownValue(values, whole)
             if all(type(value) in (int, float) for value in values):
-                return Literal(Pose.of(values), whole)
+                return KnownValue(Pose.of(values), whole)
     return None

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Final
 
 from urscript.catalogue import Catalogue
-from urscript.catalogue.binding import Shape
+from urscript.catalogue.binding import CallSignature
 from urscript.courtesy import give_way
 from urscript.dialect import MAX_LOOP_DEPTH, Dialect
 from urscript.errors import (
@@ -277,7 +277,7 @@ class _Resolver:
         names = [parameter.name for parameter in callee.node.parameters]
         optional = {parameter.name for parameter in callee.node.parameters if parameter.default is not None}
         try:
-            Shape(call.function, names, optional).check(*_shape(call.arguments))
+            CallSignature(call.function, names, optional).check(*_shape(call.arguments))
         except ScriptTypeError as error:
             self._error(error, call.span)
 

@@ -1,4 +1,4 @@
-"""Text in rough pieces: words, numbers, strings, signs. Unlike the parser's tokens they exist for any text.
+"""A tolerant tokenizer: words, numbers, strings and symbols of any text, also where the parser's lexer fails.
 
 Comments and labels are left out. Offsets count from 0, lines and columns from 1.
 """
@@ -9,12 +9,12 @@ import re
 from bisect import bisect_right
 from typing import Final, NamedTuple
 
-_PIECES: Final = re.compile(
+_TOKENS: Final = re.compile(
     r"""(?P<blank>[ \t\r\n\f\v]+|\#[^\n]*|\$[^\n]*)
     |(?P<string>"[^"\n]*"?)
     |(?P<number>(?:[0-9]|\.[0-9])(?:[eE][+-](?=[0-9])|[\w.])*)
     |(?P<word>[A-Za-z_]\w*)
-    |(?P<sign>==|!=|<=|>=|[\xc2-\xf4][\x80-\xbf]+|.)""",
+    |(?P<symbol>==|!=|<=|>=|[\xc2-\xf4][\x80-\xbf]+|.)""",
     re.VERBOSE | re.DOTALL | re.ASCII,
 )
 
@@ -22,14 +22,14 @@ PAIRS: Final = {"(": ")", "[": "]"}
 CLOSERS: Final = {")": "(", "]": "["}
 
 
-class Piece(NamedTuple):
-    """One piece of text.
+class Token(NamedTuple):
+    """One token.
 
     Attributes:
-        kind: "word", "number", "string", "sign", or "end" behind the last one.
-        text: As written; a character of several bytes is one sign.
+        kind: "word", "number", "string", "symbol", or "end" after the last one.
+        text: As written; a character of several bytes is one symbol.
         start: Offset of its first character.
-        end: Offset behind its last one.
+        end: Offset after its last one.
         line: Line it begins in.
     """
 
@@ -40,25 +40,25 @@ class Piece(NamedTuple):
     line: int
 
 
-class RoughText:
-    """A text and its pieces.
+class TokenizedText:
+    """A text and its tokens.
 
     Attributes:
         text: The text.
-        pieces: Its pieces in order, the last one of kind "end".
+        tokens: Its tokens in order, the last one of kind "end".
     """
 
     def __init__(self, text: str) -> None:
         self.text = text
         self._starts = [0]
         self._starts += [match.end() for match in re.finditer("\n", text)]
-        self.pieces: list[Piece] = []
-        for match in _PIECES.finditer(text):
-            kind = match.lastgroup or "sign"
+        self.tokens: list[Token] = []
+        for match in _TOKENS.finditer(text):
+            kind = match.lastgroup or "symbol"
             if kind != "blank":
                 line = bisect_right(self._starts, match.start())
-                self.pieces.append(Piece(kind, match[0], match.start(), match.end(), line))
-        self.pieces.append(Piece("end", "", len(text), len(text), len(self._starts)))
+                self.tokens.append(Token(kind, match[0], match.start(), match.end(), line))
+        self.tokens.append(Token("end", "", len(text), len(text), len(self._starts)))
 
     def offset(self, line: int, column: int) -> int:
         """The offset of a place."""
@@ -79,21 +79,21 @@ class RoughText:
         return self._starts[number - 1]
 
     def indent(self, number: int) -> int:
-        """Blanks before the first piece of a line; a tab reaches to the next multiple of eight."""
+        """Blanks before the first token of a line; a tab reaches to the next multiple of eight."""
         lead = re.match(r"[ \t]*", self.line(number))
         return len(lead[0].expandtabs(8)) if lead else 0
 
-    def piece_at(self, offset: int) -> int:
-        """Index of the piece at an offset, or of the next one behind it."""
-        low, high = 0, len(self.pieces) - 1
+    def token_at(self, offset: int) -> int:
+        """Index of the token at an offset, or of the next one behind it."""
+        low, high = 0, len(self.tokens) - 1
         while low < high:
             middle = (low + high) // 2
-            if self.pieces[middle].end <= offset:
+            if self.tokens[middle].end <= offset:
                 low = middle + 1
             else:
                 high = middle
         return low
 
     def is_first(self, index: int) -> bool:
-        """Whether a piece is the first of its line."""
-        return index == 0 or self.pieces[index - 1].line != self.pieces[index].line
+        """Whether a token is the first of its line."""
+        return index == 0 or self.tokens[index - 1].line != self.tokens[index].line

@@ -1,4 +1,4 @@
-"""What happens while a program runs, told line by line or kept for one JSON document: `urscript run`."""
+"""Output of `urscript run`: lines while the program runs, or one JSON document after it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 from urscript.source import Source, as_utf8
 from urscript.values import Matrix, Pose, str_form
 
-GOALS = ("q", "pose", "pose_to", "qd", "xd")
-"""Parameters of moves that say where to, or how fast, in the order of preference."""
+TARGETS = ("q", "pose", "pose_to", "qd", "xd")
+"""Parameters of moves that give the target position or speed, in order of preference."""
 
-ENDS = {
+LAST_LINES = {
     RunStatus.FINISHED: "finished after {robot:g} s of robot time",
     RunStatus.FAILED: "failed after {robot:g} s of robot time",
     RunStatus.STOPPED: "stopped by the robot after {robot:g} s of robot time",
@@ -27,15 +27,15 @@ ENDS = {
 """The last line, by how the run ended."""
 
 
-class Story(Protocol):
-    """Somebody who is told what happens."""
+class RunOutput(Protocol):
+    """Receives the events of a run."""
 
-    def wrong(self, error: ScriptError) -> None:
+    def compile_error(self, error: ScriptError) -> None:
         """The program does not compile."""
         ...
 
     def report(self, report: Report) -> None:
-        """The robot said something."""
+        """The robot reported something."""
         ...
 
     def move(self, move: WatchedMove) -> None:
@@ -43,28 +43,28 @@ class Story(Protocol):
         ...
 
     def call(self, time: float, thread: str, name: str, arguments: Sequence[Any]) -> None:
-        """A builtin with an effect was called on a robot that only writes down."""
+        """A builtin with an effect was called on the recording host."""
         ...
 
     def end(self, status: RunStatus, robot_time: float, robot: str, run: RunEnd | None) -> None:
-        """The run has ended; `robot` in words, and what became of it if there was one."""
+        """The run has ended; `robot` is its title, `run` its final state if there was one."""
         ...
 
 
-class TextStory:
-    """Tells at once, in lines: what the program does on standard output, what becomes of it on the other."""
+class TextOutput:
+    """Prints lines at once: what the program does to standard output, errors and the result to the other."""
 
     def __init__(self, source: Source, *, quiet: bool) -> None:
-        """Args: the program; quiet: the texts of textmsg and what went wrong only."""
+        """Args: the program; quiet: print texts of textmsg and errors only."""
         self._source = source
         self._quiet = quiet
 
-    def wrong(self, error: ScriptError) -> None:
-        """Show the error with its place."""
+    def compile_error(self, error: ScriptError) -> None:
+        """Print the error with its place."""
         show(error.render(), error=True)
 
     def report(self, report: Report) -> None:
-        """Show a text as it is, everything else with its time, errors with their place."""
+        """Print a text unchanged, errors with their place, everything else with its time."""
         kind, text = report.kind, report.text
         if kind is ReportKind.TEXT:
             show(text)
@@ -79,37 +79,37 @@ class TextStory:
             show(f"{report.time:9.3f} s  {kind.value} {text}")
 
     def move(self, move: WatchedMove) -> None:
-        """Show where it led and how long it took."""
+        """Print its target and duration."""
         if self._quiet:
             return
-        goal = next((move.arguments[name] for name in GOALS if name in move.arguments), None)
+        goal = next((move.arguments[name] for name in TARGETS if name in move.arguments), None)
         where = f" {_rounded(goal)}" if goal is not None else ""
         calls = f" in {move.calls} calls" if move.calls > 1 else ""
-        broken = "" if move.completed else ", broken off"
+        broken = "" if move.completed else ", interrupted"
         thread = f" ({move.thread})" if not move.in_main else ""
         what = f"line {move.line}{thread}: {move.name}{where}, {move.duration:g} s{calls}{broken}"
         show(f"{move.start:9.3f} s  {what}")
 
     def call(self, time: float, thread: str, name: str, arguments: Sequence[Any]) -> None:
-        """Show the call."""
+        """Print the call."""
         if not self._quiet:
             show(f"{time:9.3f} s  {thread}: {name}({', '.join(map(_argument, arguments))})")
 
     def end(self, status: RunStatus, robot_time: float, robot: str, run: RunEnd | None) -> None:
-        """Show where the arm is, and the times."""
+        """Print the position of the arm, and the times."""
         if run is not None and not self._quiet:
-            joints = ", ".join(f"{_plain(degrees(angle), 2)}" for angle in run.joints)
+            joints = ", ".join(f"{_decimal(degrees(angle), 2)}" for angle in run.joints)
             show(f"joints {_rounded(list(run.joints))} rad, [{joints}] deg")
             show(f"TCP    {_rounded(Pose.of(run.tcp_pose))} m, rad")
-        # A failing program has said why; nobody but who wants to know everything wants more.
+        # The error of a failed program is printed already.
         if status is RunStatus.RUNNING or status is RunStatus.INTERRUPTED or not self._quiet:
-            last = ENDS[status].format(robot=round(robot_time, 3))
+            last = LAST_LINES[status].format(robot=round(robot_time, 3))
             real = f", {run.real_time:.1f} s of real time" if run is not None else ""
             show(f"{last}{real} ({robot})", error=True)
 
 
-class JsonStory:
-    """Keeps everything and tells it at the end, as one JSON document."""
+class JsonOutput:
+    """Collects everything and prints it at the end, as one JSON document."""
 
     def __init__(self, source: Source, file: str) -> None:
         """Args: the program; name of its file."""
@@ -118,13 +118,13 @@ class JsonStory:
         self._events: list[dict[str, Any]] = []
         self._errors: list[ScriptError] = []
 
-    def wrong(self, error: ScriptError) -> None:
+    def compile_error(self, error: ScriptError) -> None:
         """Keep the error; there is no run."""
         self._errors.append(error)
-        self._tell("failed", None, "", None)
+        self._print("failed", None, "", None)
 
     def report(self, report: Report) -> None:
-        """Keep it; what the program failed of is a diagnostic too."""
+        """Keep it; the failure of the program is a diagnostic too."""
         if report.kind is ReportKind.FAILURE:
             self._errors.append(_located(ScriptRuntimeError(report.text), self._source, report))
         text = as_utf8(report.text)
@@ -149,13 +149,13 @@ class JsonStory:
         self._add("call", time, 0, name=name, thread=thread, arguments=list(map(_json_value, arguments)))
 
     def end(self, status: RunStatus, robot_time: float, robot: str, run: RunEnd | None) -> None:
-        """Tell all of it."""
-        self._tell(status.value, round(robot_time, 6), robot, run)
+        """Print the document."""
+        self._print(status.value, round(robot_time, 6), robot, run)
 
     def _add(self, kind: str, time: float, line: int, **more: Any) -> None:
         self._events.append({"kind": kind, "time": round(time, 6), "line": line or None, **more})
 
-    def _tell(self, status: str, robot_time: float | None, robot: str, run: RunEnd | None) -> None:
+    def _print(self, status: str, robot_time: float | None, robot: str, run: RunEnd | None) -> None:
         echo_json(
             file=self._file,
             robot=robot,
@@ -170,7 +170,7 @@ class JsonStory:
 
 
 class _RobotError(ScriptError):
-    """Something that the controller reports with a code."""
+    """An error that the controller reports with a code."""
 
     kind = "Robot"
 
@@ -184,15 +184,15 @@ def _argument(value: Any) -> str:
 
 
 def _rounded(value: Any) -> str:
-    """A goal with four decimals at most."""
+    """A target with four decimals at most."""
     if isinstance(value, (list, Pose)) and all(isinstance(item, (int, float)) for item in value):
-        items = ", ".join(_plain(item, 4) for item in value)
+        items = ", ".join(_decimal(item, 4) for item in value)
         return f"p[{items}]" if isinstance(value, Pose) else f"[{items}]"
     return _argument(value)
 
 
-def _plain(value: float, decimals: int) -> str:
-    """A number rounded, without trailing zeros and without a minus before nothing."""
+def _decimal(value: float, decimals: int) -> str:
+    """A rounded number without trailing zeros and without a negative zero."""
     text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
