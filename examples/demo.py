@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 
 from pc_client.analysis.report import build_report, build_tables
-from pc_client.analysis.side_by_side import build_side_by_side
+from pc_client.analysis.side_by_side_page import build_side_by_side
 from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import ClientError

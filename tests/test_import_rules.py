@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -100,13 +101,14 @@ LEVELS = [
 
 
 def imported_modules(path):
+    """Return every imported module or name, in full."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module in OURS:
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            yield node.module
+        elif isinstance(node, ast.ImportFrom):
+            here = path.relative_to(ROOT).parent.parts if node.level else ()
+            origin = ".".join((*here, node.module) if node.module else here)
+            yield from (f"{origin}.{alias.name}" for alias in node.names)
 
 
 def imports(path):
@@ -151,6 +153,20 @@ def test_the_parts_of_a_package_import_in_one_direction(package, order, level):
         and module.removeprefix(f"{package}.").split(".")[0] not in allowed
     }
     assert not wrong
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    paths = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for package in OURS
+        for path in modules(package)
+    }
+
+    def module_of(name):  # an imported name is a module, or is in one
+        return name if name in paths else name.rpartition(".")[0]
+
+    graph = {name: {module_of(m) for m in imported_modules(path)} - {name} for name, path in paths.items()}
+    list(TopologicalSorter(graph).static_order())  # its CycleError names the circle
 
 
 @pytest.mark.parametrize("package", sorted(OURS))

@@ -29,7 +29,7 @@ def report(
         show_report(folders[0])
         return
     from pc_client.analysis.report import build_report
-    from pc_client.analysis.side_by_side import build_side_by_side
+    from pc_client.analysis.side_by_side_page import build_side_by_side
 
     page = out or Path("report.html")
     shown = build_side_by_side([build_report(folder, console) for folder in folders], page)

@@ -12,7 +12,8 @@ from rich.console import Console
 
 from pc_client import cli
 from pc_client.analysis.report import Report, build_report, build_tables
-from pc_client.analysis.side_by_side import build_side_by_side, side_by_side
+from pc_client.analysis.side_by_side import side_by_side
+from pc_client.analysis.side_by_side_page import build_side_by_side
 from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
 from pc_client.errors import RecordingError
 
