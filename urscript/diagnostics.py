@@ -28,10 +28,10 @@ ERROR_CODES: Final[dict[type[ScriptError], str]] = {
 
 
 class Diagnostic(NamedTuple):
-    """Something about a program, with its place.
+    """An error or warning about a program, with its place.
 
     Lines and columns count from 1 and columns count bytes, as in a controller's messages; `end_column` is the
-    one just after the last character.
+    one after the last character.
     """
 
     file: str

@@ -1,12 +1,12 @@
-"""Every choice about the language that no document settles, in one place, with what is known.
+"""Every decision about the language that no document answers, in one place, with what is known.
 
-Two kinds: what differs between software generations or deserves a switch is a field of `Dialect`; what is
-merely unknown is a constant. Letters: D documented, O observed, I inferred, U unknown. `docs/fidelity.md`
+Two kinds: what differs between software generations is a field of `Dialect`; what is only unknown is a
+constant. Letters: D documented, O observed, I inferred, U unknown. `docs/fidelity.md`
 lists the U rows for users.
 
-Choices that are no switch, and where they are made:
+Decisions without a constant, and where they are made:
 
-| question (all U) | our reading | made in |
+| question (all U) | decision | made in |
 |---|---|---|
 | hexadecimal literals, a line end in a string | refused | grammar.lark |
 | a label behind a statement, `return` without a value | accepted | grammar.lark |
@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 STATEMENT_BUDGET: Final = 110_000
-"""Statements a thread may run in one cycle (U): a loop of 100,000 rounds and what stands around it. Exported
+"""Statements a thread may run in one cycle (U): a loop of 100,000 iterations and the code around it. Exported
 programs run thousands of assignments at their start without a sync, so real budgets are at least 10^4 to
 10^5 (O)."""
 
@@ -35,21 +35,21 @@ PROGRAM_BUDGET: Final = 4
 """All threads of a program together may run this many times STATEMENT_BUDGET in one cycle (U)."""
 
 LONGEST_STRING: Final = 65_536
-"""Characters of a string that `+` makes (U; str_cat and to_str end at 1023, D). Without an end, one that is
-added to itself fills the memory within thirty statements."""
+"""Characters of a string that `+` makes (U; str_cat and to_str end at 1023, D). Without a limit, a string
+that is added to itself thirty times fills the memory."""
 
 RECURSION_LIMIT: Final = 200
-"""Depth at which a recursive function is stopped with a run-time error (U; no field script recurses)."""
+"""Depth at which a recursive function fails with a run-time error (U; no field script recurses)."""
 
 MAX_LOOP_DEPTH: Final = 16
-"""Loops that may stand inside each other (U). The oldest Python that runs the box allows 20 blocks; a
+"""Nesting of loops that is allowed (U). The oldest Python that runs the box allows 20 blocks; a
 recursive function needs one more."""
 
 MAX_THREADS: Final = 200
-"""Threads that one program may have running at the same time (U). Driver scripts have a handful."""
+"""Threads that one program may have running at the same time (U). Driver scripts have a few."""
 
 INT_OVERFLOW: Literal["wrap", "error"] = "wrap"
-"""Results outside 32 bits fold around as in the controller's C (I)."""
+"""Results outside 32 bits wrap around as in the controller's C (I)."""
 
 EXACT_DIVISION_GIVES_INT: Final = False
 """6 / 3 is a float as 7 / 3 is (U). Both print the same; the driver script relies on real division."""
@@ -76,10 +76,10 @@ NONE_FITS_EVERY_VARIABLE: Final = True
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """The switches one program is compiled with.
+    """The language options that one program is compiled with.
 
     Attributes:
-        short_circuit: `and` / `or` leave out the right side when the left decides (U; recommended reading).
+        short_circuit: `and` / `or` do not evaluate the right side when the left decides (U).
         list_resize: What storing a list of another length into a list variable does. "error" since 3.14 /
             5.9.4 (O for 5.9.4-5.14.6, I for 3.14-3.15), "free" before (O).
         array_arithmetic: The arithmetic operators work on lists and matrices: since 3.14 / 5.9 (O).

@@ -6,13 +6,13 @@
     │   │   └── ScriptLexerError     a character or number that no token starts with
     │   ├── ScriptNameError          a name that is neither defined nor built in
     │   ├── ScriptTypeError          wrong number or names of arguments
-    │   └── ScriptContextError       a statement where it makes no sense (`break` outside a loop)
+    │   └── ScriptContextError       a statement in the wrong context (`break` outside a loop)
     └── ScriptRuntimeError           raised by an operation or a builtin while the program runs
-        └── ScriptBudgetError        a thread computed too long without giving the cycle away
+        └── ScriptBudgetError        a thread computed too long in one cycle
 
-Who raises `ScriptRuntimeError` gives the message only: the interpreter adds the place of the call.
+Code that raises `ScriptRuntimeError` gives the message only: the runtime adds the place of the call.
 `wire_text` is what a controller puts into a runtime-exception message, `log_text` what its log shows,
-`render()` what a person at a terminal wants. This module must not import the rest of the language.
+`render()` is for terminals. This module must not import the rest of the language.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class StackEntry(NamedTuple):
-    """One call on the way to a run-time error: the function and where in it the program was."""
+    """One entry of the call stack of a run-time error: the function and the place in it."""
 
     function: str
     line: int
@@ -40,7 +40,7 @@ class ScriptError(Exception):
         column: From 1; 0 while the place is not known.
         width: Number of characters the caret line underlines.
         source: The text the place refers to.
-        hint: A suggestion such as a name that looks alike.
+        hint: A suggestion such as a similar name.
     """
 
     kind: ClassVar[str] = "Error"
@@ -80,14 +80,14 @@ class ScriptError(Exception):
         return f"{self.kind}: {self.message}"
 
     def headline(self) -> str:
-        """One line for people: file, line, column, kind, message, suggestion."""
+        """One line: file, line, column, kind, message, hint."""
         where = self.source.name if self.source else "<program>"
         place = f"{where}:{self.line}:{self.column}: " if self.line else ""
         hint = f" ({self.hint})" if self.hint else ""
         return f"{place}{self.kind}: {self.message}{hint}"
 
     def render(self) -> str:
-        """The headline, the source line and a caret below the place."""
+        """The headline, the source line and a caret line."""
         if self.source is None or not self.line:
             return self.headline()
         return f"{self.headline()}\n{self.source.caret(self.line, self.column, self.width)}"
@@ -103,11 +103,11 @@ class ScriptCompileError(ScriptError):
 
 
 class ScriptSyntaxError(ScriptCompileError):
-    """The text does not follow the grammar; the place is where the parser noticed.
+    """The text does not follow the grammar; the place is where the parser detected it.
 
     Attributes:
-        unexpected: Terminal of the grammar that the parser met there; empty if it met none.
-        accepted: Terminals that it would have taken.
+        unexpected: Terminal of the grammar that was found; empty if none was.
+        accepted: Terminals that were expected.
     """
 
     kind = "Syntax error"
@@ -153,7 +153,7 @@ class ScriptTypeError(ScriptCompileError):
 
 
 class ScriptContextError(ScriptCompileError):
-    """A statement or name where it makes no sense."""
+    """A statement or name in the wrong context."""
 
     kind = "Contextual error"
 
@@ -162,7 +162,7 @@ class ScriptRuntimeError(ScriptError):
     """Raised by an operation or a builtin while the program runs.
 
     Attributes:
-        stack: The calls on the way, outermost first; the last entry is the place of the error.
+        stack: The call stack, outermost call first; the last entry is the place of the error.
     """
 
     kind = "Runtime error"
@@ -181,7 +181,7 @@ class ScriptRuntimeError(ScriptError):
 
 
 class ScriptBudgetError(ScriptRuntimeError):
-    """A thread computed too long without giving the cycle away. Source: CB3 3.4 log text."""
+    """A thread computed too long in one control cycle. Source: CB3 3.4 log text."""
 
     def __init__(self) -> None:
         super().__init__(

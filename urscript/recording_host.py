@@ -1,7 +1,7 @@
-"""A host without a robot: it writes down what the program does and answers from what was written.
+"""A host without a robot: it records the calls of a program and answers from what they stored.
 
-Moves take three cycles and arrive, registers and outputs read back what was stored, sockets deliver what a
-test put into them. Used by `urscript run` and by tests; it models no physics on purpose.
+Moves take three cycles and reach their target, registers and outputs read back what was stored, sockets
+deliver prepared data. Used by `urscript run` and by tests; it models no physics.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
 from urscript.values import Pose
 
 MOVE_CYCLES: Final = 3
-"""How long every move takes that does not say a time itself."""
+"""Duration of a move without the argument `t`."""
 
 _ZERO_POSE: Final = Pose(0, 0, 0, 0, 0, 0)
 
@@ -38,13 +38,13 @@ class RecordedCall(NamedTuple):
 
 
 class FakeSocket:
-    """What a peer sends: frames of integers, in order; `closed` after the last one."""
+    """A peer that sends frames of integers, in order; `closed` after the last one."""
 
     def __init__(self, frames: Iterable[list[int]] = (), closed: bool = False) -> None:
         self.frames: deque[list[int]] = deque(frames)
         self.closed = closed
 
-    def has_news(self) -> bool:
+    def is_readable(self) -> bool:
         """Whether a read would return at once."""
         return bool(self.frames) or self.closed
 
@@ -86,7 +86,7 @@ class RecordingHost:
         self._on_message = on_message
         self._on_call = on_call
 
-    # --- the contract of a host --------------------------------------------------------------------------
+    # --- interface of a host --------------------------------------------------------------------------
 
     def builtins(self) -> Mapping[str, HostFunction]:
         """Every builtin of the catalogue that is not pure."""
@@ -148,14 +148,14 @@ class RecordingHost:
         if builtin.returns == "None" or name.startswith("socket_"):
             self._record(thread, name, arguments)
             if arguments:
-                self._stored[_memory(name), str(arguments[0])] = arguments[-1]
+                self._stored[_register_name(name), str(arguments[0])] = arguments[-1]
             return True if name.startswith("socket_send") else None
         if name.startswith("get_") and "joint_positions" in name:
             return self.q
         if name.startswith("get_") and "tcp_pose" in name:
             return self.tcp_pose
         key = str(arguments[0]) if arguments else ""
-        return self._stored.get((_memory(name), key), _default(builtin))
+        return self._stored.get((_register_name(name), key), _default(builtin))
 
     def _answer_later(
         self, builtin: Builtin, thread: ScriptThread, *arguments: Any
@@ -190,22 +190,22 @@ class RecordingHost:
         self, thread: ScriptThread, number: int, socket_name: str, timeout: float
     ) -> Generator[Wait, None, list[int]]:
         peer = self.sockets.get(socket_name)
-        if peer is not None and not peer.has_news():
-            yield Blocked(peer.has_news, outside=True)
+        if peer is not None and not peer.is_readable():
+            yield Blocked(peer.is_readable, outside=True)
         if peer is None or not peer.frames:
             return [0] + [-1] * number
         return [number, *peer.frames.popleft()]
 
 
-def _memory(name: str) -> str:
-    """What a setter and its getter have in common: `set_standard_digital_out` -> `standard_digital_out`."""
+def _register_name(name: str) -> str:
+    """The common part of the names of setter and getter: `set_standard_digital_out` -> `standard_digital_out`."""
     for prefix in ("set_", "get_", "write_", "read_"):
         name = name.removeprefix(prefix)
     return name
 
 
 def _default(builtin: Builtin) -> Any:
-    """Something of the type that `builtin` returns."""
+    """A value of the type that `builtin` returns."""
     kind = builtin.returns
     if kind.startswith("bool"):
         return False

@@ -1,7 +1,7 @@
-"""What `urscript run` needs of a robot, and how it finds the robots that are installed.
+"""The interface of robots for `urscript run`, and the search for installed ones.
 
-The language knows no robot. A package that has one announces a `RobotMaker` as an entry point of the group
-`urscript.robots`; nothing of it is imported before a program is to run on it.
+The language knows no robot. A package that has one declares a `RobotMaker` as an entry point of the group
+`urscript.robots`; it is imported when a program is to run on it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ GROUP: Final = "urscript.robots"
 
 
 class ReportKind(Enum):
-    """What a robot has to say while a program runs."""
+    """What a robot reports while a program runs."""
 
     TEXT = "text"
     POPUP = "popup"
@@ -29,14 +29,14 @@ class ReportKind(Enum):
 
 
 class Report(NamedTuple):
-    """Something a robot said.
+    """One report of a robot.
 
     Attributes:
         time: Seconds of robot time since the program began.
         kind: TEXT of textmsg, a POPUP or QUESTION to the operator, a CODE of the controller such as C204A3,
-            the FAILURE of the program, a NOTICE of the robot to whoever watches.
+            the FAILURE of the program, or another NOTICE.
         text: One line.
-        line: Line of the program it is about, from 1; 0 if it is about none.
+        line: Line of the program that it concerns, from 1; 0 for none.
         column: Column there, from 1.
     """
 
@@ -58,13 +58,13 @@ class RunStatus(Enum):
 
 
 class RunEnd(NamedTuple):
-    """What a run has come to, the arm at rest.
+    """The result of a run, the arm at rest.
 
     Attributes:
         status: The program FINISHED or FAILED, a protective stop STOPPED it, it was still RUNNING at the
             limit, or somebody pressed Ctrl-C.
         robot_time: Seconds of robot time from the start to the end of the program.
-        real_time: Seconds it took.
+        real_time: Seconds that the run took.
         joints: Measured joint angles (rad), (6,).
         tcp_pose: Measured pose of the tool centre point in the base frame (m, rad), (6,).
     """
@@ -77,7 +77,7 @@ class RunEnd(NamedTuple):
 
 
 class ScriptRobot(Protocol):
-    """A robot to try a program on: its time runs as fast as it can, and stands still between runs."""
+    """A robot on which a program runs; its time advances as fast as possible, and only during runs."""
 
     title: str
     """One line: which robot it is."""
@@ -91,21 +91,21 @@ class ScriptRobot(Protocol):
         ...
 
     def run(self, program: CompiledProgram, limit: float, report: Callable[[Report], None]) -> RunEnd:
-        """Run `program` to its end and the arm to rest, for `limit` seconds of robot time at most.
+        """Run `program` to its end, then until the arm is at rest, for at most `limit` seconds of robot time.
 
-        Ctrl-C ends the run; what `report` raises goes through.
+        Ctrl-C ends the run; exceptions of `report` are not caught.
         """
         ...
 
 
 class RobotMaker(Protocol):
-    """Makes robots: the object that an entry point names."""
+    """Makes robots; an entry point names an object of this type."""
 
     names: Sequence[str]
-    """The robots it knows, the usual one first."""
+    """Names of the robots, the default first."""
 
     fidelities: Sequence[str]
-    """How true they can be made, by name, the usual one first."""
+    """Names of the levels of fidelity, the default first."""
 
     def make(
         self, name: str, *, fidelity: str, seed: int, software: Sequence[int], answers: Sequence[str]
@@ -115,9 +115,9 @@ class RobotMaker(Protocol):
         Args:
             name: One of `names`.
             fidelity: One of `fidelities`.
-            seed: Of everything random in it.
-            software: The version it runs, e.g. (3, 15).
-            answers: What the operator answers to the questions of the program, in order.
+            seed: Of all random numbers.
+            software: Software version, e.g. (3, 15).
+            answers: Answers of the operator to the questions of the program, in order.
         """
         ...
 

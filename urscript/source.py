@@ -1,8 +1,8 @@
-"""Program text with positions: `Source` (the text, its name, its lines) and `Span` (a stretch of it).
+"""Program text with positions: `Source` (the text, its name, its lines) and `Span` (a range of it).
 
 Lines and columns count from 1, as a controller reports them; line 1 is the first line of the text that
-was handed in, on the wire the `def` line. Source: primary interface captures of runtime exceptions.
-This module renders carets; it must not know what is wrong or why.
+was passed, on the wire the `def` line. Source: primary interface captures of runtime exceptions.
+This module renders carets; it knows nothing of errors.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 
 class Span(NamedTuple):
-    """A stretch of program text; `end_column` is the column just after the last character."""
+    """A range of program text; `end_column` is the column after the last character."""
 
     line: int
     column: int
@@ -23,12 +23,12 @@ class Span(NamedTuple):
 NOWHERE = Span(1, 1, 1, 1)
 
 BLANKS: Final = " \t\r\n\f\v"
-"""White space of the language. More than these must not be stripped: in latin-1 text, str.strip() would take
-bytes 0x85 and 0xA0 too, which end many a UTF-8 character."""
+"""White space of the language. str.strip() removes more: in latin-1 text also the bytes 0x85 and 0xA0, which
+occur inside UTF-8 characters."""
 
 
 def as_bytes(text: str) -> str:
-    """Text as a controller sees it, one character a byte."""
+    """Text as a controller receives it, one character a byte."""
     try:
         text.encode("latin-1")
     except UnicodeEncodeError:
@@ -37,7 +37,7 @@ def as_bytes(text: str) -> str:
 
 
 def as_utf8(text: str) -> str:
-    """Text of a program for people: bytes that are UTF-8 become the characters they mean."""
+    """Text of a program for display: UTF-8 bytes are decoded."""
     try:
         return text.encode("latin-1").decode("utf-8")
     except UnicodeError:
@@ -46,7 +46,7 @@ def as_utf8(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One program text and the name that people know it by (a file name, or `<program>`)."""
+    """One program text and its name in messages (a file name, or `<program>`)."""
 
     text: str
     name: str = "<program>"
@@ -63,8 +63,8 @@ class Source:
     def caret(self, line: int, column: int, width: int = 1) -> str:
         """The source line and, below it, carets under `width` characters from `column` on.
 
-        Tabs before the caret are kept, and characters of several bytes count as one, so that it stands below
-        the same character in any terminal.
+        Tabs before the caret are kept, and characters of several bytes count as one, so that the caret stands
+        below its character in any terminal.
         """
         shown = self.line(line)
         before, under = as_utf8(shown[: column - 1]), as_utf8(shown[column - 1 : column - 1 + width])

@@ -7,10 +7,9 @@
 | int | `int`, 32 bit | | matrix | `Matrix` |
 | float | `float` | | pose | `Pose` |
 
-URScript passes everything by value. Here that is done by never changing a list, pose or matrix once it
-exists: assigning to an element makes a new one (`ops.store_item`). So nobody has to copy, as long as
-nobody, host functions included, changes a list in place after it was handed over.
-This module must not compute (see `run.ops`) and must not know the robot.
+URScript passes everything by value. Therefore lists, poses and matrices are never changed in place:
+assigning to an element makes a new value (`elements.store_item`), and no copies are needed. Host functions
+must not change lists either. Operators are in `run.ops`.
 """
 
 from __future__ import annotations
@@ -113,11 +112,11 @@ TYPE_NAMES: Final[dict[type, str]] = {
     Matrix: "matrix",
     Pose: "pose",
 }
-"""Python type -> URScript's word for it; other value classes carry theirs as `script_type`."""
+"""Python type -> its name in URScript; other value classes have theirs as `script_type`."""
 
 
 def type_name(value: Any) -> str:
-    """URScript's word for the type of `value`, for messages."""
+    """The name of the type of `value`, for messages."""
     return TYPE_NAMES.get(type(value)) or str(getattr(value, "script_type", type(value).__name__))
 
 
@@ -136,12 +135,12 @@ def is_number(value: Any) -> bool:
 
 
 def to_script_text(text: str) -> str:
-    """A text from outside as scripts have it: one character for each byte of its UTF-8 form."""
+    """A text as a script string: its UTF-8 bytes, one character a byte."""
     return text.encode("utf-8", "replace").decode("latin-1")
 
 
 def wrap_int(value: int) -> int:
-    """`value` folded into 32 bits, two's complement (see `dialect.INT_OVERFLOW`)."""
+    """`value` wrapped to 32 bits, two's complement (see `dialect.INT_OVERFLOW`)."""
     if dialect.INT_OVERFLOW == "error" and not INT_MIN <= value <= INT_MAX:
         raise ScriptRuntimeError(f"{value} does not fit into an integer of 32 bits")
     return (value - INT_MIN) % 2**32 + INT_MIN
@@ -155,7 +154,7 @@ def _decimals(value: float) -> str:
 def str_form(value: Any) -> str:
     """The text that `to_str` and `str_cat` make, without their length limit.
 
-    Floats have up to six decimals without trailing zeros, elements stand apart by comma and blank.
+    Floats have up to six decimals without trailing zeros, elements are separated by a comma and a space.
     Source: script manual 3.15.4, to_str.
     """
     if isinstance(value, str):

@@ -15,7 +15,7 @@ from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.events import EventQueue, LogAdded
 from ur_emulator.scripting.network import Network, ScriptSocket
 from urscript.errors import ScriptRuntimeError
-from urscript.run.waits import GIVE_WAY, Blocked
+from urscript.run.waits import CHECKPOINT, Blocked
 from urscript.values import log_form
 
 # socket_open gives up after this [s of robot time]. Source: URScript manual, socket_open.
@@ -136,7 +136,7 @@ class ProgramSockets:
             )
             size = find(inbox)
         else:
-            yield GIVE_WAY
+            yield CHECKPOINT
         if not size:
             if len(inbox) > MAX_INBOX:
                 inbox.clear()
@@ -159,7 +159,7 @@ class ProgramSockets:
                 lambda: len(inbox) >= enough or not socket.is_open or clock.program_tick >= end, outside=True
             )
         else:
-            yield GIVE_WAY
+            yield CHECKPOINT
         if not 0 < size <= len(inbox):
             if len(inbox) > MAX_INBOX:
                 inbox.clear()

@@ -102,7 +102,7 @@ class _Layout:
             self._lines.append(_PhysicalLine())
 
     def _add(self, logical: LogicalLine) -> None:
-        """Add one logical line; it breaks only at allowed places where the author broke it, and at comments."""
+        """Add a logical line; it breaks only at allowed places where the author broke it, and at comments."""
         indent = INDENT * logical.level
         line = _PhysicalLine(indent)
         self._lines.append(line)

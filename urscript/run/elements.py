@@ -1,6 +1,6 @@
 """Lists, poses and matrices at run time: literals, reading an element, storing one.
 
-Storing makes a new value and leaves the old one as it was: that is how everything is passed by value.
+Storing makes a new value and does not change the old one, because values are passed by value.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def cell(target: Any, row: Any, column: Any) -> Any:
 
 
 def store_item(value: Any, index: Any, target: Any) -> Any:
-    """What `target` becomes by `target[index] = value`; the old value stays as it is."""
+    """The new value of `target` in `target[index] = value`; the old one does not change."""
     kind = type(target)
     if kind is list:
         place = _position(index, len(target))
@@ -101,7 +101,7 @@ def store_item(value: Any, index: Any, target: Any) -> Any:
 
 
 def store_cell(value: Any, row: Any, column: Any, target: Any) -> Any:
-    """What `target` becomes by `target[row, column] = value`."""
+    """The new value of `target` in `target[row, column] = value`."""
     if type(target) is not Matrix:
         raise ScriptRuntimeError(f"[row, column] needs a matrix, got {a_type(target)}")
     rows, columns = target.shape

@@ -1,7 +1,7 @@
-"""What a program needs from the robot it runs on: the seam between the language and the box.
+"""The interface between a running program and its robot.
 
-The language knows flow, text and mathematics; everything with an effect on the world, or a look at it, is
-a function of the host. `recording_host` is a host without a robot.
+The language implements control flow, text and mathematics; everything that acts on the robot or reads its
+state is a function of the host. `recording_host` is a host without a robot.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ class Host(Protocol):
     """Length of a control cycle in s."""
 
     def builtins(self) -> Mapping[str, HostFunction]:
-        """The effects this robot offers, by URScript name; asked once for each program start.
+        """The builtins of this robot, by URScript name; called once for each start of a program.
 
-        A name that is pure (see `urscript.builtins`) may be offered too and then replaces it: `random`.
+        A function of `urscript.builtins` may be replaced: `random` is.
         """
         ...
 
@@ -36,11 +36,11 @@ class Host(Protocol):
         ...
 
     def thread_ended(self, thread: ScriptThread) -> None:
-        """A thread ended, by itself or killed: what it owned (the arm) is free again."""
+        """A thread ended, by itself or killed: it owns the arm no longer."""
         ...
 
     def program_ended(self) -> None:
-        """The program ended, for whatever reason: close its sockets, leave its modes."""
+        """The program ended, for any reason: close its sockets, leave its modes."""
         ...
 
 

@@ -1,8 +1,8 @@
-"""The budget of a cycle, charged for what takes longer than a statement: arrays, texts, builtins, threads.
+"""Charges the budget of a cycle for operations that take longer than a statement: arrays, strings, builtins.
 
-The compiler counts statements. An operation on a matrix, or a call that solves the arm's kinematics, takes as
-long as hundreds of them; uncounted, a loop of it would keep the box from its cycle for minutes before the
-thread is found to have used too much time. What is too dear for the rest of the budget is not even begun.
+The compiler counts statements. An operation on a matrix, or a call of inverse kinematics, takes as long as
+hundreds of them; without a charge, a loop of it would block the control cycle for minutes before the budget
+is exceeded. An operation that costs more than the rest of the budget is not started.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ COSTS: Final = {
     "socket_send_line": 30,
     "socket_send_string": 30,
 }
-"""Builtin -> statements that a call counts for (C): of what takes longest, by measurement."""
+"""Builtin -> number of statements that a call counts for (C): the slowest ones, by measurement."""
 
 HOST_COST: Final = 10
-"""Of every other builtin that looks at the robot or has an effect on it."""
+"""Of every other builtin of the host."""
 
 PURE_COST: Final = 3
-"""Of every other function of its arguments alone."""
+"""Of every other pure function."""
 
 START_COST: Final = 100
 """Of starting a thread."""
@@ -45,7 +45,7 @@ Function = Callable[..., Any]
 
 
 class Meter:
-    """Takes work off the budget of the thread that runs.
+    """Subtracts costs from the budget of the running thread.
 
     Args:
         namespace: The globals of the compiled program; `_b` is what is left for this cycle.
@@ -55,14 +55,14 @@ class Meter:
         self._namespace = namespace
 
     def charge(self, statements: int) -> None:
-        """Take as much as `statements` would; raises ScriptBudgetError when it is more than is left."""
+        """Charge the cost of `statements`; raises ScriptBudgetError when it exceeds the budget."""
         left = self._namespace["_b"] - statements
         self._namespace["_b"] = left
         if left < 0:
             raise ScriptBudgetError
 
     def operations(self, names: Mapping[str, Any]) -> dict[str, Function]:
-        """The operations of `names` that may meet arrays, charged for each element."""
+        """The operations of `names` that may get arrays, charged for each element."""
         pairs = {name: self._pair(names[name], name == "_mul") for name in _OF_TWO}
         return pairs | {name: self._change(names[name]) for name in _OF_ONE_ARRAY}
 
@@ -85,7 +85,7 @@ class Meter:
         return call
 
     def checked(self, function: Function, cost: int, check: Callable[[Sequence[Any]], None]) -> Function:
-        """A builtin none of whose arguments can be long, charged for the call, its arguments checked."""
+        """A builtin without long arguments, charged for the call; its arguments are checked."""
         namespace = self._namespace
 
         def call(thread: Any, *arguments: Any) -> Any:
@@ -117,7 +117,7 @@ class Meter:
         return operate
 
     def _change(self, operation: Function) -> Function:
-        """Of an operation whose array is its last argument: a literal, a sign, a store."""
+        """Charge an operation whose array is its last argument: a literal, a sign, a store."""
         charge = self.charge
 
         def operate(*arguments: Any) -> Any:

@@ -1,8 +1,8 @@
-"""What the operators do at run time: arithmetic, comparison, conditions.
+"""The operators at run time: arithmetic, comparison, conditions.
 
-The compiler calls these where it cannot tell the types; with evident floats or booleans it emits the
-Python operator itself. The common case, two numbers, comes first in each function. Choices that no
-document settles are named in `dialect`.
+The compiler calls these where the types are not known statically; for known numbers or booleans it emits the
+Python operator. The common case, two numbers, comes first in each function. Undocumented behaviour is decided
+in `dialect`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def add(a: Any, b: Any) -> Any:
                 f"a string of {len(a) + len(b)} characters; allowed: up to {dialect.LONGEST_STRING}"
             )
         return a + b
-    return _spread("+", add, a, b)
+    return _elementwise("+", add, a, b)
 
 
 def sub(a: Any, b: Any) -> Any:
@@ -45,7 +45,7 @@ def sub(a: Any, b: Any) -> Any:
         return result if INT_MIN <= result <= INT_MAX else wrap_int(result)
     if (ta is float or ta is int) and (tb is float or tb is int):
         return a - b
-    return _spread("-", sub, a, b)
+    return _elementwise("-", sub, a, b)
 
 
 def mul(a: Any, b: Any) -> Any:
@@ -58,7 +58,7 @@ def mul(a: Any, b: Any) -> Any:
         return a * b
     if ta is Matrix and (tb is Matrix or tb is list):
         return _matrix_product(a, b)
-    return _spread("*", mul, a, b)
+    return _elementwise("*", mul, a, b)
 
 
 def div(a: Any, b: Any) -> Any:
@@ -70,7 +70,7 @@ def div(a: Any, b: Any) -> Any:
         if dialect.EXACT_DIVISION_GIVES_INT and ta is int and tb is int and a % b == 0:
             return a // b
         return a / b
-    return _spread("/", div, a, b)
+    return _elementwise("/", div, a, b)
 
 
 def mod(a: Any, b: Any) -> Any:
@@ -86,7 +86,7 @@ def mod(a: Any, b: Any) -> Any:
             return -rest if a < 0 else rest
         # As in C; Python's fmod refuses an infinite dividend.
         return fmod(a, b) if isfinite(a) else nan
-    return _spread("%", mod, a, b)
+    return _elementwise("%", mod, a, b)
 
 
 def neg(a: Any) -> Any:
@@ -101,7 +101,7 @@ def neg(a: Any) -> Any:
     if kind is Matrix:
         return Matrix([neg(item) for item in row] for row in a.rows)
     if is_number(a):
-        return neg(_plain(a))
+        return neg(_to_builtin(a))
     raise ScriptRuntimeError(f"a sign needs a number, a list or a matrix of numbers, got {a_type(a)}")
 
 
@@ -112,7 +112,7 @@ def pos(a: Any) -> Any:
 
 
 def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]:
-    """An arithmetic operator of software that knows it for numbers and strings only."""
+    """An arithmetic operator of software in which it takes numbers and strings only."""
 
     def operate(*operands: Any) -> Any:
         if any(type(operand) is list or type(operand) is Matrix for operand in operands):
@@ -123,12 +123,12 @@ def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]
     return operate
 
 
-def _plain(value: Any) -> Any:
-    """A number of some subclass (numpy's, an enum's) as int or float."""
+def _to_builtin(value: Any) -> Any:
+    """A number of a subclass (of numpy, an enum) as int or float."""
     return float(value) if isinstance(value, float) else int(value)
 
 
-def _spread(sign: str, one: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
+def _elementwise(sign: str, one: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
     """Operators on lists and matrices, element by element; anything else is an error.
 
     Source: script manual 3.15.4, array and matrix arithmetic.
@@ -151,7 +151,7 @@ def _spread(sign: str, one: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
         pairs = zip(a.rows, b.rows, strict=True)
         return Matrix([one(x, y) for x, y in zip(left, right, strict=True)] for left, right in pairs)
     if is_number(a) and is_number(b):
-        return one(_plain(a), _plain(b))
+        return one(_to_builtin(a), _to_builtin(b))
     raise ScriptRuntimeError(f"'{sign}' is not defined for {type_name(a)} and {type_name(b)}")
 
 

@@ -1,10 +1,10 @@
-"""Cooperative threads: who runs when within one control cycle.
+"""Cooperative threads: the scheduler of one control cycle.
 
 Every runnable thread runs once a cycle, the main thread first, then the others by age, in the same order
-every cycle; each runs until it uses its slice up (`NEXT_CYCLE`) or waits (`Blocked`). A thread whose
+every cycle; each runs until its time slice ends (`NEXT_CYCLE`) or it waits (`Blocked`). A thread whose
 condition comes true later in the cycle (a `join` on a thread that ends) goes on in the same cycle with
-what is left of its budget. Nothing is ever interrupted, so a critical section is the natural state; calls
-that take time are the only places where others run, inside a critical section too. Source: script manual,
+the rest of its budget. Threads are not preempted, so a critical section needs no code: other threads run
+only during calls that take time, also inside a critical section. Source: script manual,
 thread scheduling; the fixed order: streaming programs stutter without it.
 """
 
@@ -22,7 +22,7 @@ ThreadBody = Generator[Wait, None, Any]
 
 
 class ThreadKilled(BaseException):
-    """Unwinds a thread that killed itself or its parent; no error, so nobody may catch it by accident."""
+    """Unwinds a thread that killed itself or its parent; `except Exception` does not catch it."""
 
 
 class ProgramHalted(BaseException):
@@ -35,12 +35,12 @@ class ScriptThread:
     Attributes:
         thread_id: From 1 (the main thread) in the order of starts.
         name: Name of the `thread` definition; of the main thread the program's.
-        parent: The thread that ran it.
+        parent: The thread that started it.
         finished: It ended or was killed.
         wait: What it waits for; None when it can run in the next cycle.
         label: Text of the last `$` line it passed.
         budget: Statements it may still run in this cycle.
-        slice_used: Not to be run again in this cycle.
+        slice_used: Its time slice of this cycle is used up.
         depth: How deep it is in recursive functions.
         body: The generator that runs it.
     """
@@ -74,10 +74,10 @@ class ScriptThread:
         self.slice_used = False
         self.depth = 0
 
-    def family(self) -> Iterator[ScriptThread]:
+    def subtree(self) -> Iterator[ScriptThread]:
         """Its unfinished descendants, deepest first, then itself."""
         for child in self.children:
-            yield from child.family()
+            yield from child.subtree()
         if not self.finished:
             yield self
 
@@ -100,7 +100,7 @@ class Scheduler:
     def __init__(
         self, namespace: dict[str, Any], budget: int, thread_ended: Callable[[ScriptThread], None]
     ) -> None:
-        """Args: the globals of the compiled program, statements per thread and cycle, a notice of ends."""
+        """Args: the globals of the compiled program, statements per thread and cycle, a callback for ends."""
         self._namespace = namespace
         self._budget = budget
         self._left = 0
@@ -130,7 +130,7 @@ class Scheduler:
         return thread
 
     def step(self) -> None:
-        """Run one control cycle; what a thread raises goes through."""
+        """Run one control cycle; exceptions of threads are not caught."""
         threads = self.threads
         budget = self._budget
         self._left = budget * PROGRAM_BUDGET
@@ -198,7 +198,7 @@ class Scheduler:
         thread.finished = True
         thread.slice_used = True
         thread.wait = None
-        # Threads it left running belong to its parent now: killing that stops them too.
+        # Its running children now belong to its parent: killing that one stops them too.
         if thread.parent is not None:
             thread.parent.children.remove(thread)
             thread.parent.children.extend(thread.children)
@@ -219,7 +219,7 @@ class Scheduler:
         if thread is None:
             return
         kills_itself = False
-        for member in list(thread.family()):
+        for member in list(thread.subtree()):
             if member is by:
                 kills_itself = True
                 continue
@@ -229,7 +229,7 @@ class Scheduler:
             raise ThreadKilled
 
     def kill_all(self) -> Exception | None:
-        """Stop every thread, children first; returns the first error of a builtin cleaning up, if any."""
+        """Stop every thread, children first; returns the first error of a builtin's cleanup, if any."""
         fault: Exception | None = None
         for thread in reversed(self.threads):
             if thread.finished:
@@ -253,7 +253,7 @@ def join(by: ScriptThread, handle: Any) -> ThreadBody:
 
 
 def thread_of(handle: Any, word: str) -> ScriptThread | None:
-    """The thread a handle stands for; None for an integer, because handles are preset to 0 and killed anyway.
+    """The thread of a handle; None for an integer, because programs preset handles to 0 and kill them.
 
     Source: driver scripts.
     """

@@ -1,6 +1,6 @@
-"""What a variable holds before its first value, and which values it takes after.
+"""Values of variables: undefined before the first assignment, of one type after it.
 
-The first value fixes the type; `dialect` names what no document settles.
+Undocumented behaviour is decided in `dialect`.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ def undefined(name: str) -> Any:
 
 
 def same_kind(old: type, value: Any) -> bool:
-    """Whether a place that held type `old` may receive `value`; int and float are one kind, number."""
+    """Whether a variable or element of type `old` may receive `value`; int and float are one kind, number."""
     new = type(value)
     if new is old or (dialect.NONE_FITS_EVERY_VARIABLE and (value is None or old is type(None))):
         return True
     if old is int or old is float:
-        # A thread handle and an integer stand for each other. Source: driver scripts preset handles to 0.
+        # A thread handle and an integer replace each other. Source: driver scripts preset handles to 0.
         return (new is not bool and isinstance(value, (int, float))) or hasattr(value, "thread_id")
     return hasattr(old, "thread_id") and new is int
 
 
 def assign(value: Any, old: Any, name: str) -> Any:
-    """What variable `name`, which holds `old`, becomes by `name = value`.
+    """The new value of variable `name`, which holds `old`, in `name = value`.
 
     The first value fixes the type (D), and that of a list its length (see Dialect.list_resize).
     """
@@ -51,7 +51,7 @@ def assign(value: Any, old: Any, name: str) -> Any:
 
 
 def assign_resizing(value: Any, old: Any, name: str) -> Any:
-    """`assign` where a list may change its length."""
+    """`assign` for software in which a list may change its length."""
     if type(value) is list and type(old) is list:
         if old and value and not same_kind(type(old[0]), value[0]):
             raise _other_type(name, f"a list of {type_name(old[0])}", f"a list of {type_name(value[0])}")

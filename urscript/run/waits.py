@@ -1,6 +1,6 @@
-"""What a running thread yields to the scheduler when it cannot go on.
+"""What a running thread yields to the scheduler when it cannot continue.
 
-A builtin that takes time is a generator function; each `yield` hands one of these up to the scheduler.
+A builtin that takes time is a generator function; each `yield` passes one of these to the scheduler.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ class _NextCycle(Enum):
 
 
 NEXT_CYCLE: Final = _NextCycle.NEXT_CYCLE
-"""This thread's slice of this cycle is used up: go on in the next one."""
+"""The thread's time slice of this cycle is used up: it continues in the next one."""
 
 
 class Blocked:
-    """The thread cannot run until `ready()` is true; asked at the start of every cycle.
+    """The thread cannot run until `ready()` is true.
 
     Attributes:
-        ready: Must be cheap and free of effects: it is asked more often than once a cycle.
-        outside: The thread waits for something outside the box (bytes of a peer), so that time must stand
-            still in lockstep until it comes.
+        ready: Called once a cycle or more often; must be cheap and without side effects.
+        outside: The thread waits for something outside the box (bytes of a peer); in lockstep, time stands
+            still until it comes.
     """
 
     __slots__ = ("outside", "ready")
@@ -34,10 +34,9 @@ class Blocked:
         self.outside = outside
 
 
-GIVE_WAY: Final = Blocked(lambda: True)
-"""For a call that takes time by its nature and happens not to: the thread goes on at once, unless it has used
-much of its budget; then this call takes up the rest of the cycle. A program that reads what a peer floods it
-with is so never found to have used too much time, however much of it comes at once."""
+CHECKPOINT: Final = Blocked(lambda: True)
+"""For a call that may wait but need not now: the thread continues at once, unless it has used half of its
+budget; then its time slice ends. So a program that reads a flood of data does not exceed its budget."""
 
 Wait = _NextCycle | Blocked
 """Everything a thread may yield."""
