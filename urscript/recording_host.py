@@ -198,7 +198,7 @@ class RecordingHost:
 
 
 def _register_name(name: str) -> str:
-    """The common part of the names of setter and getter: `set_standard_digital_out` -> `standard_digital_out`."""
+    """The common part of setter and getter: `set_standard_digital_out` -> `standard_digital_out`."""
     for prefix in ("set_", "get_", "write_", "read_"):
         name = name.removeprefix(prefix)
     return name
