@@ -390,7 +390,7 @@ class FuzzBox:
                 wire.connection for wire in (*self.hostile[name], self.witnesses[name]) if wire.is_open
             }
             for connection in known:
-                assert connection._pending <= OUTBOX_LIMIT + 4096, name
+                assert len(connection._outbox) <= OUTBOX_LIMIT + 4096, name
         assert all(connection.is_open for connection in self.served.backlog)
         for session in self.ports["rtde"]._sessions.values():
             assert session.is_lost or len(session.protocol._buffer) <= 2 * MAX_REQUEST_SIZE

@@ -112,7 +112,7 @@ def between_cycles(box, ask):
 def our_objects():
     """How many there are of each class of ours, without what is kept on purpose: last lines, last states."""
     gc.collect()
-    found = Counter(type(o) for o in gc.get_objects() if type(o).__module__.split(".")[0] in OURS)
+    found = Counter(type(o) for o in gc.get_objects() if str(type(o).__module__).split(".")[0] in OURS)
     del found[LogEntry], found[Snapshot]
     return found
 
@@ -147,7 +147,7 @@ def test_no_client_leaves_work_for_the_garbage_collector(quiet_box):
             o
             for o in gc.garbage
             if isinstance(o, (FunctionType, FrameType, BaseException))
-            or type(o).__module__.split(".")[0] in OURS
+            or str(type(o).__module__).split(".")[0] in OURS
         ]
         assert left == []
     finally:

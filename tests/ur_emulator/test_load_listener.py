@@ -11,8 +11,8 @@ from box_support import TIMEOUT
 from ur_emulator.errors import PortError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp import listener
-from ur_emulator.servers.tcp.listener import DEAF_TIME, MAX_AT_ONCE, Listener
-from ur_emulator.servers.tcp.reserve import Reserve
+from ur_emulator.servers.tcp.listener import MAX_AT_ONCE, PAUSE, Listener
+from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
 
 class Clients:
@@ -105,25 +105,25 @@ class NoDescriptors(socket.socket):
 
 def test_without_descriptors_clients_are_closed_at_once_and_the_log_says_so_once(loop, monkeypatch):
     monkeypatch.setattr(listener.socket, "socket", NoDescriptors)
-    clients, notices, reserve = Clients(), [], Reserve()
-    reserve.fill()
-    monkeypatch.setattr(NoDescriptors, "given_up", lambda sock: reserve._descriptor is None)
-    port = listen(loop, clients, notices, reserve=reserve)
+    clients, notices, spare = Clients(), [], SpareDescriptor()
+    spare.take()
+    monkeypatch.setattr(NoDescriptors, "given_up", lambda sock: spare._descriptor is None)
+    port = listen(loop, clients, notices, spare=spare)
     monkeypatch.undo()
     socks = [socket.create_connection(("127.0.0.1", port.number), timeout=TIMEOUT) for _ in range(3)]
     loop.add(Turns(loop, clients, 3))
-    monkeypatch.setattr(NoDescriptors, "given_up", lambda sock: reserve._descriptor is None)
+    monkeypatch.setattr(NoDescriptors, "given_up", lambda sock: spare._descriptor is None)
     loop.run()
     assert [sock.recv(1) for sock in socks] == [b"", b"", b""]
     assert notices == [
         f"clients are turned away from dashboard port {port.number}: Too many open files",
     ]
-    assert os.fstat(reserve._descriptor)
-    reserve.close()
+    assert os.fstat(spare._descriptor)
+    spare.close()
     close_all(port, clients, *socks)
 
 
-def test_a_port_that_cannot_even_turn_away_is_deaf_for_a_while_instead_of_spinning(loop, monkeypatch):
+def test_a_port_that_cannot_even_refuse_pauses_instead_of_spinning(loop, monkeypatch):
     monkeypatch.setattr(listener.socket, "socket", NoDescriptors)
     clients = Clients()
     port = listen(loop, clients)
@@ -131,14 +131,14 @@ def test_a_port_that_cannot_even_turn_away_is_deaf_for_a_while_instead_of_spinni
     port._accept(selectors.EVENT_READ)
     assert not is_watched(loop, port)
     assert port in loop._services
-    assert port.advance(10.0) == 10.0 + DEAF_TIME
-    assert port.advance(10.0 + 0.5 * DEAF_TIME) == 10.0 + DEAF_TIME
+    assert port.advance(10.0) == 10.0 + PAUSE
+    assert port.advance(10.0 + 0.5 * PAUSE) == 10.0 + PAUSE
     assert not is_watched(loop, port)
-    port.advance(10.0 + DEAF_TIME)
+    port.advance(10.0 + PAUSE)
     assert is_watched(loop, port)
     assert port not in loop._services
     port._accept(selectors.EVENT_READ)
-    assert port.advance(20.0) == 20.0 + DEAF_TIME
+    assert port.advance(20.0) == 20.0 + PAUSE
     close_all(port, clients)
     assert port not in loop._services
 

@@ -9,7 +9,7 @@ from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.servers.tcp.connection import Connection
 from ur_emulator.servers.tcp.listener import Listener, Port
-from ur_emulator.servers.tcp.reserve import Reserve
+from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
 CONTROL, MODBUS = "control", "modbus"
 
@@ -33,7 +33,7 @@ class PortSet:
         self._box = box
         self._ports = dict(ports)
         self._listeners: dict[str, Listener] = {}
-        self._reserve = Reserve()
+        self._spare = SpareDescriptor()
         self.notices: list[str] = []
 
     @property
@@ -53,7 +53,7 @@ class PortSet:
         Raises:
             PortError: one of them cannot be opened; `close` gives back the others.
         """
-        self._reserve.fill()
+        self._spare.take()
         for name, port in self._ports.items():
             if name not in wanted:
                 continue
@@ -67,7 +67,7 @@ class PortSet:
 
     def close(self) -> None:
         """Close all ports and connections; harmless if closed already."""
-        self._reserve.close()
+        self._spare.close()
         for listener in self._listeners.values():
             listener.close()
 
@@ -76,7 +76,7 @@ class PortSet:
         box = self._box
         backlog = set[Connection]() if name == CONTROL else box.backlog
         notice = _keep_quiet if name == CONTROL else box.notice
-        return Listener(self._loop, self._host, number, port, backlog, notice, name, self._reserve)
+        return Listener(self._loop, self._host, number, port, backlog, notice, name, self._spare)
 
 
 def _keep_quiet(text: str) -> None:

@@ -13,6 +13,7 @@ from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.modbus.client import ModbusClient
 from ur_emulator.servers.modbus.link import ModbusLink
 from ur_emulator.servers.scripts.xmlrpc_client import XmlRpcServer
+from ur_emulator.servers.tcp.buffered_socket import BufferedSocket
 
 _READ_SIZE = 64 * 1024
 # Bytes a script may have in flight to a peer that does not read; further sends fail.
@@ -23,7 +24,7 @@ _INBOX_LIMIT = 2 << 20
 _IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOULDBLOCK", errno.EINPROGRESS)}
 
 
-class LoopSocket:
+class ScriptConnection(BufferedSocket):
     """One client connection of a script."""
 
     def __init__(self, loop: EventLoop, host: str, port: int, own_address: str = "") -> None:
@@ -35,14 +36,10 @@ class LoopSocket:
             port: of the peer.
             own_address: where to call from, if the peer can be reached from there; "" leaves it open.
         """
-        self._loop = loop
+        super().__init__(loop, _SEND_LIMIT, _READ_SIZE)
         self._own_address = own_address
         self._inbox = bytearray()
-        self._held_back = False
-        self.is_open = False
         self.is_connecting = True
-        self._outbox = bytearray()
-        self._sock: socket.socket | None = None
         if _is_numeric(host):
             self._connect(host, port)
         else:
@@ -53,37 +50,15 @@ class LoopSocket:
     @property
     def inbox(self) -> bytearray:
         """Bytes that have come and were not read yet; asking lets a peer that was held back go on."""
-        if self._held_back and self._sock is not None:
-            self._held_back = False
+        if not self._wants_data and self._sock is not None:
+            self._wants_data = True
             self._watch()
         return self._inbox
 
-    def send(self, data: bytes) -> bool:
-        """Send now what the kernel takes, queue the rest."""
-        sock = self._sock
-        if sock is None or not self.is_open or len(self._outbox) > _SEND_LIMIT:
-            return False
-        sent = 0
-        if not self._outbox:
-            try:
-                sent = sock.send(data)
-            except BlockingIOError:
-                pass
-            except OSError:
-                self.close()
-                return False
-        if sent < len(data):
-            self._outbox += data[sent:]
-            self._watch()
-        return True
-
     def close(self) -> None:
-        """Close; what the kernel has taken is still delivered."""
-        if self._sock is not None:
-            self._loop.unwatch(self._sock)
-            self._sock.close()
-            self._sock = None
-        self.is_open = self.is_connecting = False
+        """Close; what has come can still be read."""
+        super().close()
+        self.is_connecting = False
 
     # --- connecting
 
@@ -117,54 +92,25 @@ class LoopSocket:
         if self._sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
             self.close()
             return
-        self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.is_connecting = False
-        self.is_open = True
-        self._watch()
+        self._open(self._sock)
 
     # --- bytes
 
-    def _watch(self) -> None:
-        """Tell the loop what this socket waits for at present."""
-        assert self._sock is not None
-        events = 0 if self._held_back else selectors.EVENT_READ
-        if self._outbox:
-            events |= selectors.EVENT_WRITE
-        if events:
-            self._loop.watch(self._sock, events, self._on_ready)
-        else:
-            self._loop.unwatch(self._sock)
-
-    def _on_ready(self, events: int) -> None:
-        if events & selectors.EVENT_WRITE:
-            self._flush()
-        if events & selectors.EVENT_READ and self._sock is not None:
-            try:
-                data = self._sock.recv(_READ_SIZE)
-            except BlockingIOError:
-                return
-            except OSError:
-                data = b""
-            if data:
-                self._inbox += data
-                if len(self._inbox) > _INBOX_LIMIT:
-                    self._held_back = True
-                    self._watch()
-            else:
-                self.close()
-
-    def _flush(self) -> None:
-        assert self._sock is not None
-        try:
-            sent = self._sock.send(self._outbox)
-        except BlockingIOError:
-            return
-        except OSError:
-            self.close()
-            return
-        del self._outbox[:sent]
-        if not self._outbox:
+    def _received(self, data: bytes) -> None:
+        self._inbox += data
+        if len(self._inbox) > _INBOX_LIMIT:
+            self._wants_data = False
             self._watch()
+
+    def _ended(self) -> None:
+        self.close()
+
+    def _send_failed(self) -> None:
+        self.close()
+
+    def _sent(self) -> None:
+        pass
 
 
 def _is_numeric(host: str) -> bool:
@@ -196,12 +142,12 @@ class LoopNetwork:
         """
         self._loop = loop
         self._own_address = own_address
-        self._sockets: WeakSet[LoopSocket] = WeakSet()
+        self._sockets: WeakSet[ScriptConnection] = WeakSet()
         self._modbus = ModbusClient(loop, self.open, period_s)
 
-    def open(self, host: str, port: int) -> LoopSocket:
+    def open(self, host: str, port: int) -> ScriptConnection:
         """Begin to connect to `host`:`port`."""
-        opened = LoopSocket(self._loop, host, port, self._own_address)
+        opened = ScriptConnection(self._loop, host, port, self._own_address)
         self._sockets.add(opened)
         return opened
 

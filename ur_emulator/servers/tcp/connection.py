@@ -1,13 +1,12 @@
-"""One TCP connection of a client: it never blocks, its outbox is bounded, and packages stay whole."""
+"""One TCP connection of a client: packages are sent whole or not at all."""
 
 from __future__ import annotations
 
-import selectors
 import socket
-from collections import deque
 from collections.abc import Callable
 
 from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.servers.tcp.buffered_socket import BufferedSocket
 
 # Bytes that may wait for a client that does not read; further packages are dropped for it.
 OUTBOX_LIMIT = 64 * 1024
@@ -25,7 +24,7 @@ _KEEP_ALIVE = [
 ]
 
 
-class Connection:
+class Connection(BufferedSocket):
     """A connected client.
 
     Attributes:
@@ -51,22 +50,15 @@ class Connection:
             on_close: called once when the connection is gone, for whatever reason.
             backlog: the connection is in this set while something waits in its outbox.
         """
-        self._loop = loop
-        self._sock = sock
+        super().__init__(loop, OUTBOX_LIMIT, _READ_SIZE)
         self._on_data = on_data
         self._on_close = on_close
         self._backlog = backlog
-        self._outbox: deque[memoryview] = deque()
-        self._pending = 0
         self._closing = False
-        self._deaf = False
-        self._open = True
-        self._reading = selectors.EVENT_READ
         self._on_end: Callable[[Connection], None] | None = None
         self.dropped = 0
         self.has_ended = False
         sock.setblocking(False)
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         for option, value in _KEEP_ALIVE:
@@ -75,12 +67,7 @@ class Connection:
             self.peer = "{}:{}".format(*sock.getpeername()[:2])
         except OSError:
             self.peer = "gone"
-        loop.watch(sock, selectors.EVENT_READ, self._on_ready)
-
-    @property
-    def is_open(self) -> bool:
-        """True until the connection is closed by either side."""
-        return self._open
+        self._open(sock)
 
     @property
     def host(self) -> str:
@@ -101,111 +88,49 @@ class Connection:
         Returns:
             False if the package was dropped: the outbox is full or the connection is closed.
         """
-        if not self._open or self._deaf:
-            return False
-        if self._pending:
-            if self._pending + len(package) > OUTBOX_LIMIT:
-                self.dropped += 1
-                return False
-            self._queue(memoryview(package))
-            return True
-        try:
-            sent = self._sock.send(package)
-        except BlockingIOError:
-            sent = 0
-        except OSError:
-            self._stop_sending()
-            return False
-        if sent < len(package):
-            self._queue(memoryview(package)[sent:])
-            self._loop.watch(self._sock, self._reading | selectors.EVENT_WRITE, self._on_ready)
-        return True
+        is_sent = super().send(package)
+        if self._outbox:
+            self._backlog.add(self)
+            self.dropped += not is_sent
+        return is_sent
 
     def close_when_sent(self) -> None:
         """Close as soon as the outbox is empty."""
         self._closing = True
-        if not self._pending:
+        if not self._outbox:
             self.close()
 
     def close(self) -> None:
         """Close at once; harmless if closed already."""
-        if self._open:
-            self._open = False
-            self._loop.unwatch(self._sock)
-            self._sock.close()
-            self._outbox.clear()
-            self._pending = 0
+        if self.is_open:
+            super().close()
             self._backlog.discard(self)
             self._on_close(self)
 
-    def _stop_sending(self) -> None:
-        """The peer takes nothing any more. What it sent before it went is still read; then it is closed.
+    def _received(self, data: bytes) -> None:
+        self._on_data(self, data)
+
+    def _ended(self) -> None:
+        if self._on_end is None:
+            self.close()
+            return
+        self.has_ended = True
+        self._wants_data = False
+        self._watch()
+        self._on_end(self)
+
+    def _send_failed(self) -> None:
+        """Send nothing more. What the peer sent before it went is still read; then it is closed.
 
         Without this, a script is lost when its sender closes the socket at once, as many do.
         """
-        self._deaf = True
+        self._can_send = False
         self._outbox.clear()
-        self._pending = 0
+        self._sent()
+        if self.is_open:
+            self._watch()
+
+    def _sent(self) -> None:
         self._backlog.discard(self)
         if self._closing:
             self.close()
-        else:
-            self._watch_for_data()
-
-    def _watch_for_data(self) -> None:
-        if self._reading:
-            self._loop.watch(self._sock, self._reading, self._on_ready)
-        else:
-            self._loop.unwatch(self._sock)
-
-    def _queue(self, data: memoryview) -> None:
-        self._outbox.append(data)
-        self._pending += len(data)
-        self._backlog.add(self)
-
-    def _on_ready(self, events: int) -> None:
-        if events & selectors.EVENT_WRITE:
-            self._flush()
-        if events & selectors.EVENT_READ and self._open:
-            self._receive()
-
-    def _receive(self) -> None:
-        try:
-            data = self._sock.recv(_READ_SIZE)
-        except BlockingIOError:
-            return
-        except OSError:
-            self.close()
-            return
-        if data:
-            self._on_data(self, data)
-        elif self._on_end is None:
-            self.close()
-        else:
-            self.has_ended = True
-            self._reading = 0
-            self._loop.unwatch(self._sock)
-            if self._pending:
-                self._loop.watch(self._sock, selectors.EVENT_WRITE, self._on_ready)
-            self._on_end(self)
-
-    def _flush(self) -> None:
-        try:
-            while self._outbox:
-                data = self._outbox[0]
-                sent = self._sock.send(data)
-                self._pending -= sent
-                if sent < len(data):
-                    self._outbox[0] = data[sent:]
-                    return
-                self._outbox.popleft()
-        except BlockingIOError:
-            return
-        except OSError:
-            self._stop_sending()
-            return
-        self._backlog.discard(self)
-        if self._closing:
-            self.close()
-        else:
-            self._watch_for_data()

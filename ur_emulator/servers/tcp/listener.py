@@ -1,8 +1,8 @@
 """A listening port: accepts clients and hands each to the port that it belongs to.
 
-There is no limit on clients: none of a real controller is known. What bounds them is the number of
-descriptors that the operating system gives this process. Once they are out, further clients are accepted and
-closed at once, so that they see why nothing comes; who is connected is not disturbed.
+There is no limit on clients: none of a real controller is known. They are limited by the number of
+descriptors that the operating system gives this process. Without a free one, further clients are accepted and
+closed at once, so that they notice it; connected clients are not disturbed.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import Protocol
 from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp.connection import Connection
-from ur_emulator.servers.tcp.reserve import Reserve
+from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
 # Clients accepted in one go; the rest waits for the next turn of the loop, so that a crowd at one port does
 # not hold up a cycle: a client costs up to 0.3 ms.
 MAX_AT_ONCE = 4
-# How long not to listen when a client can be neither served nor turned away [s].
-DEAF_TIME = 0.1
-# What accept() says when the client is not to blame.
-_OUT_OF_MEANS = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
+# How long not to listen when a client can be neither accepted nor refused [s].
+PAUSE = 0.1
+# Errors of accept() that mean that this process or system has nothing left, not that the client has gone.
+_EXHAUSTED = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
 
 
 class Port(Protocol):
@@ -60,7 +60,7 @@ class Listener:
         backlog: set[Connection],
         notice: Callable[[str], None],
         name: str,
-        reserve: Reserve | None = None,
+        spare: SpareDescriptor | None = None,
     ) -> None:
         """Listen.
 
@@ -70,9 +70,9 @@ class Listener:
             number: TCP port; 0 takes a free one.
             port: gets the clients.
             backlog: shared by all connections of a box, see Connection.
-            notice: told who comes and goes.
+            notice: called with a text when a client connects or disconnects.
             name: of the port, for notices.
-            reserve: what turns clients away when descriptors are out; without one they wait.
+            spare: refuses clients when no descriptor is left; without one they wait.
 
         Raises:
             PortPermissionError: this user may not open ports below 1024.
@@ -83,9 +83,9 @@ class Listener:
         self._backlog = backlog
         self._notice = notice
         self._name = name
-        self._reserve = reserve
-        self._is_out_of_means = False
-        self._deaf_until: float | None = None
+        self._spare = spare
+        self._refuses = False
+        self._paused_until: float | None = None
         self._sock = _listening_socket(host, number)
         self.connections: dict[Connection, None] = {}
         self.number: int = self._sock.getsockname()[1]
@@ -100,15 +100,15 @@ class Listener:
             connection.close()
 
     def advance(self, now: float) -> float:
-        """Listen again when the time has come; called by the loop only while this port is deaf."""
-        if self._deaf_until is None:
-            self._deaf_until = now + DEAF_TIME
-        if now >= self._deaf_until:
-            self._deaf_until = None
+        """Listen again at the end of a pause; called by the loop only in one."""
+        if self._paused_until is None:
+            self._paused_until = now + PAUSE
+        if now >= self._paused_until:
+            self._paused_until = None
             self._loop.remove(self)
             self._loop.watch(self._sock, selectors.EVENT_READ, self._accept)
             return now
-        return self._deaf_until
+        return self._paused_until
 
     def _accept(self, events: int) -> None:
         for _ in range(MAX_AT_ONCE):
@@ -117,11 +117,11 @@ class Listener:
             except BlockingIOError:
                 return
             except OSError as error:
-                if error.errno not in _OUT_OF_MEANS:
+                if error.errno not in _EXHAUSTED:
                     continue  # this client has gone again
-                self._turn_away(error)
+                self._refuse(error)
                 return
-            self._is_out_of_means = False
+            self._refuses = False
             try:
                 connection = Connection(self._loop, client, self._port.received, self._closed, self._backlog)
             except OSError:
@@ -131,18 +131,18 @@ class Listener:
             self._notice(f"{connection.peer} connected to {self._name} port {self.number}")
             self._port.opened(connection)
 
-    def _turn_away(self, error: OSError) -> None:
-        """Close the next client, or be deaf for a while: the port stays readable, the loop would spin."""
+    def _refuse(self, error: OSError) -> None:
+        """Close the next client, or pause: the port stays readable, the loop would spin."""
         try:
-            if self._reserve is None:
+            if self._spare is None:
                 raise error
-            is_refused = self._reserve.turn_away(self._sock)
+            is_refused = self._spare.refuse_client(self._sock)
         except OSError:
             self._loop.unwatch(self._sock)
             self._loop.add(self)
             is_refused = True
-        if is_refused and not self._is_out_of_means:
-            self._is_out_of_means = True
+        if is_refused and not self._refuses:
+            self._refuses = True
             self._notice(f"clients are turned away from {self._name} port {self.number}: {error.strerror}")
 
     def _closed(self, connection: Connection) -> None:
