@@ -1,1 +1,1 @@
-"""What is known about each arm: numbers with their sources, no behaviour."""
+"""Numbers of arms and generations with their sources; no behaviour."""

@@ -37,7 +37,7 @@ def draw_calibration(fidelity: Fidelity, seed: int) -> Calibration:
     """Draw the calibration of the box with this seed: normal, mean 0, independent entries.
 
     Real tables split the distance between the parallel axes 2, 3 and 4 into huge offsets that cancel;
-    here the offsets stay small, which is the same arm written sensibly.
+    here the offsets stay small; the arm is the same.
 
     Source: three factory calibrations of UR3e arms (kevinhpham/DalESelfEBot): lengths .06-.5 mm, tilts
     .3-2.9 mrad; pose error over random joint angles .6-.85 mm and 3.3-3.9 mrad in the mean.
@@ -51,7 +51,7 @@ def draw_calibration(fidelity: Fidelity, seed: int) -> Calibration:
 
 
 def calibrated_dh(robot: RobotModel, calibration: Calibration) -> tuple[DhRow, ...]:
-    """Return the six rows of this very arm: nominal plus calibration."""
+    """Return the six rows of one arm: nominal plus calibration."""
     return tuple(
         DhRow(row.a + da, row.d + dd, row.alpha + dalpha, row.theta + dtheta)
         for row, da, dd, dalpha, dtheta in zip(

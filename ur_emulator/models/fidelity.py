@@ -3,7 +3,7 @@
 Four sets have names. `exact` has no physics: what is measured is the target, as in the maker's simulator.
 `ideal` is for debugging clients: hardly a delay, hardly any noise. `typical` is what
 logs and reports of real arms show, and the default. `poor` is an arm and a network at the bad end of what
-users report. Every number that spoils the arm is here; every number of the arm itself is in `RobotModel`.
+users report. Every imperfection is here; every number of the arm itself is in `RobotModel`.
 
 Sources, cited by letter below:
  A  Logs of a real UR3e at rest and moving, 500 Hz (kevinhpham/DalESelfEBot): encoder noise, steps, the filter
@@ -55,7 +55,7 @@ class Fidelity:
         force_friction: offset of the force estimate against the direction of motion [N].
         accelerometer_sigma: sd of each axis of the tool accelerometer [m/s²].
         voltage_sigma: sd of each joint voltage [V].
-        has_physics: False: the arm is where it is asked to be, and nothing else above counts.
+        has_physics: False: the arm is at its target, and the numbers above have no effect.
     """
 
     name: str

@@ -1,6 +1,6 @@
 """Independent random streams from one seed.
 
-Every part that needs chance asks for its stream by name, so that adding a part does not change what the
+Every part that needs random numbers gets a stream by name, so that adding a part does not change what the
 others draw: the same seed stays the same box.
 """
 

@@ -1,4 +1,4 @@
-"""RobotModel: everything that tells one arm from another, as frozen numbers.
+"""RobotModel: the numbers of one type of arm, frozen.
 
 The physics, the kinematics and the wire read their robot from here and from nowhere else; a new arm is a
 new file of numbers beside `ur3.py` and a row in `robots.py`. This module holds no numbers of any robot

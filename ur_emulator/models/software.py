@@ -1,4 +1,4 @@
-"""Software: one version of a generation's software, what the box says of it and what it has on its ports."""
+"""Software: one version of a generation's software: its identity, and its tables of ports and builtins."""
 
 from __future__ import annotations
 

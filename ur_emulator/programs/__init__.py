@@ -1,4 +1,4 @@
-"""Programs and installations as files: where they lie, what they hold, which script they come to.
+"""Program files and installations: how they are found and read, and the script that they become.
 
 `ProgramFolder` finds them, `load_program` reads one. Nothing here runs a program or opens a socket.
 """

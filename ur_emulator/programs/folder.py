@@ -1,8 +1,8 @@
 """The folder of programs, and how names on the wire are paths in it.
 
-A box keeps its programs in `/programs`, the maker's simulator in `/ursim/programs`; both are the one folder
-here, and so is a name without any folder. Nothing outside of it can be named: neither by `..`, nor by another
-absolute path, nor through a link that leads out.
+A box keeps its programs in `/programs`, the maker's simulator in `/ursim/programs`; here both
+mean the one folder, and so does a name without a folder. No name leads out of it: neither by `..`, nor by
+another absolute path, nor through a link.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 
 from ur_emulator.errors import FileMissingError
 
-# What the folder is called on the wire; the first is how the box itself calls it.
+# Names of the folder on the wire; the box itself uses the first.
 # Source: replies of real boxes and of the maker's simulator.
 WIRE_ROOTS = (PurePosixPath("/programs"), PurePosixPath("/ursim/programs"))
 
@@ -23,7 +23,7 @@ class FoundFile:
 
     Attributes:
         path: where it is.
-        wire_path: how the box calls it, `/programs/sub/x.urp`.
+        wire_path: its name on the wire, `/programs/sub/x.urp`.
     """
 
     path: Path
@@ -31,7 +31,7 @@ class FoundFile:
 
 
 class ProgramFolder:
-    """The folder that `--programs` names, or none."""
+    """The folder of `--programs`; a box may have none."""
 
     def __init__(self, root: Path | None) -> None:
         """Take a folder; `None` is a box without programs."""
@@ -41,7 +41,7 @@ class ProgramFolder:
         """Return the file of that name.
 
         Args:
-            name: as a client gives it: with or without folder, perhaps in quotes.
+            name: as a client gives it: with or without folder, with quotes or without.
 
         Raises:
             FileMissingError: there is none, or the name leads out of the folder.
@@ -60,7 +60,7 @@ class ProgramFolder:
         return True
 
     def locate(self, name: str) -> Path:
-        """Return the path that a name stands for, whether there is something or not.
+        """Return the path that a name stands for; nothing need exist there.
 
         Raises:
             FileMissingError: the name leads out of the folder, or there is no folder.

@@ -1,7 +1,7 @@
-"""Installations: what they say that concerns a program.
+"""Installations: the settings that programs need.
 
-Only where External Control finds its PC is read; tool, payload, safety settings and names of lines are not.
-`default.installation` is always there, if only with nothing in it: a new box has one, too.
+Only the PC of External Control is read; tool, payload, safety settings and names of lines are not.
+`default.installation` always exists, perhaps without settings, as on a new box.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ur_emulator.programs.xml_tree import XmlTree, read_xml
 
 SUFFIX = ".installation"
 DEFAULT_NAME = "default" + SUFFIX
-# Who contributed the part of an installation. Source: a public generator of installations for CB3.
+# Contributor of a part of an installation. Source: a public generator of installations for CB3.
 _OWNER = "com.fzi.externalcontrol"
 
 
@@ -25,15 +25,15 @@ class ExternalControlPc:
     """Where External Control gets its program.
 
     Attributes:
-        host: name or address; "" if it is not said here.
-        port: of its script sender; 0 if it is not said here.
+        host: name or address; "" if not given here.
+        port: of its script sender; 0 if not given here.
     """
 
     host: str = ""
     port: int = 0
 
     def over(self, other: ExternalControlPc) -> ExternalControlPc:
-        """Return this, and what it leaves out from the other."""
+        """Return this PC; what it does not give is taken from the other."""
         return ExternalControlPc(self.host or other.host, self.port or other.port)
 
 
@@ -42,7 +42,7 @@ class Installation:
     """An installation.
 
     Attributes:
-        wire_path: how the box calls it.
+        wire_path: its name on the wire.
         pc: for External Control nodes that do not name one themselves.
     """
 
@@ -55,7 +55,7 @@ def load_installation(folder: ProgramFolder, name: str) -> Installation:
 
     Raises:
         FileMissingError: there is none of that name.
-        ProgramFileError: it is none.
+        ProgramFileError: it is not an installation.
     """
     try:
         file = folder.find(name)
@@ -77,7 +77,7 @@ def installation_of(folder: ProgramFolder, tree: XmlTree, program: FoundFile) ->
     """Read the installation of a program: at its path from the program's folder, else by its name.
 
     Raises:
-        ProgramFileError: there is none of that name, or it is none.
+        ProgramFileError: there is none of that name, or the file is not an installation.
     """
     given = tree.root.get("installationRelativePath") or tree.root.get("installation") or ""
     path = given.replace("\\", "/").removesuffix(SUFFIX) + SUFFIX if given else DEFAULT_NAME
@@ -92,10 +92,10 @@ def installation_of(folder: ProgramFolder, tree: XmlTree, program: FoundFile) ->
 
 
 def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
-    """Return the PC that the data of a node or an installation name. Keys: the source text of the URCap.
+    """Return the PC in the data of a node or an installation. Keys: the source text of the URCap.
 
     Raises:
-        ProgramFileError: the port is none.
+        ProgramFileError: the port is not a port number.
     """
     port = data.get("port_nr", "")
     if port and not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 1 << 16):

@@ -1,4 +1,4 @@
-"""From a name to a program that can be played: the steps of PolyScope's `load`."""
+"""Loads programs: from a name to a program that can be played, as PolyScope's `load`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from urscript.values import to_script_text
 
 SCRIPT_SUFFIX = ".script"
 PROGRAM_SUFFIX = ".urp"
-# What the PC's program marks as belonging before everything else, once. Source: the External Control URCap.
+# Marks of the part of a PC's program that is written once, before the rest. Source: External Control URCap.
 _HEADER_BEGIN = "# HEADER_BEGIN"
 _HEADER_END = "# HEADER_END"
 
@@ -33,7 +33,7 @@ class LoadedProgram:
 
     Attributes:
         wire_path: how the box calls its file, `/programs/sub/x.urp`.
-        installation: that it came with; a script file has none.
+        installation: of the program; a script file has none.
         parts: its script, and gaps in it.
     """
 
@@ -48,7 +48,7 @@ class LoadedProgram:
 
     @property
     def pcs(self) -> tuple[ExternalControlPc, ...]:
-        """The PCs whose programs belong into it, each once, as far as its nodes name them."""
+        """The PCs that its nodes name, each once."""
         return tuple(dict.fromkeys(part.pc for part in self.parts if isinstance(part, Gap)))
 
     def script(self, received: Callable[[ExternalControlPc], str]) -> str:
@@ -72,7 +72,7 @@ class LoadedProgram:
 
 
 def split_header(text: str) -> tuple[list[str], list[str]]:
-    """Split what a PC has sent: what stands once in a program, and what stands at each of its nodes."""
+    """Split the text of a PC into its header, which is written once, and the part for each node."""
     lines = text.replace("\r\n", "\n").rstrip("\n").split("\n")
     marks = [line.strip() for line in lines]
     try:
@@ -92,7 +92,7 @@ def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
 
     Raises:
         FileMissingError: there is no such program.
-        ProgramFileError: it cannot be used, for the reason that is told.
+        ProgramFileError: it cannot be used; the text says why.
     """
     file = folder.find(name)
     program_name = identifier(file.path.stem)

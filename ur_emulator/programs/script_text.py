@@ -16,7 +16,7 @@ def read_script(path: Path) -> str:
     """Read a text file, UTF-8 or else Latin-1.
 
     Raises:
-        ProgramFileError: it cannot be read, is too large, or is no text.
+        ProgramFileError: it cannot be read, is too large, or is not text.
     """
     data = read_bytes(path)
     if b"\0" in data:
@@ -31,9 +31,9 @@ def read_script(path: Path) -> str:
 def as_one_program(text: str, name: str) -> str:
     """Return a script file as one program, one character a byte.
 
-    A file with one `def` and nothing else is a program already, as PolyScope saves it beside a .urp.
-    Anything else is wrapped into a program with the name of the file, as a node of type script would be: then
-    several functions and a call of one of them are a program, and so are bare statements.
+    A file with one `def` and nothing else is a program, as PolyScope saves it beside a .urp.
+    Any other file is wrapped into a program with the name of the file, as a node of type script is: several
+    functions and a call of one of them, or statements alone, are a program then.
 
     Raises:
         ProgramFileError: the script is longer than a box takes.

@@ -1,4 +1,4 @@
-"""Puts a script together line by line, with indentation, labels, and gaps for what a PC will send."""
+"""ScriptWriter: writes a script line by line, with indentation, labels, and gaps for programs of PCs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ScriptWriter:
 
     @property
     def depth(self) -> int:
-        """How many blocks are open."""
+        """Number of open blocks."""
         return self._depth
 
     def add(self, text: str) -> None:
@@ -55,12 +55,12 @@ class ScriptWriter:
         self.parts.extend(indent + line for line in text.replace("\r\n", "\n").rstrip("\n").split("\n"))
 
     def label(self, text: str) -> None:
-        """Write the label of a node, as PolyScope numbers and names them for those who watch the program."""
+        """Write the label of a node, with the number and name that PolyScope shows."""
         self._labels += 1
         self.add(f'$ {self._labels} "{one_line(text)}"')
 
     def gap(self, pc: ExternalControlPc) -> None:
-        """Leave a place for a program that comes later."""
+        """Add a gap for a program that comes later."""
         self.parts.append(Gap(pc, "  " * self._depth))
 
     @contextmanager
@@ -73,12 +73,12 @@ class ScriptWriter:
 
     @contextmanager
     def indented(self) -> Iterator[None]:
-        """Indent what is written meanwhile."""
+        """Indent the lines that are written inside."""
         self._depth += 1
         yield
         self._depth -= 1
 
 
 def one_line(text: str) -> str:
-    """Return a text that may stand between quotes in a script, which knows no escapes."""
+    """Return a text for a string literal of a script; there are no escapes."""
     return " ".join(text.replace('"', "'").split())

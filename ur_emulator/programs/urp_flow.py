@@ -20,7 +20,7 @@ def write_folder(maker: UrpMaker, element: Element) -> None:
 
 
 def write_loop(maker: UrpMaker, element: Element) -> None:
-    """Write a `<Loop>`: for ever, a number of times, or as long as something holds."""
+    """Write a `<Loop>`: without end, a number of times, or while a condition holds."""
     _not_watched(maker, element)
     writer = maker.writer
     writer.label("Loop")
@@ -114,6 +114,6 @@ def write_thread(maker: UrpMaker, element: Element) -> str:
 
 
 def _not_watched(maker: UrpMaker, element: Element) -> None:
-    """Refuse a condition that is to be watched while what it governs runs: that takes a thread of its own."""
+    """Refuse a condition that is checked continuously while its block runs: it would take a thread."""
     if element.get("checkContinuously") == "true":
         raise maker.error(f"a <{element.tag}> that is checked continuously cannot be turned into a script")

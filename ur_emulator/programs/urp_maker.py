@@ -1,4 +1,4 @@
-"""What turns nodes into a script has at hand: the file, the script so far, names given, files beside it."""
+"""UrpMaker: writes the nodes of a file into a script, with the names and the files that they need."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ur_emulator.programs.xml_tree import XmlTree, read_xml
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-# Programs nest a few levels; a file beyond this was made to break something.
+# Greatest depth of nodes; real programs nest a few levels.
 _MAX_DEPTH = 50
 _MAX_SUBPROGRAMS = 200
 
@@ -42,14 +42,14 @@ class SubProgram:
 
 @dataclass(slots=True)
 class Shared:
-    """What the files of one program have in common.
+    """What the files of one program share.
 
     Attributes:
         nodes: what writes each kind of node.
         folder: of all programs.
         writer: takes the script.
         subprograms: by the element that defines each, in the order of the first calls.
-        names: of variables, functions and threads, so that none is given twice.
+        names: of variables, functions and threads, so that each is unique.
     """
 
     nodes: Mapping[str, NodeWriter]
@@ -106,7 +106,7 @@ class UrpMaker:
         """Write one node.
 
         Raises:
-            ProgramFileError: nobody knows how.
+            ProgramFileError: the node is not known.
         """
         node_writer = self.shared.nodes.get(element.tag)
         if node_writer is None:
@@ -129,7 +129,7 @@ class UrpMaker:
         self._depth -= 1
 
     def name_of_subprogram(self, element: Element) -> str:
-        """Return the function that a sub-program becomes; it is remembered to be written.
+        """Return the name of a sub-program's function, and note that it has to be written.
 
         Args:
             element: that defines it, or stands for the one that does.

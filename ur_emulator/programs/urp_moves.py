@@ -1,7 +1,7 @@
 """Moves and their waypoints.
 
-Waypoints are kept as joint angles, so a move goes exactly where it was taught, whatever the tool and whatever
-feature it was taught in. Source: files as public generators write them.
+Waypoints are kept as joint angles, so a move goes exactly where it was taught, with any tool and
+any feature. Source: files as public generators write them.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 The script has the form of those that PolyScope makes: first values of variables, sub-programs and threads,
 the sequence before the start, then the nodes of the main program, in a loop unless it runs once. Names,
-nesting and meaning of the nodes come from public generators and readers of such files; nobody has published a
-description of all of them. What is not known is an error, never a guess.
+nesting and meaning of the nodes come from public generators and readers of such files; there is no
+published description of all of them. A node that is not known is an error.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def make_script(file: FoundFile, tree: XmlTree, name: str, folder: ProgramFolder
         folder: where files that it refers to lie.
 
     Raises:
-        ProgramFileError: there is something in it that nobody knows how to turn into a script.
+        ProgramFileError: a part of it is not known.
     """
     maker = UrpMaker(file, tree, Shared(NODES, folder))
     writer = maker.writer

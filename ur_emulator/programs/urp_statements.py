@@ -1,4 +1,4 @@
-"""Nodes that do one thing: scripts, lines, waits, popups, variables, nodes of URCaps."""
+"""Nodes of a single statement: scripts, lines, waits, popups, variables, nodes of URCaps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands inside the nodes of a program: expressions, variables, pins, numbers."""
+"""Values in the nodes of a program: expressions, variables, pins, numbers."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def number(tree: XmlTree, text: str | None, what: str) -> float:
     """Read a finite number.
 
     Raises:
-        ProgramFileError: it is none.
+        ProgramFileError: it is not a finite number.
     """
     try:
         value = float(text or "")
@@ -155,7 +155,7 @@ def six_numbers(tree: XmlTree, text: str | None, what: str) -> str:
     """Read six numbers with commas between; return them as a script has them, without brackets.
 
     Raises:
-        ProgramFileError: they are not six, or no numbers.
+        ProgramFileError: they are not six numbers.
     """
     parts = (text or "").split(",")
     if len(parts) != 6:

@@ -44,7 +44,7 @@ class XmlTree:
         """Return the element that `element` stands for, itself if it has no reference.
 
         Raises:
-            ProgramFileError: the reference leads nowhere.
+            ProgramFileError: the reference does not lead to an element.
         """
         for _ in range(_MAX_STEPS):
             reference = element.get("reference")
@@ -75,14 +75,14 @@ def read_xml(path: Path) -> XmlTree:
     """Read a file, packed or not.
 
     Raises:
-        ProgramFileError: it cannot be read, is too large, or is no XML.
+        ProgramFileError: it cannot be read, is too large, or is not XML.
     """
     data = read_bytes(path)
     if data.startswith(_GZIP_MAGIC):
         data = _unpack(path.name, data)
     if b"<!DOCTYPE" in data:
         raise ProgramFileError(f"{path.name}: a document type is declared, PolyScope's files have none")
-    from xml.etree import ElementTree  # costs more than all else here, and few boxes need it
+    from xml.etree import ElementTree  # a slow import, which few boxes need
 
     parser = ElementTree.XMLParser()
     try:
