@@ -162,7 +162,7 @@ class ArmModel:
         position = (flange[0], flange[1], flange[2])
         rotation = rotvec_to_flat(flange[3], flange[4], flange[5])
         found = self._refine(near, position, rotation)
-        if found is not None and max(map(_distance, found, near)) < _NEAR:
+        if found is not None and max(abs(a - b) for a, b in zip(found, near, strict=True)) < _NEAR:
             inside = self._into_range(found, near)
             if inside is not None:
                 return inside
@@ -243,7 +243,3 @@ class ArmModel:
                 return None
             angles.append(turned)
         return six(angles)
-
-
-def _distance(a: float, b: float) -> float:
-    return abs(a - b)
