@@ -25,7 +25,7 @@ def test_the_test_of_the_readme_passes(pytester, monkeypatch):
     monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
     driver = "import socket\n\ndef connect_my_driver(host, ports):\n    socket.create_connection((host, ports.primary), 20).close()\n\n"
     pytester.makepyfile(driver + block("In your tests", "python"))
-    pytester.runpytest_subprocess("-p", "no:cacheprovider", timeout=100).assert_outcomes(passed=2)
+    pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(passed=2)
 
 
 def test_the_commands_of_the_readme_work(capsys):

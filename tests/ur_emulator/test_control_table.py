@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ur_emulator.commands.obstacles import SIZES
@@ -109,6 +109,7 @@ ODD = st.recursive(
 
 
 @EVERY
+@settings(max_examples=40)
 @given(data=st.data())
 def test_whatever_comes_fits_or_is_refused_in_one_line(name, data):
     for parameter in OPERATIONS[name].parameters:
