@@ -315,15 +315,16 @@ def test_doctor_refuses_another_generation_by_name(robot, capsys):
 
 
 @pytest.mark.parametrize(
-    ("spoilt", "words"),
+    ("command", "spoilt", "words"),
     [
-        ({"slider": 0.95}, "the robot's speed slider is 95 %"),
-        ({"tcp_offset": (0.0, 0.0, 0.15, 0.0, 0.0, 0.0)}, "the robot's TCP offset is (0.0, 0.0, 150.0) mm"),
-        ({"payload": 0.5}, "the robot's payload is 0.50 kg"),
-        ({"model": "UR16"}, "the robot's arm is UR16, must be UR3 or UR5 or UR10"),
+        ("run", {"slider": 0.95}, "the robot's speed slider is 95 %"),
+        ("run", {"tcp_offset": (0, 0, 0.15, 0, 0, 0)}, "the robot's TCP offset is (0.0, 0.0, 150.0) mm"),
+        ("run", {"payload": 0.5}, "the robot's payload is 0.50 kg"),
+        ("run", {"model": "UR16"}, "the robot's arm is UR16, must be UR3 or UR5 or UR10"),
+        ("compare", {"payload": 0.5}, "the robot's payload is 0.50 kg"),
+        ("compare", {"model": "UR16"}, "the robot's arm is UR16, must be UR3 or UR5 or UR10"),
     ],
 )
-@pytest.mark.parametrize("command", ["run", "compare"])
 def test_a_robot_that_is_not_as_it_must_be_is_refused_in_one_line(
     command, robot, spoilt, words, tmp_path, capsys
 ):

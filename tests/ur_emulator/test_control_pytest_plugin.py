@@ -22,7 +22,9 @@ def suite(pytester, monkeypatch):
         pytester.makepyfile(text)
         options = ["-p", "no:cacheprovider", *words]
         if "-n" in words:
-            monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # each of three processes would pay for all
+            monkeypatch.setenv(
+                "PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1"
+            )  # each of three processes would pay for all
             return pytester.runpytest_subprocess("-p", "xdist", "-p", "ur_emulator.pytest_plugin", *options)
         return pytester.runpytest_inprocess(*options)
 
