@@ -191,7 +191,17 @@ def test_a_script_that_sends_to_a_peer_that_never_reads_is_told(lockstep_box):
             assert primary.message(TextMessage, limit=50_000).text == "full"
 
 
-@pytest.mark.parametrize("target", ["full backlog", "refused", "unknown name", "no address", "zero byte"])
+@pytest.mark.parametrize(
+    ("box", "target"),
+    [
+        ("realtime_box", "full backlog"),
+        *(
+            ("lockstep_box", t)
+            for t in ("full backlog", "refused", "unknown name", "no address", "zero byte")
+        ),
+    ],
+    indirect=["box"],
+)
 def test_an_open_that_cannot_succeed_returns_false(box, monkeypatch, target):
     monkeypatch.setattr(pacing, "HANG_LIMIT", 0.1)  # s, instead of a minute
     with ExitStack() as stack:
