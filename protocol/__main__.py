@@ -1,11 +1,11 @@
-"""`python -m protocol`: captured bytes to named fields, a look at a box that runs, and the tables as text.
+"""`python -m protocol`: decode captured bytes or a running box, and print the tables.
 
-    python -m protocol decode capture.bin                        port 30001 to 30003; `-` is standard input
+    python -m protocol decode capture.bin                        ports 30001 to 30003; `-` is standard input
     python -m protocol decode rtde capture.bin --names actual_q  what the robot has sent on port 30004
     python -m protocol decode realtime --live 127.0.0.1          the next frame of a box
     python -m protocol layout --version 3.15.8
 
-Exit status: 0 done, 1 the bytes are not what they should be, 2 wrong arguments, file or address.
+Exit status: 0 success, 1 bytes that cannot be decoded, 2 wrong arguments, file or address.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def decode_capture(
 
     Args:
         data: what a socket gave, from the beginning of a package on.
-        version: software of the controller, until its version message says better.
-        interface: one of `INTERFACES`; "" finds out which of the ports 30001 to 30003 it was.
+        version: software of the controller, until its version message arrives.
+        interface: one of `INTERFACES`; "" detects which of the ports 30001 to 30003 it is.
         names: of the variables in an RTDE capture.
 
     Raises:
@@ -58,9 +58,9 @@ def _parser() -> argparse.ArgumentParser:
         nargs="+",
         metavar="[INTERFACE] [FILE]",
         help=f"{', '.join(INTERFACES)}; then a capture, - for standard input; without an interface, "
-        "which of the ports 30001 to 30003 it was is found out",
+        "the port, 30001 to 30003, is detected",
     )
-    decode.add_argument("--live", metavar="HOST[:PORT]", help="look at a box that runs, instead of a file")
+    decode.add_argument("--live", metavar="HOST[:PORT]", help="decode a running box instead of a file")
     decode.add_argument("--count", type=int, default=1, help="packages to wait for with --live (%(default)s)")
     decode.add_argument(
         "--names",
@@ -98,7 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         for line in _lines(options):
             print(line)
-    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+    except BrokenPipeError:  # the reader, such as `head`, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except RemoteProtocolError as error:

@@ -1,7 +1,7 @@
 """Captured bytes as lines of text, one a field: what `python -m protocol decode` prints.
 
-A decoder takes the bytes that one side has sent on one connection, from its beginning, in pieces of any size.
-`feed` gives the lines of the packages that have become whole, `end` those of what is left over.
+A decoder takes the bytes that one side has sent on one connection, from its beginning, in parts of any size.
+`feed` returns the lines of the complete packages, `end` a line about remaining bytes.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ _WIDTH = 28
 
 
 class StreamDecoder:
-    """Ports 30001 to 30003 and their twins; which of them shows in the first bytes.
+    """Ports 30001 to 30003 and their read-only ports; the first bytes show which it is.
 
     Args:
-        version: software of the controller, until its version message says better.
+        version: software of the controller, until its version message arrives.
 
     Attributes:
-        count: whole packages so far.
+        count: complete packages so far.
     """
 
     def __init__(self, version: SoftwareVersion) -> None:
@@ -68,10 +68,10 @@ class StreamDecoder:
             self._position += len(frame)
 
     def end(self) -> Iterator[str]:
-        """A line about the bytes that are left over."""
+        """A line about the remaining bytes."""
         if self._frames is None and self._head:
             self._begin()
-            yield from self.feed(b"")  # a frame this short is no frame
+            yield from self.feed(b"")  # raises: too short for a frame
         if self._frames is not None and self._frames.pending:
             yield f"byte {self._position}: {self._frames.pending} bytes of a package that is not complete"
 
@@ -103,12 +103,12 @@ class RtdeDecoder:
     """What a robot has sent on port 30004.
 
     Args:
-        names: of the variables that the client asked for; the robot repeats only their types. Numbers stand
-            for those that are missing.
+        names: of the variables that the client asked for, because the robot sends only their types. Missing
+            ones get numbers.
 
     Attributes:
         count: whole packages so far.
-        refused: words that the robot gave instead of types, by name.
+        refused: refusals that the robot sent instead of types, by name.
     """
 
     def __init__(self, names: Sequence[str] = ()) -> None:
@@ -135,7 +135,7 @@ class RtdeDecoder:
             self._position += size
 
     def end(self) -> Iterator[str]:
-        """A line about the bytes that are left over."""
+        """A line about the remaining bytes."""
         if self._buffer:
             yield f"byte {self._position}: {len(self._buffer)} bytes of a package that is not complete"
 
@@ -150,7 +150,7 @@ class RtdeDecoder:
                     yield f"  {name:<{_WIDTH}} {_text(value)}"
                 return
             case RequestProtocolVersionReply(True):
-                self._protocol = 2  # nobody asks for the first: a connection begins in it
+                self._protocol = 2  # version 1 needs no request
             case SetupOutputsReply(types):
                 self._take_types(types)
         yield from _describe(message)

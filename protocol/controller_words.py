@@ -1,7 +1,7 @@
 """Lines that the script ports accept although they are not URScript.
 
-PolyScope itself drives the controller with them and clients copied them. What a word does is the box's
-business; this table only says which lines are words, so that nobody tries to compile them.
+PolyScope itself drives the controller with them and clients copied them. The box implements the words;
+this table lists them, so that they are not compiled.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ class ControllerWord:
     """One row.
 
     Attributes:
-        text: the fixed words, one blank between.
+        text: the fixed words, with one space between.
         takes_number: whether one number follows.
-        effect: what a controller does, for people.
+        effect: what a controller does, for documentation.
         source: who sends it.
     """
 
@@ -46,14 +46,14 @@ CONTROLLER_WORDS: tuple[ControllerWord, ...] = (
 )  # fmt: skip
 
 _BY_TEXT = {word.text: word for word in CONTROLLER_WORDS}
-_LONGEST = 64  # characters; a longer line is no word, whatever it is
+_LONGEST = 64  # characters; a longer line is not a word
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 def match_controller_word(line: str) -> tuple[ControllerWord, str] | None:
-    """The row that a line is, and its number as text ("" without one); None for anything else.
+    """The row of a line, and its number as text ("" without one); None for any other line.
 
-    Words are lower case; blanks around and between them do not count.
+    Words are lower case; spaces around and between them are ignored.
     """
     if len(line) > _LONGEST:
         return None

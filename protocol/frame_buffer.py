@@ -1,6 +1,6 @@
 """Cuts a byte stream into frames that begin with their own length (`i32`, big-endian, counts itself).
 
-Serves the realtime port and the primary and secondary ports, at either end. It does not look inside a frame.
+Used for the realtime, primary and secondary ports, at both ends. The content of a frame is not read.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ class FrameBuffer:
     The usual case on a live port, one `recv` that holds exactly one frame, costs no copy.
 
     Args:
-        max_size: longest frame in bytes that is believed; a longer one means that we lost the frame
-            boundary or that the peer speaks another protocol.
-        min_size: shortest believable frame, at least the length prefix itself.
+        max_size: longest valid frame in bytes; a longer one means that the frame boundary is lost or that the
+            peer uses another protocol.
+        min_size: shortest valid frame, at least the length prefix.
     """
 
     __slots__ = ("_buffer", "_max_size", "_min_size", "_start", "_whole")
@@ -30,16 +30,16 @@ class FrameBuffer:
         self._max_size = max_size
         self._min_size = max(min_size, LENGTH_SIZE)
         self._buffer = bytearray()
-        self._start = 0  # consumed bytes at the head of the buffer; cut off when new data comes
+        self._start = 0  # consumed bytes at the start of the buffer; removed when new data comes
         self._whole: bytes | None = None  # one complete frame that never went through the buffer
 
     @property
     def pending(self) -> int:
-        """Bytes held that are not handed out yet; at end of stream, more than 0 means a cut frame."""
+        """Bytes that are not returned yet; more than 0 at the end of the stream means an incomplete frame."""
         return len(self._buffer) - self._start + (len(self._whole) if self._whole is not None else 0)
 
     def feed(self, data: bytes) -> None:
-        """Take what the socket gave; any split is fine."""
+        """Add received bytes, split anywhere."""
         if self._whole is None and not self._buffer:
             size = len(data)
             if self._min_size <= size <= self._max_size and int.from_bytes(data[:LENGTH_SIZE], "big") == size:
@@ -54,10 +54,10 @@ class FrameBuffer:
         self._buffer += data
 
     def next_frame(self) -> bytes | None:
-        """The next whole frame, length prefix included, or None when more bytes are needed.
+        """The next complete frame, length prefix included, or None when more bytes are needed.
 
         Raises:
-            RemoteProtocolError: the length is absurd. The stream is lost, every further call raises again.
+            RemoteProtocolError: the length is invalid. The stream is lost, every further call raises again.
         """
         whole = self._whole
         if whole is not None:

@@ -1,4 +1,4 @@
-"""Look at a box that runs: connect, let a decoder read what comes, for `python -m protocol decode --live`.
+"""Read the packages of a running box: `python -m protocol decode --live`.
 
 The one place of this package that opens a socket.
 """
@@ -17,7 +17,7 @@ from protocol.ur_types import Ports
 __all__ = ["INTERFACES", "watch"]
 
 INTERFACES = {"realtime": "realtime_ro", "primary": "primary_ro", "secondary": "secondary_ro", "rtde": "rtde"}
-"""What can be looked at, and the port for it: the read-only twins where there are some."""
+"""Interface and port: the read-only ports where they exist."""
 
 _TIMEOUT = 3.0  # s; every port sends ten times a second or more
 
@@ -30,25 +30,27 @@ def watch(
     names: tuple[str, ...] = (),
     frequency: float = 10.0,
 ) -> Iterator[str]:
-    """Lines of what a box sends.
+    """Decode what a box sends, as lines of text.
 
     Args:
         interface: one of `INTERFACES`.
-        address: host, or host:port where it is not the vendor's.
+        address: host, or host:port for another port than the standard one.
         decoder: for that interface.
         count: packages to wait for, after the replies of the set-up on RTDE.
         names: variables to ask RTDE for.
         frequency: packages a second to ask RTDE for.
 
     Raises:
-        LocalProtocolError: the address is none, or the box lacks a variable.
-        OSError: nobody answers there.
-        RemoteProtocolError: what answers is no box.
+        LocalProtocolError: not an address, or the box does not have a variable.
+        OSError: no connection.
+        RemoteProtocolError: the bytes are not those of a box.
     """
     host, _, number = address.partition(":")
     port = number or str(getattr(Ports(), INTERFACES[interface]))
     if not host or not port.isdecimal() or not 0 < int(port) < 1 << 16:
-        raise LocalProtocolError(f"{address!r} is no address: give a host such as 127.0.0.1, or host:port")
+        raise LocalProtocolError(
+            f"{address!r} is not an address: give a host such as 127.0.0.1, or host:port"
+        )
     with socket.create_connection((host, int(port)), timeout=_TIMEOUT) as sock:
         if isinstance(decoder, RtdeDecoder):
             requests: tuple[Request, ...] = (
@@ -62,7 +64,7 @@ def watch(
                 yield from _until(sock, decoder, n_replies)
                 if decoder.refused:
                     unknown = ", ".join(decoder.refused)
-                    raise LocalProtocolError(f"this box has no {unknown}: `layout rtde` lists what there is")
+                    raise LocalProtocolError(f"this box has no {unknown}: `layout rtde` lists the variables")
             count += len(requests)
         yield from _until(sock, decoder, count)
 

@@ -1,8 +1,8 @@
-"""How long somebody has waited for the other side, counted only while he could have seen it come.
+"""The duration of a wait for a peer, without the time in which this process did not run.
 
-A process that is stopped (SIGSTOP, a debugger, a suspended machine) or gets no processor finds its clock far
-ahead when it goes on. That jump says nothing of the other side, so between two looks at the clock no more
-than `LONGEST_STEP` counts. No clock here: the time is handed in.
+When a process was stopped (SIGSTOP, a debugger, a suspended machine) or got no processor, its clock jumps.
+The jump says nothing about the peer, so at most `LONGEST_STEP` counts between two readings of the clock. This
+module reads no clock: the time is an argument.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 
 LONGEST_STEP = 0.1
-"""Most that counts between two looks [s]. Who waits looks at least as often."""
+"""Most that counts between two readings [s]. A waiting caller reads at least as often."""
 
 
 class Patience:
-    """The time spent with one wait."""
+    """The duration of one wait."""
 
     __slots__ = ("_last", "_spent")
 
@@ -23,13 +23,13 @@ class Patience:
         self._last = math.nan
 
     def spent(self, now: float) -> float:
-        """Look at the clock; the first look begins the wait.
+        """Take a reading of the clock; the first one begins the wait.
 
         Args:
             now: monotonic time [s].
 
         Returns:
-            How long the wait has taken [s], jumps of the clock left out.
+            Duration of the wait [s], without jumps of the clock.
         """
         if not math.isnan(self._last):
             self._spent += min(now - self._last, LONGEST_STEP)
@@ -37,6 +37,6 @@ class Patience:
         return self._spent
 
     def restart(self) -> None:
-        """End this wait; the next look begins another."""
+        """End this wait; the next reading begins another."""
         self._spent = 0.0
         self._last = math.nan

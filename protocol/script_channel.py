@@ -1,21 +1,21 @@
 r"""Where one program ends and the next begins on a script port (30001, 30002, 30003).
 
-The ports carry plain text without any frame. What makes a program is this:
+The ports carry plain text without frames. The rules:
 
-* Lines end in `\n`; a `\r` before it is dropped. A line without its `\n` does not exist yet.
+* Lines end in `\n`; a `\r` before it is dropped. A line is read when its `\n` has come.
 * A line that begins with `def` or `sec` starts a program. It ends with the line of the `end` that closes all
   blocks: `def sec thread if while` open one, `end` closes one; comments, strings and `$` labels do not count.
   Indentation does not decide, because programs in the field break it (python-urx writes bodies in column 1).
 * Outside a program, a line is a program of one statement, or one of the controller's own words
-  (`controller_words`). Blank lines, comments and labels are nothing.
-* A program whose blocks never close would swallow everything after it. So a `def`, a `sec` or a controller's
-  word in column 1 hands out the open text as it is (its compiler will name the error) and starts afresh:
-  nested functions are indented in every program we know, and no statement looks like a controller's word.
-* Nothing may grow without bound: a line or program beyond the limits is dropped and reported as `Overflow`.
-  The rest of a dropped program is dropped too, up to an `end` in column 1, lest its body runs line by line.
+  (`controller_words`). Blank lines, comments and labels are ignored.
+* In a program whose blocks never close, a `def`, a `sec` or a controller's word in column 1 ends the program:
+  it is returned as it is (the compiler reports the error), and a new one begins. Nested functions are
+  indented in every known program, and no statement looks like a controller's word.
+* A line or program beyond the limits is dropped and reported as `Overflow`. The rest of a dropped program is
+  dropped too, up to an `end` in column 1, so that its body does not run line by line.
 
 Sources: URScript manual CB3, chapter 2; the exceptions from python-urx, ur_rtde and ur_modern_driver.
-Nothing here judges the text: whatever does not compile is the compiler's to report, at the right line.
+The text is not checked here: the compiler reports errors, at the right line.
 """
 
 from __future__ import annotations
@@ -60,11 +60,11 @@ class ControlLine(NamedTuple):
 
 
 class Overflow(NamedTuple):
-    """Something was too long and has been dropped.
+    """A line or program was too long and has been dropped.
 
     Attributes:
         what: "line" or "program".
-        limit: the limit in bytes that it broke.
+        limit: the limit in bytes that it exceeds.
     """
 
     what: Literal["line", "program"]
@@ -81,7 +81,7 @@ MAX_PROGRAM = 4 << 20
 
 _HEADER = re.compile(r"[ \t]*(def|sec)(?![A-Za-z0-9_])[ \t]*([A-Za-z_][A-Za-z0-9_]*)?")
 _COUNTED = re.compile(
-    r'"[^"]*"?'  # a string; one that is not closed ends with its line, so that a missing quote stays local
+    r'"[^"]*"?'  # a string; an unterminated one ends with its line
     r"|#.*"
     r"|(?<![A-Za-z0-9_.])(def|sec|thread|if|while|end)(?![A-Za-z0-9_])"
 )
@@ -107,7 +107,7 @@ class ScriptChannel:
     def __init__(self, max_line: int = MAX_LINE, max_program: int = MAX_PROGRAM) -> None:
         self._max_line = max_line
         self._max_program = max_program
-        self._partial = bytearray()  # the line whose end has not come
+        self._partial = bytearray()  # the incomplete line
         self._skipping_line = False
         self._state = _State.OUTSIDE
         self._lines: list[str] = []
@@ -118,11 +118,11 @@ class ScriptChannel:
 
     @property
     def pending(self) -> int:
-        """Bytes of a line or program that is not complete; they are lost if the connection ends now."""
+        """Bytes of an incomplete line or program; they are lost if the connection ends."""
         return self._size + len(self._partial)
 
     def feed(self, data: bytes) -> list[ScriptItem]:
-        """Take what the socket gave and return what has become complete. Never raises."""
+        """Add received bytes and return what is complete. Never raises."""
         items: list[ScriptItem] = []
         if b"\n" not in data:
             if not self._skipping_line:
@@ -159,7 +159,7 @@ class ScriptChannel:
     def _take_line(self, line: str, items: list[ScriptItem]) -> None:
         if self._state is _State.OUTSIDE:
             self._take_outside(line, items)
-        elif self._starts_afresh(line):
+        elif self._begins_new_program(line):
             if self._state is _State.IN_PROGRAM:
                 items.append(self._finish())
             self._state = _State.OUTSIDE
@@ -200,7 +200,7 @@ class ScriptChannel:
             items.append(self._finish())
 
     def _closes(self, line: str) -> bool:
-        """Count the blocks of one line; True when the last one closes. What follows is the compiler's."""
+        """Count the blocks of one line; True when the last one closes. The rest of the line is not read."""
         if line.lstrip().startswith("$"):
             return False
         for counted in _COUNTED.finditer(line):
@@ -214,7 +214,7 @@ class ScriptChannel:
         return False
 
     @staticmethod
-    def _starts_afresh(line: str) -> bool:
+    def _begins_new_program(line: str) -> bool:
         if not line or line[0] in " \t":
             return False
         return _HEADER.match(line) is not None or match_controller_word(line) is not None

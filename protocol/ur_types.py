@@ -1,7 +1,6 @@
-"""The controller's own numbers and names: modes, software versions, ports, serial numbers.
+"""Numbers and names of the controller: modes, software versions, ports, serial numbers.
 
-Only values that both ends must agree on stand here; nothing in this module knows a robot's state.
-The numbers are those of the vendor's client interface documents; they go out unchanged on every port.
+The numbers are those of the vendor's client interface documents, the same on every port.
 """
 
 from __future__ import annotations
@@ -221,7 +220,7 @@ SIMULATED_SERIAL_PREFIX = "2099"
 """Serial numbers start with the year of make (seen: 2017...); no arm was made in 2099."""
 
 SIMULATED_MASTERBOARD = 2099
-"""Masterboard version of an emulated box: software before 3.12 tells no serial number. A UR5e has 6."""
+"""Masterboard version of an emulated box: software before 3.12 sends no serial number. A UR5e has 6."""
 
 SIMULATOR_CHECKSUM = 0xFFFFFFFF
 """Calibration checksum of each joint in the maker's own simulator. Source: URCL, captures of URSim."""
@@ -231,7 +230,7 @@ _SEED_MODULUS = 10**6
 
 
 class SerialNumber(NamedTuple):
-    """A serial number and what it says: `seed` is None for a real arm."""
+    """A serial number and its meaning: `seed` is None for a real arm."""
 
     text: str
     simulated: bool

@@ -1,6 +1,6 @@
 """Encoder and decoder made from a record's table (see `wire_record`), for one software version.
 
-Numbers go through one `struct` for every run of numeric fields, texts one by one. Nothing here knows a field.
+Consecutive numeric fields are one `struct`, texts are encoded one by one.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Codec(Generic[R]):
         return self.record(**self.decode_fields(data))
 
     def decode_fields(self, data: bytes) -> dict[str, Any]:
-        """Values by field name; surplus bytes at the end are skipped, as the vendor tells clients to do.
+        """Values by field name; surplus bytes at the end are skipped, as the vendor asks of clients.
 
         Raises:
             RemoteProtocolError: the bytes end before the fields do.

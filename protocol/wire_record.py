@@ -1,4 +1,4 @@
-"""Records whose dataclass is the table of their bytes: one row a field, with type, unit and first version.
+"""Records of the wire: a dataclass whose fields declare type, unit and first version.
 
     @dataclass(frozen=True, slots=True)
     class CartesianInfo(...):
@@ -10,7 +10,7 @@ Field types are the letters of `struct`, and four of ours. Text: `p`, a byte wit
 `t`, the same with a length of 32 bits; `s`, text up to the end of the record (last field only). Text travels
 as Latin-1. `*`: records of another table, as many as there are up to the end (last field only).
 
-This module only declares. The tables are in `primary.layout` and `primary.messages`.
+The tables are in `primary.layout` and `primary.messages`.
 """
 
 from __future__ import annotations

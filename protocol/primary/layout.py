@@ -2,8 +2,7 @@
 
 Every class is the table of its bytes after the five-byte header (`i32 size | u8 sub-type`): order, types,
 units and the software that first had a field. Defaults are what an idle CB3 may send. To add a field: add a
-row. How records become packages is in `primary.packages`; what a value means for the robot is the box's
-business.
+row. `primary.packages` makes packages of records.
 
 Sources: UR "Primary/Secondary Client Interface" (2021, chapters 5.9 and 5.10) and UR "Client_Interface"
 workbook (software 1.6 to 3.2); sizes checked against totals seen on robots and simulators from 3.1 to 5.8.

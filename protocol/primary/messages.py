@@ -50,7 +50,7 @@ __all__ = [
 
 
 class MessageSource(IntEnum):
-    """Who speaks; joints and boards have further numbers from 20 to 127."""
+    """Sender of a message; joints and boards have further numbers from 20 to 127."""
 
     GUI = -5
     SIMULATED_ROBOT = -4
@@ -72,7 +72,7 @@ class ReportLevel(IntEnum):
 
 
 class RequestedType(IntEnum):
-    """What a popup or value request wants to be answered with; NONE is a popup."""
+    """Type of the answer to a value request; NONE is a popup."""
 
     BOOLEAN = 0
     INTEGER = 1
@@ -94,7 +94,7 @@ class RobotMessage:
     Attributes:
         MESSAGE_TYPE: number on the wire.
         timestamp: microseconds since controller start, or NO_TIME.
-        source: who speaks, see MessageSource.
+        source: sender, see MessageSource.
     """
 
     MESSAGE_TYPE: ClassVar[int]
@@ -196,7 +196,7 @@ class KeyMessage(RobotMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RequestValueMessage(RobotMessage):
-    """A program asks for a value (`request_integer_from_primary_client` and its kin)."""
+    """A program asks for a value (`request_integer_from_primary_client` and similar)."""
 
     MESSAGE_TYPE: ClassVar[int] = 9
 
@@ -321,7 +321,7 @@ def encode_message(message: RobotMessage, version: SoftwareVersion) -> bytes:
 
 
 def decode_message(body: bytes, version: SoftwareVersion) -> RobotMessage:
-    """The inverse of `encode_message`; a version message is read by the version that it says itself.
+    """The inverse of `encode_message`; a version message is decoded for the version that it contains.
 
     Raises:
         RemoteProtocolError: the body ends before the fields do.

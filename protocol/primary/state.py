@@ -40,7 +40,7 @@ S = TypeVar("S", bound=SubPackage)
 
 @dataclass(frozen=True, slots=True)
 class UnknownSubPackage:
-    """A part of a state that has no table here; `body` follows its five-byte header."""
+    """A sub-package without a table here; `body` follows its five-byte header."""
 
     sub_type: int
     body: bytes

@@ -194,7 +194,7 @@ def decode_value(data: bytes, position: int, version: SoftwareVersion) -> tuple[
 def _decode(data: bytes, position: int, types: Mapping[int, ValueType], depth: int) -> tuple[TypedValue, int]:
     kind = types.get(data[position])
     if kind is None:
-        raise RemoteProtocolError(f"{data[position]} at byte {position} is no type of a variable")
+        raise RemoteProtocolError(f"{data[position]} at byte {position} is not a type of a variable")
     if depth > MAX_NESTING:
         raise RemoteProtocolError(f"lists are nested deeper than {MAX_NESTING}")
     position += 1

@@ -4,7 +4,7 @@
 
 The size is the only hint at the layout. Both directions run once per control cycle, so both are prepared
 from the table when a layout is first asked for: the encoder is one generated call of `struct.pack`, the
-frame's attributes are slices. Nothing here knows what the values mean; see `realtime.columns` for that.
+frame's attributes are slices. The meaning of the values is in `realtime.columns`.
 """
 
 from __future__ import annotations

@@ -143,7 +143,7 @@ def _encode_words(words: tuple[str, ...]) -> bytes:
 def _encode_names(names: tuple[str, ...]) -> bytes:
     for name in names:
         if not name or "," in name:
-            raise LocalProtocolError(f"{name!r} is no name of a variable")
+            raise LocalProtocolError(f"{name!r} is not a name of a variable")
     data = _encode_words(names)
     if len(data) > MAX_NAMES_SIZE:
         raise LocalProtocolError(

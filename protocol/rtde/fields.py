@@ -1,7 +1,7 @@
 """RTDE's variables as two tables: `OUTPUTS` (robot to client) and `INPUTS` (client to robot).
 
 To add a variable: add a row; `comes_from` names the attribute of the snapshot that holds its value, with an
-index where it is one element of it. What an input does, the box knows; nothing else knows single variables.
+index where it is one element of it. The box implements the inputs.
 
 Source of names, types and meanings, unless a row says otherwise: UR "Real-Time Data Exchange (RTDE) Guide";
 types compared with the type table of the public client library (`rtde/data_package.cpp`), with which they
@@ -34,7 +34,7 @@ class RtdeField:
         since: first software of each generation that has it.
         origin: how the emulated box fills an output; None for an input, and for an output of late e-Series
             software that it does not answer.
-        meaning: what the value says, and its frame of reference.
+        meaning: of the value, with its frame of reference.
         comes_from: attribute of the snapshot, such as "actual_q" or "registers.output_integers[3]"; empty if
             `constant` is what the box sends.
         constant: value of an output behind which nothing is simulated.
@@ -247,7 +247,7 @@ OUTPUTS: tuple[RtdeField, ...] = (
     _e_series("control_step", _U64, "-", "count of control cycles"),
     _e_series("target_base_wrench", _VEC6, "N, Nm", "wrench at the base"),
 )  # fmt: skip
-"""What a client can subscribe to, in the order of the guide."""
+"""Variables that a client can subscribe to, in the order of the guide."""
 
 INPUTS: tuple[RtdeField, ...] = (
     _in("speed_slider_mask", _U32, "-", "0 leave the slider, 1 apply the fraction"),
@@ -279,7 +279,7 @@ INPUTS: tuple[RtdeField, ...] = (
     _in("external_force_torque", _VEC6, "N, Nm", "replaces the estimate of the external wrench when a script "
         "has enabled that", since((3, 3))),
 )  # fmt: skip
-"""What a client can write, in the order of the guide."""
+"""Variables that a client can write, in the order of the guide."""
 
 
 @cache

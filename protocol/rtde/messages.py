@@ -1,6 +1,6 @@
-"""RTDE's packages as values: one frozen class each. Their bytes are in `rtde.codec`.
+"""RTDE packages as values, one frozen class each; `rtde.codec` encodes them.
 
-A request is named after what it asks, its answer is the same name with `Reply`. The order of packages is in
+The answer to a request has its name with `Reply`. The order of packages is in
 `rtde.server_connection` and `rtde.client_connection`.
 
 Source: UR RTDE guide.
@@ -95,12 +95,12 @@ class SetupInputs:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Let data packages flow."""
+    """Start sending data packages."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """Let no more data packages flow; recipes stay."""
+    """Stop sending data packages; recipes stay."""
 
 
 # --- robot to client
@@ -108,7 +108,7 @@ class Pause:
 
 @dataclass(frozen=True, slots=True)
 class RequestProtocolVersionReply:
-    """Whether the version is spoken from now on."""
+    """Whether the version is used from now on."""
 
     accepted: bool
 
@@ -191,4 +191,4 @@ REQUESTS: dict[type[Request], type[Reply]] = {
     Start: StartReply,
     Pause: PauseReply,
 }
-"""What the client may ask, and how each is answered: exactly once."""
+"""Requests of the client and their replies; each has exactly one."""

@@ -1,4 +1,4 @@
-"""Recipes: which variables stand in an RTDE data package, in which order, and the codec made from that.
+"""Recipes: the variables of an RTDE data package, their order, and the codec made from them.
 
 A recipe is made once, when a client sets it up, and used every cycle: the robot's encoder is one generated
 call of `struct.pack` over all numbers of the package. Nothing here knows ids, frequencies or clients.
@@ -54,10 +54,10 @@ class Recipe:
         return self._group(self._struct.unpack(data))
 
     def decode_leading(self, data: bytes) -> tuple[RtdeValue, ...]:
-        """The values that are there whole: all of them from surplus bytes, the first ones from too few.
+        """The complete values: all of them from surplus bytes, the first ones from too few.
 
-        Clients send both: the public ur_rtde 1.6.5 writes 12 floats over a recipe of 6 and 6 floats over a
-        recipe that asks for an integer more.
+        Clients send both: the public ur_rtde 1.6.5 sends 12 floats for a recipe of 6, and 6 floats for a
+        recipe that has one more integer.
         """
         if len(data) >= self.size:
             return self._group(self._struct.unpack_from(data))
@@ -82,8 +82,8 @@ def snapshot_encoder(fields: Sequence[RtdeField], header: bytes) -> Callable[[An
     """Make a function from snapshot to data package; the same one for the same recipe.
 
     Args:
-        fields: the variables; all of them must be ones that the box fills.
-        header: what stands before the values, the same in every package.
+        fields: the variables; the box must send all of them.
+        header: the bytes before the values, the same in every package.
 
     Returns:
         A function of an object that has the attributes named by the fields' `comes_from`: tuples of numbers
@@ -91,11 +91,11 @@ def snapshot_encoder(fields: Sequence[RtdeField], header: bytes) -> Callable[[An
         `AttributeError` when the object lacks an attribute.
 
     Raises:
-        LocalProtocolError: one of the fields is not filled by the box.
+        LocalProtocolError: the box does not send one of the fields.
     """
     for field in fields:
         if field.origin is None:
-            raise LocalProtocolError(f"{field.name} is no output that this box fills")
+            raise LocalProtocolError(f"{field.name} is not an output that this box sends")
     return _make_encoder(tuple(fields), header)
 
 
@@ -125,7 +125,7 @@ def _make_encoder(fields: tuple[RtdeField, ...], header: bytes) -> Callable[[Any
             try:
                 struct.pack(">" + field.type.letters, *(value if field.type.count > 1 else (value,)))
             except (struct.error, TypeError):
-                return LocalProtocolError(f"{field.name} is {value!r}, which is no {field.type.value}")
+                return LocalProtocolError(f"{field.name} is {value!r}, which is not {field.type.value}")
         return LocalProtocolError(f"this snapshot cannot be encoded: {problem}")
 
     letters = "".join(field.type.letters for field in fields)

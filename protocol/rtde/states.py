@@ -1,4 +1,4 @@
-"""When RTDE data flows: the answer to every request in both states of a connection, and the rate.
+"""The answer to every RTDE request in both states of a connection, and the rate of data packages.
 
 Only tables and formulas; `rtde.server_connection` applies them.
 """

@@ -189,7 +189,7 @@ def test_lists_are_read_and_written_to_a_depth():
         (f"{NO_TIME} 00 0000 61", "not ended by a line feed"),
         (f"{NO_TIME} 01 0005 0d 01", "no line feed ends the value of variable 5"),
         (f"{NO_TIME} 01 0000 0d 01 0b", "no line feed ends the value of variable 0"),
-        (f"{NO_TIME} 01 0000 63 0a", "99 at byte 2 is no type"),
+        (f"{NO_TIME} 01 0000 63 0a", "99 at byte 2 is not a type"),
         (f"{NO_TIME} 01 0000 03 ffff 0a", "cut off"),
         (f"{NO_TIME} 01 0000 11 ffff 0a", "has -1 elements"),
         (f"{NO_TIME} 01 0000 12 7fff 7fff 00", "cut off"),

@@ -132,7 +132,7 @@ def test_a_variable_that_the_box_lacks_is_named(capsys):
     with ControlBox(pace="lockstep", port_base=None) as box:
         where = f"{box.host}:{box.ports.rtde}"
         assert main(["decode", "rtde", "--live", where, "--names", "timestamp,actual_Q"]) == 2
-    assert capsys.readouterr().err == "error: this box has no actual_Q: `layout rtde` lists what there is\n"
+    assert capsys.readouterr().err == "error: this box has no actual_Q: `layout rtde` lists the variables\n"
 
 
 @pytest.mark.parametrize(
@@ -142,9 +142,9 @@ def test_a_variable_that_the_box_lacks_is_named(capsys):
         (["decode", "rtde", "capture.bin", "--live", "127.0.0.1"], "error: with --live, name one interface"),
         (["decode", "rtde"], "error: 0 files given"),
         (["decode", "a", "b"], "error: 2 files given"),
-        (["decode", "rtde", "--live", "127.0.0.1:port"], "error: '127.0.0.1:port' is no address"),
-        (["decode", "rtde", "--live", "127.0.0.1:70000"], "error: '127.0.0.1:70000' is no address"),
-        (["decode", "rtde", "--live", ":30004"], "error: ':30004' is no address"),
+        (["decode", "rtde", "--live", "127.0.0.1:port"], "error: '127.0.0.1:port' is not an address"),
+        (["decode", "rtde", "--live", "127.0.0.1:70000"], "error: '127.0.0.1:70000' is not an address"),
+        (["decode", "rtde", "--live", ":30004"], "error: ':30004' is not an address"),
     ],
 )
 def test_mistakes_are_one_line(arguments, message, capsys):
