@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import mujoco
 
-from ur_emulator.models.fidelity import Fidelity, fidelity_by_name
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant import Plant
@@ -50,7 +51,7 @@ class Limit(NamedTuple):
 
 def measure_limit(fidelity: str = "typical") -> Limit:
     """Measure both parts, in a second."""
-    return Limit(measure_steps(fidelity_by_name(fidelity)), _measure_round_trip())
+    return Limit(measure_steps(CB3.fidelity(fidelity)), _measure_round_trip())
 
 
 def measure_steps(fidelity: Fidelity) -> float:

@@ -9,7 +9,7 @@ from functools import partial
 from bench.script import SYNC_THREADS
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.interpreter import collection_put_off
 from ur_emulator.scripting.program_slot import ProgramSlot
@@ -53,7 +53,7 @@ def measure_script_in_box() -> dict[str, float]:
 
 def _box() -> Controller:
     programs = partial(ProgramSlot, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
-    return Controller(robot_by_name("ur3"), fidelity_by_name("typical"), 7, programs)
+    return Controller(robot_by_name("ur3"), CB3.fidelity("typical"), 7, programs)
 
 
 def _box_running(n_threads: int) -> Controller:

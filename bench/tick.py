@@ -9,7 +9,7 @@ import mujoco
 from bench.limit import STEPS, best_of
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
@@ -37,7 +37,7 @@ def measure_tick() -> dict[str, float]:
     """Measure the tick and four steps of the same arm in turn; the best of each counts."""
     prepare()
     programs = partial(ProgramSlot, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
-    controller = Controller(robot_by_name("ur3"), fidelity_by_name("typical"), 7, programs)
+    controller = Controller(robot_by_name("ur3"), CB3.fidelity("typical"), 7, programs)
     controller.tick([StartProgram(compile_program(_SPEEDJ))])
     for _ in range(WARM_UP):
         controller.tick(())

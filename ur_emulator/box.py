@@ -20,7 +20,6 @@ from ur_emulator.control.step_operation import Context
 from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError, NotRunningError
-from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.programs.folder import ProgramFolder
@@ -107,7 +106,7 @@ class Box(BoxOperations):
         self.generation = generation = model.generation
         asked = generation.parse_version(generation.default_version if version is None else version)
         software = generation.software(asked)
-        imperfections = fidelity_by_name(fidelity)
+        imperfections = generation.fidelity(fidelity)
         named_pace = parse_pace(pace)
         check_options(host, speed, seed, programs, control_port)
         self.host = host
@@ -123,7 +122,6 @@ class Box(BoxOperations):
             seed,
             partial(ProgramSlot, network=self._network),
             mode=RobotMode.RUNNING,
-            generation=generation,
             version=(asked.major, asked.minor),
         )
         self._box = ServedBox(

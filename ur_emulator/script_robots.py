@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
-from ur_emulator.models.fidelity import FIDELITIES
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import ROBOTS
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ class BoxMaker:
     """Makes boxes (see urscript.robot.RobotMaker); the physics is loaded when the first one is made."""
 
     names: Sequence[str] = tuple(ROBOTS)
-    fidelities: Sequence[str] = ("typical", *(name for name in FIDELITIES if name != "typical"))
+    fidelities: Sequence[str] = ("typical", *(it.name for it in CB3.fidelities if it.name != "typical"))
 
     def make(
         self, name: str, *, fidelity: str, seed: int, software: Sequence[int], answers: Sequence[str]

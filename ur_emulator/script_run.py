@@ -20,7 +20,6 @@ from ur_emulator.controller import events as ev
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import ArgumentError
-from ur_emulator.models.fidelity import fidelity_by_name
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.program_slot import ProgramSlot
@@ -30,8 +29,8 @@ from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 if TYPE_CHECKING:
     from urscript import CompiledProgram
 
-# After the program the arm gets this many cycles to come to rest (2 s): the longest ramp and its echo.
-REST_CYCLES = 250
+# Time after the program for the arm to come to rest [s]: the longest ramp and the lag of the drives.
+REST_TIME = 2.0
 # A wait for the outside is worth a word when it has lasted this long [s].
 PATIENCE = 1.0
 _KINDS = {
@@ -70,7 +69,7 @@ class ScriptBox:
         self._loop = EventLoop()
         self._controller = Controller(
             model,
-            fidelity_by_name(fidelity),
+            model.generation.fidelity(fidelity),
             seed,
             partial(ProgramSlot, network=LoopNetwork(self._loop, model.generation.period_s)),
             version=(software[0], software[1]),
@@ -130,7 +129,7 @@ class _Run:
         self._due = -math.inf
         self._waits_since = math.inf
         self._is_over = False
-        self._rest = REST_CYCLES
+        self._rest = controller.generation.cycles(REST_TIME)
 
     def submit(self, command: Command) -> None:
         """Take a command for the next cycle."""

@@ -22,7 +22,7 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.primary.framing import NO_TIME
 from protocol.ur_types import SafetyMode, SoftwareVersion
 from protocol.wire_codec import codec_for
-from protocol.wire_record import OLDEST, since, wire
+from protocol.wire_record import ALWAYS, OLDEST, Since, since, wire
 
 __all__ = [
     "MESSAGES",
@@ -93,11 +93,13 @@ class RobotMessage:
 
     Attributes:
         MESSAGE_TYPE: number on the wire.
+        SINCE: software that first sent the message.
         timestamp: microseconds since controller start, or NO_TIME.
         source: sender, see MessageSource.
     """
 
     MESSAGE_TYPE: ClassVar[int]
+    SINCE: ClassVar[Since] = ALWAYS
 
     timestamp: int = NO_TIME
     source: int = MessageSource.RTMACHINE
@@ -244,10 +246,12 @@ class ThreadLabel:
 class ProgramThreadsMessage(RobotMessage):
     """Where the threads of a program stand in PolyScope's program tree.
 
-    Source: the form from UR's document of 5.9; that 3.3 is the first software to send it is assumed.
+    Source: the form from UR's document of 5.9. That 3.3 is the first software to send it is assumed: the
+    document of 3.2 has the message of one thread, and 3.3 changed other messages.
     """
 
     MESSAGE_TYPE: ClassVar[int] = 14
+    SINCE: ClassVar[Since] = _SINCE_3_3
 
     threads: tuple[ThreadLabel, ...] = wire("*", default=(), record=ThreadLabel)
 

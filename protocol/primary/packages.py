@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.primary.framing import (
@@ -32,6 +32,7 @@ from protocol.primary.state import (
     decode_state,
 )
 from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import Since, since
 
 __all__ = [
     "SAFETY_TOLERANCES",
@@ -69,7 +70,13 @@ _TOLERANCES = struct.Struct(f">{len(SAFETY_TOLERANCES)}d")
 
 @dataclass(frozen=True, slots=True)
 class SafetyTolerances:
-    """Package type 24: 22 numbers of undocumented meaning."""
+    """Package type 24: 22 numbers of undocumented meaning.
+
+    Attributes:
+        SINCE: the first software seen to send it. Source: captures of 3.3 (absent) and 3.10 (present).
+    """
+
+    SINCE: ClassVar[Since] = since((3, 10))
 
     values: tuple[float, ...] = SAFETY_TOLERANCES
 

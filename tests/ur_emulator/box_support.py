@@ -3,6 +3,7 @@
 import socket
 import struct
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 
 from protocol.frame_buffer import FrameBuffer
@@ -13,7 +14,7 @@ from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
@@ -99,11 +100,11 @@ class FakeNetwork:
 class Bench:
     """A controller on the bench: ticks when the test says so, remembers what was said."""
 
-    def __init__(self, *, robot="ur3", seed=7, fidelity="typical", **kwargs):
+    def __init__(self, *, robot="ur3", seed=7, fidelity="typical", generation=CB3, **kwargs):
         self.network = FakeNetwork()
         self.controller = Controller(
-            robot_by_name(robot),
-            fidelity_by_name(fidelity),
+            replace(robot_by_name(robot), generation=generation),
+            generation.fidelity(fidelity),
             seed,
             partial(ProgramSlot, network=self.network),
             **kwargs,

@@ -12,7 +12,7 @@ from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
@@ -29,7 +29,7 @@ class ChunkBench(Bench):
         self.network = ChunkNetwork(chunk)
         self.controller = Controller(
             robot_by_name("ur3"),
-            fidelity_by_name(chunk.fidelity),
+            CB3.fidelity(chunk.fidelity),
             chunk.seed,
             partial(ProgramSlot, network=self.network),
         )

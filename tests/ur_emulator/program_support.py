@@ -11,7 +11,7 @@ from box_support import Bench, FakeNetwork
 from protocol.script_channel import ControlLine, ProgramText, ScriptChannel
 from ur_emulator.commands.programs import StartProgram, StopProgram
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.network import RemoteCallError
 from ur_emulator.scripting.program_slot import ProgramSlot
@@ -114,7 +114,7 @@ class Box(Bench):
     def __init__(self, *, peers=None, servers=None, software="3.15", robot="ur3", fidelity="ideal", seed=7):
         self.network = PeerNetwork(peers or {}, servers or {})
         self.controller = Controller(
-            robot_by_name(robot), fidelity_by_name(fidelity), seed, partial(ProgramSlot, network=self.network)
+            robot_by_name(robot), CB3.fidelity(fidelity), seed, partial(ProgramSlot, network=self.network)
         )
         self.events = []
         self.snapshots = []

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from box_support import Bench, FrameReader, MessageReader, connect
+from generation_support import SECOND
 from rtde_support import RtdeClient
 
 from protocol.primary.layout import RobotModeData
@@ -16,13 +17,13 @@ from ur_emulator.models.cb3 import CB3
 
 # Control cycle and physics step [us].
 CYCLES = [(8_000, 2_000), (4_000, 2_000), (4_000, 1_000), (2_000, 2_000)]
-OTHERS = [replace(CB3, period_us=period, substep_us=substep) for period, substep in CYCLES]
+OTHERS = [*(replace(CB3, period_us=period, substep_us=substep) for period, substep in CYCLES), SECOND]
 HOME = "[0, -1.57, -1.57, -1.57, 1.57, 0]"
 # Two cycles of a CB3 [s]: by so much a script that waits for a whole cycle may differ.
 SLACK = 0.016
 
 every_generation = pytest.mark.parametrize(
-    "generation", OTHERS, ids=lambda g: f"{g.period_us}us-{g.substep_us}us"
+    "generation", OTHERS, ids=lambda g: f"{g.name}-{g.period_us}us-{g.substep_us}us"
 )
 
 

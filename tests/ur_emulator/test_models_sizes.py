@@ -70,10 +70,10 @@ def test_drives_can_carry_the_stretched_arm_with_its_payload(robot):
     assert shoulder < 0.95 * robot.tau_max[1]
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
+@pytest.mark.parametrize("fidelity", FIDELITIES, ids=lambda it: it.name)
 @pytest.mark.parametrize("robot", ARMS)
 def test_moves_with_the_rated_payload_and_comes_to_rest_on_target(robot, fidelity):
-    controller = Controller(robot, FIDELITIES[fidelity], 7, partial(ProgramSlot, network=FakeNetwork()))
+    controller = Controller(robot, fidelity, 7, partial(ProgramSlot, network=FakeNetwork()))
     program = compile_program(f"""def prog():
       set_payload({robot.payload_max}, [0, 0, 0.03])
       q = get_target_joint_positions()

@@ -11,7 +11,8 @@ import pytest
 
 from ur_emulator.errors import EmulatorError, ModelError
 from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
-from ur_emulator.models.fidelity import FIDELITIES, IDEAL, POOR, TYPICAL, fidelity_by_name
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.fidelity import FIDELITIES, IDEAL, POOR, TYPICAL
 from ur_emulator.models.mjcf import arm_spec
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robots import robot_by_name
@@ -70,11 +71,11 @@ def test_gravity_at_the_folded_pose_is_that_of_the_vendor_table():
 
 def test_unknown_names_are_refused_with_the_known_ones():
     assert robot_by_name("UR3") is UR3
-    assert fidelity_by_name("Typical") is TYPICAL
+    assert CB3.fidelity("Typical") is TYPICAL
     with pytest.raises(ModelError, match=r"'ur7'.*ur3"):
         robot_by_name("ur7")
     with pytest.raises(EmulatorError, match=r"'perfect'.*exact, ideal, typical, poor"):
-        fidelity_by_name("perfect")
+        CB3.fidelity("perfect")
 
 
 def test_a_table_without_six_rows_makes_no_arm():
@@ -83,7 +84,7 @@ def test_a_table_without_six_rows_makes_no_arm():
 
 
 def test_fidelities_are_ordered():
-    assert set(FIDELITIES) == {"exact", "ideal", "typical", "poor"}
+    assert {it.name for it in FIDELITIES} == {"exact", "ideal", "typical", "poor"}
     for better, worse in ((IDEAL, TYPICAL), (TYPICAL, POOR)):
         for field in fields(TYPICAL):
             if field.name in ("name", "speed_filter_hz", "has_physics"):

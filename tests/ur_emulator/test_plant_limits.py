@@ -115,7 +115,7 @@ def test_a_cycle_that_does_not_divide_a_second_is_refused():
 
 
 def test_a_two_millisecond_cycle_works_too():
-    plant = Plant(UR3, TYPICAL, 0, replace(CB3, period_us=2_000))
+    plant = Plant(replace(UR3, generation=replace(CB3, period_us=2_000)), TYPICAL, 0)
     for _ in range(400):
         plant.step(target(HOME))
         plant.sense()

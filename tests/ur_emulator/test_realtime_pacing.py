@@ -6,7 +6,7 @@ import pytest
 
 from ur_emulator.commands.programs import SetSpeedSlider
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.pacing import (
     HANG_LIMIT,
@@ -92,7 +92,7 @@ def test_the_lead_is_at_most_a_quarter_of_a_short_period():
 
 def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count_in_the_next_cycle():
     controller = Controller(
-        robot_by_name("ur3"), fidelity_by_name("exact"), 0, partial(ProgramSlot, network=None)
+        robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(ProgramSlot, network=None)
     )
     box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None, pytest.fail)
     seen = []

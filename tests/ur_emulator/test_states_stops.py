@@ -31,13 +31,11 @@ from ur_emulator.commands.safety import (
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
 from ur_emulator.controller.safety.speed_scaling import (
-    RECOVERY_SPEED,
-    REDUCED_SHARE,
     TOLERANCE,
     joint_limits,
 )
 from ur_emulator.errors import EmulatorError
-from ur_emulator.models.fidelity import fidelity_by_name
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import SpeedJ
@@ -287,7 +285,7 @@ def test_an_emergency_stop_over_a_protective_stop_leads_back_to_it():
 @pytest.mark.parametrize("name", ["ur3", "ur5", "ur10"])
 def test_every_arm_brakes_with_its_own_deceleration(name):
     robot = robot_by_name(name)
-    controller = Controller(robot, fidelity_by_name("ideal"), 1, partial(ProgramSlot, network=FakeNetwork()))
+    controller = Controller(robot, CB3.fidelity("ideal"), 1, partial(ProgramSlot, network=FakeNetwork()))
     bench = Bench(fidelity="ideal")
     bench.controller = controller
     bench.start(LONG_MOVE)
@@ -306,7 +304,7 @@ def test_reduced_mode_slows_a_move_down_to_half_the_rated_speed():
     bench = Bench(fidelity="ideal")
     bench.tick(1, REDUCE)
     bench.run(LONG_MOVE)
-    limit = REDUCED_SHARE * bench.controller.state.robot.qd_max[0]
+    limit = CB3.limits.reduced_share * bench.controller.state.robot.qd_max[0]
     fastest = np.abs(speeds(bench)[:, 0]).max()
     assert 0.85 * limit < fastest <= limit + TOLERANCE
     assert bench.now.safety_mode == SafetyMode.REDUCED
@@ -331,7 +329,7 @@ def test_a_fast_arm_is_within_the_limits_half_a_second_after_reduced_mode_began(
     assert bench.now.target_qd[0] == pytest.approx(2.6)
     first = len(bench.snapshots)
     bench.tick(110, REDUCE)
-    limit = REDUCED_SHARE * bench.controller.state.robot.qd_max[0]
+    limit = CB3.limits.reduced_share * bench.controller.state.robot.qd_max[0]
     assert np.abs(speeds(bench, first + 62)[:, 0]).max() <= limit + TOLERANCE
     assert bench.now.safety_mode == SafetyMode.REDUCED
     bench.tick(100, NO_REDUCE)
@@ -355,7 +353,7 @@ def test_limits_of_the_modes():
     robot = robot_by_name("ur3")
     assert joint_limits(SafetyMode.NORMAL, robot) is None
     assert joint_limits(SafetyMode.REDUCED, robot) == tuple(0.5 * v for v in robot.qd_max)
-    assert joint_limits(SafetyMode.RECOVERY, robot) == (RECOVERY_SPEED,) * 6
+    assert joint_limits(SafetyMode.RECOVERY, robot) == (CB3.limits.recovery_speed,) * 6
 
 
 def test_an_arm_that_wakes_up_out_of_range_is_in_recovery_until_it_is_back():
@@ -372,7 +370,7 @@ def test_an_arm_that_wakes_up_out_of_range_is_in_recovery_until_it_is_back():
     )
     while bench.now.safety_mode == SafetyMode.RECOVERY:
         bench.tick()
-        assert abs(bench.now.target_qd[0]) <= RECOVERY_SPEED + TOLERANCE
+        assert abs(bench.now.target_qd[0]) <= CB3.limits.recovery_speed + TOLERANCE
     assert bench.now.safety_mode == SafetyMode.NORMAL
     assert bench.now.actual_q[0] <= high
     bench.tick(100)

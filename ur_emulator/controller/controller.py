@@ -50,9 +50,7 @@ from ur_emulator.controller.tool_settings import ToolSettings
 from ur_emulator.errors import RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
-from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.target import JointTarget
@@ -78,24 +76,22 @@ class Controller:
         make_programs: Callable[[ControllerState], Programs],
         *,
         mode: RobotMode = RobotMode.RUNNING,
-        generation: RobotGeneration = CB3,
-        version: tuple[int, int] = (3, 15),
+        version: tuple[int, int] | None = None,
     ) -> None:
         """Assemble the box.
 
         Args:
-            robot: the arm.
+            robot: the arm; its generation has the control cycle.
             fidelity: how far it is from a perfect one.
             seed: of everything random in it: calibration, phases, noise.
             make_programs: makes what runs the programs, which act on the parts of the controller.
             mode: robot mode to start in.
-            generation: of the robot; its control cycle.
-            version: of the software, major and minor.
+            version: of the software, major and minor; None: the usual one of the generation.
         """
-        self.generation = generation
+        self.generation = generation = robot.generation
         self.period_s = generation.period_s
         make_plant = Plant if fidelity.has_physics else ExactPlant
-        self.plant = make_plant(robot, fidelity, seed, generation)
+        self.plant = make_plant(robot, fidelity, seed)
         q = six(robot.home_q)
         self.plant.reset(q)
         self._setpoints = SetpointCheck(robot, self.period_s)
@@ -115,7 +111,7 @@ class Controller:
             motion,
             RobotModeMachine(mode, self.period_s),
             partial(_place_arm, self.plant, motion),
-            version,
+            version or generation.parse_version(generation.default_version)[:2],
         )
         self._payload = self.state.tool.payload
         self.programs = make_programs(self.state)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from datetime import datetime
+from math import radians
 
 from protocol.dashboard.commands import COMMANDS
 from protocol.primary.layout import SUB_PACKAGES
 from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.models.robot_generation import Builds, RobotGeneration
+from ur_emulator.models.fidelity import FIDELITIES
+from ur_emulator.models.robot_generation import Builds, RobotGeneration, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 
 _BUILDS: Builds = (
@@ -27,6 +29,12 @@ CB3 = RobotGeneration(
     major=3,
     default_version="3.15.8",
     builds=_BUILDS,
+    limits=SafetyLimits(
+        reduced_share=0.5,  # chosen: the manual's defaults were not at hand
+        recovery_speed=radians(30.0),  # UR3 and UR5/CB3 user manuals
+        acceleration=40.0,  # not known; that of a UR5e capture
+    ),
+    fidelities=FIDELITIES,
     robot_subtype=2,
     dashboard=COMMANDS,
     realtime=COLUMNS,

@@ -20,9 +20,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ur_emulator.errors import ModelError
-from ur_emulator.models.robot_model import Vector6
-
 
 @dataclass(frozen=True, slots=True)
 class Fidelity:
@@ -36,14 +33,14 @@ class Fidelity:
         dead_time: from the start of a cycle until the drives act on its target [s].
         dead_time_spread: a part uniform in [0, spread) is added, drawn once a box [s].
         drive_lag: time constant of the drive's set-point filter [s].
-        feedback_age: age of the measurements when they are reported [s]; 2 ms at least.
+        feedback_age: age of the measurements when they are reported [s]; at least one physics step.
         sample_jitter: sd of the moment at which all joints are sampled [s].
-        encoder_sigma: sd of the white noise of each reported angle [rad].
+        encoder_sigma: sd of the white noise of each reported angle, (6,) [rad].
         encoder_step: quantisation of the reported angle [rad].
-        speed_filter_hz: pole of the one-pole filter of each reported speed [Hz].
+        speed_filter_hz: pole of the one-pole filter of each reported speed, (6,) [Hz].
         speed_dead_band: below this joint speed the filter's input is gated to zero [rad/s].
         speed_sigma: sd of the white noise of the reported speed while moving [rad/s].
-        current_sigma: sd of the reported current [A].
+        current_sigma: sd of the reported current, (6,) [A].
         ripple_first: rms speed ripple of the gear at one cycle per motor turn, as a share of joint speed [1].
         ripple_second: the same at two cycles per motor turn.
         friction_error: sd of the relative error of the controller's friction model, per joint [1].
@@ -64,12 +61,12 @@ class Fidelity:
     drive_lag: float
     feedback_age: float
     sample_jitter: float
-    encoder_sigma: Vector6
+    encoder_sigma: tuple[float, ...]
     encoder_step: float
-    speed_filter_hz: Vector6
+    speed_filter_hz: tuple[float, ...]
     speed_dead_band: float
     speed_sigma: float
-    current_sigma: Vector6
+    current_sigma: tuple[float, ...]
     ripple_first: float
     ripple_second: float
     friction_error: float
@@ -153,16 +150,4 @@ POOR = replace(
     force_friction=4.0,
 )
 
-FIDELITIES: dict[str, Fidelity] = {fidelity.name: fidelity for fidelity in (EXACT, IDEAL, TYPICAL, POOR)}
-
-
-def fidelity_by_name(name: str) -> Fidelity:
-    """Look a fidelity up by its name, in any letter case.
-
-    Raises:
-        ModelError: when no set has that name.
-    """
-    fidelity = FIDELITIES.get(name.lower())
-    if fidelity is None:
-        raise ModelError(f"unknown fidelity {name!r}: choose one of {', '.join(FIDELITIES)}")
-    return fidelity
+FIDELITIES = (EXACT, IDEAL, TYPICAL, POOR)

@@ -18,12 +18,28 @@ from protocol.realtime.layout import RealtimeLayout, frame_size
 from protocol.rtde.fields import RtdeField, input_fields, output_fields
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
+from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.software import Software
 from urscript.catalogue import Builtin, Catalogue, Version
 
 # First version, build and date of each row, the oldest first; software between two rows has the build and the
 # date of the earlier one.
 Builds = tuple[tuple[SoftwareVersion, int, datetime], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyLimits:
+    """Limits that the safety systems of all arms have in common.
+
+    Attributes:
+        reduced_share: joint speeds of reduced mode, as a share of the rated ones.
+        recovery_speed: joint speed of recovery mode [rad/s].
+        acceleration: largest joint acceleration that the configuration data announce [rad/s^2].
+    """
+
+    reduced_share: float
+    recovery_speed: float
+    acceleration: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,6 +53,8 @@ class RobotGeneration:
         major: first number of its software versions.
         default_version: what a box runs if the user names none.
         builds: which version has which build.
+        limits: of the safety system.
+        fidelities: how far its arms are from perfect ones.
         robot_subtype: code in the primary interface's configuration data.
         dashboard: commands of the dashboard server.
         realtime: columns of the frames on port 30003.
@@ -56,6 +74,8 @@ class RobotGeneration:
     major: int
     default_version: str
     builds: Builds
+    limits: SafetyLimits
+    fidelities: tuple[Fidelity, ...]
     robot_subtype: int
     dashboard: tuple[DashboardCommand, ...]
     realtime: tuple[RealtimeColumn, ...]
@@ -115,6 +135,18 @@ class RobotGeneration:
                 f"for example {self.default_version}"
             )
         return version
+
+    def fidelity(self, name: str) -> Fidelity:
+        """Look a fidelity up by its name, in any letter case.
+
+        Raises:
+            ModelError: no set has that name.
+        """
+        for fidelity in self.fidelities:
+            if fidelity.name == name.lower():
+                return fidelity
+        known = ", ".join(fidelity.name for fidelity in self.fidelities)
+        raise ModelError(f"unknown fidelity {name!r}: choose one of {known}")
 
     def software(self, version: SoftwareVersion) -> Software:
         """Return a version of the software, with its part of every table; a build number above 0 stays."""

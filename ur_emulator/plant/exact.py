@@ -13,10 +13,8 @@ import mujoco
 
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError, RefusedError
-from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
-from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
@@ -28,10 +26,8 @@ from ur_emulator.plant.sensors import SUPPLY_VOLTAGE
 class ExactPlant(Plant):
     """An arm that follows exactly; arguments and the rest of the interface as `Plant`."""
 
-    def __init__(
-        self, robot: RobotModel, fidelity: Fidelity, seed: int, generation: RobotGeneration = CB3
-    ) -> None:
-        super().__init__(robot, fidelity, seed, generation)
+    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
+        super().__init__(robot, fidelity, seed)
         self._physics.obstacles = _NoObstacles(self._physics.model, self._physics.q)
 
     def reset(self, q: Sequence[float]) -> None:

@@ -27,11 +27,9 @@ from numpy.typing import NDArray
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
 from ur_emulator.models.calibration import calibrated_dh, draw_calibration
-from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.random_streams import random_stream
-from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, six
 from ur_emulator.plant.arm_physics import ArmPhysics
 from ur_emulator.plant.drives import TARGET_MAX, Drives
@@ -49,19 +47,17 @@ class Plant:
     Starts at the robot's home pose with its brakes on.
 
     Args:
-        robot: type of the arm.
+        robot: type of the arm; its generation has the control cycle and the physics step.
         fidelity: how imperfect it is.
         seed: which one of all such arms; fixes calibration, gear phases, delays and noise.
-        generation: control cycle and physics step.
 
     Attributes:
         calibration: the factory calibration of this arm, for the controller's kinematics.
         dead_time: the delay drawn for this box, from the start of a cycle to the drives acting on it [s].
     """
 
-    def __init__(
-        self, robot: RobotModel, fidelity: Fidelity, seed: int, generation: RobotGeneration = CB3
-    ) -> None:
+    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
+        generation = robot.generation
         self.robot = robot
         self.fidelity = fidelity
         self.seed = seed

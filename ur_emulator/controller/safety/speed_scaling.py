@@ -2,9 +2,8 @@
 
 In these modes the time on the path runs slower, so that no joint exceeds its limit.
 
-Sources: recovery mode 30 deg/s, tolerance 1.15 deg/s and 0.5 s until the limits of reduced mode hold: UR3 and
-UR5/CB3 user manuals. The default joint speeds of reduced mode are not known: half the rated ones are chosen,
-and that the controller slows down instead of stopping.
+The limits are those of the robot's generation. Source of tolerance and patience: UR3 and UR5/CB3 user
+manuals. That the controller slows down instead of stopping is chosen.
 """
 
 from __future__ import annotations
@@ -19,8 +18,6 @@ from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.path_motion import SCALING_RATE
 
-REDUCED_SHARE = 0.5
-RECOVERY_SPEED = radians(30.0)
 TOLERANCE = radians(1.15)
 # A joint above its limit for longer than this is a protective stop [s].
 PATIENCE = 0.5
@@ -31,8 +28,9 @@ AIM = 0.95
 def joint_limits(mode: SafetyMode, robot: RobotModel) -> Vector6 | None:
     """Return the joint speeds allowed in a mode [rad/s]; None for the rated ones."""
     if mode is SafetyMode.REDUCED:
-        return six([REDUCED_SHARE * limit for limit in robot.qd_max])
-    return (RECOVERY_SPEED,) * 6 if mode is SafetyMode.RECOVERY else None
+        share = robot.generation.limits.reduced_share
+        return six([share * limit for limit in robot.qd_max])
+    return (robot.generation.limits.recovery_speed,) * 6 if mode is SafetyMode.RECOVERY else None
 
 
 class SpeedLimiter:

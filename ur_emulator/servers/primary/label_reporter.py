@@ -13,10 +13,6 @@ from protocol.primary.messages import ProgramLabelMessage, ProgramThreadsMessage
 from protocol.ur_types import SoftwareVersion
 from urscript import RunningProgram
 
-# The first software with the message about all threads; those before told of the main thread. Assumed: the
-# document of 5.9 has the new one, that of 3.2 the old one, and 3.3 changed other messages.
-THREADS_SINCE = SoftwareVersion(3, 3)
-
 _LABEL = re.compile(r'\s*(-?\d{1,9})\s*"([^"]*)"')
 
 
@@ -31,7 +27,7 @@ class LabelReporter:
     """What one port has told of where the threads of one run stand."""
 
     def __init__(self, version: SoftwareVersion) -> None:
-        self._tells_of_threads = version >= THREADS_SINCE
+        self._tells_of_threads = ProgramThreadsMessage.SINCE.covers(version)
         self._run: RunningProgram | None = None
         self._told: tuple[ThreadLabel, ...] = ()
 

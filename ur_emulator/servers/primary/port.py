@@ -10,9 +10,9 @@ its threads stand in PolyScope's tree.
 from __future__ import annotations
 
 from protocol.primary.messages import RobotMessage, StartupMessage, version_message
-from protocol.primary.packages import encode_message_package, encode_safety_tolerances
+from protocol.primary.packages import SafetyTolerances, encode_message_package, encode_safety_tolerances
 from protocol.script_channel import ScriptChannel
-from protocol.ur_types import RobotMode, SoftwareVersion
+from protocol.ur_types import RobotMode
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, ProgramStarted, ProgramStopped
 from ur_emulator.controller.snapshot import Snapshot
@@ -26,8 +26,6 @@ from ur_emulator.servers.tcp.connection import Connection
 from urscript import RunningProgram
 
 STATE_RATE = 10  # states per second
-# The first software seen to send the tolerances package. Source: captures of 3.3 (absent) and 3.10 (present).
-_TOLERANCES_SINCE = SoftwareVersion(3, 10)
 
 
 class PrimaryPort:
@@ -63,7 +61,7 @@ class PrimaryPort:
         self._was_running = controller.snapshot.robot_mode == RobotMode.RUNNING
         self._greeting = encode_message_package(version_message(version, software.built), version)
         self._second_greeting = encode_message_package(StartupMessage(), version)
-        if version >= _TOLERANCES_SINCE:
+        if SafetyTolerances.SINCE.covers(version):
             self._second_greeting += encode_safety_tolerances()
 
     def opened(self, connection: Connection) -> None:

@@ -43,10 +43,7 @@ from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.robot_model import DhRow, RobotModel
 from ur_emulator.models.software import Software
 
-# Largest joint acceleration in the configuration data; the CB3 value is unknown, this is the one of a UR5e
-# capture.
-MAX_ACCELERATION = 40.0  # rad/s^2
-# Radius of the sphere around the elbow that the safety system watches [m]. Source: the same capture.
+# Radius of the sphere around the elbow that the safety system watches [m]. Source: a UR5e capture.
 ELBOW_RADIUS = 0.13
 
 # Modes in which the box does not hear its arm.
@@ -208,7 +205,7 @@ def setup_records(
             joint_min_limit=robot.q_min,
             joint_max_limit=robot.q_max,
             joint_max_speed=robot.qd_max,
-            joint_max_acceleration=(MAX_ACCELERATION,) * 6,
+            joint_max_acceleration=(robot.generation.limits.acceleration,) * 6,
             dh_a=tuple(row.a for row in robot.dh),
             dh_d=tuple(row.d for row in robot.dh),
             dh_alpha=tuple(row.alpha for row in robot.dh),

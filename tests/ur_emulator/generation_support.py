@@ -1,0 +1,39 @@
+"""A second generation, unlike CB3 in every field: what the box decides by its generation shows on it."""
+
+from dataclasses import replace
+from datetime import datetime
+
+from protocol.dashboard.commands import COMMANDS
+from protocol.primary.layout import ForceModeData
+from protocol.ur_types import SoftwareVersion
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.robot_generation import RobotGeneration, SafetyLimits
+
+MISSING_BUILTIN = "popup"
+
+SECOND = RobotGeneration(
+    name="second series",
+    period_us=4_000,
+    substep_us=1_000,
+    major=5,
+    default_version="5.1.0",
+    builds=((SoftwareVersion(5, 0), 77, datetime(2031, 2, 3)),),
+    limits=SafetyLimits(reduced_share=0.25, recovery_speed=0.1, acceleration=55.0),
+    fidelities=tuple(
+        replace(it, dead_time=it.dead_time + 0.004, force_sigma=0.15)
+        for it in CB3.fidelities
+        if it.name != "poor"
+    ),
+    robot_subtype=3,
+    dashboard=tuple(
+        replace(row, replies={"ok": f"second: {row.replies['ok']}"})
+        for row in COMMANDS
+        if row.name in ("PolyscopeVersion", "robotmode", "running", "power off", "quit")
+    ),
+    realtime=tuple(column for column in CB3.realtime if column.since_size <= 1060),
+    frame_sizes=((SoftwareVersion(5, 0), 1044), (SoftwareVersion(5, 1), 1060)),
+    sub_packages=tuple(record for record in CB3.sub_packages if record is not ForceModeData),
+    rtde_outputs=tuple(field for field in CB3.rtde_outputs if field.name != "actual_momentum"),
+    rtde_inputs=tuple(field for field in CB3.rtde_inputs if field.name != "speed_slider_mask"),
+    builtins=tuple(row for row in CB3.builtins if row.name != MISSING_BUILTIN),
+)
