@@ -1,7 +1,7 @@
 """The `urscript` command: `check` programs, `run` them, lay them out (`fmt`).
 
-Exit codes: 0 all is well, 1 a program is wrong, failed or is not in canonical layout, 2 the command was used
-wrongly. docs/urscript-tool.md shows all of it.
+Exit codes: 0 success, 1 a program has errors, failed or is not in canonical layout, 2 wrong usage.
+docs/urscript-tool.md shows all of it.
 """
 
 from __future__ import annotations
@@ -151,6 +151,6 @@ def _write_bytes(text: str) -> None:
 
 def main() -> None:
     """Entry point of the console script."""
-    # Trees of long programs are no garbage: a third of the time would go into looking for some.
+    # Trees of long programs are no garbage; the collector would take a third of the time.
     gc.set_threshold(*_GC_THRESHOLD)
     app()

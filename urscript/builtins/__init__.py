@@ -1,7 +1,7 @@
 """The builtins that are plain functions of their arguments: mathematics, strings, lists, poses.
 
-They check their own arguments, raise ScriptRuntimeError without a place, and change no value. Everything that
-needs a robot, a socket or a clock is offered by the host instead.
+They check their own arguments, raise ScriptRuntimeError without a place, and change no value. The host has
+the builtins that need a robot, a socket or a clock.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PURE: Mapping[str, Callable[..., Any]] = MappingProxyType(
 
 
 def pure_builtins(seed: int) -> dict[str, Callable[..., Any]]:
-    """`PURE` and `random`, whose numbers follow from the seed alone: one program, one seed, one course.
+    """`PURE` and `random`, whose numbers depend on the seed only.
 
     Args:
         seed: of the pseudo-random numbers; the same seed gives the same sequence on every machine.

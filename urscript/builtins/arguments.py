@@ -1,7 +1,7 @@
 """Argument checks that the pure builtins share.
 
-Pure functions check what they are given by themselves, so that the compiler may call them without passing
-through the catalogue's checks. The texts are the catalogue's.
+Pure functions check their own arguments, so that calls of them need no checks of the catalogue. The texts are
+those of the catalogue.
 """
 
 from __future__ import annotations

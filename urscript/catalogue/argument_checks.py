@@ -22,7 +22,7 @@ from .types import Builtin, Param, ParamType
 Predicate = Callable[[Any], bool]
 
 _SHOWN_TEXT = 40
-# Numbers beyond this are no length, time or angle of a robot; their products would leave the floats.
+# Larger numbers are not a length, time or angle of a robot; their products would overflow.
 _LARGEST = 1e15
 
 
@@ -121,7 +121,7 @@ def _is_finite(value: Any) -> bool:
 
 
 def _is_bounded(value: Any) -> bool:
-    """Like `_is_finite`, and not absurd either."""
+    """Like `_is_finite`, and not larger than `_LARGEST`."""
     if isinstance(value, (list, Pose)):
         # NaN slips through a maximum, not through a sum.
         return not value or (isfinite(sum(value)) and max(map(abs, value)) <= _LARGEST)
@@ -181,18 +181,18 @@ def _accepts(builtin: Builtin, param: Param) -> Predicate | None:
             return False
         return not is_ranged or _is_in_range(param, value)
 
-    is_plain = _PLAIN.get(param.type) if needs_finite and not is_ranged else None
-    return accepts if is_plain is None else lambda value: is_plain(value) or accepts(value)
+    is_usual = _FAST_PREDICATES.get(param.type) if needs_finite and not is_ranged else None
+    return accepts if is_usual is None else lambda value: is_usual(value) or accepts(value)
 
 
 _NUMBER_TYPES = frozenset({int, float})
 
 
-def _is_plain_number(value: Any) -> bool:
+def _is_usual_number(value: Any) -> bool:
     return type(value) in _NUMBER_TYPES and bool(-_LARGEST <= value <= _LARGEST)
 
 
-def _is_plain_six(value: Any) -> bool:
+def _is_usual_six(value: Any) -> bool:
     # The norm is not a number, or infinite, where an element is; it is at least as large as each of them.
     return (
         type(value) is list
@@ -202,12 +202,12 @@ def _is_plain_six(value: Any) -> bool:
     )
 
 
-# What nearly every argument of a motion command is, told in a few steps; others have the whole test.
-_PLAIN: dict[ParamType, Predicate] = {
-    ParamType.NUMBER: _is_plain_number,
-    ParamType.JOINTS: _is_plain_six,
-    ParamType.POSE_OR_JOINTS: _is_plain_six,
-    ParamType.VECTOR6: _is_plain_six,
+# Fast tests that accept nearly every argument of a motion command; others get the full test.
+_FAST_PREDICATES: dict[ParamType, Predicate] = {
+    ParamType.NUMBER: _is_usual_number,
+    ParamType.JOINTS: _is_usual_six,
+    ParamType.POSE_OR_JOINTS: _is_usual_six,
+    ParamType.VECTOR6: _is_usual_six,
 }
 
 

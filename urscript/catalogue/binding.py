@@ -1,4 +1,4 @@
-"""Which argument of a call fills which parameter, decided from the form of the call alone.
+"""Which argument of a call belongs to which parameter, decided from the form of the call alone.
 
 The compiler calls `static_bind` once for each call in a program; at run time nothing is left to decide.
 

@@ -1,7 +1,6 @@
-"""The record kinds of the catalogue: a builtin, its parameters, what it costs, how well it is modelled.
+"""The records of the catalogue: a builtin, its parameters, its time, its support.
 
-Only declarations live here. Tables fill them (one module a chapter of the script manual), `binding` and
-`argument_checks` interpret them.
+One module a chapter of the script manual has the rows; `binding` and `argument_checks` interpret them.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from .versions import NEVER, Generation, PerGeneration, Version
 
 
 class TimeClass(Enum):
-    """What a call costs the calling thread.
+    """What a call means for the calling thread.
 
     Source: script manual, chapter "Thread scheduling" and the description of each function.
     """
@@ -29,7 +28,7 @@ class TimeClass(Enum):
 
 
 class Support(Enum):
-    """How faithfully this box does what the controller does."""
+    """How closely this box follows the controller."""
 
     EXACT = "exact"
     APPROXIMATE = "approximate"
@@ -61,7 +60,7 @@ class ParamType(Enum):
     NORMED = "a number, a list of numbers or a Pose"
 
 
-SHORT: Final = frozenset(
+FIXED_SIZE: Final = frozenset(
     {
         ParamType.BOOL,
         ParamType.INT,
@@ -91,7 +90,7 @@ class Param:
     Args:
         name: as in keyword calls.
         type: what the argument must be.
-        default: the value handed on when the argument is left out; None stands for "the controller fills it
+        default: the value when the argument is omitted; None stands for "the controller fills it
             in" (the active TCP, the present joint positions, another parameter's value), see `shown`.
         unit: SI unit or the meaning of the codes.
         low: smallest value allowed for a number, None for no bound.
@@ -138,7 +137,7 @@ class Builtin:
         params: in positional order.
         returns: type of the result, then after a comma its unit; "None" where there is none. The compiler
             reads the type, so it must hold for every call ("int or list" where it varies).
-        time: what a call costs the thread.
+        time: what a call means for the thread.
         module: chapter of the script manual.
         since: first release of each generation that knows this form.
         until: first release that no longer has this form.

@@ -1,1 +1,1 @@
-"""What is allowed but probably not meant: the warnings of `urscript check`."""
+"""Warnings of `urscript check`: what is allowed but probably a mistake."""

@@ -1,4 +1,4 @@
-"""Warnings of a program whose names are all known: what is allowed but probably not meant."""
+"""All warnings of a program without errors."""
 
 from __future__ import annotations
 

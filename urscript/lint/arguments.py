@@ -1,4 +1,4 @@
-"""Warnings about arguments that a builtin refuses: literals of another type, length or range."""
+"""Warnings about arguments that a builtin refuses: constants of a wrong type, length or range."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from urscript.values import Pose
 
 
 class KnownValue(NamedTuple):
-    """What is known of a value before the program runs.
+    """What is statically known of a value.
 
     Attributes:
-        value: The value; numbers that are not known are 0 in it.
+        value: The value; unknown numbers in it are 0.
         whole: All of it is known, not only type and length.
     """
 
@@ -75,7 +75,7 @@ def _refused(builtin: Builtin, param: Param, argument: Expression) -> str | None
 
 
 def _known_value(expression: Expression) -> KnownValue | None:
-    """What is known of an expression; None if nothing is."""
+    """What is known of an expression, or None."""
     match expression:
         case (
             nodes.IntLiteral(value=value)

@@ -1,4 +1,4 @@
-"""Warnings about what happens: loops that take no time, reads nobody checks, code that is never reached."""
+"""Warnings about control flow: busy loops, unchecked reads, unreachable code."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def flow_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[Sc
 
 
 def constant_truth(expression: Expression) -> bool | None:
-    """What a condition made of literals always is; None if that is not evident."""
+    """The value of a constant condition; None if it is not evidently constant."""
     match expression:
         case nodes.BoolLiteral(value=truth):
             return truth
@@ -65,15 +65,15 @@ _LITERALS = (nodes.IntLiteral, nodes.BoolLiteral, nodes.StringLiteral)
 
 
 def _head(span: Span, condition: Expression) -> Span:
-    """From the word of a loop or branch to the end of its condition."""
+    """From the keyword of a loop or branch to the end of its condition."""
     return span._replace(end_line=condition.span.end_line, end_column=condition.span.end_column)
 
 
-# --- loops without time ----------------------------------------------------------------------------------
+# --- busy loops ------------------------------------------------------------------------------------------
 
 
 def _is_busy(loop: nodes.While, scope: FunctionScope, catalogue: Catalogue) -> bool:
-    """Whether the loop, once in its second round, never ends and never lets a cycle pass."""
+    """Whether the loop, from its second iteration on, never ends and never lets a cycle pass."""
     statements = list(all_statements(loop.body))
     expressions = [loop.condition, *(item for each in statements for item in own_expressions(each))]
     parts = [part for expression in expressions for part in all_expressions(expression)]
@@ -108,7 +108,7 @@ def _takes_time(part: Expression, scope: FunctionScope, catalogue: Catalogue) ->
 
 
 def _has_effect(part: Expression, scope: FunctionScope, catalogue: Catalogue) -> bool:
-    """Whether evaluating it twice in one cycle may give something else the second time."""
+    """Whether a second evaluation in the same cycle may give another result."""
     if isinstance(part, nodes.Call):
         builtin = None if scope.find_function(part.function) else catalogue.lookup(part.function)
         return builtin is None or builtin.returns == "None" or builtin.name == "random"
@@ -129,11 +129,11 @@ def _can_leave(block: Block, in_loop: bool = False) -> bool:
     return False
 
 
-# --- code that is never reached --------------------------------------------------------------------------
+# --- unreachable code ------------------------------------------------------------------------------------
 
 
 def _unreachable(block: Block, program: ResolvedProgram) -> Iterator[ScriptWarning]:
-    """The first statement behind the end of each block; definitions and labels may stand anywhere."""
+    """The first unreachable statement of each block; definitions and labels are allowed anywhere."""
     ended_by = ""
     for statement in block:
         if ended_by and not isinstance(statement, (nodes.Function, nodes.Label, nodes.Declare)):
@@ -147,7 +147,7 @@ def _unreachable(block: Block, program: ResolvedProgram) -> Iterator[ScriptWarni
 
 
 def _end_of(statement: Statement) -> str:
-    """What makes control never pass `statement`, in words; empty if it may pass."""
+    """Why control never passes `statement`, in words; empty if it may."""
     match statement:
         case nodes.Return():
             return "return"
@@ -173,7 +173,7 @@ def _breaks(block: Block) -> bool:
 
 
 def _first_line(statement: Statement) -> Span:
-    """The statement, or the head of it if it is a block."""
+    """The statement, or its head if it is a block."""
     match statement:
         case nodes.While(condition=condition):
             return _head(statement.span, condition)
@@ -210,7 +210,7 @@ def _is_same(first: Expression, second: Expression) -> bool:
 
 
 def _unchecked_reads(program: ResolvedProgram) -> Iterator[ScriptWarning]:
-    """Reads whose numbers are used while element 0 is not read and the list goes nowhere as a whole."""
+    """Reads whose values are used without reading element 0 or the list as a whole."""
     numbers_used: set[Variable] = set()
     checked: set[Variable] = set()
     indexed: set[int] = set()

@@ -34,7 +34,7 @@ def name_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[Sc
 
 
 def owner(name: str, scope: FunctionScope) -> Variable:
-    """The variable that `name` means in `scope`."""
+    """The variable of `name` in `scope`."""
     return (scope if name in scope.locals else None), name
 
 
@@ -52,7 +52,7 @@ def read_expressions(statement: Statement) -> tuple[Expression, ...]:
 
 
 def expressions_read(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, Expression]]:
-    """Every expression that is read, with all its parts, beside the scope whose names it uses."""
+    """Every expression that is read, with all its parts, and the scope of its names."""
     for scope in program.scopes():
         for statement in all_statements(scope.body):
             for expression in read_expressions(statement):
@@ -66,7 +66,7 @@ def expressions_read(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, 
 
 
 def declared_variables(program: ResolvedProgram) -> Iterator[tuple[Variable, Span]]:
-    """Every place in the text, parameters aside, that makes a variable or sets one as a whole."""
+    """Every declaration of a variable and assignment to a whole variable, without parameters."""
     for scope in program.scopes():
         for statement in all_statements(scope.body):
             if isinstance(statement, nodes.Declare):
@@ -80,7 +80,7 @@ def declared_variables(program: ResolvedProgram) -> Iterator[tuple[Variable, Spa
 
 
 def name_of(function: nodes.Function, source: Source) -> Span:
-    """Where the name of a definition stands."""
+    """The span of the name of a definition."""
     line, after_word = function.span.line, function.span.column - 1 + len(function.kind)
     column = source.line(line).find(function.name, after_word) + 1
     if not column:

@@ -1,6 +1,6 @@
-"""What `urscript check` warns about: one table, and the warning itself.
+"""The warnings of `urscript check`: the table of rules, and the exception.
 
-A code never changes its meaning and is never used again for another one.
+A code never changes its meaning and is never reused.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ class Rule(NamedTuple):
     """One kind of warning.
 
     Attributes:
-        code: What people ignore it by.
+        code: For `--ignore`.
         meaning: What the program does.
-        reason: Why that is probably not meant.
+        reason: Why this is probably a mistake.
     """
 
     code: str
@@ -68,12 +68,12 @@ CALL_OF_PROGRAM: Final = Rule(
 )
 
 UNUSED_VALUE: Final = Rule(
-    "W114", "a value is computed and not used", "a comparison that should assign, or the other way round"
+    "W114", "a value is computed and not used", "probably a comparison in place of an assignment"
 )
 CALL_WITHOUT_HANDLE: Final = Rule(
     "W115",
     "a method is called where nothing has methods",
-    "only what rpc_factory returns has any; lists and texts have functions instead",
+    "only values of rpc_factory have methods; lists and strings have functions instead",
 )
 REFUSED_ARGUMENT: Final = Rule(
     "W116", "a builtin gets an argument that it refuses", "the call fails when it is reached"
@@ -100,11 +100,11 @@ RULES: Final = (
 
 
 class ScriptWarning(ScriptError):
-    """Allowed but probably not meant.
+    """Allowed but probably a mistake.
 
     Attributes:
         rule: The row of the table.
-        span: The stretch of text it is about.
+        span: The text that it concerns.
     """
 
     kind = "Warning"
@@ -116,5 +116,5 @@ class ScriptWarning(ScriptError):
         self.span = span
 
     def headline(self) -> str:
-        """One line for people, the code at its end."""
+        """One line, with the code at its end."""
         return f"{super().headline()} [{self.rule.code}]"

@@ -1,4 +1,4 @@
-"""Warnings about values: computed for nothing, methods of what has none."""
+"""Warnings about values: unused results, methods of values without methods."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from urscript.syntax.nodes import Expression
 from urscript.syntax.walk import all_statements
 
 METHODS_SINCE = (5, 15)
-"""Lists and structs have methods from here on. Source: script manual of the e-Series."""
+"""First software in which lists and structs have methods. Source: script manual of the e-Series."""
 
 
 def value_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
@@ -44,7 +44,7 @@ _FUNCTIONS = {
     "strip": "write str_sub(x, first, length)",
     "split": "write str_find and str_sub",
 }
-"""What to write instead of methods that lists and texts have elsewhere."""
+"""Replacements for methods of lists and strings in other languages."""
 
 
 def _has_effect(value: Expression) -> bool:
@@ -53,7 +53,7 @@ def _has_effect(value: Expression) -> bool:
 
 
 def _unused(value: Expression) -> tuple[str, str | None]:
-    """What to say about a value that nobody uses."""
+    """Message and hint for an unused value."""
     match value:
         case nodes.Binary(operator="==", left=nodes.Name(name=name)):
             return "the result of this comparison is not used", f"write {name} = ... to assign"

@@ -20,7 +20,7 @@ from typing import Any, Final
 
 from urscript.builtins import PURE
 from urscript.catalogue import Catalogue
-from urscript.catalogue.types import SHORT
+from urscript.catalogue.types import FIXED_SIZE
 from urscript.compile.long_blocks import PART
 from urscript.dialect import Dialect
 from urscript.errors import ScriptBudgetError, ScriptRuntimeError, StackEntry
@@ -177,7 +177,7 @@ def _checked(
     if builtin is None or not builtin.params:
         return meter.function(function, cost, name)
     check = catalogue.check_of(name)
-    if all(param.type in SHORT for param in builtin.params):
+    if all(param.type in FIXED_SIZE for param in builtin.params):
         return meter.checked(function, cost, check)
 
     def call(thread: ScriptThread, *arguments: Any) -> Any:

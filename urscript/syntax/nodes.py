@@ -1,7 +1,6 @@
-"""The tree of a program: frozen nodes, each with the stretch of text it came from.
+"""The syntax tree of a program: frozen nodes, each with its span of the text.
 
-Two trees are equal when they mean the same: spans and the spelling of numbers do not count.
-A node knows nothing about names, types or execution.
+The comparison of trees ignores spans and the spelling of numbers.
 """
 
 from __future__ import annotations
@@ -14,19 +13,19 @@ from urscript.source import NOWHERE, Span
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """Anything with a place in the text."""
+    """A node of the tree."""
 
     span: Span = field(default=NOWHERE, compare=False, repr=False, kw_only=True)
 
 
 class Expression(Node):
-    """Anything with a value."""
+    """A node with a value."""
 
     __slots__ = ()
 
 
 class Statement(Node):
-    """Anything that stands alone in a block."""
+    """A node of a block."""
 
     __slots__ = ()
 
@@ -178,14 +177,14 @@ class Declare(Statement):
 
 @dataclass(frozen=True, slots=True)
 class Evaluate(Statement):
-    """An expression for its effect."""
+    """An expression as a statement."""
 
     value: Expression
 
 
 @dataclass(frozen=True, slots=True)
 class Arm(Node):
-    """One condition of an `if` and what to do when it holds."""
+    """One condition of an `if` and its block."""
 
     condition: Expression
     body: Block

@@ -1,7 +1,6 @@
 """The rules of the grammar as nodes: one method for each rule of `grammar.lark`, called by the parser.
 
-Here the few things are decided that the grammar leaves open: what is a pose, what can be called, what can
-be assigned to.
+What the grammar leaves open is decided here: what is a pose, what can be called, what can be assigned to.
 """
 
 # ruff: noqa: D102 - a method is the rule of the grammar that it is named after
@@ -15,23 +14,23 @@ from urscript.syntax import nodes
 
 
 def _span(item: Any) -> Span:
-    """The place of a node or token; lark's own tokens, in texts with errors, spell it out."""
+    """The span of a node or token; lark's own tokens, in texts with errors, have four attributes instead."""
     span: Span | None = getattr(item, "span", None)
     return span or Span(item.line, item.column, item.end_line, item.end_column)
 
 
 def _cover(items: list[Any]) -> Span:
-    """The place from the first to the last of `items`."""
+    """The span from the first to the last of `items`."""
     first, last = _span(items[0]), _span(items[-1])
     return Span(first.line, first.column, last.end_line, last.end_column)
 
 
 def _expressions(items: list[Any]) -> tuple[Any, ...]:
-    """The nodes among `items`: what is left when brackets, commas and gaps are gone."""
+    """The nodes among `items`, without brackets, commas and gaps."""
     return tuple(item for item in items if isinstance(item, nodes.Node))
 
 
-def _wrong(message: str, span: Span) -> ScriptSyntaxError:
+def _syntax_error(message: str, span: Span) -> ScriptSyntaxError:
     return ScriptSyntaxError(message, line=span.line, column=span.column, width=span.end_column - span.column)
 
 
@@ -104,7 +103,7 @@ class TreeBuilder:
         while isinstance(root, (nodes.Index, nodes.Member)):
             root = root.target
         if not isinstance(root, nodes.Name):
-            raise _wrong(
+            raise _syntax_error(
                 "cannot assign to this expression, only to a variable or an element of one", target.span
             )
         return nodes.Assign(target, value, span=_cover(items))
@@ -131,7 +130,7 @@ class TreeBuilder:
             return nodes.Call(callee.name, arguments, span=_cover(items))
         if isinstance(callee, nodes.Member):
             return nodes.MethodCall(callee.target, callee.name, arguments, span=_cover(items))
-        raise _wrong("cannot call this expression, only a function by its name", callee.span)
+        raise _syntax_error("cannot call this expression, only a function by its name", callee.span)
 
     def index(self, items: list[Any]) -> nodes.Expression:
         target, indices = items[0], _expressions(items[1:])
@@ -139,7 +138,9 @@ class TreeBuilder:
         if len(indices) == 6 and isinstance(target, nodes.Name) and target.name == "p":
             return nodes.PoseLiteral(indices, span=_cover(items))
         if len(indices) > 2:
-            raise _wrong(f"an index has 1 or 2 values, a pose p[...] 6, not {len(indices)}", _cover(items))
+            raise _syntax_error(
+                f"an index has 1 or 2 values, a pose p[...] 6, not {len(indices)}", _cover(items)
+            )
         return nodes.Index(target, indices, span=_cover(items))
 
     def member(self, items: list[Any]) -> nodes.Member:
@@ -158,7 +159,7 @@ class TreeBuilder:
     def integer(self, items: list[Any]) -> nodes.IntLiteral:
         span = _span(items[0])
         if len(items[0]) > 10 or int(items[0]) > 2**31:
-            raise _wrong("this integer does not fit into 32 bits; write a float", span)
+            raise _syntax_error("this integer does not fit into 32 bits; write a float", span)
         return nodes.IntLiteral(int(items[0]), span=span)
 
     def float_(self, items: list[Any]) -> nodes.FloatLiteral:

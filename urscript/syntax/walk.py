@@ -1,4 +1,4 @@
-"""Going through a tree: the expressions of a statement, the parts of an expression, nested statements."""
+"""Traversal of a tree: expressions of a statement, parts of an expression, nested statements."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def all_expressions(expression: Expression) -> Iterator[Expression]:
 
 
 def same_tree(first: Block, second: Block) -> bool:
-    """Whether two trees mean the same, as `==` says, however deep they are."""
+    """Whether two trees are equal, as by `==`, for trees of any depth."""
     todo: list[tuple[Any, Any]] = [(first, second)]
     while todo:
         one, other = todo.pop()
@@ -105,7 +105,7 @@ def _meaning(kind: str) -> tuple[str, ...]:
 
 
 def falls_through(block: Block) -> bool:
-    """Whether control can reach the end of the block: its last statement is no `return` in all branches."""
+    """Whether control can reach the end of the block: not every branch of its last statement returns."""
     if not block:
         return True
     match block[-1]:
