@@ -26,9 +26,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from protocol.pose import Pose, rotvec_to_matrix
+from protocol.pose import Pose, pose_add, pose_sub, rotvec_to_matrix
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
-from ur_emulator.motion.overlay import apply_shift, shift_between
 from ur_emulator.motion.task_frame import TaskFrame
 from ur_emulator.motion.tool import Tool
 
@@ -149,13 +148,13 @@ class ForceMode:
 
     def displace(self, tool_pose: Pose, dt: float) -> Pose:
         """See Overlay."""
-        along_path = ZERO6 if self._path_pose is None else shift_between(self._path_pose, tool_pose)
+        along_path = ZERO6 if self._path_pose is None else pose_sub(tool_pose, self._path_pose)
         self._path_pose = tool_pose
         measured = self._measure()
         share = dt / (FILTER_TIME + dt)
         self._wrench += share * (np.array(measured.wrench) - self._wrench)
         self._twist += share * (np.array(measured.twist) - self._twist)
-        place = apply_shift(self._shift, tool_pose)
+        place = pose_add(self._shift, tool_pose)
         axes = self.frame.turn(place, [way / dt for way in along_path])
         if axes is None or not self._chosen.any():
             speed = np.zeros(6)
@@ -169,8 +168,8 @@ class ForceMode:
             cancelled = rotation @ np.where(self._chosen, rotation.T @ way, 0.0)
         step = 0.5 * dt * (self._speed + speed) - cancelled
         self._speed = speed
-        self._shift = apply_shift(six(step.tolist()), self._shift)
-        return apply_shift(self._shift, tool_pose)
+        self._shift = pose_add(six(step.tolist()), self._shift)
+        return pose_add(self._shift, tool_pose)
 
     def deviation(self, q: Sequence[float], position_error: Sequence[float]) -> Deviation | None:
         """Return the stiff axis on which the arm is further from its set-point than its limit allows.

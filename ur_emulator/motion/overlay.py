@@ -6,10 +6,9 @@ terms of the path; the joints get the displaced target. Without overlays none of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Protocol
 
-from protocol.pose import Pose, pose_inv, pose_trans
+from protocol.pose import Pose, pose_add, pose_inv, pose_sub, pose_trans
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.speed_l import twist_towards
 from ur_emulator.motion.target import JointTarget
@@ -63,22 +62,9 @@ class LastDisplacement:
         if self._velocity is not ZERO6:
             after = twist_towards(self._velocity, ZERO6, self.LINEAR, self.ANGULAR, dt)
             way = [0.5 * dt * (a + b) for a, b in zip(self._velocity, after, strict=True)]
-            self._shift = apply_shift(six(way), self._shift)
+            self._shift = pose_add(six(way), self._shift)
             self._velocity = after if any(after) else ZERO6
-        return apply_shift(self._shift, tool_pose)
-
-
-def shift_between(before: Sequence[float], after: Sequence[float]) -> Pose:
-    """Return the displacement in base axes that takes one pose to another."""
-    x, y, z = (b - a for a, b in zip(before[:3], after[:3], strict=True))
-    turn = pose_trans((0.0, 0.0, 0.0, *after[3:]), pose_inv((0.0, 0.0, 0.0, *before[3:])))
-    return (x, y, z, turn[3], turn[4], turn[5])
-
-
-def apply_shift(shift: Sequence[float], pose: Sequence[float]) -> Pose:
-    """Return a pose displaced in base axes: the position moved, the rotation turned about the tool."""
-    turned = pose_trans((0.0, 0.0, 0.0, *shift[3:]), (0.0, 0.0, 0.0, *pose[3:]))
-    return (pose[0] + shift[0], pose[1] + shift[1], pose[2] + shift[2], turned[3], turned[4], turned[5])
+        return pose_add(self._shift, tool_pose)
 
 
 _NO_SHIFT: tuple[Pose, Pose, float] = (ZERO6, ZERO6, 1.0)
@@ -106,7 +92,7 @@ class OverlayChain:
     def keep_last(self, overlay: Overlay) -> None:
         """Replace an overlay by its last displacement."""
         last, before, dt = self._shifts.pop(id(overlay), _NO_SHIFT)
-        velocity = six([x / dt for x in shift_between(before, last)])
+        velocity = six([x / dt for x in pose_sub(last, before)])
         self.overlays[self.overlays.index(overlay)] = LastDisplacement(overlay.tool, last, velocity)
 
     @property
@@ -140,10 +126,10 @@ class OverlayChain:
             previous = self._shifts.get(id(overlay), _NO_SHIFT)[0]
             if share > 0.0:
                 moved = overlay.displace(pose, share * dt)
-                shift = shift_between(pose, moved)
+                shift = pose_sub(moved, pose)
                 self._shifts[id(overlay)] = (shift, previous, share * dt)
             else:
-                moved, shift = apply_shift(previous, pose), previous
+                moved, shift = pose_add(previous, pose), previous
             still = still and shift == previous
             flange = pose_trans(moved, pose_inv(tcp))
         near = [q + dt * v for q, v in zip(before.q, before.qd, strict=True)]
