@@ -16,7 +16,6 @@ definition below, does a whole cycle of all joints in one product:
 
 | rows of the outputs        | what they are                                                         |
 |----------------------------|-----------------------------------------------------------------------|
-| target speed               | of the newest target                                                  |
 | set-point speed            | at the start of the last sub-step                                     |
 | control, n times           | q + lead qd + deflection + trim at the start of each sub-step         |
 | q, qd, deflection, trim, 0 | the first rows of the inputs of the next cycle                        |
@@ -55,9 +54,9 @@ class CommandPath:
 
     Attributes:
         newest: the target of this cycle (3, 6): q [rad], qd [rad/s], deflection [rad]; see `take`.
-        newest_acts_later: of the outputs of a cycle only the target speed depends on its target.
-        speeds: (3, 6) [rad/s]: the first row is the caller's, for the actual speeds; then the speed of the
-            newest target, and that of the set-point at the start of the last sub-step.
+        newest_acts_later: the outputs of a cycle do not depend on its target.
+        speeds: (3, 6) [rad/s]: the caller's row for the actual speeds; the speed of the newest target; that
+            of the set-point at the start of the last sub-step.
         control: what the servos are told at the start of each sub-step (n_substeps, 6) [rad].
         q_final: set-point position at the end of the cycle (6,) [rad].
         trim: shift of the servos in this cycle (6,) [rad].
@@ -76,20 +75,22 @@ class CommandPath:
         self._delay = dead_substeps * substep + lag
         responses = path_responses(n_substeps, substep, dead_substeps, lag)
         self._matrix = _cycle_matrix(responses, lead, trim_gain)
-        self.newest_acts_later = not self._matrix[1:, _N_KEPT : _N_KEPT + N_SIGNALS].any()
+        self.newest_acts_later = not self._matrix[:, _N_KEPT : _N_KEPT + N_SIGNALS].any()
         n_outputs, n_inputs = self._matrix.shape
         self._inputs = np.zeros((n_inputs, 6))
         self._kept = self._inputs[:_N_KEPT]
         self._error: NDArray[np.float64] = self._inputs[_ERROR]
         self._targets = self._inputs[_N_KEPT:]
         self.newest: NDArray[np.float64] = self._targets[:N_SIGNALS]
+        self._newest_speed = self.newest[1]
         self._newest_memory = self.newest.data.cast("B")
         self._younger = self._targets[:-N_SIGNALS]
         self._older = self._targets[N_SIGNALS:]
-        # The actual speeds stand before the outputs, so that all speeds are one array.
-        memory = np.zeros((1 + n_outputs, 6))
-        self._outputs = memory[1:]
+        # Two speeds stand before the outputs, so that all speeds are one array.
+        memory = np.zeros((2 + n_outputs, 6))
+        self._outputs = memory[2:]
         self.speeds: NDArray[np.float64] = memory[:3]
+        self._target_speed = self.speeds[1]
         self.control: NDArray[np.float64] = memory[3 : 3 + n_substeps]
         self._final = memory[-_N_KEPT:]
         self.q_final: NDArray[np.float64] = self._final[0]
@@ -123,6 +124,7 @@ class CommandPath:
         """Fill `newest`; its third row with qdd, for the caller to replace by the deflection."""
         # One call for three assignments of tuples.
         _PACK(self._newest_memory, 0, *target.q, *target.qd, *target.qdd)
+        self._target_speed[:] = self._newest_speed
 
     def advance(self) -> None:
         """Fill the outputs of this cycle."""
@@ -166,11 +168,10 @@ def path_responses(n_substeps: int, substep: float, dead_substeps: int, lag: flo
 def _cycle_matrix(responses: NDArray[np.float64], lead: float, trim_gain: float) -> NDArray[np.float64]:
     """Return the matrix of the tables above."""
     q, qd, deflection = np.insert(responses, [_TRIM, _TRIM], 0.0, axis=2)
-    trim, newest_qd = np.zeros((2, q.shape[1]))
-    newest_qd[_N_KEPT + 1] = 1.0
+    trim = np.zeros(q.shape[1])
     trim[[_TRIM, _ERROR]] = 1.0, trim_gain
     control = q[:-1] + lead * qd[:-1] + deflection[:-1] + trim
-    return np.array([newest_qd, qd[-2], *control, q[-1], qd[-1], deflection[-1], trim, 0.0 * trim])
+    return np.array([qd[-2], *control, q[-1], qd[-1], deflection[-1], trim, 0.0 * trim])
 
 
 def trace_cycle(

@@ -39,7 +39,7 @@ class Drives:
 
     A cycle is `command`, `advance`, `keep`, or for an arm that is guided by hand `guide` alone. Only `keep`
     takes a cycle for done: the others may be repeated. Where `target_acts_later`, `advance` may come first;
-    it must be repeated then for `target_current`.
+    `command` is followed by `evaluate_friction` then, for `target_current`.
 
     Args:
         robot: type of the arm.
@@ -137,8 +137,12 @@ class Drives:
         return True
 
     def advance(self) -> None:
-        """Fill `control`, `bias`, `coulomb`, `q_final` and `target_current`."""
+        """Fill `control` and `q_final`, and do what `evaluate_friction` does."""
         self._path.advance()
+        self.evaluate_friction()
+
+    def evaluate_friction(self) -> None:
+        """Fill `bias`, `coulomb` and `target_current`: all that depends on friction."""
         self._friction.evaluate(self._path.speeds)
         self._expect_current()
 

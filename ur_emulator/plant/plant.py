@@ -251,7 +251,7 @@ class Plant:
                 cycle=self.cycle,
             )
         if self._is_ahead:
-            self._drives.advance()  # again, for the current that is expected at the target
+            self._drives.evaluate_friction()  # again, for the current that is expected at the target
         else:
             self._run()
         self._is_ahead = False

@@ -145,13 +145,24 @@ class ProgramSockets:
         del inbox[:size]
         return data
 
-    def _take_fixed(self, name: str, timeout: float, size: int) -> Generator[Blocked, None, bytes | None]:
-        """As `_take`, for a message of a fixed size: command streams read one every cycle."""
-        socket, clock = self._sockets.get(name), self._clock
+    def _read_numbers(
+        self, name: str, timeout: float, number: int, code: str, width: int
+    ) -> Generator[Blocked, None, list[int]]:
+        """Wait for big-endian numbers; a stream of commands passes here every cycle.
+
+        Args:
+            name: of the socket.
+            timeout: [s]; not above 0: none.
+            number: how many.
+            code: of one of them for `struct`.
+            width: its bytes.
+        """
+        socket, clock, size = self._sockets.get(name), self._clock, width * number
+        failed = [0] + [-1] * number
         if socket is None:
-            return None
+            return failed
         inbox = socket.inbox
-        # A read of no bytes never succeeds: it ends with the time-out.
+        # Nothing to read is nothing that could come: it ends with the time-out.
         enough = min(size, MAX_INBOX + 1) if size > 0 else MAX_INBOX + 1
         if len(inbox) < enough and socket.is_open:
             end = clock.program_tick + math.ceil(timeout / clock.period_s) if timeout > 0.0 else math.inf
@@ -163,26 +174,20 @@ class ProgramSockets:
         if not 0 < size <= len(inbox):
             if len(inbox) > MAX_INBOX:
                 inbox.clear()
-            return None
+            return failed
         data = bytes(inbox[:size])
         del inbox[:size]
-        return data
+        return [number, *struct.unpack(f">{number}{code}", data)]
 
     def _read_binary_integer(
         self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
-        number = int(number)
-        data = yield from self._take_fixed(name, timeout, 4 * number)
-        if data is None:
-            return [0] + [-1] * number
-        return [number, *struct.unpack(f">{number}i", data)]
+        return self._read_numbers(name, timeout, int(number), "i", 4)
 
     def _read_byte_list(
         self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
-        number = int(number)
-        data = yield from self._take_fixed(name, timeout, number)
-        return [0] + [-1] * number if data is None else [number, *data]
+        return self._read_numbers(name, timeout, int(number), "B", 1)
 
     def _read_ascii_float(
         self, thread: object, number: float, name: str, timeout: float

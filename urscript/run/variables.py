@@ -45,8 +45,11 @@ def assign(value: Any, old: Any, name: str) -> Any:
 
     The first value fixes the type (D), and that of a list its length (see Dialect.list_resize).
     """
-    if type(value) is list and type(old) is list and len(value) != len(old):
-        raise ScriptRuntimeError("Resizing of 'List' is not supported")
+    if type(value) is list and type(old) is list:
+        if len(value) != len(old):
+            raise ScriptRuntimeError("Resizing of 'List' is not supported")
+        if value and type(value[0]) is type(old[0]):  # nearly always
+            return value
     return assign_resizing(value, old, name)
 
 
