@@ -61,7 +61,7 @@ CONTROLLER_ORDER = (
     {"controller"},
 )
 LANGUAGE_ORDER = (
-    {"courtesy", "dialect", "errors", "programs", "source", "values"},
+    {"dialect", "errors", "programs", "source", "values"},
     {"syntax"},
     {"layout"},
     {"catalogue"},

@@ -26,11 +26,12 @@ from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.realtime.event_loop import WAKE_UP, EventLoop
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.served_box import ServedBox
+from ur_emulator.realtime.worker_process import prestart_process
 from ur_emulator.scripting.program_slot import ProgramSlot
 from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from ur_emulator.servers.dashboard.answers import DashboardAnswers
 from ur_emulator.servers.dashboard.port import DashboardPort
-from ur_emulator.servers.dashboard.reports import BoxReports
+from ur_emulator.servers.dashboard.reports import ReportFolder
 from ur_emulator.servers.modbus.server import ModbusPort
 from ur_emulator.servers.port_set import CONTROL, MODBUS, PortSet
 from ur_emulator.servers.primary.port import PrimaryPort
@@ -109,6 +110,7 @@ class Box(BoxOperations):
         imperfections = generation.fidelity(fidelity)
         named_pace = parse_pace(pace)
         check_options(host, speed, seed, programs, control_port)
+        prestart_process()  # it loads the compiler while the box is assembled
         self.host = host
         self.port_base = port_base or 0
         self.ports = standard_ports(self.port_base)
@@ -130,11 +132,13 @@ class Box(BoxOperations):
             self._loop.expect_soon,
             self._fail,
         )
-        self._intake = ProgramIntake(self._loop, software.catalogue, self._box.submit, self._box.announce)
+        self._intake = ProgramIntake(
+            self._loop.tasks, software.catalogue, self._box.submit, self._box.announce
+        )
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         player = ProgramPlayer(self._access, ProgramFolder(None if programs is None else Path(programs)))
-        self._reports = BoxReports(player.folder)
+        self._reports = ReportFolder(player.folder)
         states = StateEncoder(software, controller.state.arm)
         realtime, realtime_ro = (RealtimePort(software.realtime, intake) for intake in (self._intake, None))
         rtde = RtdePort(software, controller, self._box.submit, self._box.announce)
@@ -237,6 +241,7 @@ class Box(BoxOperations):
         self.control_port = numbers.pop(CONTROL, 0)
         self.ports = dataclasses.replace(self.ports, **{MODBUS: 0, **numbers})
         self._loop.add(self._box)
+        self._loop.tasks.start()
 
     def _wanted_numbers(self) -> dict[str, int]:
         """Numbers of the ports to open by name; 0 takes a free one."""

@@ -78,8 +78,10 @@ def serve(
 ) -> None:
     """Serve a control box, or several, powered on with the brakes released, until Ctrl-C."""
     from ur_emulator.descriptor_limit import raise_descriptor_limit
+    from ur_emulator.realtime.worker_process import prestart_process
 
     raise_descriptor_limit()
+    prestart_process()  # it loads the compiler while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is drawn: no need to look for a display
     from ur_emulator.emulator import ControlBox
     from ur_emulator.errors import EmulatorError

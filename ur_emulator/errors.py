@@ -9,7 +9,8 @@ EmulatorError
 ├── ControlError      an operation of the control API was not done
 │   ├── ArgumentError         it was given something that it does not take
 │   ├── RefusedError          the state of the box stands against it
-│   │   └── WaitTimeoutError  what was waited for did not come (a TimeoutError as well)
+│   │   ├── WaitTimeoutError  what was waited for did not come (a TimeoutError as well)
+│   │   └── WorkerError       the process for long tasks could not be started, or has ended
 │   └── NotRunningError       the box does not run, or has ended before it was done
 └── PortError         a TCP port of the box cannot be opened
     └── PortPermissionError   because this user may not
@@ -67,6 +68,10 @@ class RefusedError(ControlError):
 
 class WaitTimeoutError(RefusedError, TimeoutError):
     """What was waited for did not come in time."""
+
+
+class WorkerError(RefusedError):
+    """A task was not done: the process for it could not be started, or has ended before."""
 
 
 class NotRunningError(ControlError):

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import marshal
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -26,8 +27,6 @@ from urscript.source import Source, as_bytes
 from urscript.syntax.parser import find_syntax_errors, parse
 
 if TYPE_CHECKING:
-    from types import CodeType
-
     from urscript.lint.rules import ScriptWarning
     from urscript.run.host import Host
 
@@ -53,15 +52,10 @@ def compile_program(
     """
     dialect = dialect or dialect_for(catalogue.version)
     program, errors = _resolve(Source(as_bytes(text), name), catalogue, dialect)
-    try:
-        if errors:
-            raise errors[0]
-        assert program is not None
-        return _compile(program, catalogue, dialect)
-    finally:
-        del errors  # or the error's traceback and this frame would keep each other alive
-        if program is not None:
-            program.dissolve()
+    if errors:
+        raise errors[0]
+    assert program is not None
+    return _compile(program, catalogue, dialect)
 
 
 def check_program(
@@ -115,7 +109,7 @@ def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -
         source=program.source,
         dialect=dialect,
         catalogue=catalogue,
-        codes=compiled.codes,
+        code=compiled.code,
         constants=compiled.constants,
         builtins=frozenset(program.builtins),
         globals=frozenset(program.globals),
@@ -131,11 +125,12 @@ def _too_deep(source: Source) -> ScriptSyntaxError:
 
 @dataclass(frozen=True, slots=True)
 class CompiledProgram:
-    """A program ready to run, any number of times.
+    """A program ready to run, any number of times; a record that can be pickled.
 
     Attributes:
         name: The `def` name; of a one-line program the function it calls.
         kind: "def" (primary), "sec" (secondary), or "statement".
+        code: Python's code object, marshalled; executed, it defines the functions.
         builtins: Builtin functions it uses.
         globals: Its global variables.
         declared_globals: Those of them that the word `global` makes, in the order of the text.
@@ -146,7 +141,7 @@ class CompiledProgram:
     source: Source
     dialect: Dialect
     catalogue: Catalogue
-    codes: tuple[CodeType, ...]
+    code: bytes
     constants: dict[str, Any]
     builtins: frozenset[str]
     globals: frozenset[str]
@@ -190,8 +185,7 @@ class RunningProgram:
         self._namespace.update(runtime.builtin_namespace(program.builtins, program.catalogue, host, meter))
         self._namespace.update(program.constants)
         self._namespace.update(dict.fromkeys((f"g_{name}" for name in program.globals), UNDEFINED))
-        for code in program.codes:
-            exec(code, self._namespace)
+        exec(marshal.loads(program.code), self._namespace)
         self._main = self._scheduler.start(self._namespace["main"], program.name, None)
 
     @property
@@ -245,6 +239,10 @@ class RunningProgram:
             KeyError: The program has no such variable.
         """
         return self._namespace[f"g_{name}"]
+
+    def line(self, thread: ScriptThread) -> int:
+        """Line where a suspended thread stands."""
+        return runtime.thread_line(thread, self.program.file_name)
 
     def position(self, thread: ScriptThread) -> tuple[int, int]:
         """Line and column where a suspended thread stands."""

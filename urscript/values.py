@@ -50,6 +50,10 @@ class Pose(tuple[float, float, float, float, float, float]):
         six[index] = float(value)
         return tuple.__new__(Pose, six)
 
+    def __getnewargs__(self) -> tuple[float, ...]:
+        """What it is pickled as."""
+        return tuple(self)
+
     def __repr__(self) -> str:
         return f"Pose{tuple(self)}"
 

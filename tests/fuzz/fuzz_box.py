@@ -7,7 +7,6 @@ import itertools
 import math
 import time
 from collections import Counter, deque
-from concurrent.futures import Future
 from functools import lru_cache
 from types import SimpleNamespace
 
@@ -34,6 +33,7 @@ from ur_emulator.commands.safety import (
     SafeguardStop,
     UnlockProtectiveStop,
 )
+from ur_emulator.programs.compiling import compile_text
 from ur_emulator.servers.modbus.server import MAX_INBOX
 from ur_emulator.servers.rtde_port import MAX_WAITING as MAX_RTDE_WAITING
 from ur_emulator.servers.tcp.connection import OUTBOX_LIMIT
@@ -58,17 +58,28 @@ ASK_HTTP = b"GET /v1/state HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 
 
 class _AtOnce:
-    """An executor that does a job before `submit` returns."""
+    """A queue whose tasks are done in this process, in the next turn of the loop."""
 
-    def submit(self, job, *args):
-        future = Future()
-        try:
-            future.set_result(job(*args))
-        except Exception as error:
-            future.set_exception(error)
-        return future
+    def __init__(self, loop):
+        self.loop = loop
+        # Most of the time would go into compiling the same programs again and again.
+        self.compile_text = lru_cache(maxsize=300)(compile_text)
 
-    def shutdown(self, **kwargs):
+    def submit(self, done, function, *arguments):
+        def work():
+            try:
+                result = (self.compile_text if function is compile_text else function)(*arguments)
+            except Exception as error:
+                done(None, error)
+            else:
+                done(result, None)
+
+        self.loop.call_soon_threadsafe(work)
+
+    def drop(self, task):
+        pass
+
+    def close(self):
         pass
 
 
@@ -126,11 +137,7 @@ class FuzzBox:
             pace="lockstep", port_base=None, seed=rng.randrange(100), programs=folder, control_port=0
         )
         box._loop._wake = lambda: None
-        box._intake._worker.shutdown()
-        box._intake._worker = _AtOnce()
-        # Most of the time would go into compiling the same programs again and again.
-        box._intake._translate = lru_cache(maxsize=300)(box._intake._translate)
-        box._access._worker = _AtOnce()
+        box._intake._tasks = box._loop.tasks = _AtOnce(box._loop)
         box.on_end = lambda: None
         self.served, self.pacer = box._box, _Pacer()
         self.served._pacer = self.pacer

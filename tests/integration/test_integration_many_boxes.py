@@ -157,22 +157,15 @@ def test_an_error_ends_its_own_box_only_and_is_raised_at_the_end():
 
 
 def test_a_box_that_compiles_is_closed_without_waiting_for_it():
-    """Another box of the loop would miss its cycles meanwhile."""
+    """Another box of the loop would miss its cycles meanwhile; its programs wait no longer either."""
     with ControlBox.many(2, pace="lockstep", port_base=None) as (one, two):
-        begun, may_end = threading.Event(), threading.Event()
-
-        def compile_slowly(item):
-            begun.set()
-            assert may_end.wait(TIMEOUT)
-
-        one._intake._translate = compile_slowly
-        send(one, "secondary", MOVE)
-        assert begun.wait(TIMEOUT)
+        endless = one._access.in_worker(signal.pause)
+        one._loop.call_soon_threadsafe(lambda: one._access.start_alone(endless))
         one._loop.call_soon_threadsafe(one.close)
         with Frames(two) as frames:
             frames.raw()
-            assert not may_end.is_set()
-        may_end.set()
+            send(two, "secondary", MOVE)
+            frames.until(lambda f: f.runtime_state == ProgramState.PLAYING)
 
 
 @own_addresses

@@ -85,6 +85,7 @@ def test_a_protective_stop_and_what_follows(box):
     with connect(box, "realtime") as frames:
         reader = FrameReader(frames)
         run(box, "def f():\n  protective_stop()\n  sleep(1)\nend\n", "PROGRAM_XXX_PAUSED")
+        reader.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
         box.submit(UnlockProtectiveStop())
         reader.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
         box.submit(ResumeProgram())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import pickle
 from collections import Counter
 
 import pytest
@@ -440,3 +441,9 @@ def test_suggestions(misspelt: str, meant: str | None) -> None:
 
 def test_parameter_types_all_have_a_check() -> None:
     assert [kind for kind in ParamType if kind is not ParamType.ANY and fits(kind, object())] == []
+
+
+def test_a_catalogue_of_the_tables_is_pickled_by_its_version_and_any_other_whole():
+    assert pickle.loads(pickle.dumps(CB3_3_15)) is CB3_3_15
+    own = catalogue_for("5.11", rows=ALL_ROWS[:30])
+    assert pickle.loads(pickle.dumps(own)).names == own.names < catalogue_for("5.11").names

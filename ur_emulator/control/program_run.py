@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -14,8 +13,6 @@ from ur_emulator.errors import ArgumentError, RefusedError
 
 if TYPE_CHECKING:
     from ur_emulator.servers.steps import Steps
-    from urscript import CompiledProgram
-    from urscript.catalogue import Catalogue
 
 
 class RunProgram(StepOperation[int]):
@@ -46,20 +43,14 @@ class RunProgram(StepOperation[int]):
             yield from player.play("127.0.0.1")
             name = access.controller.programs.name
         else:
-            job = partial(_compile, str(self.script), access.identity.software.catalogue)
-            program: CompiledProgram = yield from access.in_worker(job)
+            # The command line loads this module, too: nothing heavy at its top.
+            from ur_emulator.controller.events import ScriptFailed
+            from ur_emulator.programs.compiling import compile_text
+
+            catalogue = access.identity.software.catalogue
+            program = yield from access.in_worker(compile_text, str(self.script), catalogue)
+            if isinstance(program, ScriptFailed):
+                raise ArgumentError(f"the program does not compile: {program.log_text or program.text}")
             yield from access.apply(StartProgram(program))
             name = program.name
         return {"program": name, "tick": access.snapshot.tick}
-
-
-def _compile(text: str, catalogue: Catalogue) -> CompiledProgram:
-    """Compile a program; in the worker."""
-    # The command line loads this module, too: nothing heavy at its top.
-    from urscript import compile_program
-    from urscript.errors import ScriptError
-
-    try:
-        return compile_program(text, catalogue=catalogue)
-    except ScriptError as error:
-        raise ArgumentError(f"the program does not compile: {error.log_text or error.wire_text}") from None

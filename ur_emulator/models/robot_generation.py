@@ -20,7 +20,7 @@ from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.software import Software
-from urscript.catalogue import Builtin, Catalogue, Version
+from urscript.catalogue import Builtin, catalogue_for
 
 # First version, build and date of each row, the oldest first; software between two rows has the build and the
 # date of the earlier one.
@@ -165,5 +165,5 @@ def _software(generation: RobotGeneration, version: SoftwareVersion) -> Software
         sub_packages=generation.sub_packages,
         rtde_outputs=output_fields(version, generation.rtde_outputs),
         rtde_inputs=input_fields(version, generation.rtde_inputs),
-        catalogue=Catalogue(Version.of(version), generation.builtins),
+        catalogue=catalogue_for(version, rows=generation.builtins),
     )

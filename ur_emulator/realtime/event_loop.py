@@ -17,8 +17,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
 
-from ur_emulator.realtime.guests import Guests
 from ur_emulator.realtime.interpreter import loop_settings
+from ur_emulator.realtime.tasks import TaskQueue
 
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
 # microseconds.
@@ -51,7 +51,7 @@ class EventLoop:
 
     Attributes:
         is_running: `run` has been called, or somebody is about to; it has not returned.
-        guests: other threads with long work beside this one.
+        tasks: what takes longer than a cycle, done in a process beside this one.
     """
 
     def __init__(self, *, precise: bool = True) -> None:
@@ -77,7 +77,7 @@ class EventLoop:
         # and kqueue.
         descriptor = getattr(self._selector, "fileno", None)
         self._descriptor: int | None = descriptor() if precise and descriptor is not None else None
-        self.guests = Guests(wait=self._descriptor is not None)
+        self.tasks = TaskQueue(self)
 
     # --- sockets
 
@@ -147,10 +147,10 @@ class EventLoop:
         finally:
             self.is_running = False
             self._thread = 0
-            self.guests.leave_alone()
 
     def close(self) -> None:
-        """Release the selector and the wake-up pipe; the loop must not run any more."""
+        """Release the selector, the wake-up pipe and the process; the loop must not run any more."""
+        self.tasks.close()
         self._selector.close()
         self._waker.close()
         self._wake_end.close()
@@ -163,9 +163,7 @@ class EventLoop:
             if self._descriptor is not None and 0.0 < timeout < _COARSE:
                 ready = self._wait_precisely(self._descriptor, deadline)
             else:
-                self.guests.fall_asleep()
                 ready = self._selector.select(timeout)
-                self.guests.wake_up()
         watched = self._selector.get_map()
         for key, events in ready:
             # A callback before this one may have closed the socket, and another may have its number by now.
@@ -183,12 +181,10 @@ class EventLoop:
         sleep = deadline - time.monotonic() - WAKE_UP / max(1, len(self._services))
         if sleep > 0.0:
             ready: list[_Ready] = []
-            self.guests.fall_asleep()
             if descriptor < _SELECT_LIMIT:
                 select.select([descriptor], [], [], sleep)
             else:
                 ready = self._selector.select((int(sleep * 1e3) - 0.5) * 1e-3)
-            self.guests.wake_up()
             return ready or self._selector.select(0.0)
         while not (ready := self._selector.select(0.0)) and time.monotonic() < deadline:
             pass

@@ -1,7 +1,7 @@
 """Settings of the Python interpreter that a control loop needs; they are the process's own again afterwards.
 
-While the garbage collector runs, nothing else does. A thread with long work, such as the compile worker,
-shares the interpreter with the loop, so turns must be short.
+While the garbage collector runs, nothing else does. A thread with long work, such as the user's own beside
+`with ControlBox()`, shares the interpreter with the loop, so turns must be short.
 """
 
 from __future__ import annotations
@@ -54,20 +54,3 @@ def freeze_existing_objects() -> None:
     """
     gc.collect()
     gc.freeze()
-
-
-@contextmanager
-def collection_put_off() -> Iterator[None]:
-    """Collect nothing in this block: for work that makes many objects and leaves hardly any.
-
-    Going through the trees of a long program takes longer than a cycle has to spare, and finds nothing, since
-    they do not refer to themselves. Blocks of several threads may overlap: the first to begin lets the
-    collector run again when it ends, which is only slower for the others.
-    """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -52,7 +52,6 @@ class BoxAccess:
         self.steps = StepRunner()
         self._box = box
         self._loop = loop
-        self._worker: ThreadPoolExecutor | None = None
 
     @property
     def controller(self) -> Controller:
@@ -108,22 +107,27 @@ class BoxAccess:
             yield
         return outcome.result()
 
-    def in_worker(self, job: Callable[[], T]) -> Steps[T]:
-        """Do something that takes longer than a cycle in a thread of its own, one job at a time.
+    def in_worker(self, function: Callable[..., T], *arguments: Any) -> Steps[T]:
+        """Do something that takes longer than a cycle in the worker process, see `TaskQueue.submit`.
 
         Returns:
             What it has come to; what it raises is raised here.
         """
-        if self._worker is None:
-            self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="dashboard")
-        future = self._worker.submit(job)
-        future.add_done_callback(lambda _: self._loop.call_soon_threadsafe(self.steps.advance))
-        while not future.done():
-            yield
-        return future.result()
+        outcome: Future[T] = Future()
+        settled = settle(outcome)
+
+        def done(result: Any, error: Exception | None) -> None:
+            settled(result, error)
+            self.steps.advance()
+
+        task = self._loop.tasks.submit(done, function, *arguments)
+        try:
+            while not outcome.done():
+                yield
+        finally:
+            self._loop.tasks.drop(task)
+        return outcome.result()
 
     def close(self, error: Exception) -> None:
-        """End all steps with an error, and the worker: queued jobs are dropped, results are not used."""
+        """End all steps with an error, and the tasks that they wait for."""
         self.steps.close(error)
-        if self._worker is not None:
-            self._worker.shutdown(wait=False, cancel_futures=True)

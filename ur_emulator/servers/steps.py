@@ -1,7 +1,7 @@
 """Work that takes several cycles, written as generators, and what advances it.
 
-A generator yields where it has to wait; it is continued after every cycle and when a job of the worker has
-ended. So nothing waits for a clock, and what was asked has happened when it is answered.
+A generator yields where it has to wait; it is continued after every cycle and when a task of the worker
+process has ended. So nothing waits for a clock, and what was asked has happened when it is answered.
 """
 
 from __future__ import annotations

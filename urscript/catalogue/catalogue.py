@@ -56,12 +56,16 @@ class Catalogue:
     """
 
     def __init__(
-        self, version: Version, rows: Iterable[Builtin] = ALL_ROWS, extra: Iterable[str] = ()
+        self,
+        version: Version,
+        rows: tuple[Builtin, ...] = ALL_ROWS,
+        extra: frozenset[str] = frozenset(),
     ) -> None:
-        rows = tuple(rows)
         self.version = version
+        self._rows = rows
+        self._extra = extra
         self._by_name: dict[str, Builtin] = {row.name: row for row in rows if row.is_in(version)}
-        for name in extra:
+        for name in sorted(extra):
             forms = [row for row in rows if row.name == name]
             if not forms:
                 raise ValueError(f"no builtin named {name!r} in any software version")
@@ -71,6 +75,11 @@ class Catalogue:
         self.methods: Mapping[str, frozenset[str]] = methods_of(version)
         self._slots: dict[tuple[str, int, tuple[str, ...]], list[Slot]] = {}
         self._checks = {name: compile_check(row) for name, row in self._by_name.items()}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle it as its version, and its rows if they are others than those of the tables."""
+        rows = () if self._rows is ALL_ROWS else (self._rows,)
+        return catalogue_for, (self.version, self._extra, *rows)
 
     def lookup(self, name: str) -> Builtin | None:
         """The builtin of that name, or None."""
@@ -146,20 +155,25 @@ def _value(slot: Slot, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
 
 @lru_cache(maxsize=32)
 def _view(version: Version, extra: frozenset[str]) -> Catalogue:
-    return Catalogue(version, extra=sorted(extra))
+    return Catalogue(version, extra=extra)
 
 
-def catalogue_for(version: str | Sequence[int], extra: Iterable[str] = ()) -> Catalogue:
+def catalogue_for(
+    version: str | Sequence[int], extra: Iterable[str] = (), rows: tuple[Builtin, ...] = ALL_ROWS
+) -> Catalogue:
     """The catalogue of a software version.
 
     Args:
         version: "3.15", "5.11.4", or a version tuple.
         extra: names to accept beside those of the version, e.g. `["set_tool_communication"]` for a program
             that was exported on an e-Series.
+        rows: the builtins of all versions.
 
     Raises:
         ValueError: for a version of no known generation, or an extra name in no table.
     """
+    if rows is not ALL_ROWS:
+        return Catalogue(Version.of(version), rows, frozenset(extra))
     return _view(Version.of(version), frozenset(extra))
 
 

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, NamedTuple, Self
 
-from urscript.compile.long_blocks import PART
 from urscript.program import CompiledProgram
 
 
@@ -62,11 +61,7 @@ class LineTracer:
         """Called by Python for every frame that is entered or resumed: only the script's are followed."""
         if frame.f_code.co_filename != self._program.file_name:
             return None
-        if not frame.f_code.co_name.startswith(PART):
-            self._last = None
-        elif self._last is not None:
-            # The call of a piece of the program body stands where the piece begins.
-            self._last = id(frame), self._last[1]
+        self._last = None
         return self._line
 
     def _line(self, frame: FrameType, event: str, argument: Any) -> Any:

@@ -6,20 +6,16 @@ and nested functions share them. `runtime` provides the other names the code use
 
 Statements are counted where control turns back or enters a function, not one by one: the count of a block
 is known before it runs (of an `if`, its longest arm).
-
-Python compiles a function in one go and nothing else runs meanwhile, so each one is compiled alone, and a
-long program body in parts (`long_blocks`): the control cycle must not wait for it.
 """
 
 from __future__ import annotations
 
 import ast
+import marshal
 from dataclasses import dataclass
-from types import CodeType
 from typing import Any
 
 from urscript.catalogue import Catalogue
-from urscript.compile import long_blocks
 from urscript.compile.expressions import ExpressionCompiler
 from urscript.compile.inference import SCALARS, StaticTypes
 from urscript.compile.python_tree import (
@@ -32,7 +28,6 @@ from urscript.compile.python_tree import (
     spend,
     store,
 )
-from urscript.courtesy import give_way
 from urscript.dialect import Dialect
 from urscript.errors import ScriptContextError
 from urscript.names.scopes import FunctionScope, ResolvedProgram
@@ -46,12 +41,12 @@ class Compiled:
     """The functions of a program.
 
     Attributes:
-        codes: Each defines one function when it is executed.
+        code: Python's code object, marshalled; executed, it defines the functions.
         constants: Values the code refers to by name.
         function_names: Python function -> function of the script.
     """
 
-    codes: tuple[CodeType, ...]
+    code: bytes
     constants: dict[str, Any]
     function_names: dict[str, str]
 
@@ -66,13 +61,14 @@ def compile_resolved(
     """
     types = StaticTypes(program, catalogue)
     expressions = ExpressionCompiler(program, types, catalogue, dialect)
-    codes: list[CodeType] = []
+    functions: list[ast.stmt] = []
     function_names: dict[str, str] = {}
     try:
         for scope in program.scopes():
             for made in _FunctionCompiler(program, types, expressions, scope).compile():
                 function_names[made.name] = scope.name
-                codes.append(compile(ast.Module([made], []), file_name, "exec", dont_inherit=True))
+                functions.append(made)
+        code = compile(ast.Module(functions, []), file_name, "exec", dont_inherit=True)
     except SyntaxError as error:
         raise ScriptContextError(
             f"the program cannot be compiled: {error.msg}",
@@ -80,7 +76,7 @@ def compile_resolved(
             column=(error.offset or 0) + 1,
             source=program.source,
         ) from None
-    return Compiled(tuple(codes), expressions.constants, function_names)
+    return Compiled(marshal.dumps(code), expressions.constants, function_names)
 
 
 def _cost(block: Block) -> int:
@@ -113,11 +109,9 @@ class _FunctionCompiler:
         self._expressions = expressions
         self._scope = scope
         self._globals_stored: set[str] = {"_b"}
-        self._parts: list[ast.FunctionDef] = []
-        self._step = give_way()
 
     def compile(self) -> list[ast.FunctionDef]:
-        """The Python function, after those that compute its defaults and the parts of a long body."""
+        """The Python function, after those that compute its defaults."""
         scope = self._scope
         parameters: list[str] = []
         defaults: list[ast.FunctionDef] = []
@@ -143,7 +137,7 @@ class _FunctionCompiler:
             body = self._with_depth(body, span)
         declared = ast.Global(sorted(self._globals_stored), **place(span))
         whole = function(scope.python_name, parameters, [declared, *prologue, *body], span)
-        return [*defaults, *self._parts, whole]
+        return [*defaults, whole]
 
     def _default(self, name: str, value: Expression) -> ast.FunctionDef:
         """A function of its own for each default: it runs in the call, but sees globals only."""
@@ -170,33 +164,10 @@ class _FunctionCompiler:
     # --- statements --------------------------------------------------------------------------------------
 
     def _block(self, block: Block) -> list[ast.stmt]:
-        result: list[ast.stmt] = []
-        # Only the variables of the program body are the same in another function: they are global.
-        for piece in long_blocks.pieces(block) if self._scope is self._program.main else [block]:
-            if len(piece) > 1 and piece is not block:
-                result.extend(self._part(piece))
-                continue
-            for statement in piece:
-                result.extend(self._statement(statement))
+        result = [made for statement in block for made in self._statement(statement)]
         return result or [ast.Pass(**place(_first_span(block)))]
 
-    def _part(self, piece: Block) -> list[ast.stmt]:
-        """A function of its own for a piece of the program body; returns the call of it."""
-        stored, self._globals_stored = self._globals_stored, {"_b"}
-        made = [(statement.span, self._statement(statement)) for statement in piece]
-        body = [each for _, some in made for each in some]
-        span = next((span for span, some in made if some), None)
-        globals_stored, self._globals_stored = self._globals_stored, stored
-        if span is None:  # definitions only
-            return []
-        name = f"{long_blocks.PART}{len(self._parts)}"
-        declared = ast.Global(sorted(globals_stored), **place(span))
-        self._parts.append(long_blocks.part(name, [declared, *body], span))
-        return [long_blocks.call_of(name, span)]
-
     def _statement(self, statement: Statement) -> list[ast.stmt]:
-        if self._step is not None:
-            self._step()
         span, scope = statement.span, self._scope
         at = place(span)
         match statement:

@@ -13,7 +13,6 @@ from typing import Any
 
 from urscript import dialect
 from urscript.catalogue import Catalogue
-from urscript.courtesy import give_way
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression
@@ -153,11 +152,8 @@ class StaticTypes:
         readers = self._readers(flows)
         queued = [True] * len(flows)
         todo = deque(range(len(flows)))
-        step = give_way()
         while todo:
             number = todo.popleft()
-            if step is not None and not number & 7:
-                step()
             queued[number] = False
             goal, expression, scope = flows[number]
             old = self._types.get(goal, Type.NEVER)
@@ -172,10 +168,7 @@ class StaticTypes:
     def _readers(self, flows: list[Flow]) -> dict[Goal, list[int]]:
         """The flows whose expressions read a variable or the result of a function, by that."""
         readers: dict[Goal, list[int]] = {}
-        step = give_way()
         for number, (_, expression, scope) in enumerate(flows):
-            if step is not None and not number & 7:
-                step()
             for part in all_expressions(expression) if expression is not None else ():
                 goal: Goal
                 if isinstance(part, nodes.Name):
@@ -199,10 +192,7 @@ class _Flows:
                 self._defaults(scope, scope.node, scope.around())
 
     def _statements(self, scope: FunctionScope) -> None:
-        step = give_way()
         for statement in all_statements(scope.body):
-            if step is not None:
-                step()
             match statement:
                 case nodes.Assign(target=nodes.Name(name=name), value=value, scope=qualifier):
                     is_local = name in scope.locals and qualifier != "global"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from urscript.courtesy import give_way
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Block, Expression
@@ -60,14 +59,11 @@ class _Flow:
         self.known = known
         self.set_before_calls: set[str] | None = None
         self._forgotten: set[str] = set()
-        self._step = give_way()
 
     def block(self, block: Block) -> list[str]:
         """Walk `block`; returns what is known after it and was not before."""
         learnt: list[str] = []
         for statement in block:
-            if self._step is not None:
-                self._step()
             match statement:
                 case nodes.Assign(target=nodes.Name(name=name), value=value):
                     self.expression(value)

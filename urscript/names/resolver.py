@@ -15,7 +15,6 @@ from typing import Final
 
 from urscript.catalogue import Catalogue
 from urscript.catalogue.binding import CallSignature
-from urscript.courtesy import give_way
 from urscript.dialect import MAX_LOOP_DEPTH, Dialect
 from urscript.errors import (
     ScriptCompileError,
@@ -89,7 +88,6 @@ class _Resolver:
         self.dialect = dialect
         self.errors: list[ScriptCompileError] = []
         self._n_unknown = 0
-        self._step = give_way()
 
     def resolve(self, block: Block) -> ResolvedProgram:
         self.program = program = self._open(block)
@@ -178,8 +176,6 @@ class _Resolver:
                 self._block(inner, scope, inside)
 
     def _statement(self, statement: Statement, scope: FunctionScope, loops: int) -> None:
-        if self._step is not None:
-            self._step()
         match statement:
             case nodes.While() if loops == MAX_LOOP_DEPTH:
                 message = f"loops are nested more than {MAX_LOOP_DEPTH} deep"

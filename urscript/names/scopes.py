@@ -98,14 +98,3 @@ class ResolvedProgram:
     def scopes(self) -> list[FunctionScope]:
         """The program body and all functions."""
         return [self.main, *self.functions]
-
-    def dissolve(self) -> None:
-        """Let go of everything that leads back to itself; the record is of no use any more.
-
-        Scopes know those around them and inside them; left to the garbage collector, the tree of a long
-        program would keep a box from its cycle when it comes by.
-        """
-        for scope in self.scopes():
-            scope.parent = None
-            scope.functions.clear()
-            scope.callees.clear()

@@ -1,8 +1,7 @@
 """Text -> tree. The grammar is `grammar.lark`, `tree_builder` makes the nodes, this module words the errors.
 
 `parse` knows the form of a program only: names, types and scopes are for `resolver`.
-The parser is built on first use, once per process (about 0.05 s), then parses 1,000 lines in some 0.04 s:
-`quick_parse` reads texts without errors, lark itself those with errors and words them.
+The parser is built on first use, once a process (about 0.07 s), then parses 1,000 lines in some 0.05 s.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ from typing import TYPE_CHECKING, Any, cast
 from urscript.errors import ScriptLexerError, ScriptSyntaxError
 from urscript.source import Source
 from urscript.syntax import nodes
-from urscript.syntax.quick_parse import QuickParser
 from urscript.syntax.tree_builder import TreeBuilder
 
 if TYPE_CHECKING:
@@ -31,9 +29,6 @@ def parse(source: Source) -> nodes.Block:
     """
     from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
-    tree = _quick().parse(source.text)
-    if tree is not None:
-        return cast(nodes.Block, tree)
     try:
         return cast(nodes.Block, _lark().parse(source.text))
     except UnexpectedToken as error:
@@ -105,7 +100,7 @@ def _is_between_statements(accepted: set[str]) -> bool:
 
 def prepare() -> None:
     """Build the parser now, so that the first program need not wait for it."""
-    _quick()
+    _lark()
 
 
 @cache
@@ -117,11 +112,6 @@ def _lark() -> Lark:
     grammar = files("urscript.syntax").joinpath("grammar.lark").read_text(encoding="utf-8")
     # The basic lexer, not the contextual one: a reserved word stays reserved wherever it stands.
     return Lark(grammar, parser="lalr", lexer="basic", keep_all_tokens=True, transformer=TreeBuilder())
-
-
-@cache
-def _quick() -> QuickParser:
-    return QuickParser(_lark())
 
 
 # --- errors --------------------------------------------------------------------------------------------

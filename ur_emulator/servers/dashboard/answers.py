@@ -20,7 +20,13 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.errors import EmulatorError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
-from ur_emulator.servers.dashboard.reports import BoxFacts, BoxReports
+from ur_emulator.servers.dashboard.reports import (
+    BoxFacts,
+    ReportFolder,
+    flight_report,
+    save_log,
+    support_file,
+)
 from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer
 from ur_emulator.servers.steps import Steps
 
@@ -35,7 +41,7 @@ class DashboardAnswers:
     """Finds the answer to a command."""
 
     def __init__(
-        self, access: BoxAccess, player: ProgramPlayer, reports: BoxReports, shut_down: Callable[[], None]
+        self, access: BoxAccess, player: ProgramPlayer, reports: ReportFolder, shut_down: Callable[[], None]
     ) -> None:
         """Bind the commands to a box.
 
@@ -183,7 +189,7 @@ class DashboardAnswers:
     def _flight_report(self, row: DashboardCommand, kind: str, _: str) -> Steps[str]:
         facts = self._facts()
         try:
-            number = yield from self._access.in_worker(lambda: self._reports.flight_report(kind, facts))
+            number = yield from self._access.in_worker(flight_report, self._reports.root, kind, facts)
         except (EmulatorError, OSError) as error:
             return row.reply("failed", reason=error)
         return row.reply(id=number)
@@ -191,7 +197,7 @@ class DashboardAnswers:
     def _support_file(self, row: DashboardCommand, directory: str, _: str) -> Steps[str]:
         facts = self._facts()
         try:
-            name = yield from self._access.in_worker(lambda: self._reports.support_file(directory, facts))
+            name = yield from self._access.in_worker(support_file, self._reports.root, directory, facts)
         except (EmulatorError, OSError) as error:
             return row.reply("failed", reason=error)
         return row.reply(file=name)
@@ -199,8 +205,8 @@ class DashboardAnswers:
     def _save_log(self, row: DashboardCommand, *_: str) -> Steps[str]:
         facts = self._facts()
         try:
-            path = yield from self._access.in_worker(lambda: self._reports.save_log(facts))
-        except OSError as error:
+            path = yield from self._access.in_worker(save_log, self._reports.root, facts)
+        except (EmulatorError, OSError) as error:
             self._access.note(f"saveLog failed: {error}")
             return row.reply("failed")
         self._access.note(f"Log saved to {path}")
@@ -216,8 +222,9 @@ class DashboardAnswers:
                 "emulator": package_version("ur-hil"),
                 "python": platform.python_version(),
             },
-            snapshot=access.snapshot,
-            log=access.log,
+            timestamp=access.snapshot.timestamp,
+            state=access.snapshot.as_dict(),
+            log="".join(f"{entry}\n" for entry in access.log),
             programs={
                 "program": _path_of(player.loaded),
                 "installation": _path_of(player.installation),

@@ -1,8 +1,8 @@
 """Files that the box writes for people: the log, flight reports, support files.
 
 They go into the folder of programs, or into a temporary one that is removed with the box. What stands in them
-comes from the controller:
-the same run writes the same bytes. Name of the support file: UR dashboard documents; of the log: PolyScope's
+comes from the controller: the same run writes the same bytes. Writing takes a while: the functions run in the
+worker process. Name of the support file: UR dashboard documents; of the log: PolyScope's
 own; the rest is ours.
 """
 
@@ -10,14 +10,11 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from ur_emulator.box_log import LogEntry
-from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
 
@@ -31,102 +28,108 @@ _MAX_SAME_SECOND = 1000
 
 @dataclass(frozen=True, slots=True)
 class BoxFacts:
-    """What a report tells; taken in the thread of the loop, written in another.
+    """What a report tells; taken in the loop, written in the worker process.
 
     Attributes:
         serial_number: of the box.
         versions: of its software and what it rests on.
-        snapshot: the state of the last cycle.
-        log: all entries.
+        timestamp: of the last cycle [s].
+        state: snapshot of that cycle, by name.
+        log: all entries, a line each.
         programs: names of what is loaded.
         script: of the loaded program.
     """
 
     serial_number: str
     versions: dict[str, str]
-    snapshot: Snapshot
-    log: Sequence[LogEntry]
+    timestamp: float
+    state: dict[str, Any]
+    log: str
     programs: dict[str, str] = field(default_factory=dict)
     script: str = ""
 
     @property
     def time(self) -> datetime:
         """Date and time of the controller, to the second."""
-        return CLOCK_EPOCH + timedelta(seconds=int(self.snapshot.timestamp))
+        return CLOCK_EPOCH + timedelta(seconds=int(self.timestamp))
 
 
-class BoxReports:
-    """Writes files; its methods take a while and run in the worker."""
+class ReportFolder:
+    """Where reports go."""
 
-    def __init__(self, folder: ProgramFolder) -> None:
-        self._folder = folder
+    def __init__(self, programs: ProgramFolder) -> None:
+        self._root = programs.root
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
+
+    @property
+    def root(self) -> Path:
+        """The folder of programs; a box without one gets a temporary folder now."""
+        if self._root is None:
+            self._temporary = tempfile.TemporaryDirectory(prefix="ur-emulator-", ignore_cleanup_errors=True)
+            self._root = Path(self._temporary.name)
+        return self._root
 
     def close(self) -> None:
         """Remove the temporary folder, if there is one, with what was written into it."""
         if self._temporary is not None:
             self._temporary.cleanup()
 
-    def save_log(self, facts: BoxFacts) -> Path:
-        """Write the log, in place of what was written before; return the file."""
-        return _write(self._root() / LOG_NAME, _log_text(facts).encode("utf-8"))
 
-    def flight_report(self, kind: str, facts: BoxFacts) -> str:
-        """Write a flight report; return its number.
+def save_log(root: Path, facts: BoxFacts) -> Path:
+    """Write the log, in place of what was written before; return the file."""
+    return _write(root / LOG_NAME, facts.log.encode("utf-8"))
 
-        Args:
-            kind: one of `REPORT_KINDS`, or "" for the last of them.
-            facts: what it tells.
 
-        Raises:
-            ProgramFileError: there is no such kind.
-        """
-        if kind not in ("", *REPORT_KINDS):
-            raise ProgramFileError(f"Unknown report type: {kind}")
-        folder = self._root() / REPORT_FOLDER
-        folder.mkdir(exist_ok=True)
-        number = 1 + max((int(p.stem.rpartition("_")[2]) for p in _reports(folder)), default=0)
-        contents = {
-            "report.json": _json({"kind": kind or REPORT_KINDS[-1], "id": number}),
-            **_contents(facts),
-        }
-        _write(folder / f"flightreport_{number}.zip", _zip(contents, facts.time))
-        return str(number)
+def flight_report(root: Path, kind: str, facts: BoxFacts) -> str:
+    """Write a flight report; return its number.
 
-    def support_file(self, directory: str, facts: BoxFacts) -> str:
-        """Write a support file, which holds all flight reports and a new one; return its name.
+    Args:
+        root: of the reports.
+        kind: one of `REPORT_KINDS`, or "" for the last of them.
+        facts: what it tells.
 
-        Args:
-            directory: of the folder of programs, as a client names it.
-            facts: what the new report tells.
+    Raises:
+        ProgramFileError: there is no such kind.
+    """
+    if kind not in ("", *REPORT_KINDS):
+        raise ProgramFileError(f"Unknown report type: {kind}")
+    folder = root / REPORT_FOLDER
+    folder.mkdir(exist_ok=True)
+    number = 1 + max((int(p.stem.rpartition("_")[2]) for p in _reports(folder)), default=0)
+    contents = {
+        "report.json": _json({"kind": kind or REPORT_KINDS[-1], "id": number}),
+        **_contents(facts),
+    }
+    _write(folder / f"flightreport_{number}.zip", _zip(contents, facts.time))
+    return str(number)
 
-        Raises:
-            ProgramFileError: there is no such directory.
-        """
-        root = self._root()
-        try:
-            place = ProgramFolder(root).locate(directory or "?")
-        except FileMissingError:
-            place = root / "?"  # the path on this machine is nobody's business
-        if not place.is_dir():
-            raise ProgramFileError(f"Directory not found: {directory}")
-        self.flight_report("", facts)
-        contents = {f"{REPORT_FOLDER}/{p.name}": p.read_bytes() for p in _reports(root / REPORT_FOLDER)}
-        contents |= _contents(facts)
-        for later in range(_MAX_SAME_SECOND):  # no file takes the place of another
-            stamp = f"{facts.time + timedelta(seconds=later):%Y-%m-%d_%H-%M-%S}"
-            path = place / f"ur_{facts.serial_number}_{stamp}.zip"
-            if not path.exists():
-                break
-        return _write(path, _zip(contents, facts.time)).name
 
-    def _root(self) -> Path:
-        if self._folder.root is None:
-            self._temporary = tempfile.TemporaryDirectory(prefix="ur-emulator-", ignore_cleanup_errors=True)
-            self._folder = ProgramFolder(Path(self._temporary.name))
-        root = self._folder.root
-        assert root is not None
-        return root
+def support_file(root: Path, directory: str, facts: BoxFacts) -> str:
+    """Write a support file, which holds all flight reports and a new one; return its name.
+
+    Args:
+        root: of the reports.
+        directory: of the folder of programs, as a client names it.
+        facts: what the new report tells.
+
+    Raises:
+        ProgramFileError: there is no such directory.
+    """
+    try:
+        place = ProgramFolder(root).locate(directory or "?")
+    except FileMissingError:
+        place = root / "?"  # the path on this machine is nobody's business
+    if not place.is_dir():
+        raise ProgramFileError(f"Directory not found: {directory}")
+    flight_report(root, "", facts)
+    contents = {f"{REPORT_FOLDER}/{p.name}": p.read_bytes() for p in _reports(root / REPORT_FOLDER)}
+    contents |= _contents(facts)
+    for later in range(_MAX_SAME_SECOND):  # no file takes the place of another
+        stamp = f"{facts.time + timedelta(seconds=later):%Y-%m-%d_%H-%M-%S}"
+        path = place / f"ur_{facts.serial_number}_{stamp}.zip"
+        if not path.exists():
+            break
+    return _write(path, _zip(contents, facts.time)).name
 
 
 def _reports(folder: Path) -> list[Path]:
@@ -135,18 +138,14 @@ def _reports(folder: Path) -> list[Path]:
 
 def _contents(facts: BoxFacts) -> dict[str, bytes]:
     files = {
-        LOG_NAME: _log_text(facts).encode("utf-8"),
+        LOG_NAME: facts.log.encode("utf-8"),
         "versions.json": _json(facts.versions),
         "programs.json": _json(facts.programs),
-        "state.json": _json(facts.snapshot.as_dict()),
+        "state.json": _json(facts.state),
     }
     if facts.script:
         files["program.script"] = facts.script.encode("latin-1", "replace")
     return files
-
-
-def _log_text(facts: BoxFacts) -> str:
-    return "".join(f"{entry}\n" for entry in facts.log)
 
 
 def _json(value: Any) -> bytes:

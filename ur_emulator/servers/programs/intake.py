@@ -1,15 +1,16 @@
-"""From bytes on a script port to commands: split, compile in a worker, hand over in the order of arrival.
+"""From bytes on a script port to commands: split, compile in the worker process, hand over.
 
-Compiling a long script takes longer than a cycle, so it happens in one worker thread. Everything that
-arrives on a script port goes through that thread's queue, also what needs no compiling: a `stop program`
-sent after a program must stop it.
+The order of arrival stays. What needs no compiling waits for the programs before it: a `stop program` sent
+after a program must stop it. A program is compiled also when its sender has closed the connection meanwhile,
+as many do.
 """
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any
 
 from protocol.primary.messages import ReportLevel
 from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptItem
@@ -24,14 +25,10 @@ from ur_emulator.commands.programs import (
 from ur_emulator.commands.safety import ConfirmSafety, UnlockProtectiveStop
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
-from ur_emulator.errors import ArgumentError
-from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.realtime.interpreter import collection_put_off
-from urscript import compile_program
+from ur_emulator.errors import ArgumentError, WorkerError
+from ur_emulator.programs.compiling import compile_text
+from ur_emulator.realtime.tasks import Task, TaskQueue
 from urscript.catalogue import Catalogue
-from urscript.courtesy import giving_way
-from urscript.errors import ScriptError, ScriptTypeError
-from urscript.syntax.parser import prepare
 
 # The controller's own words and the command each stands for; words that change nothing here map to None.
 # Source: what PolyScope and public clients send on the script ports (protocol.controller_words).
@@ -60,28 +57,27 @@ class ProgramIntake:
 
     def __init__(
         self,
-        loop: EventLoop,
+        tasks: TaskQueue,
         catalogue: Catalogue,
         submit: Callable[[Command], None],
         announce: Callable[[Event], None],
     ) -> None:
-        """Start the worker.
+        """Prepare.
 
         Args:
-            loop: results come back in its thread.
+            tasks: where programs are compiled.
             catalogue: the builtins of the software.
             submit: takes a command for the next cycle.
             announce: takes an event that needs no cycle, such as a syntax error.
         """
-        self._loop = loop
+        self._tasks = tasks
         self._catalogue = catalogue
         self._submit = submit
         self._announce = announce
-        prepare()  # now, so that the first program does not pay for it in the middle of a stream
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="compile")
+        self._queue: deque[tuple[ScriptItem, object, int]] = deque()
+        self._compiling: Task | None = None
         self._waiting: Counter[object] = Counter()
         self._flooding: set[object] = set()
-        self._is_closed = False
 
     def take(self, sender: object, items: Iterable[ScriptItem]) -> None:
         """Queue what one connection has sent: words always, programs as long as not too much waits."""
@@ -94,26 +90,38 @@ class ProgramIntake:
                 self._flooding.add(sender)
                 continue
             self._waiting[sender] += cost
-            self._worker.submit(self._process, item, sender, cost)
+            self._queue.append((item, sender, cost))
+        self._go_on()
 
     def close(self) -> None:
-        """Take nothing more; what is queued is dropped, what is being compiled comes to nothing."""
-        self._is_closed = True
-        self._worker.shutdown(wait=False, cancel_futures=True)
+        """Forget what is queued and what is being compiled."""
+        self._queue.clear()
+        if self._compiling is not None:
+            self._tasks.drop(self._compiling)
 
-    def _process(self, item: ScriptItem, sender: object, cost: int) -> None:
-        """Compile or translate one item; runs in the worker, hands the result to the loop."""
-        try:
-            with collection_put_off(), self._loop.guests.working() as give_way, giving_way(give_way):
-                result = self._translate(item)
-        except Exception as error:  # a defect of ours must not swallow the program without a word
-            result = ScriptFailed(1, 1, f"the program cannot be compiled: {error!r}")
-        self._loop.call_soon_threadsafe(lambda: self._finish(result, sender, cost))
+    def _go_on(self) -> None:
+        """Hand on all that stands before the next program, and have that compiled."""
+        while self._queue and self._compiling is None:
+            item, sender, cost = self._queue.popleft()
+            if isinstance(item, ProgramText):
+                done = partial(self._compiled, sender, cost)
+                is_secondary = item.kind == "sec"
+                self._compiling = self._tasks.submit(
+                    done, compile_text, item.text, self._catalogue, "<program>", is_secondary
+                )
+            else:
+                self._finish(_translate(item), sender, cost)
+
+    def _compiled(self, sender: object, cost: int, outcome: Any, error: Exception | None) -> None:
+        self._compiling = None
+        if error is not None:  # also a defect of ours must not swallow the program without a word
+            why = str(error) if isinstance(error, WorkerError) else repr(error)
+            outcome = ScriptFailed(1, 1, f"the program cannot be compiled: {why}")
+        self._finish(outcome if isinstance(outcome, ScriptFailed) else StartProgram(outcome), sender, cost)
+        self._go_on()
 
     def _finish(self, result: Command | Event | None, sender: object, cost: int) -> None:
-        """Hand on a result; runs in the loop."""
-        if self._is_closed:
-            return
+        """Hand on a result."""
         self._waiting[sender] -= cost
         if not self._waiting[sender]:
             del self._waiting[sender]
@@ -123,23 +131,17 @@ class ProgramIntake:
         elif result is not None:
             self._announce(result)
 
-    def _translate(self, item: ScriptItem) -> Command | Event | None:
-        match item:
-            case ProgramText(text, _, kind):
-                try:
-                    return StartProgram(compile_program(text, catalogue=self._catalogue))
-                except ScriptError as error:
-                    # Arguments are counted when the call runs, so that of a `sec` is one of its exceptions.
-                    secondary = kind == "sec" and isinstance(error, ScriptTypeError)
-                    return ScriptFailed(error.line, error.column, error.wire_text, secondary, error.log_text)
-            case ControlLine(text, word, argument):
-                if word == SPEED_WORD:
-                    return _speed_command(text, argument)
-                if word in WORDS:
-                    return WORDS[word]
-                return _warning(f"'{text}' is declared only: this box does not model it yet")
-            case Overflow(what, limit):
-                return _warning(f"a script {what} of more than {limit} bytes was dropped")
+
+def _translate(item: ControlLine | Overflow) -> Command | Event | None:
+    match item:
+        case ControlLine(text, word, argument):
+            if word == SPEED_WORD:
+                return _speed_command(text, argument)
+            if word in WORDS:
+                return WORDS[word]
+            return _warning(f"'{text}' is declared only: this box does not model it yet")
+        case Overflow(what, limit):
+            return _warning(f"a script {what} of more than {limit} bytes was dropped")
 
 
 def _speed_command(text: str, argument: str) -> Command | Event:

@@ -5,7 +5,6 @@ Every action is done in steps (see `servers.steps`). What cannot be done is refu
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, NoReturn
 
@@ -14,14 +13,13 @@ from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProg
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.safety.modes import MOVING_MODES
 from ur_emulator.controller.safety.status_bits import RUNNING_STATES
-from ur_emulator.errors import FileMissingError, ProgramFileError, RefusedError
+from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
+from ur_emulator.programs.compiling import Outcome, compile_loaded, load_and_compile
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation, load_installation
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.programs.external_control import request_program
 from ur_emulator.servers.steps import Steps
-from urscript import CompiledProgram, compile_program
-from urscript.errors import ScriptError
 
 if TYPE_CHECKING:
     from ur_emulator.programs.loading import LoadedProgram
@@ -33,9 +31,6 @@ _NOT_UP = frozenset(
     {RobotMode.NO_CONTROLLER, RobotMode.DISCONNECTED, RobotMode.CONFIRM_SAFETY, RobotMode.BOOTING}
 )
 _PAUSED = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
-
-# A program that can be started, or why it cannot.
-Outcome = CompiledProgram | ScriptFailed
 
 
 class MissingFileRefusal(RefusedError):
@@ -85,7 +80,9 @@ class ProgramPlayer:
         what = f"load {name}"
         self._must_be_stopped(what)
         try:
-            loaded, ready = yield from self._access.in_worker(lambda: self._read(name))
+            loaded, ready = yield from self._access.in_worker(
+                load_and_compile, self.folder, name, self._catalogue
+            )
         except Exception as error:  # a defect of ours must not end the box
             self._refuse(what, error)
         self.loaded, self._ready = loaded, ready
@@ -99,9 +96,7 @@ class ProgramPlayer:
         what = f"load installation {name}"
         self._must_be_stopped(what)
         try:
-            self.installation = yield from self._access.in_worker(
-                lambda: load_installation(self.folder, name)
-            )
+            self.installation = yield from self._access.in_worker(load_installation, self.folder, name)
         except Exception as error:  # as above
             self._refuse(what, error)
         self._access.note(f"Loaded installation: {self.installation.wire_path}")
@@ -120,7 +115,10 @@ class ProgramPlayer:
                 if self.is_paused:  # otherwise somebody else was quicker
                     raise
             return
-        program = yield from self._prepare(client)
+        try:
+            program = yield from self._prepare(client)
+        except WorkerError as error:
+            self._refuse("play", error)
         if isinstance(program, ScriptFailed):
             self._access.announce(program)
             self._refuse("play", "the program does not compile")
@@ -173,13 +171,6 @@ class ProgramPlayer:
         if self.loaded is None and not self.is_paused:
             self._refuse("play", "no program is loaded")
 
-    def _read(self, name: str) -> tuple[LoadedProgram, Outcome | None]:
-        """Read and compile a program; in the worker."""
-        from ur_emulator.programs.loading import load_program  # few boxes need it, none at once
-
-        loaded = load_program(self.folder, name)
-        return loaded, None if loaded.pcs else self._compile(loaded, {})
-
     def _prepare(self, client: str) -> Steps[Outcome]:
         """Return the loaded program ready to start; parts that PCs have are fetched now."""
         loaded = self.loaded
@@ -192,20 +183,10 @@ class ProgramPlayer:
             default = self.installation.pc.over(default)
         for pc in loaded.pcs:
             received[pc] = yield from request_program(self._access.network, pc.over(default))
-        return (yield from self._access.in_worker(lambda: self._compile(loaded, received)))
-
-    def _compile(self, loaded: LoadedProgram, received: Mapping[ExternalControlPc, str]) -> Outcome:
-        """Compile a program; in the worker."""
-        try:
-            text = loaded.script(received.__getitem__)
-            return compile_program(text, catalogue=self._catalogue, name=loaded.file_name)
-        except ScriptError as error:
-            return ScriptFailed(error.line, error.column, error.wire_text, False, error.log_text)
-        except Exception as error:  # a defect of ours must not end the box
-            return ScriptFailed(1, 1, f"{loaded.file_name} cannot be compiled: {error!r}")
+        return (yield from self._access.in_worker(compile_loaded, loaded, received, self._catalogue))
 
     def _refuse(self, what: str, why: str | Exception) -> NoReturn:
         """Refuse an action, and write into the log why."""
-        text = f"{what} failed: {why if isinstance(why, str | ProgramFileError) else repr(why)}"
+        text = f"{what} failed: {why if isinstance(why, str | EmulatorError) else repr(why)}"
         self._access.note(text)
         raise MissingFileRefusal(text) if isinstance(why, FileMissingError) else RefusedError(text)

@@ -1,0 +1,206 @@
+"""Long tasks of a loop, with the real process: results, errors, deaths, and what is left of them."""
+
+import operator
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from ur_emulator.errors import WorkerError
+from ur_emulator.programs.compiling import compile_text
+from ur_emulator.realtime import tasks as module
+from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.realtime.worker_process import TASK_LIMIT
+from urscript.catalogue import catalogue_for
+from urscript.program import ProgramStatus, compile_program
+from urscript.recording_host import RecordingHost
+
+
+class Bench:
+    """A loop with a queue of tasks, run in the test's thread."""
+
+    def __init__(self):
+        self.loop = EventLoop()
+        self.results = []
+
+    def submit(self, function, *arguments):
+        return self.loop.tasks.submit(lambda *it: self._note(*it), function, *arguments)
+
+    def _note(self, result, error):
+        self.results.append(result if error is None else error)
+        if not self.loop.tasks._waiting and self.loop.tasks._current is None:
+            self.loop.stop()
+
+    def run(self):
+        """Run until all is done; return what has come of it."""
+        self.loop.run()
+        self.loop._stopping = False
+        results, self.results = self.results, []
+        return results
+
+    def ask(self, function, *arguments):
+        self.submit(function, *arguments)
+        return self.run()[0]
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    yield bench
+    bench.loop.close()
+
+
+def has_ended(pid):
+    """Whether a process has ended and nothing of it is left, not even its entry in the system's table."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def test_tasks_are_done_in_order_and_what_they_raise_is_told(bench):
+    for function, *arguments in (
+        (operator.add, 1, 2),
+        (operator.truediv, 1, 0),
+        (open, "/no such file"),
+        (threading.Lock,),
+        (operator.add, "a", "b"),
+    ):
+        bench.submit(function, *arguments)
+    three, division, missing, no_result, text = bench.run()
+    assert (three, text) == (3, "ab")
+    assert isinstance(division, ZeroDivisionError)
+    assert isinstance(missing, FileNotFoundError)
+    assert "cannot pickle" in str(no_result)
+
+
+def test_all_is_done_by_one_process_that_no_ctrl_c_reaches(bench):
+    pid = bench.ask(os.getpid)
+    assert pid != os.getpid()
+    assert bench.ask(os.getsid, 0) == pid
+    assert bench.ask(signal.raise_signal, signal.SIGINT) is None
+    assert bench.ask(os.getpid) == pid
+
+
+def test_long_tasks_and_long_answers_go_through(bench):
+    data = bytes(range(256)) * (1 << 14)
+    assert bench.ask(operator.add, data, data) == data + data
+
+
+def test_the_next_loop_has_the_idle_process(bench):
+    pid = bench.ask(os.getpid)
+    bench.loop.close()
+    other = Bench()
+    assert other.ask(os.getpid) == pid
+    other.loop.close()
+
+
+def test_a_process_that_dies_costs_one_task(bench):
+    pid = bench.ask(os.getpid)
+    bench.submit(os._exit, 3)
+    bench.submit(os.getpid)
+    bench.submit(signal.raise_signal, signal.SIGKILL)
+    exited, other, killed = bench.run()
+    assert str(exited) == "the process that did it was ended with exit code 3: try again"
+    assert str(killed) == "the process that did it was ended by SIGKILL: try again"
+    assert has_ended(pid)
+    assert has_ended(other)
+
+
+def test_a_task_may_take_so_much_processor_time_and_no_more(bench):
+    assert 0.0 < bench.ask(signal.getitimer, signal.ITIMER_PROF)[0] < 1.1 * TASK_LIMIT
+    error = bench.ask(signal.raise_signal, signal.SIGPROF)
+    assert isinstance(error, WorkerError)
+    assert str(error) == "it takes more than 30 s of processor time: make it shorter"
+
+
+def test_a_task_that_is_dropped_does_not_hold_up_the_next(bench):
+    pid = bench.ask(os.getpid)
+    running, waiting = bench.submit(signal.pause), bench.submit(operator.add, 1, 2)
+    bench.submit(os.getpid)
+    bench.loop.tasks.drop(waiting)
+    bench.loop.tasks.drop(running)
+    (other,) = bench.run()
+    assert other != pid
+    bench.loop.tasks.drop(running)
+    bench.loop.close()
+    assert has_ended(pid)
+
+
+def test_a_loop_that_ends_does_not_wait_for_its_task(bench):
+    pid = bench.ask(os.getpid)
+    bench.submit(signal.pause)
+    bench.loop.close()
+    assert has_ended(pid)
+
+
+def test_a_process_that_cannot_be_started_is_told_and_tried_again(bench, monkeypatch):
+    def fail():
+        raise OSError("too many")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "take_process", fail)
+        bench.loop.tasks.start()
+        bench.submit(operator.add, 1, 2)
+        bench.submit(operator.add, 3, 4)
+        first, second = bench.run()
+    assert str(first) == str(second) == "the process for it cannot be started (too many): try again later"
+    assert bench.ask(operator.add, 1, 2) == 3
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_the_process_ends_with_the_one_that_started_it(how):
+    """It holds the pipe for errors open as long as it lives."""
+    code = (
+        "from ur_emulator import ControlBox\n"
+        "import signal\n"
+        "with ControlBox(pace='lockstep', port_base=None) as box:\n"
+        "    print(box._loop.tasks._process._process.pid, flush=True)\n"
+        "    signal.pause()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as parent:
+        worker = int(parent.stdout.readline())
+        os.kill(parent.pid, how)
+        errors = parent.stderr.read()
+    assert worker != parent.pid
+    assert errors.count("Traceback") == (how is signal.SIGINT)
+
+
+def test_a_fork_leaves_the_process_to_its_parent(bench):
+    pid = bench.ask(os.getpid)
+    bench.loop.close()
+    child = os.fork()
+    if not child:
+        os._exit(len(module.take_process.__globals__["_idle"]))
+    assert os.waitpid(child, 0)[1] == 0
+    other = Bench()
+    assert other.ask(os.getpid) == pid
+    other.loop.close()
+
+
+def test_a_script_without_a_main_guard_is_not_run_again(tmp_path):
+    script = tmp_path / "mine.py"
+    script.write_text(
+        "from ur_emulator import ControlBox\n"
+        "print('once')\n"
+        "with ControlBox(pace='lockstep', port_base=None) as box:\n"
+        "    print(box.run_program('def p():\\n  sync()\\nend'))\n"
+    )
+    result = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
+    assert (result.stdout.count("once"), result.returncode, result.stderr) == (1, 0, "")
+
+
+def test_a_program_that_comes_from_the_process_is_the_one_that_is_compiled_here(bench):
+    text = "def p():\n  x = p[0, 0, 0.1, 0, 0, 0]\n  def f(a, b=[1, 2]):\n    return a + b[1]\n  end\n  textmsg(f(40), x)\nend"
+    program = bench.ask(compile_text, text, catalogue_for("3.15"), "p.script")
+    assert program == compile_program(text, catalogue=catalogue_for("3.15"), name="p.script")
+    assert program.catalogue is catalogue_for("3.15")
+    host = RecordingHost()
+    assert host.run(program).status is ProgramStatus.FINISHED
+    assert host.messages == ["42p[0,0,0.1,0,0,0]"]

@@ -1,0 +1,61 @@
+"""From the text of a program, or from its file, to a program that can be started.
+
+It takes longer than a cycle: these functions run in the worker process (`realtime.worker_process`), and all
+that goes in and comes out can be pickled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.programs.installation import ExternalControlPc
+from ur_emulator.programs.loading import LoadedProgram, load_program
+from urscript import CompiledProgram, compile_program
+from urscript.catalogue import Catalogue
+from urscript.errors import ScriptError, ScriptTypeError
+
+# A program that can be started, or why it cannot.
+Outcome = CompiledProgram | ScriptFailed
+
+
+def compile_text(
+    text: str, catalogue: Catalogue, name: str = "<program>", is_secondary: bool = False
+) -> Outcome:
+    """Compile a program.
+
+    Args:
+        text: of the program, one character a byte.
+        catalogue: the builtins of the software.
+        name: what people know it by.
+        is_secondary: it is a `sec` program.
+    """
+    try:
+        return compile_program(text, catalogue=catalogue, name=name)
+    except ScriptError as error:
+        # Arguments are counted when the call runs, so that of a `sec` is one of its exceptions.
+        secondary = is_secondary and isinstance(error, ScriptTypeError)
+        return ScriptFailed(error.line, error.column, error.wire_text, secondary, error.log_text)
+
+
+def compile_loaded(
+    loaded: LoadedProgram, received: Mapping[ExternalControlPc, str], catalogue: Catalogue
+) -> Outcome:
+    """Compile a program from a file, with the parts that PCs have sent."""
+    try:
+        return compile_text(loaded.script(received.__getitem__), catalogue, loaded.file_name)
+    except Exception as error:  # a defect of ours must not end the box
+        return ScriptFailed(1, 1, f"{loaded.file_name} cannot be compiled: {error!r}")
+
+
+def load_and_compile(
+    folder: ProgramFolder, name: str, catalogue: Catalogue
+) -> tuple[LoadedProgram, Outcome | None]:
+    """Read a program and its installation, and compile it unless parts of it are fetched when it starts.
+
+    Raises:
+        ProgramFileError: one of the files cannot be used.
+    """
+    loaded = load_program(folder, name)
+    return loaded, None if loaded.pcs else compile_loaded(loaded, {}, catalogue)

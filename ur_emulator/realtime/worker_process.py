@@ -1,0 +1,194 @@
+"""A process that does long tasks for a loop, so that they cost it no cycle: both ends of the pipe.
+
+A task is a function that can be imported and its arguments, pickled; the answer is what it returns or raises.
+The process lives as long as this one: it ends when the pipe is closed. It is in a session of its own, where
+Ctrl-C does not reach it. One that a loop leaves idle stays for the next loop of this process.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import suppress
+
+from ur_emulator.errors import WorkerError
+
+# Processor time that a task may take [s]; the process ends itself beyond it.
+TASK_LIMIT = 30.0
+# Bytes of the length in front of a task and of an answer, big-endian.
+_HEAD = 8
+_READ_SIZE = 1 << 18
+_CODE = "import sys; sys.path[:] = {path!r}; from ur_emulator.realtime.worker_process import work; work()"
+
+
+class WorkerProcess:
+    """The process, as the loop sees it.
+
+    Attributes:
+        sock: our end of the pipe, non-blocking; a loop watches it.
+    """
+
+    def __init__(self) -> None:
+        """Start it.
+
+        Raises:
+            OSError: there is no process or no descriptor to be had.
+        """
+        self.sock, other = socket.socketpair()
+        with other:
+            try:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-c", _CODE.format(path=sys.path)],
+                    stdin=other.fileno(),
+                    stdout=subprocess.DEVNULL,
+                    start_new_session=True,
+                )
+            except OSError:
+                self.sock.close()
+                raise
+        self.sock.setblocking(False)
+        self._outbox = memoryview(b"")
+        self._inbox = bytearray()
+
+    @property
+    def has_more(self) -> bool:
+        """Whether bytes of the task are still to be sent."""
+        return bool(self._outbox)
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the process has not ended."""
+        return self._process.poll() is None
+
+    def send(self, task: bytes) -> None:
+        """Begin to send a task; the one before must be answered."""
+        self._outbox = memoryview(_framed(task))
+        self.flush()
+
+    def flush(self) -> None:
+        """Send what goes now. A process that has ended is noticed by `receive`."""
+        try:
+            self._outbox = self._outbox[self.sock.send(self._outbox) :]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._outbox = memoryview(b"")
+
+    def receive(self) -> bytes | None:
+        """Return the answer once all of it has come, None before.
+
+        Raises:
+            EOFError: the process has ended.
+        """
+        try:
+            data = self.sock.recv(_READ_SIZE)
+        except BlockingIOError:
+            return None
+        except OSError:
+            data = b""
+        if not data:
+            raise EOFError
+        self._inbox += data
+        if len(self._inbox) < _HEAD or len(self._inbox) < _HEAD + int.from_bytes(self._inbox[:_HEAD], "big"):
+            return None
+        answer = bytes(memoryview(self._inbox)[_HEAD:])
+        self._inbox.clear()
+        return answer
+
+    def kill(self) -> None:
+        """Let the process end, soon."""
+        self._process.kill()
+
+    def end(self) -> int:
+        """Let the process end, wait for that and release everything; return its exit code."""
+        self._process.kill()
+        self.sock.close()
+        return self._process.wait()
+
+
+# At most one process that waits for the next loop.
+_idle: list[WorkerProcess] = []
+
+
+def prestart_process() -> None:
+    """Let a process be idle when the next loop starts: it takes a moment to load the compiler.
+
+    One that cannot be started is no error before there is a task for it.
+    """
+    if not _idle:
+        with suppress(OSError):
+            _idle.append(WorkerProcess())
+
+
+def take_process() -> WorkerProcess:
+    """Return an idle process, or a new one.
+
+    Raises:
+        OSError: it cannot be started.
+    """
+    while _idle:
+        with suppress(IndexError):  # another thread was quicker
+            process = _idle.pop()
+            if process.is_alive:
+                return process
+            process.end()
+    return WorkerProcess()
+
+
+def leave_process(process: WorkerProcess) -> None:
+    """Give back a process that has nothing to do."""
+    if _idle:
+        process.end()
+    else:
+        _idle.append(process)
+
+
+@atexit.register
+def _end_idle() -> None:
+    while _idle:
+        _idle.pop().end()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_idle.clear)
+
+
+# --- in the process
+
+
+def work() -> None:
+    """Do tasks until the other end is closed; the main function of the process."""
+    from urscript.syntax.parser import prepare
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    prepare()  # now, so that the first program does not wait for it
+    with socket.socket(fileno=sys.stdin.fileno()) as sock, sock.makefile("rwb") as stream, suppress(OSError):
+        while head := stream.read(_HEAD):
+            task = stream.read(int.from_bytes(head, "big"))
+            signal.setitimer(signal.ITIMER_PROF, TASK_LIMIT)  # its signal ends the process
+            answer = _answer(task)
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            stream.write(_framed(answer))
+            stream.flush()
+    os._exit(0)
+
+
+def _answer(task: bytes) -> bytes:
+    """Do a task; return its result and its error, one of them None, pickled."""
+    try:
+        function, arguments = pickle.loads(task)
+        return pickle.dumps((function(*arguments), None))
+    except Exception as error:
+        try:
+            return pickle.dumps((None, error))
+        except Exception:
+            return pickle.dumps((None, WorkerError(repr(error))))
+
+
+def _framed(data: bytes) -> bytes:
+    return len(data).to_bytes(_HEAD, "big") + data
