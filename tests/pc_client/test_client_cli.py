@@ -345,16 +345,11 @@ def test_doctor_where_nothing_answers(capsys):
     assert "refuses the connection" in out
 
 
-def test_movements_list_show_and_generate(tmp_path, capsys):
-    assert cli.run(["movements", "list"]) == 0
-    assert "lognorm_5_3" in capsys.readouterr().out
+def test_a_movement_is_shown_for_people_and_as_json(capsys):
     assert cli.run(["movements", "show", "uniform_5_1", "--json"]) == 0
     assert '"duration_s"' in capsys.readouterr().out
     assert cli.run(["movements", "show", "uniform_5_1"]) == 0
     assert "box of motion" in capsys.readouterr().out
-    file = tmp_path / "mine.toml"
-    assert cli.run(["movements", "generate", "--targets", "4", "--seed", "5", "--out", str(file)]) == 0
-    assert 'name = "mine"' in file.read_text()
 
 
 def test_missing_extras_name_the_command_to_install(monkeypatch, capsys):
