@@ -141,8 +141,8 @@ class Box(BoxOperations):
         self._reports = ReportFolder(player.folder)
         states = StateEncoder(software, controller.state.arm)
         realtime, realtime_ro = (RealtimePort(software.realtime, intake) for intake in (self._intake, None))
-        rtde = RtdePort(software, controller, self._box.submit, self._box.announce)
-        modbus = ModbusPort(controller, self._box.submit)
+        rtde = RtdePort(self._access)
+        modbus = ModbusPort(self._access)
         dashboard = DashboardPort(
             self._access, DashboardAnswers(self._access, player, self._reports, self._shut_down)
         )
@@ -153,7 +153,7 @@ class Box(BoxOperations):
         )
         read_only = (realtime_ro, primary_ro, secondary_ro)
         self._box.attach(  # first those whose clients act on a cycle
-            (realtime, rtde, primary, secondary, modbus, *read_only, self._access.steps),
+            (realtime, rtde, primary, secondary, *read_only, self._access.steps),
             [port.send_message for port in messengers],
         )
         ports: dict[str, Port] = {

@@ -28,11 +28,16 @@ from ur_emulator.commands.power import PowerOn, ReleaseBrakes
 from ur_emulator.commands.programs import StartProgram, StopProgram
 from ur_emulator.commands.push import AttachPayload, Push
 from ur_emulator.commands.safety import (
+    AssignSafetyInput,
+    ConfirmSafety,
+    PressButton,
     ReleaseEmergencyStop,
+    RequireSafeguardReset,
     RestartSafety,
     SafeguardStop,
     UnlockProtectiveStop,
 )
+from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS
 from ur_emulator.programs.compiling import compile_text
 from ur_emulator.servers.modbus.server import MAX_INBOX
 from ur_emulator.servers.rtde_port import MAX_WAITING as MAX_RTDE_WAITING
@@ -264,6 +269,9 @@ class FuzzBox:
                 wire.reset()
         self.turn()
         commands = [
+            *(AssignSafetyInput(pair, "none") for pair in range(N_INPUT_PAIRS)),
+            RequireSafeguardReset(False),
+            PressButton("teach", False),
             ReleaseEmergencyStop(),
             SafeguardStop(False),
             StopProgram(),
@@ -276,6 +284,7 @@ class FuzzBox:
             self._order(20, UnlockProtectiveStop())
         if self.controller.snapshot.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
             self._order(200, RestartSafety())
+        self._order(20, ConfirmSafety())
         self._order(300, PowerOn())
         self._order(100, ReleaseBrakes())
         if not self.lively:  # a moved arm may stand where it cannot work
@@ -417,7 +426,7 @@ class FuzzBox:
             assert not any(channel.pending for channel in self.ports[name]._channels.values())
         assert not self.box._intake._waiting
         for session in self.ports["control"]._sessions.values():
-            assert len(session.body) <= 1 << 20
+            assert len(session._body) <= 1 << 20
         assert len(self.controller.state.operator.requests) <= 1000
 
     def settle(self):

@@ -5,6 +5,7 @@ import struct
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
@@ -13,10 +14,12 @@ from protocol.primary.state import RobotState
 from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.programs import StartProgram
+from ur_emulator.controller.command import Submitted
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from urscript import compile_program
 
 VERSION = SoftwareVersion(3, 15, 8)
@@ -137,6 +140,16 @@ class Bench:
         else:
             raise AssertionError("the program did not end")
         return [event.text for event in self.events[first:] if type(event).__name__ == "TextPrinted"]
+
+
+def bare_access(software, controller, commands):
+    """Return the access of a port to a controller; what it submits is appended to `commands`."""
+
+    def submit(command, done=None):
+        commands.append(command if done is None else Submitted(command, done))
+
+    box = SimpleNamespace(controller=controller, submit=submit, announce=lambda event: None)
+    return BoxAccess(BoxIdentity(software, "UR3", "20993000007"), box, None, None)
 
 
 def connect(box, port):

@@ -4,7 +4,7 @@ import socket
 import struct
 
 import pytest
-from box_support import TIMEOUT, Bench, MessageReader, connect
+from box_support import TIMEOUT, Bench, MessageReader, bare_access, connect
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
@@ -344,6 +344,7 @@ class FakeConnection:
     def __init__(self, *, full=False):
         self.full = full
         self.is_open = True
+        self.has_ended = False
         self.answers = []
 
     def send(self, answer):
@@ -358,23 +359,24 @@ class FakeConnection:
 def bare_port():
     bench = Bench()
     commands = []
-    return bench, ModbusPort(bench.controller, commands.append), commands
+    access = bare_access(None, bench.controller, commands)
+    return bench, ModbusPort(access), access.steps, commands
 
 
 def test_a_write_is_answered_after_a_cycle_and_not_when_the_last_one_is_shown_again():
-    bench, port, commands = bare_port()
+    bench, port, steps, commands = bare_port()
     connection = FakeConnection()
     port.opened(connection)
     port.received(connection, frame(b"\6\0\x80\0\7") + frame(b"\3\0\x80\0\1"))
     for _ in range(3):
-        port.publish(bench.now)
+        steps.publish(bench.now)
     assert connection.answers == []
-    port.publish(bench.tick(1, *commands))
+    steps.publish(bench.tick(1, *commands))
     assert [answer[7:] for answer in connection.answers] == [b"\6\0\x80\0\7", b"\3\2\0\7"]
 
 
 def test_a_client_whose_answers_find_no_room_is_cut_off():
-    _, port, _ = bare_port()
+    _, port, *_ = bare_port()
     connection = FakeConnection(full=True)
     port.opened(connection)
     port.received(connection, frame(READ_VERSION))
@@ -382,15 +384,15 @@ def test_a_client_whose_answers_find_no_room_is_cut_off():
 
 
 def test_writes_of_several_clients_act_in_the_order_in_which_they_came():
-    bench, port, commands = bare_port()
+    bench, port, steps, commands = bare_port()
     connections = [FakeConnection() for _ in range(20)]
     for i, connection in enumerate(connections):
         port.opened(connection)
         port.received(connection, frame(b"\6\0\x80" + struct.pack(">H", i)) * 2)
     for _ in range(2):
-        assert [command.values for command in commands] == [(i,) for i in range(20)]
+        assert [submitted.command.values for submitted in commands] == [(i,) for i in range(20)]
         first, commands[:] = tuple(commands), ()
-        port.publish(bench.tick(1, *first))
+        steps.publish(bench.tick(1, *first))
     assert all(len(connection.answers) == 2 for connection in connections)
 
 

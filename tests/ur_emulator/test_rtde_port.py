@@ -1,7 +1,7 @@
 """The RTDE port without sockets: rates, repeats while time stands still, owners, clients that misbehave."""
 
 import pytest
-from box_support import Bench
+from box_support import Bench, bare_access
 from rtde_support import input_package
 
 from protocol.rtde import messages as M
@@ -19,6 +19,7 @@ class FakeConnection:
     def __init__(self, port, *, full=False):
         self.port = port
         self.is_open = True
+        self.has_ended = False
         self.full = full
         self.sent = []
         self.pc = RtdeClientConnection()
@@ -61,19 +62,24 @@ class PortBench(Bench):
     def __init__(self):
         super().__init__(fidelity="ideal")
         self.commands = []
-        self.port = RtdePort(CB3.software(V3_15), self.controller, self.commands.append)
+        self.access = bare_access(CB3.software(V3_15), self.controller, self.commands)
+        self.port = RtdePort(self.access)
 
     def tick(self, n=1, *commands):
         for _ in range(n):
             taken, self.commands[:] = (*commands, *self.commands), []
             super().tick(1, *taken)
-            self.port.publish(self.now)
+            self._publish()
             commands = ()
         return self.now
 
     def stand(self, n):
         for _ in range(n):
-            self.port.publish(self.now)
+            self._publish()
+
+    def _publish(self):
+        self.port.publish(self.now)
+        self.access.steps.publish(self.now)
 
     def client(self, *names, frequency=125.0):
         client = FakeConnection(self.port)

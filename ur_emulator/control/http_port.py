@@ -8,7 +8,7 @@ the number of clients: the one that has been silent longest is closed for a new 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field, is_dataclass
+from dataclasses import asdict, is_dataclass
 from typing import Any
 
 import h11
@@ -20,6 +20,7 @@ from ur_emulator.control.runner import OperationRunner
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
+from ur_emulator.servers.session import Session
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
 
@@ -27,25 +28,6 @@ MAX_BODY = 1024 * 1024
 # Bytes that a client may send ahead while its last request is being answered.
 MAX_AHEAD = MAX_BODY + MAX_HEADER
 MAX_CLIENTS = 64
-
-
-@dataclass(slots=True)
-class _Session:
-    """A client: its HTTP state, the request that is being read or answered, and what it sends ahead.
-
-    Attributes:
-        http: reads requests, writes answers.
-        request: head of the request that is read or answered.
-        body: what has come of its body.
-        is_busy: its requests are being answered.
-        n_ahead: bytes that have come meanwhile.
-    """
-
-    http: h11.Connection
-    request: h11.Request | None = None
-    body: bytearray = field(default_factory=bytearray)
-    is_busy: bool = False
-    n_ahead: int = 0
 
 
 class HttpPort:
@@ -62,138 +44,149 @@ class HttpPort:
         self._runner = runner
         self._host = host.lower()
         # The one that has been silent longest first.
-        self._sessions: dict[Connection, _Session] = {}
+        self._sessions: dict[Connection, _HttpSession] = {}
 
     def opened(self, connection: Connection) -> None:
         """Take in a client; if there are too many, the one that has been silent longest is closed."""
         if len(self._sessions) >= MAX_CLIENTS:
             idle = [other for other, session in self._sessions.items() if not session.is_busy]
             (idle or list(self._sessions))[0].close()
-        http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEADER)
-        self._sessions[connection] = _Session(http)
+        self._sessions[connection] = _HttpSession(connection, self._access, self._runner, self._host)
         connection.allow_half_close(self.ended)
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Take bytes and answer what can be answered now."""
         session = self._sessions[connection]
-        session.http.receive_data(data)
-        if session.is_busy:
-            session.n_ahead += len(data)
-            if session.n_ahead > MAX_AHEAD:
-                connection.close()
-            return
-        session.is_busy = True
-
-        def finished(_: Any, error: Exception | None) -> None:
-            session.is_busy = False
-            if error is not None:  # the box has ended
-                self._reject(connection, session, 503, str(error))
-
-        self._access.steps.start(self._serve(connection, session), finished)
+        n_requests = session.n_requests
+        session.receive(data)
+        if session.n_requests != n_requests and connection in self._sessions:
+            self._sessions[connection] = self._sessions.pop(connection)
 
     def ended(self, connection: Connection) -> None:
         """A client sends nothing more; its requests are still answered."""
-        if connection in self._sessions:
-            self.received(connection, b"")
+        self._sessions[connection].receive(b"")
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; what it has begun takes its course."""
-        self._sessions.pop(connection, None)
+        del self._sessions[connection]
 
-    # --- requests
 
-    def _serve(self, connection: Connection, session: _Session) -> Steps[None]:
+class _HttpSession(Session):
+    """A client: its HTTP state, and the request that is read or answered.
+
+    Attributes:
+        http: reads requests, writes answers.
+        n_requests: how many have been read.
+    """
+
+    def __init__(self, connection: Connection, access: BoxAccess, runner: OperationRunner, host: str) -> None:
+        super().__init__(connection, access.steps)
+        self._access = access
+        self._runner = runner
+        self._host = host
+        self.http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEADER)
+        self.n_requests = 0
+        self._request: h11.Request | None = None
+        self._body = bytearray()
+        # Bytes that have come while the last request is being answered.
+        self._n_ahead = 0
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes and answer what can be answered now."""
+        self.http.receive_data(data)
+        if self.is_busy:
+            self._n_ahead += len(data)
+            if self._n_ahead > MAX_AHEAD:
+                self.connection.close()
+        self.answer_requests()
+
+    def _finished(self, _: None, error: Exception | None) -> None:
+        self.is_busy = False
+        if error is not None:
+            self._reject(503, str(error))
+
+    def _serve(self) -> Steps[None]:
         """Answer the requests that have come, in order."""
         try:
-            while connection.is_open and (body := self._next_request(connection, session)) is not None:
-                self._sessions[connection] = self._sessions.pop(connection)  # it is not silent
-                session.n_ahead = 0
-                yield from self._answer(connection, session, body)
+            while self.connection.is_open and (body := self._next_request()) is not None:
+                self.n_requests += 1
+                self._n_ahead = 0
+                yield from self._answer(body)
         except h11.RemoteProtocolError as error:
-            self._reject(connection, session, error.error_status_hint, f"not understood: {error}")
+            self._reject(error.error_status_hint, f"not understood: {error}")
         except HttpError as error:
-            self._reject(connection, session, error.status, str(error))
+            self._reject(error.status, str(error))
         except Exception as error:  # a defect of ours must not end the box
-            text = f"a request of {connection.peer} could not be answered: {error!r}"
+            text = f"a request of {self.connection.peer} could not be answered: {error!r}"
             self._access.announce(LogAdded("Control", text))
-            connection.close()
+            self.connection.close()
 
-    def _next_request(self, connection: Connection, session: _Session) -> bytes | None:
+    def _next_request(self) -> bytes | None:
         """Read the next request; return its body, None if more bytes are needed or no request will come."""
         while True:
-            event = session.http.next_event()
+            event = self.http.next_event()
             if isinstance(event, h11.Request):
-                session.request = event
+                self._request = event
                 check_head(event)
-                if session.http.they_are_waiting_for_100_continue:
-                    self._send(connection, session, h11.InformationalResponse(status_code=100, headers=[]))
+                if self.http.they_are_waiting_for_100_continue:
+                    self._send(h11.InformationalResponse(status_code=100, headers=[]))
             elif isinstance(event, h11.Data):
-                session.body += event.data
-                if len(session.body) > MAX_BODY:
+                self._body += event.data
+                if len(self._body) > MAX_BODY:
                     raise HttpError(413, f"the body is longer than {MAX_BODY} bytes")
             elif isinstance(event, h11.EndOfMessage):
-                body, session.body = bytes(session.body), bytearray()
+                body, self._body = bytes(self._body), bytearray()
                 return body
             else:
                 if event is not h11.NEED_DATA:
-                    connection.close_when_sent()
+                    self.connection.close_when_sent()
                 return None
 
-    def _answer(self, connection: Connection, session: _Session, body: bytes) -> Steps[None]:
+    def _answer(self, body: bytes) -> Steps[None]:
         """Do what a request asks for, and answer it."""
-        assert session.request is not None
+        assert self._request is not None
         try:
-            name, arguments = parse_request(session.request, body, self._host)
+            name, arguments = parse_request(self._request, body, self._host)
         except HttpError as error:
-            self._finish(connection, session, error.status, {"error": str(error)}, error.allow)
+            self._finish(error.status, {"error": str(error)}, error.allow)
             return
         if name == LIST:
-            self._finish(connection, session, 200, {"operations": describe()})
+            self._finish(200, {"operations": describe()})
             return
         steps = self._runner.steps(name, arguments)
         try:
             while True:
                 next(steps)
-                if connection.has_ended and name == "wait_until":
-                    connection.close()  # it may have gone; nobody waits an hour for that
-                if not connection.is_open:
+                if self.connection.has_ended and name == "wait_until":
+                    self.connection.close()  # it may have gone; nobody waits an hour for that
+                if not self.connection.is_open:
                     return
                 yield
         except StopIteration as end:
-            self._finish(connection, session, 200, end.value)
+            self._finish(200, end.value)
         except EmulatorError as error:
-            self._finish(connection, session, _status_of(error), {"error": str(error)})
+            self._finish(_status_of(error), {"error": str(error)})
 
     # --- answers
 
-    def _finish(
-        self, connection: Connection, session: _Session, status: int, result: Any, allow: str = ""
-    ) -> None:
+    def _finish(self, status: int, result: Any, allow: str = "") -> None:
         """Send an answer; then the next request may be read."""
-        if not connection.is_open:
+        if not self.connection.is_open:
             return
-        self._respond(connection, session, status, result, allow)
-        if session.http.our_state is h11.MUST_CLOSE:
-            connection.close_when_sent()
-        elif session.http.our_state is h11.DONE and session.http.their_state is h11.DONE:
-            session.http.start_next_cycle()
-            session.request = None
+        self._respond(status, result, allow)
+        if self.http.our_state is h11.MUST_CLOSE:
+            self.connection.close_when_sent()
+        elif self.http.our_state is h11.DONE and self.http.their_state is h11.DONE:
+            self.http.start_next_cycle()
+            self._request = None
 
-    def _reject(self, connection: Connection, session: _Session, status: int, text: str) -> None:
+    def _reject(self, status: int, text: str) -> None:
         """Answer with an error after which nothing more can be read, and close."""
-        if session.http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            self._respond(connection, session, status, {"error": " ".join(text.split())}, close=True)
-        connection.close_when_sent()
+        if self.http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+            self._respond(status, {"error": " ".join(text.split())}, close=True)
+        self.connection.close_when_sent()
 
-    def _respond(
-        self,
-        connection: Connection,
-        session: _Session,
-        status: int,
-        result: Any,
-        allow: str = "",
-        close: bool = False,
-    ) -> None:
+    def _respond(self, status: int, result: Any, allow: str = "", close: bool = False) -> None:
         body = json.dumps(result, default=_as_json).encode() + b"\n"
         headers = [
             ("Content-Type", JSON),
@@ -206,15 +199,15 @@ class HttpPort:
         if close:
             headers.append(("Connection", "close"))
         events: list[h11.Event] = [h11.Response(status_code=status, headers=headers)]
-        if session.request is None or session.request.method != b"HEAD":
+        if self._request is None or self._request.method != b"HEAD":
             events.append(h11.Data(data=body))
-        self._send(connection, session, *events, h11.EndOfMessage())
+        self._send(*events, h11.EndOfMessage())
 
-    def _send(self, connection: Connection, session: _Session, *events: h11.Event) -> None:
+    def _send(self, *events: h11.Event) -> None:
         """Send events in one package; a client that does not read its answers is closed."""
-        data = b"".join(session.http.send(event) or b"" for event in events)
-        if not connection.send(data):
-            connection.close()
+        data = b"".join(self.http.send(event) or b"" for event in events)
+        if not self.connection.send(data):
+            self.connection.close()
 
 
 def _status_of(error: EmulatorError) -> int:

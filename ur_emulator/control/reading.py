@@ -42,7 +42,7 @@ class ReadLog(StepOperation[tuple[LogEntry, ...]]):
     def steps(self, context: Context) -> Steps[Any]:
         """Pick the entries."""
         yield from ()
-        log, least = context.access.box_log, ReportLevel[self.level]
+        log, least = context.access.log, ReportLevel[self.level]
         entries = [entry for entry in log.since(self.after) if entry.level >= least]
         return {"entries": entries, "next": max(self.after, log.count)}
 

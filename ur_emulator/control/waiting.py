@@ -69,13 +69,13 @@ class WaitUntil(StepOperation[BoxState]):
         wanted = {name: value for name in CONDITIONS if (value := getattr(self, name)) is not None}
         if not wanted and self.log is None:
             raise ArgumentError("wait_until needs a condition, such as program_state STOPPED or steady true")
-        box_log, controller = context.access.box_log, context.access.controller
+        log, controller = context.access.log, context.access.controller
         end = context.clock() + self.timeout
         after, seen = self.after, self.log is None
         while True:
             if not seen:
-                seen = any(str(self.log) in entry.text for entry in box_log.since(after))
-                after = max(after, box_log.count)
+                seen = any(str(self.log) in entry.text for entry in log.since(after))
+                after = max(after, log.count)
             missing = _unmet(controller, wanted) + ([] if seen else [f"no log entry with {self.log!r}"])
             if not missing:
                 return take_state(controller)

@@ -7,12 +7,11 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from ur_emulator.box_log import BoxLog, LogEntry
+from ur_emulator.box_log import BoxLog
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.errors import RefusedError
 from ur_emulator.models.software import Software
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import ServedBox
@@ -64,14 +63,13 @@ class BoxAccess:
         return self._box.controller.snapshot
 
     @property
-    def log(self) -> tuple[LogEntry, ...]:
-        """The last entries of the log."""
-        return self._box.log.entries
-
-    @property
-    def box_log(self) -> BoxLog:
-        """The log itself, for those who read on where they left off."""
+    def log(self) -> BoxLog:
+        """What the box has done."""
         return self._box.log
+
+    def submit(self, command: Command) -> None:
+        """Ask for something in the next cycle."""
+        self._box.submit(command)
 
     def announce(self, event: Event) -> None:
         """Publish an event that needs no cycle."""
@@ -85,12 +83,7 @@ class BoxAccess:
 
     def start_alone(self, steps: Steps[None]) -> None:
         """Begin with steps whose result nobody waits for; a refusal stands in the log already."""
-
-        def finished(_: None, error: Exception | None) -> None:
-            if error is not None and not isinstance(error, RefusedError):
-                self.note(f"failed: {error!r}")
-
-        self.steps.start(steps, finished)
+        self.steps.start(steps, lambda result, error: None)
 
     def apply(self, command: Command) -> Steps[Any]:
         """Ask for something, and end after the cycle in which it was applied.

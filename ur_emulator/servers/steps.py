@@ -11,10 +11,11 @@ from concurrent.futures import Future
 from typing import Any, TypeVar
 
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.errors import EmulatorError
 
 T = TypeVar("T")
 Steps = Generator[None, None, T]
-# Called with the result of the steps, or with the error that ended them.
+# Called with the result of the steps, or with the EmulatorError that ended them.
 Finished = Callable[[Any, Exception | None], None]
 
 
@@ -65,7 +66,7 @@ def _advance(steps: Steps[Any], finished: Finished) -> bool:
         next(steps)
     except StopIteration as end:
         finished(end.value, None)
-    except Exception as error:
+    except EmulatorError as error:
         finished(None, error)
     else:
         return False

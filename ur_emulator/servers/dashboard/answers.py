@@ -224,7 +224,7 @@ class DashboardAnswers:
             },
             timestamp=access.snapshot.timestamp,
             state=access.snapshot.as_dict(),
-            log="".join(f"{entry}\n" for entry in access.log),
+            log="".join(f"{entry}\n" for entry in access.log.entries),
             programs={
                 "program": _path_of(player.loaded),
                 "installation": _path_of(player.installation),

@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 from protocol.dashboard.connection import MAX_LINE, CommandReceived, DashboardConnection
 from protocol.errors import ProtocolError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.dashboard.answers import DashboardAnswers
+from ur_emulator.servers.session import Session
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
 
 # Lines of one client that are answered in a turn; more would keep the control cycle waiting.
 LINES_PER_TURN = 200
-
-
-@dataclass(slots=True)
-class _Session:
-    """A client: its lines, and whether they are being answered."""
-
-    lines: DashboardConnection
-    is_busy: bool = False
 
 
 class DashboardPort:
@@ -36,12 +26,12 @@ class DashboardPort:
         """
         self._access = access
         self._answers = answers
-        self._sessions: dict[Connection, _Session] = {}
+        self._sessions: dict[Connection, _DashboardSession] = {}
 
     def opened(self, connection: Connection) -> None:
         """Send the greeting line; a client that has closed its sending side still gets its answers."""
         connection.allow_half_close(self.ended)
-        session = _Session(DashboardConnection(self._access.identity.software.dashboard))
+        session = _DashboardSession(connection, self._access, self._answers)
         self._sessions[connection] = session
         connection.send(session.lines.greet())
 
@@ -52,47 +42,48 @@ class DashboardPort:
             session.lines.receive_data(data)
         except ProtocolError:
             connection.close()
-            return
-        if not session.is_busy:
-            session.is_busy = True
-
-            def finished(_: Any, error: Exception | None) -> None:
-                session.is_busy = False
-                if error is not None:
-                    connection.close()
-                elif connection.has_ended:
-                    connection.close_when_sent()
-
-            self._access.steps.start(self._serve(connection, session.lines), finished)
+        else:
+            session.answer_requests()
 
     def ended(self, connection: Connection) -> None:
         """A client sends nothing more: close it when all its lines are answered."""
-        if not self._sessions[connection].is_busy:
-            connection.close_when_sent()
+        self._sessions[connection].answer_requests()
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; what it has begun goes on."""
-        self._sessions.pop(connection, None)
+        del self._sessions[connection]
 
-    def _serve(self, connection: Connection, lines: DashboardConnection) -> Steps[None]:
-        """Answer all lines that have come."""
+
+class _DashboardSession(Session):
+    """A client.
+
+    Attributes:
+        lines: what it has sent, and how answers are written.
+    """
+
+    def __init__(self, connection: Connection, access: BoxAccess, answers: DashboardAnswers) -> None:
+        super().__init__(connection, access.steps)
+        self.lines = DashboardConnection(access.identity.software.dashboard)
+        self._answers = answers
+
+    def _serve(self) -> Steps[None]:
         n_answered = 0
-        while connection.is_open and (event := lines.next_event()) is not None:
+        while self.connection.is_open and (event := self.lines.next_event()) is not None:
             if n_answered and n_answered % LINES_PER_TURN == 0:
                 yield
             n_answered += 1
             if not isinstance(event, CommandReceived):
                 text = event.answer
             else:
-                answer = self._answers.answer(event, connection.host)
+                answer = self._answers.answer(event, self.connection.host)
                 text = answer if isinstance(answer, str) else (yield from answer)
-            self._reply(connection, lines, text)
+            self._reply(text)
 
-    def _reply(self, connection: Connection, lines: DashboardConnection, text: str) -> None:
+    def _reply(self, text: str) -> None:
         # A reply may repeat what the client sent, and must stay one line of allowed length.
         line = text.replace("\r", " ").replace("\n", " ")[: MAX_LINE - 1]
-        connection.send(lines.reply(line))
-        if connection.dropped:
-            connection.close()  # it does not read, and a reply less would shift all that follow
-        if lines.is_closed:
-            connection.close_when_sent()
+        self.connection.send(self.lines.reply(line))
+        if self.connection.dropped:
+            self.connection.close()  # it does not read, and a reply less would shift all that follow
+        if self.lines.is_closed:
+            self.connection.close_when_sent()
