@@ -47,7 +47,7 @@ from ur_emulator.servers.tcp.listener import Port
 class Box(BoxOperations):
     """An emulated control box, powered on with its brakes released.
 
-    What can be done to it beside connecting a client stands in `BoxOperations`.
+    Its operations stand in `BoxOperations`.
 
     Attributes:
         generation: that of its arm: control cycle, software and what comes with it.
@@ -189,11 +189,11 @@ class Box(BoxOperations):
         self.failure: Exception | None = None
         self.on_end: Callable[[], None] = self._loop.stop if loop is None else self.close
 
-    # --- what is going on, and what is asked
+    # --- log and commands
 
     @property
     def notices(self) -> list[str]:
-        """What a user should know although the box runs, one line each."""
+        """Warnings for the user, one line each; the box runs all the same."""
         return self._port_set.notices
 
     def _log_entries(self) -> tuple[LogEntry, ...]:
@@ -211,7 +211,7 @@ class Box(BoxOperations):
 
         Args:
             command: one of `ur_emulator.commands`, such as `operator.ClosePopup()` or `power.PowerOff()`.
-            done: told in that cycle, in the thread of the box, what has come of it: its result and None, or
+            done: called in that cycle, in the thread of the box: with its result and None, or with
                 None and the `RefusedError`.
         """
         self._loop.call_soon_threadsafe(lambda: self._box.submit(command, done))
@@ -226,7 +226,7 @@ class Box(BoxOperations):
     # --- life
 
     def listen(self) -> None:
-        """Open all ports; once they are open, nothing happens.
+        """Open all ports; harmless if they are open.
 
         Raises:
             PortError: one of them is taken; none stays open then and the box cannot be used any more.

@@ -1,7 +1,7 @@
 """What PolyScope's log tab would show of the box: programs, errors, safety, text messages, clients.
 
-The log is filled from the controller's events and the ports' notices; it is bounded, and nothing in it comes
-from a clock. Texts: `Starting program: <name>` and `Runtime error (<line>:<column>): ...` as seen in logs of
+The log is filled from the controller's events and the ports' notices; it is bounded, and its times are robot
+time. Texts: `Starting program: <name>` and `Runtime error (<line>:<column>): ...` as seen in logs of
 real controllers; the others are ours.
 """
 
@@ -20,7 +20,7 @@ from ur_emulator.controller import events
 if TYPE_CHECKING:
     from ur_emulator.models.robot_generation import RobotGeneration
 
-# The log forgets the oldest beyond this many entries, and cuts what is longer than this many characters.
+# Most entries, the oldest are removed; longest text of an entry in characters.
 MAX_ENTRIES = 5000
 MAX_TEXT = 1000
 
@@ -33,7 +33,7 @@ class LogEntry:
         tick: controller cycle in which it was written.
         time: seconds since controller start.
         level: how serious it is.
-        source: who speaks: Program, Controller, Safety, Client, Dashboard.
+        source: part of the box: Program, Controller, Safety, Client, Dashboard.
         text: without line breaks at its end.
         code: `C<code>A<argument>` of an error code, "" for everything else.
     """
@@ -51,10 +51,10 @@ class LogEntry:
 
 
 class BoxLog:
-    """The last entries, and those who want to hear of new ones.
+    """The last entries; followers are called with new ones.
 
     Attributes:
-        count: entries written so far, those that are forgotten included.
+        count: entries written so far, removed ones included.
     """
 
     def __init__(self, generation: RobotGeneration) -> None:

@@ -82,7 +82,7 @@ def serve(
 
     raise_descriptor_limit()
     prestart_process()  # it loads the compiler while the box is loaded
-    os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is drawn: no need to look for a display
+    os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
     from ur_emulator.emulator import ControlBox
     from ur_emulator.errors import EmulatorError
     from ur_emulator.realtime.interpreter import freeze_existing_objects
@@ -151,15 +151,15 @@ def ctl(context: typer.Context) -> None:
 
 
 def _print_entry(prefix: str, entry: LogEntry) -> None:
-    with suppress(OSError):  # nobody reads it any more
+    with suppress(OSError):  # stderr was closed
         sys.stderr.write(f"{prefix}{entry}\n")
         sys.stderr.flush()
 
 
 def _write_ready_file(path: Path, rack: Sequence[Box]) -> None:
-    """Write the file in one step, so that whoever waits for it never reads half of it.
+    """Write the file in one step: a reader never sees half of it.
 
-    It says of the first box what most readers look for, and of all boxes, the first included, in `boxes`.
+    Its top level describes the first box, `boxes` all of them.
     """
     boxes = [
         {

@@ -69,7 +69,7 @@ class BoxRack(Sequence[Box], LoopRunner):
         return len(self._boxes)
 
     def listen(self) -> None:
-        """Open all ports of all boxes; once they are open, nothing happens.
+        """Open all ports of all boxes.
 
         Raises:
             PortError: one of them is taken; none stays open then and the rack cannot be used any more.

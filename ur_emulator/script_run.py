@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Time after the program for the arm to come to rest [s]: the longest ramp and the lag of the drives.
 REST_TIME = 2.0
-# A wait for the outside is worth a word when it has lasted this long [s].
+# A wait for the outside is reported when it has lasted this long [s].
 PATIENCE = 1.0
 _KINDS = {
     RequestedType.BOOLEAN: "yes or no",
@@ -136,7 +136,7 @@ class _Run:
         self._commands.append(command)
 
     def interrupt(self) -> None:
-        """End the program at once, because somebody pressed Ctrl-C."""
+        """End the program at once, after Ctrl-C."""
         if not self._is_over:
             self._end(RunStatus.INTERRUPTED)
         self._controller.tick((*self._commands, StopProgram()))
@@ -167,12 +167,12 @@ class _Run:
         if self._waits_since == math.inf:
             self._waits_since = now
         elif now - self._waits_since >= PATIENCE:
-            self._waits_since = math.nan  # said once a wait
+            self._waits_since = math.nan  # reported once
             text = "the program waits for something outside, at real pace"
             self._report(ReportKind.NOTICE, text, *self._place())
 
     def _is_at_rest(self) -> bool:
-        """Look where the run stands; True once nothing more is to come."""
+        """Update the state of the run; True when nothing more is expected."""
         controller, cycles = self._controller, self._cycles
         if not self._is_over:
             if not controller.programs.is_running:
@@ -194,7 +194,7 @@ class _Run:
         self._is_over = True
         if self.status is RunStatus.RUNNING:
             self.status = status
-        # Up to the beginning of its last cycle, as for all that is reported; a program cut off had all of it.
+        # Up to the beginning of its last cycle, as in all reports; a program that was ended had all of it.
         cycles = self._cycles - (status is not RunStatus.RUNNING)
         self.robot_time = max(0, cycles) * self._controller.period_s
         self._commands.append(StopProgram())

@@ -13,8 +13,8 @@ from ur_emulator.servers.modbus.link import (
     FIRST_RETRY,
     LAST_RETRY,
     MAX_OWN_REQUESTS,
-    MAX_STRAYS,
     MAX_UNDER_WAY,
+    MAX_UNEXPECTED,
     TOLERANCE,
     ModbusLink,
 )
@@ -415,13 +415,13 @@ def test_answers_with_wrong_transaction_numbers_are_dropped_then_end_the_connect
     s = signal()
     wire.want(s)
     [(transaction, _)] = wire.asked()
-    for i in range(MAX_STRAYS):
+    for i in range(MAX_UNEXPECTED):
         wire.answer(transaction + 1 + i, bytes.fromhex("04020063"))
     assert s.value == 0
     assert wire.sock.is_open
     wire.answer(transaction, bytes.fromhex("04020007"))
     assert s.value == 7
-    for i in range(MAX_STRAYS + 1):
+    for i in range(MAX_UNEXPECTED + 1):
         wire.answer(transaction + 1 + i, bytes.fromhex("04020063"))
     assert not wire.sock.is_open
     assert s.value == 7

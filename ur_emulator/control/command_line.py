@@ -19,19 +19,19 @@ from ur_emulator.control.operations import OPERATIONS, make
 from ur_emulator.errors import ArgumentError, ControlError
 
 PROGRAM = "ur-emulator ctl"
-# How often a log that is followed is asked for [s].
+# Pause between two requests of a log that is followed [s].
 _FOLLOW_PERIOD = 0.2
 
 
 class _Parser(argparse.ArgumentParser):
-    """Complains in one line."""
+    """Its errors are one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{PROGRAM}: {message}; `{self.prog} --help` shows what there is\n")
 
 
 def main(words: Sequence[str]) -> int:
-    """Do what the command line says; return the exit code."""
+    """Run one command; return the exit code."""
     given = vars(make_parser().parse_args(words))
     name = given.pop("operation")
     client = ControlClient(given.pop("host", DEFAULT_HOST), given.pop("control_port", DEFAULT_PORT))
@@ -122,7 +122,7 @@ def _arguments(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _follow(client: ControlClient, arguments: dict[str, Any], as_json: bool) -> NoReturn:
-    """Print the log and what is added to it until somebody ends this."""
+    """Print the log and what is added to it until Ctrl-C."""
     while True:
         result = client.perform("log", arguments)
         for entry in result["entries"]:

@@ -158,7 +158,7 @@ class _HttpSession(Session):
             while True:
                 next(steps)
                 if self.connection.has_ended and name == "wait_until":
-                    self.connection.close()  # it may have gone; nobody waits an hour for that
+                    self.connection.close()  # it may have gone, and the wait may take an hour
                 if not self.connection.is_open:
                     return
                 yield

@@ -1,8 +1,7 @@
 """What a request to the control API asks for: an operation and its arguments, or why it is refused.
 
-A page in somebody's browser must not reach a box by accident or on purpose. So a request names the box's own
-address as its host (a foreign name that resolves to 127.0.0.1 is refused), and does not come from a page of
-another origin.
+Web pages must not control a box. So a request must name the address of the box as its host (another name that
+resolves to 127.0.0.1 is refused), and must not come from a page of another origin.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class RunProgram(StepOperation[int]):
         if (self.script is None) == (self.file is None):
             raise ArgumentError("run_program needs either script, the text, or file, a name")
         if self.file is not None:
-            with suppress(RefusedError):  # without a controller that is up, `play` says so
+            with suppress(RefusedError):  # when the controller is not up, `play` refuses
                 yield from player.stop()
             yield from player.load(self.file)
             yield from player.play("127.0.0.1")

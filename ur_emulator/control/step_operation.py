@@ -23,7 +23,7 @@ class Context:
         access: to the box.
         player: loads and plays program files.
         clock: monotonic seconds.
-        identity: returns what `identity` tells.
+        identity: returns the result of `identity`.
     """
 
     access: BoxAccess
@@ -33,11 +33,11 @@ class Context:
 
 
 class StepOperation(Operation[R_co]):
-    """An operation that says itself what it does, step by step."""
+    """An operation that is done in steps."""
 
     @abstractmethod
     def steps(self, context: Context) -> Steps[Any]:
-        """Do it; yield for every look at the box.
+        """Do it; yield to wait for the next cycle.
 
         Returns:
             The result: an object that JSON can hold, or a dataclass.

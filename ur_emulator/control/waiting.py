@@ -1,4 +1,4 @@
-"""`wait_until`, and what can be waited for: its parameters, each with what the box has to say to it now."""
+"""`wait_until`, and its conditions: each parameter with the present value in the box."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""When a cycle begins, and the one loop that everything happens in. Only here is a clock read."""
+"""The event loop and the pacers, which decide when a cycle begins. Only this package reads a clock."""

@@ -50,7 +50,7 @@ class EventLoop:
     """A selector, deadlines, and calls from other threads.
 
     Attributes:
-        is_running: `run` has been called, or somebody is about to; it has not returned.
+        is_running: `run` has been called, or will be at once; it has not returned.
         tasks: what takes longer than a cycle, done in a process beside this one.
     """
 

@@ -49,7 +49,7 @@ def loop_settings() -> Iterator[None]:
 def freeze_existing_objects() -> None:
     """Let the collector never look again at what exists now: for a process that only serves boxes.
 
-    A box in the process of somebody else must not do it: the heap may be large (with 11,000 tests
+    A box in the process of its user must not do it: the heap may be large (with 11,000 tests
     a collection takes a quarter of a second), and its owner may have frozen objects too.
     """
     gc.collect()

@@ -1,4 +1,4 @@
-"""One box in the loop: its controller, its pacer and its ports. Decides when to tick and who is told."""
+"""One box in the loop: its controller, its pacer and its ports. Decides when to tick, and publishes."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class ServedBox:
         self._publishers, self._listeners = tuple(publishers), tuple(listeners)
 
     def submit(self, command: Command, done: Done | None = None) -> None:
-        """Take a command for the next cycle; `done` is told then what has come of it."""
+        """Take a command for the next cycle; `done` is called then with the result."""
         self._commands.append(command if done is None else Submitted(command, done))
 
     def announce(self, event: Event) -> None:
@@ -84,7 +84,7 @@ class ServedBox:
             listener(event)
 
     def notice(self, text: str) -> None:
-        """Write into the log that something happened to a client."""
+        """Write a line about a client into the log."""
         self.log.write(self.controller.snapshot.tick, "Client", text)
 
     # --- what the pacer asks

@@ -38,7 +38,7 @@ class Watcher(Protocol):
 
 @dataclass(eq=False, frozen=True, slots=True)
 class Task:
-    """A task that was asked for: the pickled function with its arguments, and who is told of its end."""
+    """A task: the pickled function with its arguments, and what is called at its end."""
 
     request: bytes
     done: TaskDone
@@ -56,14 +56,14 @@ class TaskQueue:
 
     def start(self) -> None:
         """Start the process now, so that the first task need not wait for it."""
-        with suppress(OSError):  # the first task tries again, and is told
+        with suppress(OSError):  # the first task tries again, and gets the error
             self._start()
 
     def submit(self, done: TaskDone, function: Callable[..., Any], *arguments: Any) -> Task:
         """Have something done that takes longer than a cycle.
 
         Args:
-            done: told in the loop what has come of it, never before this returns.
+            done: called in the loop with its result, never before this returns.
             function: one that can be imported; it shares no memory with this process.
             arguments: of the function; what can be pickled.
         """

@@ -1,4 +1,4 @@
-"""What a server that acts for an operator may do with a box, in steps (`servers.steps`)."""
+"""What the ports may do with a box: read its state, submit commands, write into the log, work in steps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class BoxIdentity:
-    """What the box says of itself.
+    """Names and numbers by which clients know the box.
 
     Attributes:
         software: four numbers and a date.
@@ -76,20 +76,20 @@ class BoxAccess:
         self._box.announce(event)
 
     def note(self, text: str) -> None:
-        """Write into the log what the dashboard server has to say."""
+        """Write a line of the dashboard server into the log."""
         self.announce(LogAdded("Dashboard", text))
 
     # --- steps
 
     def start_alone(self, steps: Steps[None]) -> None:
-        """Begin with steps whose result nobody waits for; a refusal stands in the log already."""
+        """Begin with steps whose result is not used; a refusal stands in the log already."""
         self.steps.start(steps, lambda result, error: None)
 
     def apply(self, command: Command) -> Steps[Any]:
         """Ask for something, and end after the cycle in which it was applied.
 
         Returns:
-            What the command has to tell.
+            The result of the command.
 
         Raises:
             RefusedError: it was refused.
@@ -104,7 +104,7 @@ class BoxAccess:
         """Do something that takes longer than a cycle in the worker process, see `TaskQueue.submit`.
 
         Returns:
-            What it has come to; what it raises is raised here.
+            Its result; what it raises is raised here.
         """
         outcome: Future[T] = Future()
         settled = settle(outcome)

@@ -24,7 +24,7 @@ class PortSet:
         ports: by name.
 
     Attributes:
-        notices: what a user should know although the box runs, one line each.
+        notices: warnings for the user, one line each; the box runs all the same.
     """
 
     def __init__(self, loop: EventLoop, host: str, box: ServedBox, ports: Mapping[str, Port]) -> None:
@@ -80,4 +80,4 @@ class PortSet:
 
 
 def _keep_quiet(text: str) -> None:
-    """Say nothing."""
+    """Write nothing."""

@@ -51,7 +51,7 @@ class RtdePort:
         self._sessions[connection] = _RtdeSession(connection, self._access, self._answer)
 
     def received(self, connection: Connection, data: bytes) -> None:
-        """Answer requests in order, hand inputs on; what is no RTDE ends the connection."""
+        """Answer requests in order, pass inputs on; bytes that are not RTDE end the connection."""
         session = self._sessions[connection]
         if session.is_lost:
             return
@@ -104,8 +104,8 @@ class _RtdeSession(Session):
     Attributes:
         protocol: what it has asked for.
         encode: makes its data packages; None while it gets none. Sessions with the same recipe have the same.
-        inbox: bytes that were not looked at yet.
-        is_lost: what comes from it makes no sense any more; it is told so, then the connection ends.
+        inbox: bytes that were not read yet.
+        is_lost: it has sent bytes that are not RTDE; it gets a text message, then the connection is closed.
     """
 
     def __init__(

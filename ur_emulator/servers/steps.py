@@ -1,7 +1,7 @@
 """Work that takes several cycles, written as generators, and what advances it.
 
 A generator yields where it has to wait; it is continued after every cycle and when a task of the worker
-process has ended. So nothing waits for a clock, and what was asked has happened when it is answered.
+process has ended. So nothing waits for a clock, and a request is answered after it was done.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class StepRunner:
         self._under_way = [task for task in under_way if not _advance(*task)] + self._under_way
 
     def close(self, error: Exception) -> None:
-        """End everything; whoever waits is told the error."""
+        """End everything; `finished` is called with the error."""
         under_way, self._under_way = self._under_way, []
         for steps, finished in under_way:
             steps.close()

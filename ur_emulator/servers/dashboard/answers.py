@@ -138,7 +138,7 @@ class DashboardAnswers:
         return row.reply(path=path())
 
     def _done(self, row: DashboardCommand, action: Steps[None]) -> Steps[str]:
-        """Answer when an action has come to its end, or, in older software, when it has begun."""
+        """Answer when an action is done, or, in older software, when it has begun."""
         try:
             if row.replies_when_done(self._access.identity.software.version):
                 yield from action

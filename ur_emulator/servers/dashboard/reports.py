@@ -21,14 +21,14 @@ from ur_emulator.programs.folder import ProgramFolder
 REPORT_KINDS = ("controller", "software", "system")
 LOG_NAME = "log_history.txt"
 REPORT_FOLDER = "flightreports"
-# When the controller's clock was at 0; nobody has told the box the date.
+# Date at which the controller's clock is 0: chosen, the box knows no date.
 CLOCK_EPOCH = datetime(2021, 11, 30, tzinfo=UTC)
 _MAX_SAME_SECOND = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class BoxFacts:
-    """What a report tells; taken in the loop, written in the worker process.
+    """Contents of a report; taken in the loop, written in the worker process.
 
     Attributes:
         serial_number: of the box.
@@ -86,7 +86,7 @@ def flight_report(root: Path, kind: str, facts: BoxFacts) -> str:
     Args:
         root: of the reports.
         kind: one of `REPORT_KINDS`, or "" for the last of them.
-        facts: what it tells.
+        facts: its contents.
 
     Raises:
         ProgramFileError: there is no such kind.
@@ -110,7 +110,7 @@ def support_file(root: Path, directory: str, facts: BoxFacts) -> str:
     Args:
         root: of the reports.
         directory: of the folder of programs, as a client names it.
-        facts: what the new report tells.
+        facts: contents of the new report.
 
     Raises:
         ProgramFileError: there is no such directory.
@@ -118,7 +118,7 @@ def support_file(root: Path, directory: str, facts: BoxFacts) -> str:
     try:
         place = ProgramFolder(root).locate(directory or "?")
     except FileMissingError:
-        place = root / "?"  # the path on this machine is nobody's business
+        place = root / "?"  # a client must not see paths of this machine
     if not place.is_dir():
         raise ProgramFileError(f"Directory not found: {directory}")
     flight_report(root, "", facts)
@@ -167,7 +167,7 @@ def _zip(files: dict[str, bytes], time: datetime) -> bytes:
 
 
 def _write(path: Path, data: bytes) -> Path:
-    """Write a file in one step, so that nobody reads half of it."""
+    """Write a file in one step: a reader never sees half of it."""
     partial = path.with_name(path.name + ".part")
     partial.write_bytes(data)
     partial.replace(path)

@@ -14,7 +14,7 @@ from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.network import ScriptSocket
 from ur_emulator.servers.modbus.link import ModbusLink
 
-# Connections of which nobody wants anything any more may end in their own time, up to so many of all kinds.
+# Most connections, those included that were released and still wait for an answer.
 MAX_LINKS = 320
 
 
@@ -49,7 +49,7 @@ class ModbusClient:
         return link
 
     def advance(self, now: float) -> float:
-        """Advance all connections; end those that nobody needs."""
+        """Advance all connections; close those that were released and are idle."""
         next_time = math.inf
         for address, link in tuple(self._links.items()):
             next_time = min(next_time, link.advance(now))

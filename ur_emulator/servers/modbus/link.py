@@ -1,8 +1,8 @@
 """The connection to one Modbus unit: connects, asks for what its signals want, connects anew when it breaks.
 
-Everything here takes real time, told by the caller. Nothing that a unit sends or does not send can stop it:
-what is no Modbus, what was not asked for, and silence end the connection; an exception or a wrong answer
-spoils one answer. A signal that has waited too long for a valid answer is in trouble; programs will notice.
+All times are real time; the caller passes the clock. Bytes that are not Modbus, answers that were not asked
+for, and silence end the connection, and a new one is made; an exception or a wrong answer is no valid answer.
+A signal without a valid answer for too long is marked, and a program that uses it gets an error.
 Source of the 2 s: later script manual, modbus_set_signal_watchdog. All other times and limits: chosen.
 """
 
@@ -16,7 +16,7 @@ from protocol.errors import RemoteProtocolError
 from protocol.modbus import ModbusFrame, decode_value, encode_frame, take_frame
 from ur_emulator.controller.io.modbus_signals import ModbusSignal
 from ur_emulator.scripting.network import ScriptSocket
-from ur_emulator.servers.modbus.requests import SentRequest, complaint, request_for
+from ur_emulator.servers.modbus.requests import SentRequest, problem_of, request_for
 
 # A signal may be without a valid answer for this long [s].
 TOLERANCE = 2.0
@@ -28,8 +28,8 @@ FIRST_RETRY = 0.1
 LAST_RETRY = 2.0
 # Requests that a unit may have without an answer, unless it is in sequential mode.
 MAX_UNDER_WAY = 16
-# Answers in a row that nobody waits for, before the connection is given up.
-MAX_STRAYS = 16
+# Unexpected answers in a row after which the connection is closed.
+MAX_UNEXPECTED = 16
 # Own requests of programs that may wait for the connection; further ones are lost.
 MAX_OWN_REQUESTS = 64
 
@@ -70,7 +70,7 @@ class ModbusLink:
         self._under_way: dict[int, SentRequest] = {}
         self._transaction = 0
         self._heard_at = -math.inf
-        self._strays = 0
+        self._n_unexpected = 0
         self.is_released = False
 
     # --- what the controller asks
@@ -91,7 +91,7 @@ class ModbusLink:
                 request.signal = None
 
     def send(self, slave: int, function_code: int, data: bytes) -> None:
-        """Send a request whose answer nobody reads."""
+        """Send a request whose answer is not used."""
         self.is_released = False
         if len(self._own_requests) < MAX_OWN_REQUESTS:
             self._own_requests.append((slave, bytes((function_code,)) + data))
@@ -152,7 +152,7 @@ class ModbusLink:
         if self._connect_by != math.inf:
             self._connect_by = math.inf
             self._heard_at = now
-            self._strays = 0
+            self._n_unexpected = 0
             self._why = _SILENT
         return True
 
@@ -181,19 +181,19 @@ class ModbusLink:
     def _take(self, frame: ModbusFrame, now: float) -> None:
         request = self._under_way.pop(frame.transaction, None)
         if request is None:
-            self._strays += 1
-            if self._strays > MAX_STRAYS:
+            self._n_unexpected += 1
+            if self._n_unexpected > MAX_UNEXPECTED:
                 self._fail(now, "sends answers that were not asked for")
             return
         self._heard_at = now
-        self._strays = 0
+        self._n_unexpected = 0
         self._pause = FIRST_RETRY
         signal = request.signal
         if signal is None:
             return
         value = decode_value(request.pdu, frame.pdu)
         if value is None:
-            self._waiting[signal].why = complaint(frame.pdu, request.pdu)
+            self._waiting[signal].why = problem_of(frame.pdu, request.pdu)
             return
         signal.trouble = ""
         if signal in self._wanted:

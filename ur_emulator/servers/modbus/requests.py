@@ -27,7 +27,7 @@ class SentRequest:
     """A request that waits for its answer.
 
     Attributes:
-        signal: for which it was sent; None if nobody reads the answer.
+        signal: for which it was sent; None if its answer is not used.
         pdu: function code and data.
         sent_at: monotonic time [s].
     """
@@ -44,7 +44,7 @@ def request_for(signal: ModbusSignal) -> bytes:
     return encode_write(_WRITE[signal.type], signal.address, signal.output)
 
 
-def complaint(answer: bytes, request: bytes) -> str:
+def problem_of(answer: bytes, request: bytes) -> str:
     """Return what is wrong with an answer that has no value."""
     if answer[0] == request[0] | EXCEPTION_BIT and len(answer) > 1:
         code = answer[1]

@@ -29,7 +29,7 @@ from ur_emulator.servers.tcp.connection import Connection
 
 # Requests of one client that are answered in one go; the rest waits for the next cycle.
 MAX_AT_ONCE = 32
-# Bytes of requests that may wait; a client that sends more without reading answers is cut off.
+# Bytes of requests that may wait; a client that sends more without reading answers is disconnected.
 MAX_INBOX = 16 * 1024
 
 

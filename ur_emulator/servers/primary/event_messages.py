@@ -25,7 +25,7 @@ SECONDARY_EXCEPTION_TITLE = "SECONDARY_PROGRAM_EXCEPTION_XXX"
 
 
 def message_for(event: events.Event, timestamp: int) -> RobotMessage | None:
-    """Return the message that tells clients of an event; None for what only the log shows.
+    """Return the message for an event; None for events that stand only in the log.
 
     Args:
         event: what happened.

@@ -1,6 +1,6 @@
 """Where the threads of the running program stand in PolyScope's tree, as messages of the primary port.
 
-A `$ 12 "Move"` line is only noted by the thread that passes it; somebody who listens gets a message in each
+A `$ 12 "Move"` line is only noted by the thread that passes it; clients get a message in each
 cycle in which a thread has passed on. `"breakAfter"` and `"noBreak"` behind the text mean nothing to the box.
 """
 
@@ -24,12 +24,12 @@ def parse_label(line: str) -> tuple[int, str] | None:
 
 
 class LabelReporter:
-    """What one port has told of where the threads of one run stand."""
+    """What one port has sent of the positions of the threads of one run."""
 
     def __init__(self, version: SoftwareVersion) -> None:
         self._tells_of_threads = ProgramThreadsMessage.SINCE.covers(version)
         self._run: RunningProgram | None = None
-        self._told: tuple[ThreadLabel, ...] = ()
+        self._sent: tuple[ThreadLabel, ...] = ()
 
     @property
     def is_watching(self) -> bool:
@@ -39,14 +39,14 @@ class LabelReporter:
     def begin(self, run: RunningProgram) -> None:
         """Turn to a run; one without labels is not watched."""
         self._run = run if "$" in run.program.source.text else None
-        self._told = ()
+        self._sent = ()
 
     def end(self) -> None:
         """Forget the run."""
         self._run = None
 
     def message(self, timestamp: int) -> RobotMessage | None:
-        """Return what to tell of this cycle, or None if nothing has changed.
+        """Return the message of this cycle, or None if nothing has changed.
 
         Args:
             timestamp: microseconds since controller start.
@@ -58,9 +58,9 @@ class LabelReporter:
             for thread in self._run.threads[: None if self._tells_of_threads else 1]
             if thread.label and (label := parse_label(thread.label)) is not None
         )
-        if labels == self._told:
+        if labels == self._sent:
             return None
-        self._told = labels
+        self._sent = labels
         if self._tells_of_threads:
             return ProgramThreadsMessage(timestamp=timestamp, threads=labels)
         if not labels:

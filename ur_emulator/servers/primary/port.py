@@ -1,9 +1,9 @@
 """Ports 30001, 30002 and their read-only twins: greeting, states at 10 Hz, messages; script text comes in.
 
-The first state to a new client, and the first after the brakes have opened, also tell of kinematics and
+The first state to a new client, and the first after the brakes have opened, also have kinematics and
 configuration.
 
-The primary port also tells of the running program: its global variables at the rate of the states, and where
+The primary port also reports the running program: its global variables at the rate of the states, and where
 its threads stand in PolyScope's tree.
 """
 
@@ -43,7 +43,7 @@ class PrimaryPort:
         """Prepare the greeting.
 
         Args:
-            software: decides sizes and contents, and is told in the greeting.
+            software: decides sizes and contents, and stands in the greeting.
             controller: its snapshot greets new clients.
             intake: takes script text; None makes the port read-only.
             states: encodes the states, shared by the ports of a box.
@@ -71,7 +71,7 @@ class PrimaryPort:
         connection.send(self._states.encode_first(self._controller.snapshot))
         if self._all_messages:
             programs = self._controller.programs
-            if not self._channels:  # nobody has listened: what was told before is of no use
+            if not self._channels:  # the first client: what was sent before does not count
                 self._begin_report(programs.latest if programs.is_running else None)
                 self._variables.changes(self._now, at_once=True)
             for package in (*self._variables.names(self._now), *self._variables.values(self._now)):

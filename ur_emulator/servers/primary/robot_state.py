@@ -46,7 +46,7 @@ from ur_emulator.models.software import Software
 # Radius of the sphere around the elbow that the safety system watches [m]. Source: a UR5e capture.
 ELBOW_RADIUS = 0.13
 
-# Modes in which the box does not hear its arm.
+# Modes in which the box gets no data of its arm.
 _UNCONNECTED = frozenset({RobotMode.NO_CONTROLLER, RobotMode.DISCONNECTED})
 _TEACH = int(RobotStatusBits.TEACH_BUTTON_PRESSED)
 
@@ -173,7 +173,7 @@ class StateEncoder:
         return self._package
 
     def encode_first(self, snapshot: Snapshot) -> bytes:
-        """Return the longer state, which also tells of kinematics and configuration."""
+        """Return the longer state, which also has kinematics and configuration."""
         return self._encode((*self._records(snapshot), *self._setup))
 
     def _encode(self, records: Iterable[SubPackage]) -> bytes:

@@ -1,8 +1,8 @@
 """The global variables of the running program as messages of the primary port: names once, values on change.
 
-What the word `global` declares is reported, in the order of the text; PolyScope's variables tab shows the
-same. Nobody looks at variables while nobody listens. Values never change in place (see `urscript.values`), so
-one that is the same object is the same value.
+Variables declared with `global` are reported, in the order of the text, as in PolyScope's variables tab. They
+are not read while no client is connected. Values never change in place (see `urscript.values`), so one that is
+the same object is the same value.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ _KINDS: dict[type, ValueType] = {
 
 
 class VariableReporter:
-    """What one port has told of the variables of one run."""
+    """What one port has sent of the variables of one run."""
 
     def __init__(self, version: SoftwareVersion) -> None:
         self._version = version
@@ -74,12 +74,12 @@ class VariableReporter:
         self._read: Callable[[str], Any] | None = None
         self._names: tuple[str, ...] = ()
         self._seen: list[Any] = []
-        self._told: list[bytes] = []
+        self._sent: list[bytes] = []
         self._next = 0
 
     @property
     def is_empty(self) -> bool:
-        """True when there is no program, or it has no variables to tell of."""
+        """True when there is no program, or it has no variables."""
         return not self._names
 
     def begin(self, run: RunningProgram) -> None:
@@ -87,12 +87,12 @@ class VariableReporter:
         self._read = run.read_global
         self._names = run.program.declared_globals[:MAX_VARIABLES]
         self._seen = [UNDEFINED] * len(self._names)
-        self._told = [self._none] * len(self._names)
+        self._sent = [self._none] * len(self._names)
         self._next = 0
 
     def end(self) -> None:
         """Forget the run."""
-        self._read, self._names, self._seen, self._told = None, (), [], []
+        self._read, self._names, self._seen, self._sent = None, (), [], []
 
     def names(self, timestamp: int) -> list[bytes]:
         """Return the packages with all names."""
@@ -104,22 +104,22 @@ class VariableReporter:
         return packages
 
     def values(self, timestamp: int) -> list[bytes]:
-        """Return the packages with all values as they were told last; without variables the empty one.
+        """Return the packages with all values as they were sent last; without variables the empty one.
 
         Source of the empty one: capture of a simulator without a program.
         """
         if self.is_empty:
             return [encode_program_state(GlobalVariablesUpdate(timestamp=NO_TIME), self._version)]
-        return self._packages(timestamp, 0, self._told)
+        return self._packages(timestamp, 0, self._sent)
 
     def changes(self, timestamp: int, *, at_once: bool = False) -> list[bytes]:
-        """Return the packages with what has changed since it was told.
+        """Return the packages with what has changed since it was sent.
 
         Args:
             timestamp: microseconds since controller start.
-            at_once: look at all variables; otherwise those of a long list take turns.
+            at_once: read all variables; otherwise a part of a long list.
         """
-        read, names, seen, told = self._read, self._names, self._seen, self._told
+        read, names, seen, sent = self._read, self._names, self._seen, self._sent
         if read is None or not names:
             return []
         begin, end = (0, len(names)) if at_once else (self._next, min(len(names), self._next + PER_UPDATE))
@@ -130,13 +130,13 @@ class VariableReporter:
             if value is not seen[i]:
                 seen[i] = value
                 data = self._encode(value)
-                if data != told[i]:
-                    told[i] = data
+                if data != sent[i]:
+                    sent[i] = data
                     changed.append(i)
         packages: list[bytes] = []
         for _, run in groupby(enumerate(changed), lambda pair: pair[1] - pair[0]):
             indices = [i for _, i in run]
-            packages += self._packages(timestamp, indices[0], [told[i] for i in indices])
+            packages += self._packages(timestamp, indices[0], [sent[i] for i in indices])
         return packages
 
     def _encode(self, value: Any) -> bytes:

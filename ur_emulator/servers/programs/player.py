@@ -112,7 +112,7 @@ class ProgramPlayer:
             try:
                 yield from self._access.apply(ResumeProgram())
             except RefusedError:
-                if self.is_paused:  # otherwise somebody else was quicker
+                if self.is_paused:  # otherwise another client has resumed it already
                     raise
             return
         try:

@@ -118,14 +118,14 @@ class Listener:
                 return
             except OSError as error:
                 if error.errno not in _EXHAUSTED:
-                    continue  # this client has gone again
+                    continue  # this client has closed its end already
                 self._refuse(error)
                 return
             self._refuses = False
             try:
                 connection = Connection(self._loop, client, self._port.received, self._closed, self._backlog)
             except OSError:
-                client.close()  # gone again; some systems say so only now
+                client.close()  # closed by the client; some systems report it only now
                 continue
             self.connections[connection] = None
             self._notice(f"{connection.peer} connected to {self._name} port {self.number}")
