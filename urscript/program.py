@@ -2,7 +2,7 @@
 
     text -> source -> parser -> nodes -> resolver -> compiler -> CompiledProgram -> start(host) -> step() ...
 
-`compile_program` is the way in; `check_program` reports everything wrong with a text instead of raising.
+`compile_program` is the entry point; `check_program` returns all errors of a text instead of raising.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def compile_program(
         text: A `def` or `sec` program, or statements without a definition around them. One character a byte
             (latin-1); text with other characters is taken as UTF-8 bytes.
         catalogue: The builtins of the software version the program runs on.
-        dialect: Switches of the language; by default those of the catalogue's version.
-        name: What people know the text by, for error messages.
+        dialect: Options of the language; by default those of the catalogue's version.
+        name: Name of the text in error messages.
 
     Raises:
         ScriptCompileError: The first error in the text, with line, column, wire_text and render().
@@ -82,7 +82,7 @@ def check_program(
     try:
         return (), find_warnings(program, catalogue)
     except RecursionError:
-        # Just not too deep for the compiler; a warning is not worth an error.
+        # Nearly too deep for the compiler; then there are no warnings.
         return (), ()
 
 
@@ -133,7 +133,7 @@ class CompiledProgram:
         code: Python's code object, marshalled; executed, it defines the functions.
         builtins: Builtin functions it uses.
         globals: Its global variables.
-        declared_globals: Those of them that the word `global` makes, in the order of the text.
+        declared_globals: Those that are declared with `global`, in the order of the text.
     """
 
     name: str
@@ -150,12 +150,12 @@ class CompiledProgram:
     file_name: str
 
     def start(self, host: Host) -> RunningProgram:
-        """A new run on `host`; nothing happens before its first `step`."""
+        """A new run on `host`; it begins with its first `step`."""
         return RunningProgram(self, host)
 
 
 class ProgramStatus(Enum):
-    """Where a run stands."""
+    """State of a run."""
 
     RUNNING = "running"
     FINISHED = "finished"
@@ -167,7 +167,7 @@ class RunningProgram:
 
     Attributes:
         status: RUNNING until the main thread ends, `halt`, an error, or `kill`.
-        error: What ended a FAILED run, with line, column and the calls on the way.
+        error: The error of a FAILED run, with line, column and call stack.
     """
 
     def __init__(self, program: CompiledProgram, host: Host) -> None:

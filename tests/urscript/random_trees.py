@@ -27,7 +27,7 @@ literals = st.one_of(
     texts.map(nodes.StringLiteral),
     st.just(nodes.NoneLiteral()),
     names,
-    st.just(nodes.Run("t")),
+    st.just(nodes.RunThread("t")),
 )
 
 
@@ -46,12 +46,12 @@ def _compound(values):
     return st.one_of(
         st.builds(nodes.ListLiteral, st.lists(values, max_size=4).map(tuple)),
         st.builds(nodes.PoseLiteral, st.lists(values, min_size=6, max_size=6).map(tuple)),
-        st.builds(nodes.Prefix, st.sampled_from(["-", "+", "not"]), values),
-        st.builds(nodes.Binary, st.sampled_from(OPERATORS), values, values),
+        st.builds(nodes.UnaryOperation, st.sampled_from(["-", "+", "not"]), values),
+        st.builds(nodes.BinaryOperation, st.sampled_from(OPERATORS), values, values),
         st.builds(nodes.Call, st.sampled_from(FUNCTIONS), _arguments(values)),
         st.builds(nodes.MethodCall, values, variables, _arguments(values)),
-        st.builds(nodes.Member, values, variables),
-        st.builds(nodes.Index, values, indices).filter(_is_no_pose),
+        st.builds(nodes.Attribute, values, variables),
+        st.builds(nodes.Subscript, values, indices).filter(_is_no_pose),
     )
 
 
@@ -59,8 +59,8 @@ expressions = st.recursive(literals, _compound, max_leaves=10)
 targets = st.recursive(
     names,
     lambda inner: st.one_of(
-        st.builds(nodes.Index, inner, st.lists(expressions, min_size=1, max_size=2).map(tuple)),
-        st.builds(nodes.Member, inner, variables),
+        st.builds(nodes.Subscript, inner, st.lists(expressions, min_size=1, max_size=2).map(tuple)),
+        st.builds(nodes.Attribute, inner, variables),
     ),
     max_leaves=3,
 )
@@ -74,12 +74,12 @@ def _starts_a_statement(expression):
 short_statements = st.one_of(
     st.builds(nodes.Assign, targets, expressions),
     st.builds(nodes.Assign, names, expressions, st.sampled_from(["global", "local"])),
-    st.builds(nodes.Declare, variables, st.sampled_from(["global", "local"])),
-    st.builds(nodes.Evaluate, expressions.filter(_starts_a_statement)),
+    st.builds(nodes.Declaration, variables, st.sampled_from(["global", "local"])),
+    st.builds(nodes.ExpressionStatement, expressions.filter(_starts_a_statement)),
     st.builds(nodes.Return, expressions),
     st.builds(nodes.Kill, expressions),
     st.builds(nodes.Join, expressions),
-    st.sampled_from(SIMPLE).map(nodes.Simple),
+    st.sampled_from(SIMPLE).map(nodes.KeywordStatement),
     st.sampled_from(["", '3 "MoveJ"', '12 "Größe" "noBreak"', "def x():"]).map(nodes.Label),
 )
 parameters = st.lists(
@@ -97,9 +97,9 @@ def _block_of(statements):
 
 def _blocks(statements):
     block = _block_of(statements)
-    arms = st.lists(st.builds(nodes.Arm, expressions, block), min_size=1, max_size=3).map(tuple)
+    branches = st.lists(st.builds(nodes.Branch, expressions, block), min_size=1, max_size=3).map(tuple)
     return st.one_of(
-        st.builds(nodes.If, arms, st.none() | block),
+        st.builds(nodes.If, branches, st.none() | block),
         st.builds(nodes.While, expressions, block),
         st.builds(nodes.Function, st.sampled_from(["def", "sec"]), st.sampled_from(FUNCTIONS), parameters, block),
         st.builds(nodes.Function, st.just("thread"), st.just("t"), st.just(()), block),

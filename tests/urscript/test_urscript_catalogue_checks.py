@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from binding_support import bind
 
 from urscript.catalogue import CB3_3_15
 from urscript.errors import ScriptRuntimeError
@@ -16,7 +17,7 @@ POSE = Pose(0.1, 0.2, 0.3, 0, 3.14, 0)
 
 
 def check(name: str, *args: Any) -> None:
-    CB3_3_15.check_of(name)(CB3_3_15.bind(name, args))
+    CB3_3_15.check_of(name)(bind(name, args))
 
 
 def refusal(name: str, *args: Any) -> str:

@@ -41,13 +41,13 @@ def _statement(statement: Statement, indent: str) -> Iterator[str]:
             yield f"{indent}{kind} {name}({', '.join(map(_parameter, parameters))}):"
             yield from _block(body, deeper)
             yield f"{indent}end"
-        case nodes.If(arms=arms, otherwise=otherwise):
-            for word, arm in zip(["if"] + ["elif"] * (len(arms) - 1), arms, strict=True):
-                yield f"{indent}{word} {_expression(arm.condition, 0)}:"
-                yield from _block(arm.body, deeper)
-            if otherwise is not None:
+        case nodes.If(branches=branches, else_body=else_body):
+            for word, branch in zip(["if"] + ["elif"] * (len(branches) - 1), branches, strict=True):
+                yield f"{indent}{word} {_expression(branch.condition, 0)}:"
+                yield from _block(branch.body, deeper)
+            if else_body is not None:
                 yield f"{indent}else:"
-                yield from _block(otherwise, deeper)
+                yield from _block(else_body, deeper)
             yield f"{indent}end"
         case nodes.While(condition=condition, body=body):
             yield f"{indent}while {_expression(condition, 0)}:"
@@ -63,9 +63,9 @@ def _short_statement(statement: Statement) -> str:
         case nodes.Assign(target=target, value=value, scope=scope):
             lead = f"{scope} " if scope else ""
             return f"{lead}{_expression(target, 0)} = {_expression(value, 0)}"
-        case nodes.Declare(name=name, scope=scope):
+        case nodes.Declaration(name=name, scope=scope):
             return f"{scope} {name}"
-        case nodes.Evaluate(value=value):
+        case nodes.ExpressionStatement(value=value):
             return _expression(value, 0)
         case nodes.Return(value=value):
             return "return" if value is None else f"return {_expression(value, 0)}"
@@ -73,7 +73,7 @@ def _short_statement(statement: Statement) -> str:
             return f"join {_expression(thread, 0)}"
         case nodes.Kill(thread=thread):
             return f"kill {_expression(thread, 0)}"
-        case nodes.Simple(word=word):
+        case nodes.KeywordStatement(keyword=word):
             return word
         case nodes.Label(text=text):
             return f"$ {text}" if text else "$"
@@ -114,17 +114,17 @@ def _bare(expression: Expression) -> tuple[str, int]:
             return f"{function}({_arguments(arguments)})", _POSTFIX
         case nodes.MethodCall(target=target, method=method, arguments=arguments):
             return f"{_target(target)}.{method}({_arguments(arguments)})", _POSTFIX
-        case nodes.Index(target=target, indices=indices):
+        case nodes.Subscript(target=target, indices=indices):
             return f"{_target(target)}[{_list(indices)}]", _POSTFIX
-        case nodes.Member(target=target, name=name):
+        case nodes.Attribute(target=target, name=name):
             return f"{_target(target)}.{name}", _POSTFIX
-        case nodes.Run(thread=thread):
+        case nodes.RunThread(thread=thread):
             return f"run {thread}()", _POSTFIX
-        case nodes.Prefix(operator="not", operand=operand):
+        case nodes.UnaryOperation(operator="not", operand=operand):
             return f"not {_expression(operand, _LEVEL['not'])}", _LEVEL["not"]
-        case nodes.Prefix(operator=operator, operand=operand):
+        case nodes.UnaryOperation(operator=operator, operand=operand):
             return f"{operator}{_expression(operand, _UNARY)}", _UNARY
-        case nodes.Binary(operator=operator, left=left, right=right):
+        case nodes.BinaryOperation(operator=operator, left=left, right=right):
             level = _LEVEL.get(operator, _LEVEL["compare"])
             # Comparisons do not chain, so neither side of one may be another.
             left_level = level + 1 if level == _LEVEL["compare"] else level

@@ -10,8 +10,6 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any
 
-from urscript.errors import ScriptRuntimeError, ScriptTypeError
-
 from .argument_checks import compile_check
 from .binding import Slot, static_bind
 from .interfaces import ARRAYS
@@ -124,33 +122,12 @@ class Catalogue:
             slots = self._slots[shape] = static_bind(self._by_name[name], n_positional, keyword_names)
         return slots
 
-    def bind(
-        self, name: str, args: Sequence[Any], kwargs: Mapping[str, Any] | None = None
-    ) -> tuple[Any, ...]:
-        """The arguments in the order of the signature, defaults filled in.
-
-        Raises:
-            ScriptRuntimeError: the call does not fit the signature.
-        """
-        kwargs = kwargs or {}
-        try:
-            slots = static_bind(self._by_name[name], len(args), tuple(kwargs))
-        except ScriptTypeError as error:
-            raise ScriptRuntimeError(error.log_text, hint=error.hint) from None
-        return tuple(_value(slot, args, kwargs) for slot in slots)
-
     def check_of(self, name: str) -> Callable[[Sequence[Any]], None]:
         """A function that checks bound arguments against what the table asks for: types, ranges, finiteness.
 
         It raises ScriptRuntimeError with the controller's text where it is known.
         """
         return self._checks[name]
-
-
-def _value(slot: Slot, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
-    if slot[0] == "arg":
-        return args[slot[1]]
-    return kwargs[slot[1]] if slot[0] == "kw" else slot[1]
 
 
 @lru_cache(maxsize=32)

@@ -4,8 +4,8 @@ Every function and thread becomes one Python function of a flat module; those th
 generators, all others stay plain functions. Variables of the program body are module globals, so threads
 and nested functions share them. `runtime` provides the other names the code uses.
 
-Statements are counted where control turns back or enters a function, not one by one: the count of a block
-is known before it runs (of an `if`, its longest arm).
+Statements are counted at loop iterations and function entries, not one by one: the count of a block is known
+before it runs (of an `if`, its longest branch).
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from urscript.compile.expressions import ExpressionCompiler
 from urscript.compile.inference import SCALARS, StaticTypes
 from urscript.compile.python_tree import (
     call,
+    charge_statements,
     constant,
     expression_statement,
     function,
     load,
     place,
-    spend,
     store,
 )
 from urscript.dialect import Dialect
@@ -37,7 +37,7 @@ from urscript.syntax.nodes import Block, Expression, Statement
 
 
 @dataclass(frozen=True, slots=True)
-class Compiled:
+class CompiledCode:
     """The functions of a program.
 
     Attributes:
@@ -53,7 +53,7 @@ class Compiled:
 
 def compile_resolved(
     program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect, file_name: str
-) -> Compiled:
+) -> CompiledCode:
     """Compile a program without errors to Python.
 
     Raises:
@@ -76,21 +76,21 @@ def compile_resolved(
             column=(error.offset or 0) + 1,
             source=program.source,
         ) from None
-    return Compiled(marshal.dumps(code), expressions.constants, function_names)
+    return CompiledCode(marshal.dumps(code), expressions.constants, function_names)
 
 
 def _cost(block: Block) -> int:
-    """Statements that one pass through `block` runs at most; the bodies of loops count for themselves."""
+    """Most statements that one execution of `block` runs; bodies of loops are counted at their iterations."""
     cost = 0
     for statement in block:
         if isinstance(statement, nodes.If):
-            arms = [arm.body for arm in statement.arms]
-            cost += 1 + max(_cost(body) for body in [*arms, statement.otherwise or ()])
+            branches = [branch.body for branch in statement.branches]
+            cost += 1 + max(_cost(body) for body in [*branches, statement.else_body or ()])
         elif not isinstance(statement, (nodes.Function, nodes.Label)):
             cost += 1
             value = getattr(statement, "value", None)
             if isinstance(value, nodes.ListLiteral):
-                cost += len(value.items) // 16  # long lists take as long as many statements
+                cost += len(value.items) // 16  # a long list takes as long as many statements
     return cost
 
 
@@ -127,10 +127,10 @@ class _FunctionCompiler:
                     default = self._default(name, parameter.default)
                     defaults.append(default)
                     prologue.append(self._fill_in(parameter, default))
-        prologue.insert(0, spend(_cost(scope.body) + 1, span))
+        prologue.insert(0, charge_statements(_cost(scope.body) + 1, span))
         for name in sorted(scope.locals - {name.removeprefix("v_") for name in parameters}):
-            # Others are neither read before they are set nor compared with what they held.
-            if name in scope.unsure or types.variable(name, scope) not in SCALARS:
+            # Others are neither read before they are assigned nor compared with their old value.
+            if name in scope.maybe_unassigned or types.variable(name, scope) not in SCALARS:
                 prologue.append(store(f"v_{name}", load("_UNDEFINED", span), span))
         body = self._block(scope.body)
         if scope.recursive:
@@ -141,7 +141,7 @@ class _FunctionCompiler:
 
     def _default(self, name: str, value: Expression) -> ast.FunctionDef:
         """A function of its own for each default: it runs in the call, but sees globals only."""
-        result = self._expressions.compile(value, self._scope.around())
+        result = self._expressions.compile(value, self._scope.default_scope())
         return function(name, [], [ast.Return(result, **place(value.span))], value.span)
 
     def _fill_in(self, parameter: nodes.Parameter, default: ast.FunctionDef) -> ast.stmt:
@@ -155,7 +155,7 @@ class _FunctionCompiler:
         return ast.If(left_out, [store(f"v_{parameter.name}", value, span)], [], **at)
 
     def _with_depth(self, body: list[ast.stmt], span: Span) -> list[ast.stmt]:
-        """`_d = _enter(_T)`, then `body` with `_leave(_d)` in the end whatever happens."""
+        """`_d = _enter(_T)`, then `body` with `_leave(_d)` in a `finally`."""
         at = place(span)
         enter = store("_d", call("_enter", [load("_T", span)], span), span)
         leave = expression_statement(call("_leave", [load("_d", span)], span), span)
@@ -173,13 +173,13 @@ class _FunctionCompiler:
         match statement:
             case nodes.Assign():
                 return [self._assign(statement)]
-            case nodes.Evaluate(value=value):
+            case nodes.ExpressionStatement(value=value):
                 return [expression_statement(self._effect(value), span)]
-            case nodes.If(arms=arms, otherwise=otherwise):
-                return self._if(arms, otherwise)
+            case nodes.If(branches=branches, else_body=else_body):
+                return self._if(branches, else_body)
             case nodes.While(condition=condition, body=body):
                 test = self._expressions.condition(condition, scope)
-                turn = spend(max(1, _cost(body)), condition.span)
+                turn = charge_statements(max(1, _cost(body)), condition.span)
                 return [ast.While(test, [turn, *self._block(body)], [], **at)]
             case nodes.Return(value=value):
                 result = None if value is None else self._expressions.compile(value, scope)
@@ -190,17 +190,17 @@ class _FunctionCompiler:
             case nodes.Kill(thread=thread):
                 killed = call("_kill", [load("_T", span), self._expressions.compile(thread, scope)], span)
                 return [expression_statement(killed, span)]
-            case nodes.Simple(word="break"):
+            case nodes.KeywordStatement(keyword="break"):
                 return [ast.Break(**at)]
-            case nodes.Simple(word="continue"):
+            case nodes.KeywordStatement(keyword="continue"):
                 return [ast.Continue(**at)]
-            case nodes.Simple(word="halt"):
+            case nodes.KeywordStatement(keyword="halt"):
                 return [expression_statement(call("_halt", [], span), span)]
             case nodes.Label(text=text):
                 target = ast.Attribute(load("_T", span), "label", ast.Store(), **at)
                 return [ast.Assign([target], constant(text, span), **at)]
-        # Definitions are compiled on their own, declarations have done their work. A critical section needs
-        # no code: a thread is never interrupted but inside calls that take time, and those release it.
+        # Definitions are compiled separately, declarations need no code. A critical section needs none: a
+        # thread is interrupted only in calls that take time, and those release it.
         return []
 
     def _effect(self, value: Expression) -> ast.expr:
@@ -209,21 +209,21 @@ class _FunctionCompiler:
             return ast.YieldFrom(made, **place(value.span))
         return self._expressions.compile(value, self._scope)
 
-    def _if(self, arms: tuple[nodes.Arm, ...], otherwise: Block | None) -> list[ast.stmt]:
-        """From the last arm to the first: a chain of any length needs no recursion here."""
-        rest = self._block(otherwise) if otherwise else []
-        for arm in reversed(arms):
-            test = self._expressions.condition(arm.condition, self._scope)
-            rest = [ast.If(test, self._block(arm.body), rest, **place(arm.span))]
+    def _if(self, branches: tuple[nodes.Branch, ...], else_body: Block | None) -> list[ast.stmt]:
+        """From the last branch to the first, without recursion for chains of any length."""
+        rest = self._block(else_body) if else_body else []
+        for branch in reversed(branches):
+            test = self._expressions.condition(branch.condition, self._scope)
+            rest = [ast.If(test, self._block(branch.body), rest, **place(branch.span))]
         return rest
 
     def _assign(self, statement: nodes.Assign) -> ast.stmt:
         target, span, scope = statement.target, statement.span, self._scope
         value = self._expressions.compile(statement.value, scope)
-        # Element by element towards the variable; the old content is read after the new value is known,
-        # because computing that may take time in which another thread changes the variable.
+        # From the element outwards to the variable. The old value is read after the new one is computed,
+        # because the computation may take time in which another thread changes the variable.
         while not isinstance(target, nodes.Name):
-            if isinstance(target, nodes.Index):
+            if isinstance(target, nodes.Subscript):
                 array = self._expressions.array(target.target, scope)
                 indices = [self._expressions.compile(index, scope) for index in target.indices]
                 if array is not None:
@@ -239,7 +239,7 @@ class _FunctionCompiler:
             old = self._expressions.compile(target.target, scope)
             value = call(helper, [value, *indices, old], span)
             inner = target.target
-            assert isinstance(inner, (nodes.Name, nodes.Index, nodes.Member))
+            assert isinstance(inner, (nodes.Name, nodes.Subscript, nodes.Attribute))
             target = inner
         is_local = target.name in scope.locals and statement.scope != "global"
         name = f"v_{target.name}" if is_local else f"g_{target.name}"

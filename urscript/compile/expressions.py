@@ -1,8 +1,8 @@
 """Expressions -> Python expressions.
 
-Where the static types are evident the Python operator itself is emitted, elsewhere a call of `ops`. A call
-that may take time becomes `yield from`. Names: `v_x` local, `g_x` global, `b_f` builtin; the rest of the
-names a compiled program uses is listed in `runtime`.
+Where the static types are known, the Python operator is emitted, elsewhere a call of `ops`. A call that may
+take time becomes `yield from`. Names: `v_x` local, `g_x` global, `b_f` builtin; the rest of the names a
+compiled program uses is listed in `runtime`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from urscript import dialect
 from urscript.catalogue import Catalogue
-from urscript.compile.inference import StaticTypes, Type, is_number
+from urscript.compile.inference import StaticTypes, Type, is_numeric
 from urscript.compile.python_tree import call, constant, load, place
 from urscript.dialect import Dialect
 from urscript.names.scopes import FunctionScope, ResolvedProgram
@@ -43,7 +43,7 @@ class ExpressionCompiler:
     """Compiles the expressions of one program.
 
     Attributes:
-        constants: Values that cannot stand in Python code as they are, by the name given to them.
+        constants: Values that cannot be literals in Python code, by their name.
     """
 
     def __init__(
@@ -71,26 +71,26 @@ class ExpressionCompiler:
                 return constant(text, span)
             case nodes.NoneLiteral():
                 return constant(None, span)
-            case nodes.Binary():
+            case nodes.BinaryOperation():
                 return self._binary(expression, scope)
             case nodes.Call():
                 return self._call(expression, scope)
-            case nodes.Index():
+            case nodes.Subscript():
                 return self._index(expression, scope)
-            case nodes.Prefix():
+            case nodes.UnaryOperation():
                 return self._prefix(expression, scope)
             case nodes.ListLiteral(items=items):
                 values = ast.List(self._all(items, scope), ast.Load(), **place(span))
                 return values if self._are_numbers(items, scope) else call("_list", [values], span)
             case nodes.PoseLiteral(items=items):
                 return self._pose(items, span, scope)
-            case nodes.Run(thread=thread):
+            case nodes.RunThread(thread=thread):
                 callee = scope.find_function(thread)
                 assert callee is not None
                 return call("_run", [load(callee.python_name, span), constant(thread, span)], span)
             case nodes.MethodCall():
                 return self._method(expression, scope)
-            case nodes.Member(target=target, name=name):
+            case nodes.Attribute(target=target, name=name):
                 return call("_member", [self.compile(target, scope), constant(name, span)], span)
         raise TypeError(f"not an expression: {expression!r}")
 
@@ -105,12 +105,12 @@ class ExpressionCompiler:
 
     def _variable(self, name: str, span: Span, scope: FunctionScope) -> ast.expr:
         if name in scope.locals:
-            python_name, unsure = f"v_{name}", name in scope.unsure
+            python_name, maybe_unassigned = f"v_{name}", name in scope.maybe_unassigned
         elif name in self._program.globals:
-            python_name, unsure = f"g_{name}", name in self._program.unsure_globals
+            python_name, maybe_unassigned = f"g_{name}", name in self._program.maybe_unassigned_globals
         else:
             return constant(self._catalogue.variables[name].value, span)
-        if not unsure:
+        if not maybe_unassigned:
             return load(python_name, span)
         at = place(span)
         is_set = ast.Compare(load(python_name, span), [ast.IsNot()], [load("_UNDEFINED", span)], **at)
@@ -125,7 +125,7 @@ class ExpressionCompiler:
         return call(maker, values, span)
 
     def shared(self, value: Any, span: Span) -> ast.expr:
-        """A constant of any type; lists and poses are never changed, so one object serves all."""
+        """A constant of any type; lists and poses are never changed, so one object is enough."""
         if type(value) in _PLAIN:
             return constant(value, span)
         name = f"k{len(self.constants)}"
@@ -136,11 +136,11 @@ class ExpressionCompiler:
         return [self.compile(item, scope) for item in items]
 
     def _are_numbers(self, items: tuple[Expression, ...], scope: FunctionScope) -> bool:
-        return all(is_number(self._types.of(item, scope)) for item in items)
+        return all(is_numeric(self._types.of(item, scope)) for item in items)
 
     # --- operators ---------------------------------------------------------------------------------------
 
-    def _binary(self, expression: nodes.Binary, scope: FunctionScope) -> ast.expr:
+    def _binary(self, expression: nodes.BinaryOperation, scope: FunctionScope) -> ast.expr:
         operator, span = expression.operator, expression.span
         if operator in ("and", "or", "xor"):
             return self._logic(expression, scope)
@@ -152,11 +152,13 @@ class ExpressionCompiler:
         if operator in _COMPARISON:
             helper, comparison = _COMPARISON[operator]
             same_scalar = left_type is right_type and left_type in (Type.BOOL, Type.STRING)
-            if (is_number(left_type) and is_number(right_type)) or (same_scalar and operator in ("==", "!=")):
+            if (is_numeric(left_type) and is_numeric(right_type)) or (
+                same_scalar and operator in ("==", "!=")
+            ):
                 return ast.Compare(left, [comparison()], [right], **place(span))
             return call(helper, [left, right], span)
         helper, python_operator = _ARITHMETIC[operator]
-        if is_number(left_type) and is_number(right_type) and operator != "%":
+        if is_numeric(left_type) and is_numeric(right_type) and operator != "%":
             raw = ast.BinOp(left, python_operator(), right, **place(span))
             if operator == "/":
                 if not dialect.EXACT_DIVISION_GIVES_INT:
@@ -176,15 +178,15 @@ class ExpressionCompiler:
         )
         return ast.IfExp(fits, load("_i", span), call("_wrap", [load("_i", span)], span), **at)
 
-    def _logic(self, expression: nodes.Binary, scope: FunctionScope) -> ast.expr:
+    def _logic(self, expression: nodes.BinaryOperation, scope: FunctionScope) -> ast.expr:
         operator, at = expression.operator, place(expression.span)
         if operator == "xor":
             left, right = self.condition(expression.left, scope), self.condition(expression.right, scope)
             return ast.Compare(left, [ast.NotEq()], [right], **at)
-        # A chain of one operator leans left; flat, it costs no nesting.
+        # A chain of one operator is left-associative; a flat list needs no nesting.
         operands: list[Expression] = []
         chain: Expression = expression
-        while isinstance(chain, nodes.Binary) and chain.operator == operator:
+        while isinstance(chain, nodes.BinaryOperation) and chain.operator == operator:
             operands.append(chain.right)
             chain = chain.left
         operands.append(chain)
@@ -196,21 +198,21 @@ class ExpressionCompiler:
             result = ast.BinOp(result, ast.BitAnd() if operator == "and" else ast.BitOr(), value, **at)
         return result
 
-    def _prefix(self, expression: nodes.Prefix, scope: FunctionScope) -> ast.expr:
+    def _prefix(self, expression: nodes.UnaryOperation, scope: FunctionScope) -> ast.expr:
         operand, span = expression.operand, expression.span
         if expression.operator == "not":
             return ast.UnaryOp(ast.Not(), self.condition(operand, scope), **place(span))
         kind = self._types.of(operand, scope)
         value = self.compile(operand, scope)
         if expression.operator == "+":
-            return value if is_number(kind) else call("_pos", [value], span)
+            return value if is_numeric(kind) else call("_pos", [value], span)
         if isinstance(operand, (nodes.IntLiteral, nodes.FloatLiteral)):
             return constant(-operand.value, span)
         if kind is Type.FLOAT:
             return ast.UnaryOp(ast.USub(), value, **place(span))
         return call("_neg", [value], span)
 
-    def _index(self, expression: nodes.Index, scope: FunctionScope) -> ast.expr:
+    def _index(self, expression: nodes.Subscript, scope: FunctionScope) -> ast.expr:
         target, indices, span = expression.target, expression.indices, expression.span
         array = self.array(target, scope)
         if array is not None:
@@ -271,8 +273,8 @@ class ExpressionCompiler:
                 given.add(argument.name)
         for parameter in parameters:
             if parameter.name not in given:
-                left_out = load("_MISSING", span)
-                made.keywords.append(ast.keyword(f"v_{parameter.name}", left_out, **place(span)))
+                omitted = load("_MISSING", span)
+                made.keywords.append(ast.keyword(f"v_{parameter.name}", omitted, **place(span)))
         return ast.YieldFrom(made, **place(span)) if callee.blocks else made
 
     def _method(self, expression: nodes.MethodCall, scope: FunctionScope) -> ast.expr:

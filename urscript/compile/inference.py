@@ -1,8 +1,8 @@
-"""Static types where they are evident, so that the compiler can leave run-time checks out.
+"""Type inference over the whole program, so that the compiler can omit run-time checks.
 
-A sound guess over the whole program: a variable has the type that all assignments to it share, a parameter
-the one of all calls, a function the one of all its returns; everything else is ANY. Nothing here can make
-a program fail: an operation on ANY is checked when it runs.
+A variable has the type that all assignments to it have in common, a parameter that of all calls, a function
+that of all its returns; everything else is ANY. Inference reports no errors: an operation on ANY is checked
+at run time.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from urscript.syntax.walk import all_expressions, all_statements, falls_through,
 
 
 class Type(Enum):
-    """What is known about a value before the program runs."""
+    """Static type of a value."""
 
     NEVER = "no value yet"
     INT = "int"
@@ -43,13 +43,13 @@ _ELEMENT = {Type.NEVER: Type.NEVER, Type.POSE: Type.FLOAT, Type.NUMBERS: Type.NU
 """Types of `x[i]` by that of x."""
 
 
-def is_number(kind: Type) -> bool:
+def is_numeric(kind: Type) -> bool:
     """Whether values of this type are numbers."""
     return kind in _NUMBERS
 
 
-def join(a: Type, b: Type) -> Type:
-    """The type of something that is sometimes `a`, sometimes `b`."""
+def join_types(a: Type, b: Type) -> Type:
+    """The least type that has the values of both `a` and `b`."""
     if a is b or b is Type.NEVER:
         return a
     if a is Type.NEVER:
@@ -57,11 +57,11 @@ def join(a: Type, b: Type) -> Type:
     return Type.NUMBER if a in _NUMBERS and b in _NUMBERS else Type.ANY
 
 
-Goal = tuple[FunctionScope | None, str] | FunctionScope
+Symbol = tuple[FunctionScope | None, str] | FunctionScope
 """What has a type: a local of a function, a global (None) of the program, the result of a function."""
 
-Flow = tuple[Goal, Expression | None, FunctionScope]
-"""Where a value goes, the expression it comes from (None: the end of a function), the scope it is read in."""
+Constraint = tuple[Symbol, Expression | None, FunctionScope]
+"""A symbol, an expression whose value it gets (None: the end of a function), the scope of the expression."""
 
 
 class StaticTypes:
@@ -70,9 +70,9 @@ class StaticTypes:
     def __init__(self, program: ResolvedProgram, catalogue: Catalogue) -> None:
         self._program = program
         self._catalogue = catalogue
-        self._types: dict[Goal, Type] = {}
-        self._flows = _Flows(program)
-        self._settle()
+        self._types: dict[Symbol, Type] = {}
+        self._constraints = _Constraints(program)
+        self._solve()
 
     def variable(self, name: str, scope: FunctionScope) -> Type:
         """The type of variable `name` as seen in `scope`."""
@@ -91,17 +91,17 @@ class StaticTypes:
                 return Type.INT
             case nodes.FloatLiteral():
                 return Type.FLOAT
-            case nodes.Binary():
+            case nodes.BinaryOperation():
                 return self._binary(expression, scope)
             case nodes.Call(function=name):
                 return self._call(name, scope)
-            case nodes.Index(target=target, indices=(_,)):
+            case nodes.Subscript(target=target, indices=(_,)):
                 return _ELEMENT.get(self.of(target, scope), Type.ANY)
-            case nodes.BoolLiteral() | nodes.Prefix(operator="not"):
+            case nodes.BoolLiteral() | nodes.UnaryOperation(operator="not"):
                 return Type.BOOL
             case nodes.StringLiteral():
                 return Type.STRING
-            case nodes.Prefix(operand=operand):
+            case nodes.UnaryOperation(operand=operand):
                 kind = self.of(operand, scope)
                 return kind if kind in _NUMBERS or kind is Type.NEVER else Type.ANY
             case nodes.PoseLiteral():
@@ -116,7 +116,7 @@ class StaticTypes:
                 return Type.NONE
         return Type.ANY
 
-    def _binary(self, expression: nodes.Binary, scope: FunctionScope) -> Type:
+    def _binary(self, expression: nodes.BinaryOperation, scope: FunctionScope) -> Type:
         operator = expression.operator
         if operator not in _ARITHMETIC:
             return Type.BOOL
@@ -142,54 +142,54 @@ class StaticTypes:
         builtin = self._catalogue.lookup(name)
         return _declared_type(builtin.returns) if builtin is not None else Type.ANY
 
-    def _settle(self) -> None:
-        """Go through all flows, then again through those that read what has widened, until nothing does.
+    def _solve(self) -> None:
+        """Apply all constraints, then again those that read a widened symbol, until no type changes.
 
-        Types only ever widen, and in three steps at most, so each flow is looked at a few times for each
-        thing that it reads.
+        Types only widen, in at most three steps, so each constraint is applied a few times for each symbol
+        that it reads.
         """
-        flows = self._flows.all
-        readers = self._readers(flows)
-        queued = [True] * len(flows)
-        todo = deque(range(len(flows)))
+        constraints = self._constraints.all
+        readers = self._readers(constraints)
+        queued = [True] * len(constraints)
+        todo = deque(range(len(constraints)))
         while todo:
             number = todo.popleft()
             queued[number] = False
-            goal, expression, scope = flows[number]
-            old = self._types.get(goal, Type.NEVER)
-            new = join(old, Type.NONE if expression is None else self.of(expression, scope))
+            symbol, expression, scope = constraints[number]
+            old = self._types.get(symbol, Type.NEVER)
+            new = join_types(old, Type.NONE if expression is None else self.of(expression, scope))
             if new is not old:
-                self._types[goal] = new
-                for reader in readers.get(goal, ()):
+                self._types[symbol] = new
+                for reader in readers.get(symbol, ()):
                     if not queued[reader]:
                         queued[reader] = True
                         todo.append(reader)
 
-    def _readers(self, flows: list[Flow]) -> dict[Goal, list[int]]:
-        """The flows whose expressions read a variable or the result of a function, by that."""
-        readers: dict[Goal, list[int]] = {}
-        for number, (_, expression, scope) in enumerate(flows):
+    def _readers(self, constraints: list[Constraint]) -> dict[Symbol, list[int]]:
+        """Numbers of the constraints whose expressions read a symbol, by symbol."""
+        readers: dict[Symbol, list[int]] = {}
+        for number, (_, expression, scope) in enumerate(constraints):
             for part in all_expressions(expression) if expression is not None else ():
-                goal: Goal
+                symbol: Symbol
                 if isinstance(part, nodes.Name):
-                    goal = (scope if part.name in scope.locals else None, part.name)
+                    symbol = (scope if part.name in scope.locals else None, part.name)
                 elif isinstance(part, nodes.Call) and (callee := scope.find_function(part.function)):
-                    goal = callee
+                    symbol = callee
                 else:
                     continue
-                readers.setdefault(goal, []).append(number)
+                readers.setdefault(symbol, []).append(number)
         return readers
 
 
-class _Flows:
-    """Which expressions end up in which variable, and which are results of which function."""
+class _Constraints:
+    """Collects the constraints of a program."""
 
     def __init__(self, program: ResolvedProgram) -> None:
-        self.all: list[Flow] = []
+        self.all: list[Constraint] = []
         for scope in program.scopes():
             self._statements(scope)
             if scope.node is not None and scope.parent is not None:
-                self._defaults(scope, scope.node, scope.around())
+                self._defaults(scope, scope.node, scope.default_scope())
 
     def _statements(self, scope: FunctionScope) -> None:
         for statement in all_statements(scope.body):

@@ -1,7 +1,7 @@
-"""Building blocks of the Python tree a program is compiled to; each carries a place in the script.
+"""Nodes of the Python tree of a compiled program; each has a position in the script.
 
-The places are what makes errors readable: Python keeps them in the code object, so the position in the
-script is found from the traceback and costs nothing while all goes well.
+Python keeps the positions in the code object, so the position of an error is found from the traceback and
+costs nothing at run time.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ def expression_statement(value: ast.expr, span: Span) -> ast.Expr:
     return ast.Expr(value, **place(span))
 
 
-def spend(cost: int, span: Span) -> ast.If:
-    """`if (_b := _b - cost) < 0: _over()`: takes statements off the budget of this cycle."""
+def charge_statements(cost: int, span: Span) -> ast.If:
+    """`if (_b := _b - cost) < 0: _over()`: charges statements to the budget of this cycle."""
     at = place(span)
     rest = ast.NamedExpr(
         ast.Name("_b", ast.Store(), **at),

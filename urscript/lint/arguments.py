@@ -84,7 +84,7 @@ def _known_value(expression: Expression) -> KnownValue | None:
             | nodes.StringLiteral(value=value)
         ):
             return KnownValue(value, True)
-        case nodes.Prefix(
+        case nodes.UnaryOperation(
             operator="-" | "+" as sign, operand=nodes.IntLiteral() | nodes.FloatLiteral() as number
         ):
             return KnownValue(-number.value if sign == "-" else number.value, True)

@@ -51,12 +51,12 @@ def constant_truth(expression: Expression) -> bool | None:
             return truth
         case nodes.StringLiteral(value=text):
             return text != ""
-        case nodes.Prefix(operator="not", operand=operand):
+        case nodes.UnaryOperation(operator="not", operand=operand):
             inner = constant_truth(operand)
             return None if inner is None else not inner
-        case nodes.Binary(operator="==", left=left, right=right) if isinstance(left, _LITERALS):
+        case nodes.BinaryOperation(operator="==", left=left, right=right) if isinstance(left, _LITERALS):
             return left == right if type(left) is type(right) else None
-        case nodes.Binary(operator="or", left=left, right=right):
+        case nodes.BinaryOperation(operator="or", left=left, right=right):
             return True if True in (constant_truth(left), constant_truth(right)) else None
     return None
 
@@ -94,7 +94,7 @@ def _is_busy(loop: nodes.While, scope: FunctionScope, catalogue: Catalogue) -> b
 
 
 def _is_pause(statement: Statement) -> bool:
-    return isinstance(statement, nodes.Evaluate) and statement.value == nodes.Name("pause")
+    return isinstance(statement, nodes.ExpressionStatement) and statement.value == nodes.Name("pause")
 
 
 def _takes_time(part: Expression, scope: FunctionScope, catalogue: Catalogue) -> bool:
@@ -112,16 +112,16 @@ def _has_effect(part: Expression, scope: FunctionScope, catalogue: Catalogue) ->
     if isinstance(part, nodes.Call):
         builtin = None if scope.find_function(part.function) else catalogue.lookup(part.function)
         return builtin is None or builtin.returns == "None" or builtin.name == "random"
-    return isinstance(part, nodes.Run)
+    return isinstance(part, nodes.RunThread)
 
 
 def _can_leave(block: Block, in_loop: bool = False) -> bool:
     """Whether a statement in `block` ends the loop around it, or the function, or the program."""
     for statement in block:
         match statement:
-            case nodes.Return() | nodes.Simple(word="halt"):
+            case nodes.Return() | nodes.KeywordStatement(keyword="halt"):
                 return True
-            case nodes.Simple(word="break") if not in_loop:
+            case nodes.KeywordStatement(keyword="break") if not in_loop:
                 return True
         inside = in_loop or isinstance(statement, nodes.While)
         if any(_can_leave(inner, inside) for inner in own_blocks(statement)):
@@ -136,7 +136,7 @@ def _unreachable(block: Block, program: ResolvedProgram) -> Iterator[ScriptWarni
     """The first unreachable statement of each block; definitions and labels are allowed anywhere."""
     ended_by = ""
     for statement in block:
-        if ended_by and not isinstance(statement, (nodes.Function, nodes.Label, nodes.Declare)):
+        if ended_by and not isinstance(statement, (nodes.Function, nodes.Label, nodes.Declaration)):
             message = f"unreachable code: it follows {ended_by}"
             yield ScriptWarning(UNREACHABLE, message, _first_line(statement), program.source)
             break
@@ -151,13 +151,13 @@ def _end_of(statement: Statement) -> str:
     match statement:
         case nodes.Return():
             return "return"
-        case nodes.Simple(word="halt" | "break" | "continue" as word):
+        case nodes.KeywordStatement(keyword="halt" | "break" | "continue" as word):
             return word
         case nodes.While(condition=condition, body=body):
             endless = constant_truth(condition) is True and not _breaks(body)
             return "an endless loop" if endless else ""
-        case nodes.If(arms=arms, otherwise=otherwise) if otherwise is not None:
-            blocks = [*(arm.body for arm in arms), otherwise]
+        case nodes.If(branches=branches, else_body=else_body) if else_body is not None:
+            blocks = [*(branch.body for branch in branches), else_body]
             all_end = all(any(_end_of(inner) for inner in block) for block in blocks)
             return "an if whose branches all leave" if all_end else ""
     return ""
@@ -166,7 +166,7 @@ def _end_of(statement: Statement) -> str:
 def _breaks(block: Block) -> bool:
     """Whether a `break` in `block` ends the loop around it."""
     return any(
-        statement == nodes.Simple("break")
+        statement == nodes.KeywordStatement("break")
         or (isinstance(statement, nodes.If) and any(map(_breaks, own_blocks(statement))))
         for statement in block
     )
@@ -177,24 +177,26 @@ def _first_line(statement: Statement) -> Span:
     match statement:
         case nodes.While(condition=condition):
             return _head(statement.span, condition)
-        case nodes.If(arms=arms):
-            return _head(statement.span, arms[0].condition)
+        case nodes.If(branches=branches):
+            return _head(statement.span, branches[0].condition)
     return statement.span
 
 
 def _dead_branches(statement: nodes.If, program: ResolvedProgram) -> Iterator[ScriptWarning]:
-    earlier: list[nodes.Arm] = []
-    for arm in statement.arms:
+    earlier: list[nodes.Branch] = []
+    for branch in statement.branches:
         always = next((other for other in earlier if constant_truth(other.condition) is True), None)
-        same = next((other for other in earlier if _is_same(other.condition, arm.condition)), None)
+        same = next((other for other in earlier if _is_same(other.condition, branch.condition)), None)
         if always or same:
-            line = (always or same or arm).span.line
+            line = (always or same or branch).span.line
             why = f"the condition of line {line} is {'always true' if always else 'the same'}"
-            yield ScriptWarning(DEAD_BRANCH, f"this branch is never reached: {why}", arm.span, program.source)
-        earlier.append(arm)
+            yield ScriptWarning(
+                DEAD_BRANCH, f"this branch is never reached: {why}", branch.span, program.source
+            )
+        earlier.append(branch)
     last = earlier[-1]
-    if statement.otherwise and constant_truth(last.condition) is True:
-        first = statement.otherwise[0]
+    if statement.else_body and constant_truth(last.condition) is True:
+        first = statement.else_body[0]
         why = f"the condition of line {last.span.line} is always true"
         place = _first_line(first)
         yield ScriptWarning(DEAD_BRANCH, f"this branch is never reached: {why}", place, program.source)
@@ -202,7 +204,7 @@ def _dead_branches(statement: nodes.If, program: ResolvedProgram) -> Iterator[Sc
 
 def _is_same(first: Expression, second: Expression) -> bool:
     """Whether two conditions read the same values; a call may give another value the second time."""
-    calls = (nodes.Call, nodes.MethodCall, nodes.Run)
+    calls = (nodes.Call, nodes.MethodCall, nodes.RunThread)
     return first == second and not any(isinstance(part, calls) for part in all_expressions(first))
 
 
@@ -216,13 +218,13 @@ def _unchecked_reads(program: ResolvedProgram) -> Iterator[ScriptWarning]:
     indexed: set[int] = set()
     for scope, part in expressions_read(program):
         match part:
-            case nodes.Index(target=nodes.Name(name=name) as target, indices=indices):
+            case nodes.Subscript(target=nodes.Name(name=name) as target, indices=indices):
                 is_count = indices == (nodes.IntLiteral(0),)
                 (checked if is_count else numbers_used).add(owner(name, scope))
                 indexed.add(id(target))
             case nodes.Name(name=name) if id(part) not in indexed:
                 checked.add(owner(name, scope))
-            case nodes.Index(target=nodes.Call() as call, indices=indices) if _is_read(
+            case nodes.Subscript(target=nodes.Call() as call, indices=indices) if _is_read(
                 call, scope
             ) and indices != (nodes.IntLiteral(0),):
                 yield _unchecked(call, "its count", program)

@@ -44,8 +44,8 @@ def read_expressions(statement: Statement) -> tuple[Expression, ...]:
         return own_expressions(statement)
     parts: list[Expression] = [statement.value]
     target: Expression = statement.target
-    while isinstance(target, (nodes.Index, nodes.Member)):
-        if isinstance(target, nodes.Index):
+    while isinstance(target, (nodes.Subscript, nodes.Attribute)):
+        if isinstance(target, nodes.Subscript):
             parts.extend(target.indices)
         target = target.target
     return tuple(parts)
@@ -62,14 +62,14 @@ def expressions_read(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, 
             for parameter in scope.node.parameters:
                 if parameter.default is not None:
                     for part in all_expressions(parameter.default):
-                        yield scope.around(), part
+                        yield scope.default_scope(), part
 
 
 def declared_variables(program: ResolvedProgram) -> Iterator[tuple[Variable, Span]]:
     """Every declaration of a variable and assignment to a whole variable, without parameters."""
     for scope in program.scopes():
         for statement in all_statements(scope.body):
-            if isinstance(statement, nodes.Declare):
+            if isinstance(statement, nodes.Declaration):
                 name, span = statement.name, statement.span
                 span = span._replace(line=span.end_line, column=span.end_column - len(name))
             elif isinstance(statement, nodes.Assign) and isinstance(statement.target, nodes.Name):
@@ -120,8 +120,8 @@ def _parameters(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, str, 
 def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
     runs: dict[FunctionScope, set[FunctionScope]] = {scope: set() for scope in program.scopes()}
     for scope, part in expressions_read(program):
-        callee = scope.find_function(part.thread) if isinstance(part, nodes.Run) else None
-        if callee is None or not isinstance(part, nodes.Run):
+        callee = scope.find_function(part.thread) if isinstance(part, nodes.RunThread) else None
+        if callee is None or not isinstance(part, nodes.RunThread):
             continue
         if scope in runs:
             runs[scope].add(callee)

@@ -20,7 +20,7 @@ def value_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[S
     """Everything this module warns about, in no order."""
     for scope in program.scopes():
         for statement in all_statements(scope.body):
-            if isinstance(statement, nodes.Evaluate) and not _has_effect(statement.value):
+            if isinstance(statement, nodes.ExpressionStatement) and not _has_effect(statement.value):
                 message, hint = _unused(statement.value)
                 yield ScriptWarning(UNUSED_VALUE, message, statement.span, program.source, hint)
     if "rpc_factory" in program.builtins or tuple(catalogue.version) >= METHODS_SINCE:
@@ -49,17 +49,17 @@ _FUNCTIONS = {
 
 def _has_effect(value: Expression) -> bool:
     is_pause = isinstance(value, nodes.Name) and value.name == "pause"
-    return is_pause or isinstance(value, (nodes.Call, nodes.MethodCall, nodes.Run))
+    return is_pause or isinstance(value, (nodes.Call, nodes.MethodCall, nodes.RunThread))
 
 
 def _unused(value: Expression) -> tuple[str, str | None]:
     """Message and hint for an unused value."""
     match value:
-        case nodes.Binary(operator="==", left=nodes.Name(name=name)):
+        case nodes.BinaryOperation(operator="==", left=nodes.Name(name=name)):
             return "the result of this comparison is not used", f"write {name} = ... to assign"
-        case nodes.Binary(operator="+" | "-" as operator, right=nodes.Prefix(operator=sign)) if (
-            sign == operator
-        ):
+        case nodes.BinaryOperation(
+            operator="+" | "-" as operator, right=nodes.UnaryOperation(operator=sign)
+        ) if sign == operator:
             hint = f"there is no '{operator}{operator}': write x = x {operator} 1"
             return "a value is computed and not used", hint
     return "a value is computed and not used", None

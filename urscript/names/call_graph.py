@@ -1,6 +1,6 @@
-"""What follows from who calls whom: which functions may block, which are recursive.
+"""Analyses of the call graph: which functions may block, which are recursive.
 
-Both go through every call once, so that a program of thousands of functions costs no more than its length.
+Both visit every call once, so that the time is linear in the length of the program.
 """
 
 from __future__ import annotations
@@ -36,19 +36,19 @@ class _Components:
 
     def __init__(self) -> None:
         self._number: dict[FunctionScope, int] = {}
-        # The oldest function still open that can be reached from each.
+        # The oldest open function that can be reached from each.
         self._low: dict[FunctionScope, int] = {}
         self._open: list[FunctionScope] = []
         self._is_open: set[FunctionScope] = set()
-        self._way: list[tuple[FunctionScope, Iterator[FunctionScope]]] = []
+        self._path: list[tuple[FunctionScope, Iterator[FunctionScope]]] = []
 
     def visit(self, root: FunctionScope) -> None:
-        """Look at `root` and everything it calls that was not looked at yet."""
+        """Visit `root` and everything it calls that was not visited yet."""
         if root in self._number:
             return
         self._enter(root)
-        while self._way:
-            scope, callees = self._way[-1]
+        while self._path:
+            scope, callees = self._path[-1]
             for callee in callees:
                 if callee not in self._number:
                     self._enter(callee)
@@ -62,12 +62,12 @@ class _Components:
         self._number[scope] = self._low[scope] = len(self._number)
         self._open.append(scope)
         self._is_open.add(scope)
-        self._way.append((scope, iter(scope.callees)))
+        self._path.append((scope, iter(scope.callees)))
 
     def _leave(self) -> None:
-        scope, _ = self._way.pop()
-        if self._way:
-            caller = self._way[-1][0]
+        scope, _ = self._path.pop()
+        if self._path:
+            caller = self._path[-1][0]
             self._low[caller] = min(self._low[caller], self._low[scope])
         if self._low[scope] != self._number[scope]:
             return

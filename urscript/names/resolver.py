@@ -1,9 +1,10 @@
-"""Static names: every variable and function is found before the program runs, as a controller does.
+"""Name resolution: every variable and function is found before the program runs, as a controller does.
 
 Rules (language notes 1.6): variables of the program body are global; `global x` makes one from anywhere,
 `local x` one of this function only; a plain assignment means the global of that name if there is one
 anywhere in the program, else a local; a nested function sees its own locals and the globals, not the locals
-around it; a function may be used before its definition; a name in a branch that never runs counts too.
+of enclosing functions; a function may be used before its definition; names in branches that never run count
+too.
 
 All errors of a program are collected, the first one in the text is raised.
 """
@@ -23,7 +24,7 @@ from urscript.errors import (
     ScriptSyntaxError,
     ScriptTypeError,
 )
-from urscript.names.assignment import find_unsure
+from urscript.names.assignment import find_maybe_unassigned
 from urscript.names.call_graph import mark_recursion, spread_blocking
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Source, Span
@@ -37,8 +38,8 @@ from urscript.syntax.walk import (
     own_expressions,
 )
 
-MOST_SUGGESTIONS: Final = 40
-"""Unknown names of one program for which another one is suggested."""
+MAX_SUGGESTIONS: Final = 40
+"""Unknown names of one program for which a suggestion is searched."""
 
 
 def resolve(
@@ -55,7 +56,7 @@ def resolve(
 
 
 def statement_name(block: Block) -> str:
-    """What a program without `def` is called: the function its first statement calls.
+    """The name of a program without `def`: the function that its first statement calls.
 
     Source: key messages of one-line programs on the primary interface.
     """
@@ -64,23 +65,23 @@ def statement_name(block: Block) -> str:
             for part in all_expressions(expression):
                 if isinstance(part, nodes.Call):
                     return part.function
-        if isinstance(statement, nodes.Simple):
-            return statement.word
+        if isinstance(statement, nodes.KeywordStatement):
+            return statement.keyword
     return "unnamed"
 
 
 def _definition_and_calls(block: Block) -> tuple[nodes.Function | None, tuple[Statement, ...]]:
-    """The one definition that is the whole program, and the calls of it that people write below."""
+    """The one definition that is the whole program, and calls of it below."""
     items = tuple(item for item in block if not isinstance(item, nodes.Label))
     if not items or not isinstance(items[0], nodes.Function) or items[0].kind == "thread":
         return None, ()
     definition, calls = items[0], items[1:]
-    its_call = nodes.Evaluate(nodes.Call(definition.name, ()))
+    its_call = nodes.ExpressionStatement(nodes.Call(definition.name, ()))
     return (definition, calls) if all(item == its_call for item in calls) else (None, ())
 
 
 class _Resolver:
-    """One pass that declares, one that looks up."""
+    """Two passes: declarations, then lookups."""
 
     def __init__(self, source: Source, catalogue: Catalogue, dialect: Dialect) -> None:
         self.source = source
@@ -98,13 +99,13 @@ class _Resolver:
             self._look_up(scope)
         mark_recursion(program)
         spread_blocking(program)
-        find_unsure(program)
+        find_maybe_unassigned(program)
         return program
 
     def _open(self, block: Block) -> ResolvedProgram:
-        """The frame of the program: a single definition is the program itself, other text is its body.
+        """The program: a single definition is the program itself, other text is its body.
 
-        Calls of that program after its definition do not count: on a port it has run before they come.
+        Calls of that program after its definition are ignored: on a port it has run before they come.
         """
         function, calls = _definition_and_calls(block)
         if function is not None:
@@ -118,11 +119,11 @@ class _Resolver:
     # --- declaring ---------------------------------------------------------------------------------------
 
     def _declare(self, scope: FunctionScope) -> None:
-        """Enter the functions of `scope`, and the globals that its statements make, then go inside."""
+        """Declare the functions of `scope` and its globals, then those of nested functions."""
         for statement in all_statements(scope.body):
             if isinstance(statement, nodes.Function):
                 self._declare_function(statement, scope)
-            elif isinstance(statement, (nodes.Assign, nodes.Declare)) and (
+            elif isinstance(statement, (nodes.Assign, nodes.Declaration)) and (
                 scope is self.program.main or statement.scope == "global"
             ):
                 name = _declared_name(statement)
@@ -144,14 +145,14 @@ class _Resolver:
         self._declare(inner)
 
     def _declare_locals(self, scope: FunctionScope) -> None:
-        """Enter the locals of a function, once all globals of the program are known."""
+        """Declare the locals of a function; all globals of the program are known already."""
         assert scope.node is not None
         for parameter in scope.node.parameters:
             if parameter.name in scope.locals:
                 self._error(ScriptContextError(f"duplicate parameter '{parameter.name}'"), parameter.span)
             scope.locals.add(parameter.name)
         for statement in all_statements(scope.body):
-            if not isinstance(statement, (nodes.Assign, nodes.Declare)) or statement.scope == "global":
+            if not isinstance(statement, (nodes.Assign, nodes.Declaration)) or statement.scope == "global":
                 continue
             name = _declared_name(statement)
             if name is not None and (statement.scope == "local" or name not in self.program.globals):
@@ -163,12 +164,12 @@ class _Resolver:
         if scope.node is not None and scope.parent is not None:
             for parameter in scope.node.parameters:
                 if parameter.default is not None:
-                    # A default belongs to the scope around: it sees no parameters. It runs in the callee.
-                    self._expression(parameter.default, scope.around(), runs_in=scope)
+                    # A default belongs to the enclosing scope and sees no parameters. It runs in the callee.
+                    self._expression(parameter.default, scope.default_scope(), runs_in=scope)
         self._block(scope.body, scope, loops=0)
 
     def _block(self, block: Block, scope: FunctionScope, loops: int) -> None:
-        """Look up the names of a block that stands inside so many loops."""
+        """Look up the names of a block inside `loops` loops."""
         for statement in block:
             self._statement(statement, scope, loops)
             inside = loops + isinstance(statement, nodes.While)
@@ -180,11 +181,11 @@ class _Resolver:
             case nodes.While() if loops == MAX_LOOP_DEPTH:
                 message = f"loops are nested more than {MAX_LOOP_DEPTH} deep"
                 self._error(ScriptContextError(message), statement.span)
-            case nodes.Simple(word="break" | "continue" as word) if not loops:
+            case nodes.KeywordStatement(keyword="break" | "continue" as word) if not loops:
                 self._error(ScriptContextError(f"'{word}' outside a loop"), statement.span)
             case nodes.Join():
                 scope.blocks = True
-            case nodes.Evaluate(value=nodes.Name(name="pause")) if self._is_pause(scope):
+            case nodes.ExpressionStatement(value=nodes.Name(name="pause")) if self._is_pause(scope):
                 scope.blocks = True
                 self.program.builtins.add("pause")
                 return
@@ -201,13 +202,15 @@ class _Resolver:
                 self._variable(name, expression.span, scope)
             case nodes.Call():
                 self._call(expression, scope, runs_in)
-            case nodes.Run():
+            case nodes.RunThread():
                 self._run(expression, scope)
             case nodes.MethodCall(arguments=arguments):
-                # A remote procedure waits for its answer; what the value is shows at run time only.
+                # A remote procedure waits for its answer; the type of the value is known at run time only.
                 runs_in.blocks = True
                 self._argument_order(arguments)
-            case nodes.Index(target=nodes.Name(name=name), indices=indices) if self._is_array(name, scope):
+            case nodes.Subscript(target=nodes.Name(name=name), indices=indices) if self._is_array(
+                name, scope
+            ):
                 array = self.catalogue.arrays[name]
                 self.program.builtins.update(filter(None, (array.getter, array.setter)))
                 if len(indices) > 1:
@@ -220,7 +223,7 @@ class _Resolver:
                     ScriptSyntaxError("this integer does not fit into 32 bits; write a float"),
                     expression.span,
                 )
-            case nodes.Prefix(operator="-", operand=nodes.IntLiteral()):
+            case nodes.UnaryOperation(operator="-", operand=nodes.IntLiteral()):
                 return
         for part in child_expressions(expression):
             self._expression(part, scope, runs_in)
@@ -260,7 +263,7 @@ class _Resolver:
         except ScriptTypeError as error:
             self._error(error, call.span)
 
-    def _run(self, run: nodes.Run, scope: FunctionScope) -> None:
+    def _run(self, run: nodes.RunThread, scope: FunctionScope) -> None:
         callee = scope.find_function(run.thread)
         if callee is None:
             self._unknown(run.thread, run.span, lambda: list(scope.visible_functions()))
@@ -292,8 +295,8 @@ class _Resolver:
 
     def _unknown(self, name: str, span: Span, known: Callable[[], list[str]]) -> None:
         self._n_unknown += 1
-        # Looking for names that look alike takes a while; who has so many wrong ones has another problem.
-        alike = self.catalogue.suggest(name, known()) if self._n_unknown <= MOST_SUGGESTIONS else None
+        # The search for similar names is slow, so there is a limit.
+        alike = self.catalogue.suggest(name, known()) if self._n_unknown <= MAX_SUGGESTIONS else None
         hint = f"did you mean '{alike}'?" if alike else None
         name_only = Span(span.line, span.column, span.line, span.column + len(name))
         self._error(ScriptNameError(name, hint=hint), name_only)
@@ -303,8 +306,8 @@ class _Resolver:
         self.errors.append(error.locate(self.source, span.line, span.column, width))
 
 
-def _declared_name(statement: nodes.Assign | nodes.Declare) -> str | None:
-    if isinstance(statement, nodes.Declare):
+def _declared_name(statement: nodes.Assign | nodes.Declaration) -> str | None:
+    if isinstance(statement, nodes.Declaration):
         return statement.name
     return statement.target.name if isinstance(statement.target, nodes.Name) else None
 

@@ -1,6 +1,6 @@
-"""What the resolver finds out about a program: its functions, where each name lives, what may block.
+"""The symbol tables of a program: its functions, the scope of each name, what may block.
 
-Plain records, filled by `resolver`, read by `inference` and `compiler`.
+`resolver` makes these records; `inference`, `compiler` and `lint` read them.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from urscript.syntax.nodes import Block, Function, Statement
 
 @dataclass(eq=False, slots=True)
 class FunctionScope:
-    """The program body, a function or a thread, and the names that live in it.
+    """The program body, a function or a thread, and its names.
 
     Attributes:
         name: As in the program; the body of the program has its name.
         node: The definition; None for a program without `def` around it.
-        parent: The scope the definition stands in; None for the program body.
+        parent: The enclosing scope; None for the program body.
         body: Its statements.
         python_name: Name of the Python function it is compiled to.
         functions: Functions and threads defined directly in it.
-        locals: Variables that live in one call of it; the program body has none, its variables are global.
-        unsure: Locals that may be read before anything was assigned to them.
+        locals: Its local variables; the program body has none, its variables are global.
+        maybe_unassigned: Locals that may be read before a value is assigned to them.
         callees: User functions it calls.
-        blocks: A call of it may take time.
+        blocks: A call may take time.
         recursive: It can call itself, directly or through others.
     """
 
@@ -37,7 +37,7 @@ class FunctionScope:
     python_name: str
     functions: dict[str, FunctionScope] = field(default_factory=dict)
     locals: set[str] = field(default_factory=set)
-    unsure: set[str] = field(default_factory=set)
+    maybe_unassigned: set[str] = field(default_factory=set)
     callees: set[FunctionScope] = field(default_factory=set)
     blocks: bool = False
     recursive: bool = False
@@ -47,12 +47,12 @@ class FunctionScope:
         """Whether it is a `thread` definition."""
         return self.node is not None and self.node.kind == "thread"
 
-    def around(self) -> FunctionScope:
-        """Where the defaults of its parameters are looked up: functions of the scope around, globals only."""
+    def default_scope(self) -> FunctionScope:
+        """The scope of the defaults of its parameters: functions of the enclosing scope, globals only."""
         return FunctionScope(self.name, None, self.parent, (), f"{self.python_name}_default")
 
     def find_function(self, name: str) -> FunctionScope | None:
-        """The function of that name visible here: own ones, then those of the scopes around."""
+        """The visible function of that name: in this scope, then in the enclosing ones."""
         scope: FunctionScope | None = self
         while scope is not None:
             if name in scope.functions:
@@ -70,17 +70,17 @@ class FunctionScope:
 
 @dataclass(eq=False, slots=True)
 class ResolvedProgram:
-    """A program whose names are all known.
+    """A program with its symbol tables.
 
     Attributes:
         kind: "def", "sec", or "statement" for text without a definition around it.
         name: The `def` name; for a statement the function it calls.
         main: The program body.
-        calls_after: Calls of the program itself below its definition; they are no part of it.
+        calls_after: Calls of the program below its definition; they are not part of it.
         functions: All functions and threads, in the order of the text.
         globals: All global variables.
-        declared_globals: Those that the word `global` makes (the keys), in the order of the text.
-        unsure_globals: Those that may be read before anything was assigned to them.
+        declared_globals: Those that are declared with `global` (the keys), in the order of the text.
+        maybe_unassigned_globals: Those that may be read before a value is assigned to them.
         builtins: Builtin functions the program uses.
     """
 
@@ -92,7 +92,7 @@ class ResolvedProgram:
     functions: list[FunctionScope] = field(default_factory=list)
     globals: set[str] = field(default_factory=set)
     declared_globals: dict[str, None] = field(default_factory=dict)
-    unsure_globals: set[str] = field(default_factory=set)
+    maybe_unassigned_globals: set[str] = field(default_factory=set)
     builtins: set[str] = field(default_factory=set)
 
     def scopes(self) -> list[FunctionScope]:

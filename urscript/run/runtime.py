@@ -1,4 +1,4 @@
-"""The names that compiled programs use, and the way back from a Python exception to a place in the script.
+"""The names that compiled programs use, and the translation of Python exceptions into errors of the script.
 
 | name | is |
 |---|---|
@@ -123,7 +123,7 @@ def base_namespace(dialect: Dialect, meter: Meter) -> dict[str, Any]:
 
 
 def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any], meter: Meter) -> dict[str, Any]:
-    """The names through which a program reaches its own scheduler."""
+    """The names with which a program calls its scheduler."""
 
     def run(function: Callable[[], Any], name: str) -> ScriptThread:
         meter.charge(START_COST)
@@ -136,7 +136,7 @@ def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any], meter: Me
 
 
 def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, meter: Meter) -> dict[str, Any]:
-    """The builtins a program uses; those with effects get the check of their arguments in front."""
+    """The builtins that a program uses; those of the host check their arguments first."""
     offered = host.builtins()
     flow = _flow_builtins(host)
     bound: dict[str, Any] = {}
@@ -155,7 +155,7 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, me
 
 
 def _flow_builtins(host: Host) -> dict[str, Callable[..., Any]]:
-    """Builtins that are part of the language: they need no robot but the length of its cycle and its log."""
+    """Builtins of the language: they need only the cycle time and the log of the robot."""
 
     def textmsg(thread: ScriptThread, first: Any, second: Any) -> None:
         host.textmsg(log_form(first) + log_form(second))
@@ -217,18 +217,18 @@ def _declared_only(name: str) -> Callable[..., Any]:
     return call
 
 
-# --- from Python's exceptions back to the script ---------------------------------------------------------
+# --- errors of the script from Python's exceptions ---------------------------------------------------------
 
 
 def script_error(
     error: Exception, file_name: str, names: Mapping[str, str], source: Source
 ) -> ScriptRuntimeError:
-    """The run-time error that `error` is for the program, with place and calls.
+    """The run-time error of the program for `error`, with its place and call stack.
 
-    Where static types are evident the compiler uses Python's own operators; what those raise is translated.
+    Where static types are known, compiled code uses Python's operators; their exceptions are translated here.
 
     Args:
-        error: What came out of a thread.
+        error: Exception of a thread.
         file_name: The pseudo file name of the compiled program.
         names: Python function name -> name in the script.
         source: The text of the program.
@@ -250,7 +250,7 @@ def script_error(
 
 
 def _bad_index(frame: FrameType, place: StackEntry, source: Source) -> str:
-    """What a bare subscript went wrong with: the compiler emits it for a number after a variable only."""
+    """The message for an IndexError of a subscript, which is always a variable with a constant index."""
     form = re.match(r"(\w+)\s*\[\s*(\d+)", source.line(place.line)[place.column - 1 :])
     if form is not None:
         variable = frame.f_locals.get(f"v_{form[1]}", frame.f_globals.get(f"g_{form[1]}"))
@@ -264,7 +264,7 @@ def _bad_index(frame: FrameType, place: StackEntry, source: Source) -> str:
 def _stack(
     traceback: TracebackType | None, file_name: str, names: Mapping[str, str]
 ) -> tuple[list[StackEntry], FrameType | None]:
-    """The calls inside the script, outermost first, and the innermost frame if it is the script's own."""
+    """The call stack in the script, outermost first, and the innermost frame if it is in the script."""
     stack: list[StackEntry] = []
     innermost = None
     while traceback is not None:

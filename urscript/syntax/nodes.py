@@ -49,7 +49,7 @@ class BoolLiteral(Expression):
 
 @dataclass(frozen=True, slots=True)
 class IntLiteral(Expression):
-    """Decimal digits; never negative, a sign is a `Prefix`."""
+    """Decimal digits; never negative, a sign is a `UnaryOperation`."""
 
     value: int
 
@@ -91,7 +91,7 @@ class Name(Expression):
 
 
 @dataclass(frozen=True, slots=True)
-class Prefix(Expression):
+class UnaryOperation(Expression):
     """`-x`, `+x`, `not x` (also spelt `!x`)."""
 
     operator: Literal["-", "+", "not"]
@@ -99,7 +99,7 @@ class Prefix(Expression):
 
 
 @dataclass(frozen=True, slots=True)
-class Binary(Expression):
+class BinaryOperation(Expression):
     """Two operands: arithmetic, comparison, `and`, `or`, `xor`."""
 
     operator: str
@@ -133,7 +133,7 @@ class MethodCall(Expression):
 
 
 @dataclass(frozen=True, slots=True)
-class Index(Expression):
+class Subscript(Expression):
     """`x[i]` or, in a matrix, `x[row, column]`."""
 
     target: Expression
@@ -141,7 +141,7 @@ class Index(Expression):
 
 
 @dataclass(frozen=True, slots=True)
-class Member(Expression):
+class Attribute(Expression):
     """`x.member` of a struct."""
 
     target: Expression
@@ -149,7 +149,7 @@ class Member(Expression):
 
 
 @dataclass(frozen=True, slots=True)
-class Run(Expression):
+class RunThread(Expression):
     """`run thread_name()`: starts a thread, its value is the handle."""
 
     thread: str
@@ -162,13 +162,13 @@ class Run(Expression):
 class Assign(Statement):
     """`x = value`, `x[i] = value`, `global x = value`, `local x = value`."""
 
-    target: Name | Index | Member
+    target: Name | Subscript | Attribute
     value: Expression
     scope: Literal["global", "local"] | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Declare(Statement):
+class Declaration(Statement):
     """`global x` or `local x` without a value."""
 
     name: str
@@ -176,14 +176,14 @@ class Declare(Statement):
 
 
 @dataclass(frozen=True, slots=True)
-class Evaluate(Statement):
+class ExpressionStatement(Statement):
     """An expression as a statement."""
 
     value: Expression
 
 
 @dataclass(frozen=True, slots=True)
-class Arm(Node):
+class Branch(Node):
     """One condition of an `if` and its block."""
 
     condition: Expression
@@ -192,10 +192,10 @@ class Arm(Node):
 
 @dataclass(frozen=True, slots=True)
 class If(Statement):
-    """`if`, its `elif` arms in order, and the `else` part (None when absent)."""
+    """`if` and `elif` branches in order, and the `else` block (None when absent)."""
 
-    arms: tuple[Arm, ...]
-    otherwise: Block | None = None
+    branches: tuple[Branch, ...]
+    else_body: Block | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,10 +228,10 @@ class Kill(Statement):
 
 
 @dataclass(frozen=True, slots=True)
-class Simple(Statement):
-    """A statement that is one word."""
+class KeywordStatement(Statement):
+    """A statement that is one keyword."""
 
-    word: Literal["break", "continue", "halt", "enter_critical", "exit_critical"]
+    keyword: Literal["break", "continue", "halt", "enter_critical", "exit_critical"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Text -> tree. The grammar is `grammar.lark`, `tree_builder` makes the nodes, this module words the errors.
+"""Text -> tree. The grammar is `grammar.lark`, `tree_builder` makes the nodes, this module the errors.
 
 `parse` knows the form of a program only: names, types and scopes are for `resolver`.
 The parser is built on first use, once a process (about 0.07 s), then parses 1,000 lines in some 0.05 s.
@@ -48,7 +48,7 @@ def find_syntax_errors(source: Source, limit: int = 20) -> list[ScriptSyntaxErro
     lost_openers = 0
 
     def note(error: ScriptSyntaxError) -> None:
-        # More on the same line is most often the echo of the first.
+        # Further errors on a line are mostly consequences of the first.
         if all(error.line != earlier.line for earlier in errors):
             errors.append(error)
 
@@ -77,10 +77,10 @@ def find_syntax_errors(source: Source, limit: int = 20) -> list[ScriptSyntaxErro
 
 
 def _drop_statement(error: UnexpectedToken) -> int:
-    """Take back what was read of the broken statement; keep the token if another can start or end with it.
+    """Remove the incomplete statement from the stack; keep a token that can start or end a statement.
 
     Returns:
-        How many block openers were taken back: as many `end`s will be left over.
+        Number of block openers that were removed: as many `end`s will be superfluous.
     """
     parser: Any = error.interactive_parser
     state = parser.parser_state
@@ -128,7 +128,7 @@ _SPELLING = {
     "NAME": "a name",
     "END": "'end'",
 }
-"""How people read the tokens that a message may ask for; all others only add noise."""
+"""Display names of the tokens that a message lists as expected; others are not listed."""
 
 _BLOCK_OPENERS = frozenset({"DEF", "SEC", "THREAD", "IF", "WHILE"})
 
@@ -136,13 +136,13 @@ _BLOCK_OPENERS = frozenset({"DEF", "SEC", "THREAD", "IF", "WHILE"})
 def _unexpected_token(error: UnexpectedToken, source: Source) -> ScriptSyntaxError:
     accepted = error.accepts or error.expected
     found = (
-        _unexpected_end(source) if error.token.type == "$END" else _unwanted(error.token, accepted, source)
+        _unexpected_end(source) if error.token.type == "$END" else _unexpected(error.token, accepted, source)
     )
     found.unexpected, found.accepted = error.token.type, frozenset(accepted)
     return found
 
 
-def _unwanted(token: Token, accepted: set[str], source: Source) -> ScriptSyntaxError:
+def _unexpected(token: Token, accepted: set[str], source: Source) -> ScriptSyntaxError:
     wanted = {_SPELLING[name] for name in accepted if name in _SPELLING}
     if "RUN" in accepted:
         wanted -= {"'('", "'['", "a name"}
@@ -157,7 +157,7 @@ def _unwanted(token: Token, accepted: set[str], source: Source) -> ScriptSyntaxE
 
 
 def _unexpected_end(source: Source) -> ScriptSyntaxError:
-    """The text ended inside something; names the innermost block that is still open."""
+    """The error for a text that ends inside a statement; names the innermost open block."""
     open_blocks: list[Token] = []
     last: Token | None = None
     for last in _lark().lex(source.text):

@@ -65,19 +65,19 @@ class TreeBuilder:
     # statements
 
     def if_(self, items: list[Any]) -> nodes.If:
-        first = nodes.Arm(items[1], items[3], span=_cover(items[:3]))
-        rest = tuple(item for item in items[4:] if isinstance(item, nodes.Arm))
-        otherwise = items[-2]
-        return nodes.If((first, *rest), otherwise, span=_cover([items[0], items[-1]]))
+        first = nodes.Branch(items[1], items[3], span=_cover(items[:3]))
+        rest = tuple(item for item in items[4:] if isinstance(item, nodes.Branch))
+        else_body = items[-2]
+        return nodes.If((first, *rest), else_body, span=_cover([items[0], items[-1]]))
 
-    def elif_(self, items: list[Any]) -> nodes.Arm:
-        return nodes.Arm(items[1], items[3], span=_cover(items[:3]))
+    def elif_(self, items: list[Any]) -> nodes.Branch:
+        return nodes.Branch(items[1], items[3], span=_cover(items[:3]))
 
     def while_(self, items: list[Any]) -> nodes.While:
         return nodes.While(items[1], items[3], span=_cover(items))
 
-    def simple(self, items: list[Any]) -> nodes.Simple:
-        return nodes.Simple(cast(Any, str(items[0])), span=_span(items[0]))
+    def simple(self, items: list[Any]) -> nodes.KeywordStatement:
+        return nodes.KeywordStatement(cast(Any, str(items[0])), span=_span(items[0]))
 
     def return_(self, items: list[Any]) -> nodes.Return:
         word, value = items
@@ -93,14 +93,14 @@ class TreeBuilder:
         word, name, _, value = items
         scope = cast(Any, str(word))
         if value is None:
-            return nodes.Declare(str(name), scope, span=_cover([word, name]))
+            return nodes.Declaration(str(name), scope, span=_cover([word, name]))
         target = nodes.Name(str(name), span=_span(name))
         return nodes.Assign(target, value, scope, span=_cover(items))
 
     def assign(self, items: list[Any]) -> nodes.Assign:
         target, _, value = items
         root = target
-        while isinstance(root, (nodes.Index, nodes.Member)):
+        while isinstance(root, (nodes.Subscript, nodes.Attribute)):
             root = root.target
         if not isinstance(root, nodes.Name):
             raise _syntax_error(
@@ -108,27 +108,27 @@ class TreeBuilder:
             )
         return nodes.Assign(target, value, span=_cover(items))
 
-    def call_for_effect(self, items: list[Any]) -> nodes.Evaluate:
-        return nodes.Evaluate(items[0], span=items[0].span)
+    def call_for_effect(self, items: list[Any]) -> nodes.ExpressionStatement:
+        return nodes.ExpressionStatement(items[0], span=items[0].span)
 
     def label(self, items: list[Any]) -> nodes.Label:
         return nodes.Label(str(items[0])[1:].strip(BLANKS), span=_span(items[0]))
 
     # expressions
 
-    def binary(self, items: list[Any]) -> nodes.Binary:
+    def binary(self, items: list[Any]) -> nodes.BinaryOperation:
         left, operator, right = items
-        return nodes.Binary(str(operator), left, right, span=_cover(items))
+        return nodes.BinaryOperation(str(operator), left, right, span=_cover(items))
 
-    def prefix(self, items: list[Any]) -> nodes.Prefix:
+    def prefix(self, items: list[Any]) -> nodes.UnaryOperation:
         operator = "not" if items[0] == "!" else str(items[0])
-        return nodes.Prefix(cast(Any, operator), items[1], span=_cover(items))
+        return nodes.UnaryOperation(cast(Any, operator), items[1], span=_cover(items))
 
     def call(self, items: list[Any]) -> nodes.Expression:
         callee, _, arguments, _ = items
         if isinstance(callee, nodes.Name):
             return nodes.Call(callee.name, arguments, span=_cover(items))
-        if isinstance(callee, nodes.Member):
+        if isinstance(callee, nodes.Attribute):
             return nodes.MethodCall(callee.target, callee.name, arguments, span=_cover(items))
         raise _syntax_error("cannot call this expression, only a function by its name", callee.span)
 
@@ -141,10 +141,10 @@ class TreeBuilder:
             raise _syntax_error(
                 f"an index has 1 or 2 values, a pose p[...] 6, not {len(indices)}", _cover(items)
             )
-        return nodes.Index(target, indices, span=_cover(items))
+        return nodes.Subscript(target, indices, span=_cover(items))
 
-    def member(self, items: list[Any]) -> nodes.Member:
-        return nodes.Member(items[0], str(items[2]), span=_cover(items))
+    def member(self, items: list[Any]) -> nodes.Attribute:
+        return nodes.Attribute(items[0], str(items[2]), span=_cover(items))
 
     def args(self, items: list[Any]) -> tuple[nodes.Argument, ...]:
         return tuple(
@@ -186,5 +186,5 @@ class TreeBuilder:
     def list_(self, items: list[Any]) -> nodes.ListLiteral:
         return nodes.ListLiteral(_expressions(items), span=_cover(items))
 
-    def run(self, items: list[Any]) -> nodes.Run:
-        return nodes.Run(str(items[1]), span=_cover(items))
+    def run(self, items: list[Any]) -> nodes.RunThread:
+        return nodes.RunThread(str(items[1]), span=_cover(items))

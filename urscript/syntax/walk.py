@@ -14,19 +14,19 @@ from urscript.syntax.nodes import Block, Expression, Statement
 def child_expressions(expression: Expression) -> tuple[Expression, ...]:
     """The direct parts of an expression, in the order they are evaluated."""
     match expression:
-        case nodes.Binary(left=left, right=right):
+        case nodes.BinaryOperation(left=left, right=right):
             return left, right
         case nodes.Call(arguments=arguments):
             return tuple(argument.value for argument in arguments)
-        case nodes.Prefix(operand=operand):
+        case nodes.UnaryOperation(operand=operand):
             return (operand,)
-        case nodes.Index(target=target, indices=indices):
+        case nodes.Subscript(target=target, indices=indices):
             return target, *indices
         case nodes.ListLiteral(items=items) | nodes.PoseLiteral(items=items):
             return items
         case nodes.MethodCall(target=target, arguments=arguments):
             return target, *(argument.value for argument in arguments)
-        case nodes.Member(target=target):
+        case nodes.Attribute(target=target):
             return (target,)
     return ()
 
@@ -41,10 +41,10 @@ def own_expressions(statement: Statement) -> tuple[Expression, ...]:
             return (value,)
         case nodes.Assign(target=target, value=value):
             return value, target
-        case nodes.Evaluate(value=value):
+        case nodes.ExpressionStatement(value=value):
             return (value,)
-        case nodes.If(arms=arms):
-            return tuple(arm.condition for arm in arms)
+        case nodes.If(branches=branches):
+            return tuple(branch.condition for branch in branches)
         case nodes.While(condition=condition):
             return (condition,)
         case nodes.Return(value=result) if result is not None:
@@ -57,8 +57,8 @@ def own_expressions(statement: Statement) -> tuple[Expression, ...]:
 def own_blocks(statement: Statement) -> tuple[Block, ...]:
     """The blocks inside an `if` or `while`; the body of a function belongs to its own scope."""
     match statement:
-        case nodes.If(arms=arms, otherwise=otherwise):
-            return (*(arm.body for arm in arms), otherwise or ())
+        case nodes.If(branches=branches, else_body=else_body):
+            return (*(branch.body for branch in branches), else_body or ())
         case nodes.While(body=body):
             return (body,)
     return ()
@@ -111,8 +111,8 @@ def falls_through(block: Block) -> bool:
     match block[-1]:
         case nodes.Return():
             return False
-        case nodes.Simple(word="halt"):
+        case nodes.KeywordStatement(keyword="halt"):
             return False
-        case nodes.If(arms=arms, otherwise=otherwise) if otherwise is not None:
-            return falls_through(otherwise) or any(falls_through(arm.body) for arm in arms)
+        case nodes.If(branches=branches, else_body=else_body) if else_body is not None:
+            return falls_through(else_body) or any(falls_through(branch.body) for branch in branches)
     return True
