@@ -1,8 +1,8 @@
 """The global variables of the running program as messages of the primary port: names once, values on change.
 
 Variables declared with `global` are reported, in the order of the text, as in PolyScope's variables tab. They
-are not read while no client is connected. Values never change in place (see `urscript.values`), so one that is
-the same object is the same value.
+are not read while no client is connected. Values never change in place (see `urscript.values`), so one that
+is the same object is the same value.
 """
 
 from __future__ import annotations
