@@ -113,6 +113,15 @@ def test_boxes_in_real_time_take_turns_within_a_period():
     rack.close()
 
 
+@pytest.mark.parametrize(("count", "may_tick_early"), [(1, True), (2, False)])
+def test_a_box_without_others_computes_its_cycle_before_the_deadline(count, may_tick_early):
+    rack = ControlBox.many(count, port_base=None)
+    served = rack[0]._box
+    served._pacer.may_tick(10.0, served)
+    assert served._pacer.may_tick(10.008 - 0.0003, served) == may_tick_early
+    rack.close()
+
+
 def test_boxes_may_differ():
     options = [
         {"port_base": None, "pace": "lockstep", "version": "3.4.0"},

@@ -1,4 +1,4 @@
-"""The one loop: wait for sockets or the next deadline, hand bytes on, let the boxes advance.
+"""The loop: it waits for sockets or the next deadline, calls back, and lets the boxes advance.
 
 One thread owns the loop and all that is registered with it; other threads may only use
 `call_soon_threadsafe`. The loop knows no robot: a service is anything that says when it wants to be called
@@ -23,15 +23,15 @@ from ur_emulator.realtime.tasks import TaskQueue
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
 # microseconds.
 _COARSE = 0.050
-# A sleeping process wakes up late, and slow: so long before a deadline the loop is awake [s]. A box uses that
-# time to compute the cycle that it publishes at the deadline. Services that share a loop share it, for awake
-# is busy: twenty boxes would leave no time for anything else.
+# A sleeping process wakes up late and runs slowly at first: the loop wakes up so long before a deadline [s].
+# A box uses that time to compute the cycle that it publishes at the deadline. Services of one loop share it:
+# an awake loop uses the processor, and with twenty boxes it would never sleep.
 WAKE_UP = 400e-6
 # select() takes descriptors below this number only.
 _SELECT_LIMIT = 1024
-# How long to look again and again for what is expected soon [s]: a client in lockstep takes half of it.
-_EAGER_TIME = 200e-6
-# Most waits in a row that are not tried eagerly after failures.
+# How long to poll for an expected event [s]: a client in lockstep answers in half of it.
+_POLL_TIME = 200e-6
+# Most waits in a row without polling, after polls that failed.
 _LONGEST_PAUSE = 32
 
 
@@ -94,11 +94,10 @@ class EventLoop:
             self._selector.unregister(sock)
 
     def expect_soon(self) -> None:
-        """Say that a socket will most likely be ready within a fraction of a millisecond.
+        """Expect that a socket will be ready within a fraction of a millisecond.
 
-        Sleeping and being woken takes longer than that, so the next wait looks again and again first. If
-        nothing comes in time (another process needs the processor), it is not tried for a while, twice as
-        long each time.
+        Sleeping and waking up takes longer than that, so the next wait polls first. When nothing comes in
+        time (another process needs the processor), the next waits do not poll: twice as many each time.
         """
         self._expects_soon = True
 
@@ -158,7 +157,7 @@ class EventLoop:
     def _dispatch(self, deadline: float) -> None:
         """Wait for a ready socket until `deadline`, then run all callbacks that are ready."""
         timeout = max(0.0, deadline - time.monotonic()) if not self._calls else 0.0
-        ready = self._look_eagerly(timeout) if self._expects_soon else []
+        ready = self._poll(timeout) if self._expects_soon else []
         if not ready:
             if self._descriptor is not None and 0.0 < timeout < _COARSE:
                 ready = self._wait_precisely(self._descriptor, deadline)
@@ -190,13 +189,13 @@ class EventLoop:
             pass
         return ready
 
-    def _look_eagerly(self, timeout: float) -> list[_Ready]:
-        """Look again and again for a ready socket, for a fraction of a millisecond, as long as that pays."""
+    def _poll(self, timeout: float) -> list[_Ready]:
+        """Poll for a ready socket for a fraction of a millisecond, unless the last polls failed."""
         self._expects_soon = False
         if self._skip:
             self._skip -= 1
             return []
-        end = time.perf_counter() + min(timeout, _EAGER_TIME)
+        end = time.perf_counter() + min(timeout, _POLL_TIME)
         while not (ready := self._selector.select(0.0)):
             if time.perf_counter() > end:
                 self._skip = self._pause

@@ -106,7 +106,7 @@ class RealtimePacer:
         self.lost_cycles = 0
 
     def may_tick(self, now: float, situation: Situation) -> bool:
-        """True from the lead before the deadline on; each call that says so uses up one deadline."""
+        """True from the lead before the deadline on; each call that returns True uses one deadline."""
         if math.isnan(self._deadline):
             self._deadline = now + self._phase * self._period
         if now < self._deadline - self._lead:
@@ -147,7 +147,7 @@ class LockstepPacer:
         if not hangs:
             self._outside.restart()
         elif self._outside.spent(now) < HANG_LIMIT or now - self._last_tick < self._period:
-            return False  # time stands still anyway: whoever does not read loses nothing
+            return False  # time stands still: a client that does not read loses nothing
         if situation.readers_full:
             if not hangs and self._readers.spent(now) < READER_LIMIT:
                 return False

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from protocol.realtime.layout import RealtimeLayout
-from protocol.script_channel import ScriptChannel
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.servers.programs.intake import ProgramIntake
-from ur_emulator.servers.tcp.connection import Connection
+from ur_emulator.servers.programs.script_port import ScriptPort
 
 
-class RealtimePort:
-    """Streams realtime frames."""
+class RealtimePort(ScriptPort):
+    """Streams realtime frames; there is no greeting."""
 
     def __init__(self, layout: RealtimeLayout, intake: ProgramIntake | None) -> None:
         """Prepare the encoder.
@@ -19,26 +18,10 @@ class RealtimePort:
             layout: of the frames.
             intake: takes script text; None makes the port read-only.
         """
+        super().__init__(intake)
         self._encode = layout.encoder()
-        self._intake = intake
-        self._channels: dict[Connection, ScriptChannel] = {}
-
-    def opened(self, connection: Connection) -> None:
-        """The stream to this client starts with the next frame; there is no greeting."""
-        self._channels[connection] = ScriptChannel()
-
-    def received(self, connection: Connection, data: bytes) -> None:
-        """Take script text."""
-        if self._intake is not None:
-            self._intake.take(connection, self._channels[connection].feed(data))
-
-    def closed(self, connection: Connection) -> None:
-        """Forget the client; a program it sent goes on."""
-        self._channels.pop(connection, None)
 
     def publish(self, snapshot: Snapshot) -> None:
         """Send the frame of this cycle."""
         if self._channels:
-            frame = self._encode(snapshot)
-            for connection in tuple(self._channels):
-                connection.send(frame)
+            self._send(self._encode(snapshot))

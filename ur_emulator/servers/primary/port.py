@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from protocol.primary.messages import RobotMessage, StartupMessage, version_message
 from protocol.primary.packages import SafetyTolerances, encode_message_package, encode_safety_tolerances
-from protocol.script_channel import ScriptChannel
 from protocol.ur_types import RobotMode
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, ProgramStarted, ProgramStopped
@@ -22,13 +21,14 @@ from ur_emulator.servers.primary.label_reporter import LabelReporter
 from ur_emulator.servers.primary.robot_state import StateEncoder
 from ur_emulator.servers.primary.variable_reporter import VariableReporter
 from ur_emulator.servers.programs.intake import ProgramIntake
+from ur_emulator.servers.programs.script_port import ScriptPort
 from ur_emulator.servers.tcp.connection import Connection
 from urscript import RunningProgram
 
 STATE_RATE = 10  # states per second
 
 
-class PrimaryPort:
+class PrimaryPort(ScriptPort):
     """Publishes robot states and, on the primary port, messages."""
 
     def __init__(
@@ -49,12 +49,11 @@ class PrimaryPort:
             states: encodes the states, shared by the ports of a box.
             all_messages: True on the primary port; the secondary one only sends the greeting.
         """
+        super().__init__(intake)
         version = self._version = software.version
         self._controller = controller
-        self._intake = intake
         self._states = states
         self._all_messages = all_messages
-        self._channels: dict[Connection, ScriptChannel] = {}
         self._phase = 0
         self._variables = VariableReporter(version)
         self._labels = LabelReporter(version)
@@ -76,16 +75,7 @@ class PrimaryPort:
                 self._variables.changes(self._now, at_once=True)
             for package in (*self._variables.names(self._now), *self._variables.values(self._now)):
                 connection.send(package)
-        self._channels[connection] = ScriptChannel()
-
-    def received(self, connection: Connection, data: bytes) -> None:
-        """Take script text."""
-        if self._intake is not None:
-            self._intake.take(connection, self._channels[connection].feed(data))
-
-    def closed(self, connection: Connection) -> None:
-        """Forget the client; a program it sent goes on."""
-        self._channels.pop(connection, None)
+        super().opened(connection)
 
     def publish(self, snapshot: Snapshot) -> None:
         """Send a state and what has changed of the variables if they are due in this cycle."""
@@ -125,11 +115,6 @@ class PrimaryPort:
 
     def _package(self, message: RobotMessage) -> bytes:
         return encode_message_package(message, self._version)
-
-    def _send(self, *packages: bytes) -> None:
-        for connection in tuple(self._channels):
-            for package in packages:
-                connection.send(package)
 
     def _begin_report(self, run: RunningProgram | None) -> None:
         """Turn to the variables and labels of a run, or to none."""
