@@ -6,10 +6,7 @@ from collections.abc import Iterator
 
 from docs.generate.page_parts import MARKS, example, table
 from protocol.realtime.columns import COLUMNS, VERSIONS, RealtimeColumn
-from protocol.realtime.layout import layout_for_version
-from protocol.ur_types import SoftwareVersion
-
-_NEWEST = SoftwareVersion(5, 10)  # its frame is the longest: all columns
+from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
 
 _INTRODUCTION = """\
 # Realtime interface: ports 30003 and 30013
@@ -63,7 +60,7 @@ def render() -> str:
 
 
 def _rows() -> Iterator[tuple[object, ...]]:
-    layout = layout_for_version(_NEWEST)
+    layout = layout_for_size(MAX_FRAME_SIZE)
     column = 1
     for row in COLUMNS:
         yield (

@@ -8,7 +8,6 @@ What a robot does not tell is shown as "not told": it never counts as passed, an
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from types import MappingProxyType
 
 import numpy as np
 
@@ -36,10 +35,9 @@ _OFFSET_TOLERANCE = (1e-4, 1e-3)
 _PAYLOAD_TOLERANCE = 0.05
 """Of the mass [kg]. Its weight is 0.5 N, a sixth of the noise of the controller's own force estimate."""
 
-_POSITION_TOLERANCE = MappingProxyType({"ur3": 0.005, "ur5": 0.009, "ur10": 0.014})
 _ROTATION_TOLERANCE = 0.02
-"""Between the reported flange and the model's [m, rad]: twice what three real UR3e calibrations come to,
-2.7 mm and 8 mrad, the length in proportion to the reach of 0.5, 0.85, 1.3 m. A choice: docs/fidelity.md."""
+"""Between the reported flange and the model's [rad]: twice what three real UR3e calibrations come to, 8 mrad.
+A choice: docs/fidelity.md."""
 
 Check = Callable[[RobotReport, RobotModel | None], Condition]
 """Holds one thing that a robot reports against what is needed."""
@@ -120,7 +118,7 @@ def forward_kinematics(report: RobotReport, model: RobotModel | None) -> Conditi
     flange = pose_trans(tuple(frame.actual_tcp_pose.tolist()), pose_inv(offset))
     computed = T_to_pose(tcp_pose(model, frame.actual_q))
     distance, angle = _size(pose_trans(pose_inv(computed), flange))
-    most = _POSITION_TOLERANCE[model.name]
+    most = model.description.position_tolerance
     return Condition(
         "flange pose",
         f"{distance * 1e3:.1f} mm, {angle * 1e3:.1f} mrad from the {model.name.upper()} model",

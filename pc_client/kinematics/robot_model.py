@@ -54,6 +54,7 @@ class RobotDescription:
         q_branch: a posture on the IK branch that is preferred for drawing in front of the arm [rad].
         tcp_speed_max: TCP speed limit [m/s].
         reach: distance from the base axis to the flange of the stretched arm [m].
+        position_tolerance: between the flange that a real arm reports and this model's [m].
     """
 
     name: str
@@ -62,6 +63,7 @@ class RobotDescription:
     q_branch: Six
     tcp_speed_max: float
     reach: float
+    position_tolerance: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +130,9 @@ _ELBOW_UP = _six_degrees(22.6, -101.1, -120.3, -5.9, 74.2, 106.4)
 # DH article; rotor inertia and friction: identified sets of real arms (.45 kg m² for joints of size 2 on a
 # UR3, 1.93 for size 3, 5.9 for size 4). The base gets what the shoulder gets.
 #
-# TCP speeds: the data sheets of all three arms, "typical tool speed 1 m/s". Reach: the same.
+# TCP speeds: the data sheets of all three arms, "typical tool speed 1 m/s". Reach: the same. Position
+# tolerances: twice what three real UR3e calibrations come to, 2.7 mm, in proportion to the reach; a choice,
+# docs/fidelity.md.
 ROBOTS = MappingProxyType(
     {
         # Speeds: UR3 manual CB3 3.13: base, shoulder, elbow 180 deg/s, wrists 360 deg/s
@@ -146,6 +150,7 @@ ROBOTS = MappingProxyType(
             q_branch=_ELBOW_UP,
             tcp_speed_max=1.0,
             reach=0.5,
+            position_tolerance=0.005,
         ),
         # UR5 manual CB3 3.13: all joints 180 deg/s (= config/ur5/joint_limits.yaml).
         "ur5": RobotDescription(
@@ -161,6 +166,7 @@ ROBOTS = MappingProxyType(
             q_branch=_ELBOW_UP,
             tcp_speed_max=1.0,
             reach=0.85,
+            position_tolerance=0.009,
         ),
         # UR10 manual CB3 3.13: base, shoulder 120 deg/s, others 180 deg/s (config/ur10/joint_limits.yaml).
         "ur10": RobotDescription(
@@ -176,6 +182,7 @@ ROBOTS = MappingProxyType(
             q_branch=_ELBOW_UP,
             tcp_speed_max=1.0,
             reach=1.3,
+            position_tolerance=0.014,
         ),
     }
 )

@@ -14,6 +14,7 @@ from protocol.primary.layout import SUB_PACKAGES
 from protocol.primary.messages import version_message
 from protocol.primary.packages import encode_message_package
 from protocol.primary.state import encode_state
+from protocol.realtime.columns import COLUMNS
 from protocol.realtime.layout import SNAPSHOT_FIELDS, layout_for_size
 from protocol.ur_types import SoftwareVersion
 
@@ -22,7 +23,7 @@ VERSION = SoftwareVersion(3, 15, 8)
 
 def realtime_capture():
     layout = layout_for_size(1140)
-    counts = {column.attribute: column.count for column in layout_for_size(1220).columns}
+    counts = {column.attribute: column.count for column in COLUMNS}
     values = {name: 0.25 if counts[name] == 1 else (0.5,) * counts[name] for name in SNAPSHOT_FIELDS}
     return layout.encoder()(SimpleNamespace(**values))
 
