@@ -86,5 +86,5 @@ _TYPE_NAMES = {
 
 
 def type_name(field: WireField) -> str:
-    """Type of a field for people: f64 x6."""
+    """Type of a field, such as `f64 x6`."""
     return _TYPE_NAMES[field.code] + (f" x{field.count}" if field.count > 1 else "")

@@ -204,7 +204,7 @@ def interpolate_pose(p_from: Sequence[float], p_to: Sequence[float], alpha: floa
     Args:
         p_from: pose at `alpha` = 0.
         p_to: pose at `alpha` = 1.
-        alpha: may leave [0, 1]; the movement then goes on beyond its ends.
+        alpha: may leave [0, 1]; the movement then continues beyond its ends.
 
     Source: URScript manual CB3, `interpolate_pose`.
     """

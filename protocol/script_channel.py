@@ -49,7 +49,7 @@ class ControlLine(NamedTuple):
     """One of the controller's own words.
 
     Attributes:
-        text: the line with single blanks, such as `set speed 0.5`.
+        text: the line with single spaces, such as `set speed 0.5`.
         word: the row's fixed part, such as `set speed`.
         argument: the number as text, "" for words without.
     """

@@ -81,5 +81,5 @@ def check_hello(data: bytes) -> None:
     """
     if data != _HELLO:
         raise RemoteProtocolError(
-            f"the caller said {data[:16].hex(' ') or 'nothing'} instead of hello ({_HELLO.hex(' ')})"
+            f"the caller sent {data[:16].hex(' ') or 'nothing'} instead of hello ({_HELLO.hex(' ')})"
         )

@@ -35,7 +35,7 @@ class ValueOrigin(Enum):
     PROPERTY = "of this arm"
     """From the numbers of the arm, its type or its calibration: the same as long as the box lives."""
     CONSTANT = "constant"
-    """A plausible fixed value; nothing is simulated behind it."""
+    """A plausible fixed value that is not simulated."""
     INTERNAL_ZERO = "internal, zero"
     """Meaning unpublished; always sent as 0, and clients ignore it."""
 
@@ -85,7 +85,7 @@ class WireField:
         unit: SI unit, "enum", or "".
         note: meaning.
         record: table of the records of a `*`.
-        origin: how the emulated box fills it; None where it is what an event says.
+        origin: where the emulated box takes it from; None for fields of messages.
     """
 
     name: str

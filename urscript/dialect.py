@@ -9,7 +9,7 @@ Decisions without a constant, and where they are made:
 | question (all U) | decision | made in |
 |---|---|---|
 | hexadecimal literals, a line end in a string | refused | grammar.lark |
-| a label behind a statement, `return` without a value | accepted | grammar.lark |
+| a label after a statement, `return` without a value | accepted | grammar.lark |
 | list * matrix, matrix / matrix; matrix + matrix | errors; of equal shape by element | ops |
 | a sign before a list or matrix | by element | ops |
 | reading a variable before it has a value | run-time error | variables |

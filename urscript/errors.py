@@ -116,7 +116,7 @@ class ScriptSyntaxError(ScriptCompileError):
 
     @property
     def wire_text(self) -> str:
-        """`syntax_error_on_line:<n>:<that line, blanks included>:`. Source: captures of e-Series 5.x."""
+        """`syntax_error_on_line:<n>:<that line, spaces included>:`. Source: captures of e-Series 5.x."""
         text = self.source.line(self.line) if self.source else ""
         return f"syntax_error_on_line:{self.line}:{text}:"
 

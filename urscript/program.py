@@ -241,11 +241,11 @@ class RunningProgram:
         return self._namespace[f"g_{name}"]
 
     def line(self, thread: ScriptThread) -> int:
-        """Line where a suspended thread stands."""
+        """Line of a suspended thread."""
         return runtime.thread_line(thread, self.program.file_name)
 
     def position(self, thread: ScriptThread) -> tuple[int, int]:
-        """Line and column where a suspended thread stands."""
+        """Line and column of a suspended thread."""
         return runtime.thread_position(thread, self.program.file_name)
 
     def _script_error(self, error: Exception) -> ScriptRuntimeError:
@@ -261,7 +261,7 @@ class RunningProgram:
         if error.stack:
             place = error.stack[-1]
             error.locate(self.program.source, place.line, place.column)
-        # The traceback would keep every frame of the run alive for as long as somebody keeps the error.
+        # The traceback would keep every frame of the run alive as long as the error is referenced.
         self.error = error.with_traceback(None)
         self._finish(ProgramStatus.FAILED)
 

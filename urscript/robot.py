@@ -62,7 +62,7 @@ class RunEnd(NamedTuple):
 
     Attributes:
         status: The program FINISHED or FAILED, a protective stop STOPPED it, it was still RUNNING at the
-            limit, or somebody pressed Ctrl-C.
+            limit, or Ctrl-C INTERRUPTED it.
         robot_time: Seconds of robot time from the start to the end of the program.
         real_time: Seconds that the run took.
         joints: Measured joint angles (rad), (6,).

@@ -63,7 +63,7 @@ class Source:
     def caret(self, line: int, column: int, width: int = 1) -> str:
         """The source line and, below it, carets under `width` characters from `column` on.
 
-        Tabs before the caret are kept, and characters of several bytes count as one, so that the caret stands
+        Tabs before the caret are kept, and characters of several bytes count as one, so that the caret is
         below its character in any terminal.
         """
         shown = self.line(line)

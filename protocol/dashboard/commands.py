@@ -37,9 +37,9 @@ class DashboardCommand:
 
     Attributes:
         name: the fixed words, spelled as on the wire.
-        argument: what may follow, for people; "" if nothing may.
+        argument: description of the argument; "" if there is none.
         since: first CB3 software.
-        does: in a few words.
+        does: description.
         replies: templates by key; "ok" is always there. Braces name what the box fills in.
         done_since: first software whose reply comes when the command is carried out; None for commands whose
             reply has always come at once. (3, 0): all CB3 software.
@@ -163,7 +163,7 @@ def match_command(line: str, known: Mapping[str, DashboardCommand]) -> tuple[Das
     """The command that a line is, and its argument; None if no known command is.
 
     The longest name wins, so `load installation x` is not a program called `installation x`. Names are
-    case-sensitive; the argument runs to the end of the line and may hold blanks.
+    case-sensitive; the argument runs to the end of the line and may contain spaces.
     """
     words = line.split(None, _MOST_WORDS)
     for count in range(min(len(words), _MOST_WORDS), 0, -1):
@@ -178,5 +178,5 @@ def match_command(line: str, known: Mapping[str, DashboardCommand]) -> tuple[Das
 
 
 def unknown_command_reply(line: str) -> str:
-    """The answer to anything else. Its wording is believed, not documented; clients only need one line."""
+    """The answer to anything else. Its wording is assumed; clients only need one line."""
     return f"could not understand: '{line}'"

@@ -76,7 +76,7 @@ class RobotModeData(SubPackage):
 
 @dataclass(frozen=True, slots=True)
 class JointData(SubPackage):
-    """Six joints, base first; on the wire all values of one joint stand together."""
+    """Six joints, base first; on the wire all values of one joint are consecutive."""
 
     SUB_TYPE: ClassVar[int] = 1
 

@@ -4,7 +4,7 @@
 
 Every class is the table of its fields; `encode_message` and `decode_message` interpret them, for the box
 and for the client. Messages with text at the end use what the package size leaves. Software up to 3.2 had
-shorter forms; the rows say which fields came with 3.3.
+shorter forms; the rows show which fields came with 3.3.
 
 Sources: UR "Primary/Secondary Client Interface" (2021), UR "Client_Interface" workbook, UR client library;
 byte captures named at the classes.
@@ -116,7 +116,7 @@ class TextMessage(RobotMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramLabelMessage(RobotMessage):
-    """Where PolyScope's program tree stands; software up to 3.2. `ProgramThreadsMessage` took its place."""
+    """Position in PolyScope's program tree; software up to 3.2, then replaced by `ProgramThreadsMessage`."""
 
     MESSAGE_TYPE: ClassVar[int] = 1
 
@@ -235,7 +235,7 @@ class StartupMessage(RobotMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThreadLabel:
-    """Where one thread stands in PolyScope's program tree."""
+    """Position of one thread in PolyScope's program tree."""
 
     label_id: int = wire("i", "number after the $")
     text: str = wire("t", default="")
@@ -244,7 +244,7 @@ class ThreadLabel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramThreadsMessage(RobotMessage):
-    """Where the threads of a program stand in PolyScope's program tree.
+    """Positions of the threads of a program in PolyScope's program tree.
 
     Source: the form from UR's document of 5.9. That 3.3 is the first software to send it is assumed: the
     document of 3.2 has the message of one thread, and 3.3 changed other messages.
@@ -290,7 +290,7 @@ def version_message(
 ) -> VersionMessage:
     """Return the version message of a controller.
 
-    Up to 3.2 the build number stands in the place of the third number; from 3.10 on it is 0. The date has two
+    Up to 3.2 the build number is in the place of the third number; from 3.10 on it is 0. The date has two
     forms. Source: captures of 3.3 and 3.10; that both changes came with 3.10 is assumed.
 
     Args:

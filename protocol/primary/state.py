@@ -3,8 +3,8 @@
     state body  = sub-package*
     sub-package = i32 size, itself included | u8 sub-type | fields
 
-A writer goes by the software version. A reader goes by sizes, as the vendor tells clients to: an unknown
-sub-package comes out as it is, surplus bytes at the end of a known one are skipped.
+The encoder uses the software version. The decoder uses the sizes, as the vendor asks of clients: an unknown
+sub-package is returned as it is, surplus bytes at the end of a known one are skipped.
 
 Source: UR "Primary/Secondary Client Interface" (2021); order and sizes from captures of 3.3 to 5.8.
 """
@@ -164,7 +164,7 @@ def split_state(body: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def decode_sub_package(sub_type: int, data: bytes) -> SubPackage | UnknownSubPackage:
-    """Read the fields of one sub-package; its size tells which software's form it is.
+    """Read the fields of one sub-package; its size determines the software version of its form.
 
     Raises:
         RemoteProtocolError: shorter than the oldest form.
@@ -173,7 +173,7 @@ def decode_sub_package(sub_type: int, data: bytes) -> SubPackage | UnknownSubPac
     if record is None:
         return UnknownSubPackage(sub_type, data)
     oldest = _forms(sub_type, ())[0]
-    fields = oldest.decode_fields(data)  # conditions stand where every form has them
+    fields = oldest.decode_fields(data)  # conditions have the same place in every form
     forms = _forms(sub_type, tuple(condition for condition in _CONDITIONS[record] if fields[condition]))
     best = oldest
     for form in forms:

@@ -31,7 +31,7 @@ class RealtimeColumn:
         unit: SI unit, or "enum", "bits", "-".
         since_size: size in bytes of the shortest frame that has the column.
         origin: how the emulated box fills it.
-        meaning: what the value says, and its frame of reference.
+        meaning: of the value, with its frame of reference.
         source: only where it is not the sheet named in the module's docstring.
     """
 

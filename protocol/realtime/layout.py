@@ -50,7 +50,7 @@ class RealtimeFrame:
     """One decoded frame; attributes are the columns' names in lower case.
 
     A scalar column is a float, a vector column a read-only array view, shape (count,). Asking for a column
-    that the frame's version does not have is an `AttributeError` that says so.
+    that the frame's version does not have raises AttributeError.
 
     Attributes:
         values: all columns one after another, float64, native byte order, read-only.

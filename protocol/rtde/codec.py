@@ -78,7 +78,7 @@ def encode_message(message: Message, sender: Role, version: int) -> bytes:
 
 
 def data_header(size: int, recipe_id: int | None) -> bytes:
-    """What stands before `size` bytes of values in a data package."""
+    """The header of a data package with `size` bytes of values."""
     tail = b"" if recipe_id is None else bytes((recipe_id,))
     return _HEADER.pack(HEADER_SIZE + len(tail) + size, RtdePackageType.DATA_PACKAGE) + tail
 
@@ -186,7 +186,7 @@ def decode_message(kind: int, payload: bytes, sender: Role, version: int) -> Mes
         version: protocol version spoken.
 
     Returns:
-        The package, or None if nobody knows its type.
+        The package, or None if its type is unknown.
 
     Raises:
         RemoteProtocolError: the payload is too short for its type.

@@ -37,7 +37,7 @@ class RtdeField:
         meaning: of the value, with its frame of reference.
         comes_from: attribute of the snapshot, such as "actual_q" or "registers.output_integers[3]"; empty if
             `constant` is what the box sends.
-        constant: value of an output behind which nothing is simulated.
+        constant: value of an output that is not simulated.
         source: only where it is not what the module's docstring names.
     """
 
@@ -101,7 +101,7 @@ def _fixed(
     source: str = "UR RTDE guide",
     since: Since = _BASE,
 ) -> RtdeField:
-    """An output behind which nothing is simulated."""
+    """An output that is not simulated."""
     return RtdeField(name, kind, unit, since, _CONSTANT, meaning, "", constant, source)
 
 

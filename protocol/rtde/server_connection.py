@@ -72,7 +72,7 @@ class RtdeServerConnection:
     """One connection, as the robot sees it.
 
     Args:
-        version: software of the robot, told to clients that ask.
+        version: software of the robot, sent to clients on request.
         outputs: variables that a client can subscribe to, by name.
         inputs: variables that a client can write, by name.
 
@@ -165,7 +165,7 @@ class RtdeServerConnection:
             message = decode_message(kind, payload, Role.PC, self.protocol_version)
         except RemoteProtocolError:
             if kind in (RtdePackageType.DATA_PACKAGE, RtdePackageType.TEXT_MESSAGE):
-                return None  # nobody waits for an answer: no reason to end the connection
+                return None  # no answer is expected: the connection need not end
             raise
         if isinstance(message, DataPackage):
             recipe = self.input_recipes.get(message.recipe_id or 0)

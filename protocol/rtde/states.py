@@ -50,7 +50,7 @@ TRANSITIONS: Mapping[tuple[RtdeState, type[Request]], Transition] = {
     # The layout of what flows cannot change under it.
     (_STARTED, RequestProtocolVersion): Transition(False, _STARTED),
     (_STARTED, GetControllerVersion): Transition(True, _STARTED),
-    # Assumed: the guide has set-ups before S or after P only, and does not say that others fail.
+    # Assumed: the guide shows set-ups before S or after P only, but not that others fail.
     (_STARTED, SetupOutputs): Transition(True, _STARTED),
     (_STARTED, SetupInputs): Transition(True, _STARTED),
     (_STARTED, Start): Transition(True, _STARTED),

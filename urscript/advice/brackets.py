@@ -130,7 +130,7 @@ def trailing_comma(problem: Problem) -> Advice | None:
 
 
 def inside_brackets(problem: Problem) -> Advice | None:
-    """`x[1:2]`, `[i for i in x]`: what cannot stand in brackets."""
+    """`x[1:2]`, `[i for i in x]`: what is not allowed in brackets."""
     token = problem.token
     if problem.starts_line or not problem.open_brackets() or not problem.accepts("COMMA", "RPAR", "RSQB"):
         return None

@@ -57,18 +57,20 @@ def symbol(problem: Problem) -> Advice | None:
     token, last = problem.token, problem.token
     if problem.error.unexpected or token.kind != "symbol":
         return None
-    spelt = as_utf8(token.text)
+    written = as_utf8(token.text)
     if token.text + problem.following.text in SYMBOLS and problem.following.start == token.end:
         last = problem.following
-        spelt = token.text + last.text
-    if spelt not in SYMBOLS:
-        message = f"unexpected character '{spelt}'"
+        written = token.text + last.text
+    if written not in SYMBOLS:
+        message = f"unexpected character '{written}'"
         return advice_at(token, message, None, replacement(token, " "), exact=False)
-    new, hint = SYMBOLS[spelt]
-    if spelt == "{" and problem.previous.text == ":":
+    new, hint = SYMBOLS[written]
+    if written == "{" and problem.previous.text == ":":
         new = " "
     edit = replacement(token, f" {new} " if new.isalpha() else new, last)
-    what = f"unexpected {INVISIBLE[spelt]}" if spelt in INVISIBLE else f"there is no '{spelt}' in URScript"
+    what = (
+        f"unexpected {INVISIBLE[written]}" if written in INVISIBLE else f"there is no '{written}' in URScript"
+    )
     return advice_at(token, what, hint, edit, last=last)
 
 

@@ -26,12 +26,12 @@ def concerns_whole_line(error: ScriptCompileError) -> bool:
 
 
 def _hint_for_name(name: str, text: str, column: int) -> str | None:
-    behind = text[column - 1 + len(name) :]
+    rest = text[column - 1 + len(name) :]
     if text.lstrip().startswith("--"):
         return "a comment begins with '#'"
-    if name in TYPES and (variable := re.match(r"\s+([A-Za-z_]\w*)\s*=", behind)):
+    if name in TYPES and (variable := re.match(r"\s+([A-Za-z_]\w*)\s*=", rest)):
         return f"URScript has no type declarations: write {variable[1]} = ..."
-    if name in ("math", "np") and (function := re.match(r"\.(\w+)\s*\(", behind)):
+    if name in ("math", "np") and (function := re.match(r"\.(\w+)\s*\(", rest)):
         return f"mathematical functions have no prefix: write {function[1]}(...)"
     if name in STATEMENTS and not text[: column - 1].strip():
         return STATEMENTS[name].hint
@@ -47,6 +47,6 @@ def _point_at_keyword(error: ScriptTypeError, text: str) -> None:
     if place is not None:
         error.column, error.width = place.start() + 1, len(unknown[1])
     signature = error.hint or ""
-    meant = KEYWORDS.get(unknown[1].lower(), unknown[1].lower())
-    if re.search(rf"[(,]\s*{meant}\b", signature):
-        error.hint = f"write {meant}=, {signature}"
+    parameter = KEYWORDS.get(unknown[1].lower(), unknown[1].lower())
+    if re.search(rf"[(,]\s*{parameter}\b", signature):
+        error.hint = f"write {parameter}=, {signature}"

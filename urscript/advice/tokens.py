@@ -10,7 +10,7 @@ from bisect import bisect_right
 from typing import Final, NamedTuple
 
 _TOKENS: Final = re.compile(
-    r"""(?P<blank>[ \t\r\n\f\v]+|\#[^\n]*|\$[^\n]*)
+    r"""(?P<space>[ \t\r\n\f\v]+|\#[^\n]*|\$[^\n]*)
     |(?P<string>"[^"\n]*"?)
     |(?P<number>(?:[0-9]|\.[0-9])(?:[eE][+-](?=[0-9])|[\w.])*)
     |(?P<word>[A-Za-z_]\w*)
@@ -55,7 +55,7 @@ class TokenizedText:
         self.tokens: list[Token] = []
         for match in _TOKENS.finditer(text):
             kind = match.lastgroup or "symbol"
-            if kind != "blank":
+            if kind != "space":
                 line = bisect_right(self._starts, match.start())
                 self.tokens.append(Token(kind, match[0], match.start(), match.end(), line))
         self.tokens.append(Token("end", "", len(text), len(text), len(self._starts)))
@@ -84,7 +84,7 @@ class TokenizedText:
         return len(lead[0].expandtabs(8)) if lead else 0
 
     def token_at(self, offset: int) -> int:
-        """Index of the token at an offset, or of the next one behind it."""
+        """Index of the token at an offset, or of the next one after it."""
         low, high = 0, len(self.tokens) - 1
         while low < high:
             middle = (low + high) // 2

@@ -85,16 +85,16 @@ def str_sub(src: Any, index: Any, count: Any = None) -> str:
     return text[start : start + at_most]
 
 
-def to_num(spelt: Any) -> int | float:
+def to_num(number_text: Any) -> int | float:
     """The number a string spells: a float if it has a decimal point, else an int.
 
-    Leading blanks, a sign, an exponent, 0x..., inf and nan are allowed. An exponent without a point that
+    Leading spaces, a sign, an exponent, 0x..., inf and nan are allowed. An exponent without a point that
     leaves a fraction ("5e-4") gives a float: the manual allows the text and names no type.
 
     Raises:
         ScriptRuntimeError: no valid number, or out of range for its type.
     """
-    text = string("to_num", "str", spelt)
+    text = string("to_num", "str", number_text)
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise ScriptRuntimeError(f'to_num: string doesn\'t contain a valid number: "{text[:40]}"')

@@ -108,18 +108,18 @@ class Catalogue:
         return by_lower_case[matches[0]] if matches else None
 
     def static_bind(self, name: str, n_positional: int, keyword_names: Sequence[str] = ()) -> list[Slot]:
-        """Where the value of each parameter comes from in a call of this shape; nobody may change the list.
+        """Where the value of each parameter comes from in a call of this form; the list must not be changed.
 
         Raises:
             ScriptTypeError: the call does not fit the signature.
         """
-        shape = name, n_positional, tuple(keyword_names)
-        slots = self._slots.get(shape)
+        form = name, n_positional, tuple(keyword_names)
+        slots = self._slots.get(form)
         if slots is None:
-            # A program has few shapes, the catalogue is for all programs: do not let it grow for ever.
+            # A program has few forms of calls, but all programs share the catalogue: limit its size.
             if len(self._slots) > _MOST_CALL_FORMS:
                 self._slots.clear()
-            slots = self._slots[shape] = static_bind(self._by_name[name], n_positional, keyword_names)
+            slots = self._slots[form] = static_bind(self._by_name[name], n_positional, keyword_names)
         return slots
 
     def check_of(self, name: str) -> Callable[[Sequence[Any]], None]:

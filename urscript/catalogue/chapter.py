@@ -12,7 +12,7 @@ MANUAL_CB3 = "URScript API Reference CB3 3.15.4"
 MANUAL_E = "Script Manual e-Series 5.11"
 MANUAL_LATE = "Script Directory e-Series 5.2x"
 MANUAL_X = "world model and ROS 2 pages of the 5.2x / 10.x script directories"
-DRIVER_SCRIPT = "called behind run-time tests by the maker's driver script, which 3.14.3 and later accept"
+DRIVER_SCRIPT = "called after run-time tests by the maker's driver script, which 3.14.3 and later accept"
 POLYSCOPE_EXPORT = "written by PolyScope into exported programs"
 FIELD_USE = "called by field scripts and public clients"
 

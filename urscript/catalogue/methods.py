@@ -1,7 +1,7 @@
 """The methods that values have in later software: `list.append(x)` and its like.
 
-None is modelled; the table lets the box say so instead of denying them. Source: e-Series script directory,
-chapter Lists and Structs.
+None is modelled; with the table, the box reports that instead of an unknown method. Source: e-Series script
+directory, chapter Lists and Structs.
 """
 
 from __future__ import annotations

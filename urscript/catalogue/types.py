@@ -90,7 +90,7 @@ class Param:
     Args:
         name: as in keyword calls.
         type: what the argument must be.
-        default: the value when the argument is omitted; None stands for "the controller fills it
+        default: the value when the argument is omitted; None means "the controller fills it
             in" (the active TCP, the present joint positions, another parameter's value), see `shown`.
         unit: SI unit or the meaning of the codes.
         low: smallest value allowed for a number, None for no bound.

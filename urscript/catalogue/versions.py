@@ -94,7 +94,7 @@ def releases(
 
 
 NEVER = PerGeneration()
-# "3.0", "5.0" and "10.0" stand for "since the first release": the manuals rarely give a later one.
+# "3.0", "5.0" and "10.0" mean "since the first release": the manuals rarely give a later one.
 EVERYWHERE = releases("3.0", "5.0", "10.0")
 CB3_ONLY = releases("3.0")
 NOT_CB3 = releases(None, "5.0", "10.0")

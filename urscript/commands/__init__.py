@@ -1,1 +1,1 @@
-"""What the commands of `urscript` do behind their options, above all `urscript run`."""
+"""Implementation of the commands of `urscript`, mainly `urscript run`."""

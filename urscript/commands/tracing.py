@@ -20,7 +20,7 @@ class TracedLine(NamedTuple):
     Attributes:
         thread: Name of the thread that executes it.
         line: From 1.
-        text: The line without the blanks around it.
+        text: The line without surrounding spaces.
     """
 
     thread: str

@@ -1,7 +1,7 @@
 """Text -> logical lines of tokens, and the comments between them: what a formatter needs beside the tree.
 
 A logical line is one line of the canonical layout: a short statement, the head of a block up to its colon,
-`else:`, `end`. A comment is what stands between two tokens besides spaces.
+`else:`, `end`. Comments are between two tokens.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ _COMMENT: Final = re.compile(r"#[^\n]*")
 
 
 class Comment(NamedTuple):
-    """A `#` and the rest of its line, without blanks at the end.
+    """A `#` and the rest of its line, without trailing spaces.
 
     Attributes:
         text: From the `#` on.
         position: Characters of the text before it.
         column: From 1.
-        follows_code: A token stands before it on its line.
+        follows_code: A token precedes it on its line.
     """
 
     text: str
@@ -36,12 +36,12 @@ class Comment(NamedTuple):
 
     @property
     def end(self) -> int:
-        """The position just after it."""
+        """The position after it."""
         return self.position + len(self.text)
 
 
 class RuleToken(NamedTuple):
-    """One token and the rule of the grammar it stands in."""
+    """One token and the rule of the grammar that it belongs to."""
 
     token: Token
     rule: str
@@ -58,12 +58,12 @@ class RuleToken(NamedTuple):
 
     @property
     def end(self) -> int:
-        """The position just after it."""
+        """The position after it."""
         return self.token.end_pos or 0
 
 
 class LogicalLine(NamedTuple):
-    """The tokens of one line of the canonical layout, and how many blocks it stands in."""
+    """The tokens of one line of the canonical layout, and the number of blocks around it."""
 
     level: int
     tokens: tuple[RuleToken, ...]
@@ -75,7 +75,7 @@ def read_logical_lines(source: Source) -> list[LogicalLine]:
 
 
 def read_comments(text: str, start: int, end: int) -> list[Comment]:
-    """The comments in `text[start:end]`, a stretch between two tokens."""
+    """The comments in `text[start:end]`, a range between two tokens."""
     found = []
     for match in _COMMENT.finditer(text, start, end):
         line_start = text.rfind("\n", 0, match.start()) + 1

@@ -1,9 +1,9 @@
 """Text -> text in the canonical layout: `urscript fmt`.
 
-Two blanks a level, one statement a line, one blank around operators and after commas. Kept as written:
-comments, `$` labels, spare brackets, the spelling of numbers, one blank line where there were some, and a
-line break inside a statement where it stands after a comma or an opening bracket or beside an operator.
-Only blanks and line ends ever change, so the program means what it meant.
+Two spaces a level, one statement a line, one space around operators and after commas. Kept as written:
+comments, `$` labels, redundant brackets, the spelling of numbers, one blank line where there were some, and a
+line break inside a statement after a comma or an opening bracket or beside an operator.
+Only white space changes, so the program keeps its meaning.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ _CALL_LIKE: Final = frozenset({"function", "thread", "call", "run"})
 INDENT: Final = "  "
 
 _CONTINUED: Final = 2 * INDENT
-"""How much deeper the rest of a broken statement stands; more than a block, to look different."""
+"""Additional indentation of continuation lines; more than that of a block."""
 
 ALIGNED_WIDTH: Final = 60
-"""Comments behind neighbouring lines stand below each other; behind longer lines each stands for itself."""
+"""Comments after consecutive lines are aligned; those after longer lines are not."""
 
 
 def format_program(source: Source) -> str:
     """The text of `source` in the canonical layout, line feeds only.
 
     Raises:
-        ScriptSyntaxError: `source` is not a program; nothing can be said about its layout.
+        ScriptSyntaxError: `source` has a syntax error.
     """
     tree = parse(source)
     try:
@@ -89,7 +89,7 @@ class _Layout:
         return position - self._text.rfind("\n", 0, position)
 
     def _add_comment(self, comment: Comment, indent: str) -> None:
-        """A comment behind the line before it, or on a line of its own."""
+        """Add a comment after the line before it, or on its own line."""
         if comment.follows_code:
             self._lines[-1].comment = comment.text
         else:
@@ -107,7 +107,7 @@ class _Layout:
         line = _PhysicalLine(indent)
         self._lines.append(line)
         before: RuleToken | None = None
-        opened: list[int] = []  # for each open bracket the line it stands in
+        opened: list[int] = []  # the line of each open bracket
         for token in logical.tokens:
             if token.kind in _CLOSERS:
                 opened.pop()
@@ -177,7 +177,7 @@ def _may_break(before: RuleToken, token: RuleToken) -> bool:
 
 
 def _needs_space(before: RuleToken, token: RuleToken) -> bool:
-    """Whether a blank stands between two tokens of a line."""
+    """Whether a space separates two tokens of a line."""
     kind = token.kind
     if kind == "DOT":
         return before.kind in _NUMBERS  # or the dot would become part of the number
@@ -198,7 +198,7 @@ def _binds_name(token: RuleToken) -> bool:
 
 
 def _render(lines: list[_PhysicalLine]) -> str:
-    """The text of `lines`, comments behind neighbouring lines aligned."""
+    """The text of `lines`, comments after consecutive lines aligned."""
     result: list[str] = []
     start = 0
     while start < len(lines):

@@ -286,7 +286,7 @@ def _position(code: CodeType, instruction: int) -> tuple[int, int]:
 
 
 def thread_line(thread: ScriptThread, file_name: str) -> int:
-    """The line of the script where a suspended thread stands, of the innermost call.
+    """The line of a suspended thread in the script, of the innermost call.
 
     Quick enough for every cycle; a position takes long in a long function.
     """
@@ -295,7 +295,7 @@ def thread_line(thread: ScriptThread, file_name: str) -> int:
 
 
 def thread_position(thread: ScriptThread, file_name: str) -> tuple[int, int]:
-    """Line and column where a suspended thread stands."""
+    """Line and column of a suspended thread."""
     frame = _standing(thread, file_name)
     return (1, 1) if frame is None else _position(frame.f_code, frame.f_lasti)
 

@@ -2,7 +2,7 @@
 
 Every runnable thread runs once a cycle, the main thread first, then the others by age, in the same order
 every cycle; each runs until its time slice ends (`NEXT_CYCLE`) or it waits (`Blocked`). A thread whose
-condition comes true later in the cycle (a `join` on a thread that ends) goes on in the same cycle with
+condition comes true later in the cycle (a `join` on a thread that ends) continues in the same cycle with
 the rest of its budget. Threads are not preempted, so a critical section needs no code: other threads run
 only during calls that take time, also inside a critical section. Source: script manual,
 thread scheduling; the fixed order: streaming programs stutter without it.
@@ -209,7 +209,7 @@ class Scheduler:
         self._thread_ended(thread)
 
     def kill(self, by: ScriptThread | None, handle: Any) -> None:
-        """Stop the thread of `handle` and its children; 0 stands for no thread and does nothing.
+        """Stop the thread of `handle` and its children; 0 is no thread and has no effect.
 
         Raises:
             ThreadKilled: The killer is among them.
@@ -244,7 +244,7 @@ class Scheduler:
 
 
 def join(by: ScriptThread, handle: Any) -> ThreadBody:
-    """Wait until the thread of `handle` ends; 0 stands for no thread and does nothing."""
+    """Wait until the thread of `handle` ends; 0 is no thread and has no effect."""
     thread = thread_of(handle, "join")
     if thread is by:
         raise ScriptRuntimeError("a thread cannot join itself")

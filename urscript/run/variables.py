@@ -25,7 +25,7 @@ UNDEFINED: Final = _Undefined()
 
 
 def undefined(name: str) -> Any:
-    """A variable was read before anything was assigned to it (U: what a controller says)."""
+    """A variable was read before a value was assigned to it (U: the text of a controller)."""
     raise ScriptRuntimeError(f"variable '{name}' is used before a value is assigned to it")
 
 

@@ -23,8 +23,8 @@ class Blocked:
 
     Attributes:
         ready: Called once a cycle or more often; must be cheap and without side effects.
-        outside: The thread waits for something outside the box (bytes of a peer); in lockstep, time stands
-            still until it comes.
+        outside: The thread waits for something outside the box (bytes of a peer); in lockstep, time
+            stops until it comes.
     """
 
     __slots__ = ("outside", "ready")

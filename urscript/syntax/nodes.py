@@ -92,7 +92,7 @@ class Name(Expression):
 
 @dataclass(frozen=True, slots=True)
 class UnaryOperation(Expression):
-    """`-x`, `+x`, `not x` (also spelt `!x`)."""
+    """`-x`, `+x`, `not x` (also written `!x`)."""
 
     operator: Literal["-", "+", "not"]
     operand: Expression
@@ -236,7 +236,7 @@ class KeywordStatement(Statement):
 
 @dataclass(frozen=True, slots=True)
 class Label(Statement):
-    """`$ 12 "Move"`: where PolyScope's program tree stands; `text` is the line after the `$`."""
+    """`$ 12 "Move"`: a node of PolyScope's program tree; `text` is the line after the `$`."""
 
     text: str
 

@@ -24,7 +24,7 @@ def parse(source: Source) -> nodes.Block:
 
     Raises:
         ScriptSyntaxError: The text does not follow the grammar; the place is the first token that
-            cannot continue what stands before it (a missing bracket shows on the next statement).
+            cannot follow the text before it (a missing bracket is detected at the next statement).
         ScriptLexerError: A character or number that starts no token.
     """
     from lark.exceptions import UnexpectedCharacters, UnexpectedToken
@@ -41,7 +41,7 @@ def parse(source: Source) -> nodes.Block:
 
 
 def find_syntax_errors(source: Source, limit: int = 20) -> list[ScriptSyntaxError]:
-    """The first syntax errors of `source`: after each the parser goes on with the next statement."""
+    """The first syntax errors of `source`: after each the parser continues with the next statement."""
     from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
     errors: list[ScriptSyntaxError] = []
@@ -110,7 +110,7 @@ def _lark() -> Lark:
     from lark import Lark
 
     grammar = files("urscript.syntax").joinpath("grammar.lark").read_text(encoding="utf-8")
-    # The basic lexer, not the contextual one: a reserved word stays reserved wherever it stands.
+    # The basic lexer, not the contextual one: a reserved word is reserved everywhere.
     return Lark(grammar, parser="lalr", lexer="basic", keep_all_tokens=True, transformer=TreeBuilder())
 
 
