@@ -128,9 +128,7 @@ class Sessions(RuleBasedStateMachine):
                 self.fuzz.close()
 
 
-Sessions.TestCase.settings = settings(
-    max_examples=15, stateful_step_count=40, deadline=None, derandomize=True
-)
+Sessions.TestCase.settings = settings(max_examples=15, stateful_step_count=40, derandomize=True)
 TestSessions = Sessions.TestCase
 
 

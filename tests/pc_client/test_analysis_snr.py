@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from recording_samples import PERIOD, SIGNALS, append_rows, bell, provenance, record_movement
 
@@ -23,7 +23,6 @@ def measured(path: Path) -> Snr:
     return measure_snr(track_of(load_recording(path)))
 
 
-@settings(deadline=None)
 @given(st.floats(0.001, 0.1), st.integers(1, 8))
 def test_delayed_sine(delay: float, periods: int) -> None:
     t = np.arange(1000) / 1000.0
@@ -33,7 +32,6 @@ def test_delayed_sine(delay: float, periods: int) -> None:
     assert snr_db(reference, actual) == pytest.approx(expected, abs=1e-6)
 
 
-@settings(deadline=None)
 @given(st.floats(-0.9, 3.0).filter(lambda g: abs(g - 1.0) > 1e-3))
 def test_scaled_signal(gain: float) -> None:
     reference = np.array([0.0, 1.0, 4.0, 2.0])

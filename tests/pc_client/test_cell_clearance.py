@@ -38,7 +38,7 @@ def ball_centre(q):
     return (dh_pose(q) @ (0.0, 0.0, 0.2, 1.0))[:3]
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(0, 10**6))
 def test_a_ball_at_the_flange_has_the_distance_that_the_dh_table_says(seed):
     # Solids around nothing but the ball: the arm's own links are far from a wall on the ball's side.
@@ -55,7 +55,7 @@ def test_a_ball_at_the_flange_has_the_distance_that_the_dh_table_says(seed):
     assert distances.nearest[0] == ("tool sphere 'ball'", "wall 'across'", 5)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     st.sampled_from(["boxes", "spheres", "cylinders", "capsules"]),
     st.floats(-3.0, 3.0),

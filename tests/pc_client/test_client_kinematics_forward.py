@@ -21,7 +21,6 @@ def test_the_nominal_model_is_the_published_dh_table_in_the_base_frame(name):
         np.testing.assert_allclose(tcp_pose(model, q), dh_pose(q, DH[name]), rtol=0, atol=1e-10)
 
 
-@settings(deadline=None)
 @given(ANGLES)
 def test_the_oracle_solves_its_own_forward_kinematics(q):
     T = dh_pose(q)
@@ -32,7 +31,7 @@ def test_the_oracle_solves_its_own_forward_kinematics(q):
         assert min(np.abs(wrap(q - solution)).max() for solution in closed_form_ik(T).values()) < 1e-8
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(ANGLES)
 def test_the_jacobian_is_the_derivative_of_the_pose(q):
     J, h = tcp_jacobian(UR3, q), 1e-6

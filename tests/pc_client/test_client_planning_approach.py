@@ -48,7 +48,7 @@ def test_from_home_the_direct_way_is_taken():
     assert_above_the_plane(approach)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.lists(st.integers(-1, 1), min_size=6, max_size=6), st.floats(-0.3, 0.3))
 def test_turns_of_the_present_posture_are_kept_not_unwound(turns, offset):
     q_now = PLAN.start_q + 2 * np.pi * np.array(turns) + offset
@@ -121,7 +121,7 @@ def test_raised_postures_stay_within_the_joint_ranges(turns):
     assert chain[2][2, 3] == pytest.approx(0.1519 + 0.24365 + 0.21325, abs=1e-9)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 10**6))
 def test_from_any_clear_posture_the_way_found_is_clear(seed):
     rng = np.random.default_rng(seed)

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pc_client.planning.joint_lines import JointLines
@@ -17,7 +17,6 @@ ways = st.lists(posture, min_size=2, max_size=4)
 limits = {"v": st.floats(0.05, 0.5), "a": st.floats(0.05, 0.8)}
 
 
-@settings(deadline=None)
 @given(postures=ways, **limits)
 def test_it_begins_and_ends_at_rest_in_the_first_and_the_last_posture(postures, v, a):
     lines = JointLines(postures, v, a)
@@ -34,7 +33,6 @@ def test_it_begins_and_ends_at_rest_in_the_first_and_the_last_posture(postures, 
         assert not qd.any()
 
 
-@settings(deadline=None)
 @given(way=st.floats(1e-4, 6.0), **limits)
 def test_the_leading_joint_has_the_trapezoid_of_v_and_a(way, v, a):
     lines = JointLines([np.zeros(6), np.array((0, -way, way / 2, 0, 0, 0))], v, a)
@@ -47,7 +45,6 @@ def test_the_leading_joint_has_the_trapezoid_of_v_and_a(way, v, a):
     np.testing.assert_allclose(q[:, 2], -q[:, 1] / 2, atol=1e-12)
 
 
-@settings(deadline=None)
 @given(postures=ways, **limits)
 def test_it_stays_on_the_lines_and_rests_at_each_posture(postures, v, a):
     lines = JointLines(postures, v, a)

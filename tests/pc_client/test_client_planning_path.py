@@ -68,7 +68,7 @@ def test_the_whole_path_is_one_closed_form_branch(movement):
     assert plan.report.rotation_error.value <= 1e-9
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.lists(POINTS, min_size=2, max_size=3))
 def test_every_path_in_the_recommended_box_can_be_planned(points):
     # .35 m/s in any direction is possible all over the box; peak speed here is 1.875 * .45 / 3 = .28 m/s.

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -13,7 +13,6 @@ KNOTS = st.integers(2, 30).flatmap(lambda n: arrays(np.float64, (n, 6), elements
 DURATIONS = st.floats(0.01, 60.0)
 
 
-@settings(deadline=None)
 @given(KNOTS, DURATIONS)
 def test_it_passes_through_its_knots_and_rests_at_both_ends(knots, duration):
     spline = JointSpline(duration, knots)
@@ -22,7 +21,6 @@ def test_it_passes_through_its_knots_and_rests_at_both_ends(knots, duration):
     np.testing.assert_array_equal(qd[[0, -1]], 0.0)
 
 
-@settings(deadline=None)
 @given(KNOTS, DURATIONS)
 def test_position_velocity_and_acceleration_are_continuous_at_knots(knots, duration):
     spline = JointSpline(duration, knots)
@@ -36,7 +34,6 @@ def test_position_velocity_and_acceleration_are_continuous_at_knots(knots, durat
     np.testing.assert_allclose(spline.qdd(t - eps), spline.qdd(t + eps), rtol=0, atol=1e-5 * scale / h**2)
 
 
-@settings(deadline=None)
 @given(KNOTS, DURATIONS, st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=20))
 def test_one_time_and_many_times_give_the_same(knots, duration, fractions):
     spline = JointSpline(duration, knots)
@@ -86,7 +83,6 @@ def test_after_the_end_it_rests_at_the_last_knot(t):
     np.testing.assert_array_equal(qd, 0.0)
 
 
-@settings(deadline=None)
 @given(DURATIONS, st.integers(2, 3000))
 def test_the_last_moment_before_the_end_is_inside(duration, n):
     knots = np.linspace(0.0, 1.0, n)[:, None] * np.ones(6)

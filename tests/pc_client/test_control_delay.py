@@ -46,7 +46,7 @@ def test_excitation_is_small_smooth_and_ends_where_it_began(pulse, fastest):
     np.testing.assert_allclose(qd_cmd.sum(axis=0) * PERIOD, 0.0, atol=1e-12)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(delay=st.floats(0.003, 0.15), seed=st.integers(0, 99))
 def test_estimate_is_sub_sample_under_encoder_noise_and_ripple(delay, seed):
     t, qd_cmd = commands()

@@ -31,7 +31,7 @@ def stream(dead_time, lag, disturbance=0.0, seed=0):
     return qd_cmd, q + np.cumsum(pushes, axis=0) * PERIOD
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(dead_time=st.floats(0.0, 0.05), lag=st.floats(0.0, 0.03))
 def test_of_a_loop_that_it_knows_it_predicts_every_frame(dead_time, lag):
     qd_cmd, q = stream(dead_time, lag)

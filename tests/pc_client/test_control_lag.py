@@ -54,7 +54,7 @@ def test_slow_motion_trails_by_dead_time_and_lag(dead_time, lag):
     assert phase / (2 * np.pi * hertz[0]) == pytest.approx(dead_time + lag + PERIOD, abs=1e-4)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(dead_time=st.floats(0.005, 0.06), lag=st.floats(0.003, 0.03), seed=st.integers(0, 99))
 def test_both_are_found_under_noise_and_gear_waves(dead_time, lag, seed):
     t, qd_cmd = excitation()

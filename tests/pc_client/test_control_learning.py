@@ -94,7 +94,7 @@ def test_noise_that_is_learned_costs_what_the_filter_says():
     share=st.floats(0.0, 1.0),
     late=st.floats(-1.0, 1.0),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_contraction_holds_for_every_loop_within_the_spread(dead_time, lag, spread, share, late):
     loop = LoopModel(dead_time, lag, spread, 0.0)
     promised = design_filter(loop, PERIOD, **GAINS)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from control_loop import PERIOD, DelayedArm
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -92,7 +92,6 @@ gains_p = st.just(0.0) | st.floats(-2.0, 2.5).map(lambda x: 10.0**x)
 gains_i = st.just(0.0) | st.floats(-2.0, 4.0).map(lambda x: 10.0**x)
 
 
-@settings(deadline=None)
 @given(loop=loops, gain_p=gains_p, gain_i=gains_i)
 def test_the_gain_margin_is_above_one_exactly_when_all_poles_are_inside(loop, gain_p, gain_i):
     assume(gain_p > 0.0 or gain_i > 0.0)
@@ -104,7 +103,6 @@ def test_the_gain_margin_is_above_one_exactly_when_all_poles_are_inside(loop, ga
     assert (margins.gain > 1.0) == (margins.peak < math.inf)
 
 
-@settings(deadline=None)
 @given(loop=loops, gain_p=gains_p, gain_i=gains_i)
 def test_gains_that_grow_by_the_margin_put_a_pole_on_the_unit_circle(loop, gain_p, gain_i):
     assume(gain_p > 0.0 or gain_i > 0.0)

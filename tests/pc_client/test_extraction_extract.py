@@ -276,7 +276,7 @@ rows = st.lists(
 
 
 @given(rows, st.sampled_from([1e-3, 1e-2]))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_no_samples_whatever_make_it_fail(rows, unit):
     t, x, y = np.array(rows, dtype=float).T
     part, _ = ordered_part(np.nancumsum(t) * unit, np.column_stack((x, y)))

@@ -57,7 +57,7 @@ def test_times_begin_and_end_with_the_part():
 )
 @example([(1, 0, 0), (10, 0, 0), (28, 0, 1), (11, 0, 0), (39, 0, 0)])
 @example([(1, 0, 0), (46, 0, 0), (12, 0, 1), (24, 0, 0)])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_clock_makes_the_signal_leave_the_path_far(rows):
     """No overshoot of a curve between close time stamps: never more than the size of the path itself; ends stay."""
     steps, x, y = np.array(rows, dtype=float).T

@@ -69,7 +69,7 @@ def test_slows_down_only_when_asked() -> None:
     assert fit_movement(movement, max_speed=100.0, may_slow_down=True).stretch == 1.0
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     angle=st.floats(-math.pi, math.pi),
     scale=st.floats(1e-3, 1e3),

@@ -45,7 +45,7 @@ def test_every_kind_keeps_targets_and_time_and_survives_saving(kind: str, tmp_pa
         np.testing.assert_array_equal(got, expected)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(kind=st.sampled_from(list(GENERATORS)), n=st.integers(2, 7), seed=st.integers(0, 10**6))
 def test_any_movement_of_any_kind_is_smooth_from_rest_to_rest(kind: str, n: int, seed: int) -> None:
     made = generate_movement(kind, n, seed)
@@ -173,7 +173,7 @@ def test_windows_overlap_by_their_share_and_fill_the_total(
     np.testing.assert_allclose(shared, overlap * np.minimum(lengths[:-1], lengths[1:]), atol=1e-9 * total)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32), share=st.floats(0.0, 1.0), number=st.sampled_from(["4_1", "5_2"]))
 def test_duplicates_are_valid_and_inside_the_published_ranges(seed: int, share: float, number: str) -> None:
     original = load_movement(f"arcs/lognorm_{number}")

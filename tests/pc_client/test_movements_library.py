@@ -93,7 +93,7 @@ def test_sums_of_strokes_reach_the_last_target() -> None:
         assert np.linalg.norm(movement.law.evaluate(60.0).p[0] - movement.target_points[-1]) < 1e-14
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32), n=st.integers(2, 7))
 def test_random_targets_follow_their_rules(seed: int, n: int) -> None:
     rules = TargetRules()
@@ -113,7 +113,7 @@ def test_random_targets_follow_their_rules(seed: int, n: int) -> None:
     np.testing.assert_array_equal(points, random_targets(n, UR3_BOX, random.Random(seed), rules))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6), n=st.integers(2, 6))
 def test_generated_twins_share_targets_and_times(seed: int, n: int) -> None:
     human, robot = generate_movement("lognormal", n, seed), generate_movement("uniform", n, seed)

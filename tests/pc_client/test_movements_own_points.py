@@ -33,7 +33,7 @@ def test_both_styles_have_the_same_strokes_by_default() -> None:
     np.testing.assert_array_equal(human.stroke_durations, default_durations(POINTS))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(*(st.floats(-0.5, 0.5),) * 3), min_size=2, max_size=6))
 def test_default_durations_keep_the_top_speed_and_are_never_short(
     points: list[tuple[float, float, float]],

@@ -100,7 +100,7 @@ def test_derivatives(law: PowerLaw) -> None:
         np.testing.assert_allclose((after.v - before.v) / (2 * h), at.a, atol=1e-5)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     scale=st.floats(0.1, 10.0),
     angles=st.tuples(*(st.floats(-3.0, 3.0) for _ in range(3))),

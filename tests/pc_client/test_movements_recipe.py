@@ -125,7 +125,7 @@ def test_the_lead_of_one_window_is_the_one_that_a_hand_allows() -> None:
     assert sigma_for_k(4.0 / 3.0) == pytest.approx(0.066756911, abs=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10**6), n=st.integers(2, 7))
 def test_any_seed_stays_in_the_box_at_the_top_speed(seed: int, n: int) -> None:
     movement = recipe_movement(n, seed, "x")

@@ -125,7 +125,7 @@ def test_a_changed_provenance_is_noticed(tmp_path: Path, whole: bytes) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 20_000), st.integers(0, 255)), min_size=1, max_size=4))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_no_damage_makes_the_loader_fail_otherwise(
     tmp_path_factory: pytest.TempPathFactory, changes: list[tuple[int, int]]
 ) -> None:

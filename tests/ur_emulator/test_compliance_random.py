@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from box_support import Bench
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocol.ur_types import ControlMode, RobotMode
@@ -83,7 +83,7 @@ event = st.one_of(
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=30)
 @given(st.lists(st.tuples(event, st.integers(1, 60)), min_size=1, max_size=10), st.integers(0, 5))
 def test_nothing_breaks_a_compliant_arm(events, seed):
     bench = Bench(fidelity=("ideal", "typical", "poor")[seed % 3], seed=seed)

@@ -308,7 +308,7 @@ def test_many_clients_at_once(box):
             assert read_answer(sock)[1] == b"\3\2" + struct.pack(">H", i)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.lists(st.binary(min_size=1, max_size=30), min_size=1, max_size=5))
 def test_any_request_gets_an_answer(pdus):
     with connect(_any_box(), "modbus") as sock:

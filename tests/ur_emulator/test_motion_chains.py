@@ -188,7 +188,7 @@ def test_corners_of_process_moves_keep_the_acceleration(r, v):
     assert speeds(targets)[40:-40].min() == pytest.approx(min(v, math.sqrt(A * r)), rel=0.03)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.floats(0.005, 0.05), st.floats(0.1, 2.0), st.booleans())
 def test_arcs_keep_the_acceleration(radius, v, fixed):
     via, goal = at(radius, radius, 0.0), at(2 * radius, 0.0, 0.0)
@@ -277,7 +277,7 @@ def check_chain(makers):
     return targets, legs, outcomes
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(moves, min_size=2, max_size=5))
 def test_moves_that_can_be_executed_one_by_one_can_be_executed_as_a_chain(makers):
     assume(can_be_executed_one_by_one(makers))
@@ -331,7 +331,7 @@ def test_chains_that_random_search_has_found_can_be_executed(name):
     check_chain(FOUND[name])
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     st.lists(st.tuples(places, radii), min_size=2, max_size=5),
     st.sampled_from([0.1, 0.25, 0.5]),

@@ -31,7 +31,7 @@ offsets = st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.3, 0.3)] * 3)
 V, A = 0.25, 1.2
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(offsets, st.floats(0.05, 0.3), st.floats(0.3, 3.0))
 def test_movel_keeps_its_limits_stays_on_the_line_and_arrives_exactly(way, v, a):
     assume(math.dist(way[:3], (0, 0, 0)) > 0.045)
@@ -88,7 +88,7 @@ def corner_moves(second, r=0.02, **limits):
     return first, line(corner, second, first.goal, **limits), corner
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.floats(0.0, 3.1), st.floats(0.002, 0.035), st.floats(0.1, 0.3))
 def test_a_blend_of_movels_keeps_limits_and_stays_within_r(angle, r, v):
     first, second, corner = corner_moves(

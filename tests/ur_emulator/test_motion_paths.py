@@ -27,7 +27,6 @@ def check_derivatives(path):
         assert path.at(s)[1] == pytest.approx(derivative(path, s), abs=1e-5)
 
 
-@settings(deadline=None)
 @given(poses, poses)
 def test_a_line_is_straight_ends_exactly_and_knows_its_derivative(start, goal):
     path = PoseLine(start, goal)
@@ -45,7 +44,6 @@ def test_a_turn_on_the_spot_has_a_length():
     assert path.at(path.length / 2)[0] == pytest.approx((0.1, 0.2, 0.3, 0, 0, 0.5))
 
 
-@settings(deadline=None)
 @given(poses, poses, poses, st.booleans())
 def test_an_arc_is_a_circle_through_its_three_points(start, via, goal, fixed):
     a, b, c = (np.array(p[:3]) for p in (start, via, goal))
@@ -91,7 +89,7 @@ def test_points_that_differ_by_rounding_only_give_a_line(twin):
     assert path.at(path.length)[0] == points[2]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.4, 0.4)] * 3),
     st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.4, 0.4)] * 3),

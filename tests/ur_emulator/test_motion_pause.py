@@ -58,7 +58,7 @@ def travel(make, pauses=(), limit=5000):
     raise AssertionError("it does not end")
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     st.sampled_from([straight, arc, joints, corner]),
     st.lists(st.tuples(st.integers(0, 60), st.integers(1, 60)), min_size=1, max_size=2),

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ur_emulator.motion.speed_plan import Interval, plan, stopping_curve
@@ -46,7 +46,6 @@ def test_one_straight_part_is_the_trapezoid(length, v, a):
     )
 
 
-@settings(deadline=None)
 @given(intervals())
 def test_no_limit_is_exceeded_and_the_end_is_reached_at_rest(parts):
     found = plan(parts, 0.0)
@@ -71,7 +70,6 @@ def test_no_limit_is_exceeded_and_the_end_is_reached_at_rest(parts):
             assert abs(a) <= (bound - bend * z) * (1 + 1e-6) + 1e-6 * bound
 
 
-@settings(deadline=None)
 @given(intervals())
 def test_speed_is_continuous_from_segment_to_segment(parts):
     found = plan(parts, 0.0)
@@ -82,7 +80,6 @@ def test_speed_is_continuous_from_segment_to_segment(parts):
         assert s + (v + 0.5 * a * dt) * dt == pytest.approx(found.phases[k].s, rel=1e-9, abs=1e-9)
 
 
-@settings(deadline=None)
 @given(intervals(), st.floats(0.0, 1.0), intervals())
 def test_what_can_stop_can_go_on_whatever_follows(parts, share, following):
     """The promise that blends rest on: below the curve, any continuation behind the point has a plan."""

@@ -45,7 +45,7 @@ def test_servoj_follows_a_slow_sine_with_the_lag_of_its_lookahead_time(lookahead
     assert math.hypot(sine, cosine) == pytest.approx(size, abs=0.01)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(0.03, 0.2), st.floats(100, 2000), st.floats(-1, 1))
 def test_servoj_settles_at_its_goal_for_every_gain_and_lookahead(lookahead, gain, goal):
     targets = run(ServoJ((goal,) * 6, lookahead, gain), JointTarget(ZERO6), 800)
@@ -79,7 +79,7 @@ def test_a_servoj_that_is_not_renewed_stops():
     assert before - motion.target.qd[0] == pytest.approx(LOST_DECELERATION * DT)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(twists, st.floats(0.2, 2.0), st.floats(0.2, 3.0))
 def test_speedl_gives_the_tool_the_twist_it_asks_for(twist, a, a_rot):
     targets = run(SpeedL(twist, a, a_rot, TOOL), JointTarget(HOME), 70)
@@ -99,7 +99,7 @@ def test_speedl_accelerates_on_a_straight_line():
     assert np.abs(v[:, 2]).max() < 1e-3
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(twists, st.floats(0.2, 2.0))
 def test_stopl_decelerates_the_tool_at_a_and_ends_at_exact_rest(twist, a):
     moving = JointTarget(HOME, TOOL.rates(HOME, twist))

@@ -62,7 +62,7 @@ def states(plant, cycles, *, ahead):
 
 
 @given(CYCLES, st.sampled_from([TYPICAL, POOR, IDEAL]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_running_ahead_changes_no_bit(cycles, fidelity):
     plain, ahead = (states(Plant(UR3, fidelity, 3), cycles, ahead=on) for on in (False, True))
     assert plain == ahead

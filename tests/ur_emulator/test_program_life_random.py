@@ -62,7 +62,7 @@ NEXT = {
 QD_MAX = np.array(robot_by_name("ur3").qd_max) * (1 + 1e-6)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(STEPS)
 def test_commands_in_any_order(steps):
     bench = Bench(fidelity="ideal")

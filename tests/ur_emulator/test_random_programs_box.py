@@ -20,9 +20,7 @@ from ur_emulator.commands.safety import UnlockProtectiveStop
 from urscript.catalogue.types import Support
 
 EXAMPLES = int(os.environ.get("RANDOM_PROGRAMS", "25"))
-some = settings(
-    max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck), print_blob=True
-)
+some = settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck), print_blob=True)
 TOLERANCE = 1.001
 
 
@@ -123,7 +121,7 @@ def test_builtins_with_random_arguments_give_a_value_or_an_error_in_words(some_c
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
 def test_every_builtin_survives_a_few_random_arguments(row):
-    @settings(max_examples=2, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=2, database=None, suppress_health_check=list(HealthCheck))
     @given(calls(row.name))
     def survive(call):
         box = run_and_leave(program_of([f"x = {call}"]), 15)

@@ -178,7 +178,6 @@ class AnyBox(RuleBasedStateMachine):
 AnyBox.TestCase.settings = settings(
     max_examples=20,
     stateful_step_count=20,
-    deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
 TestAnyBox = AnyBox.TestCase

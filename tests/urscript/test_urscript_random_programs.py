@@ -21,9 +21,7 @@ from urscript.syntax import nodes
 from urscript.syntax.parser import parse
 
 EXAMPLES = int(os.environ.get("RANDOM_PROGRAMS", "60"))
-some = settings(
-    max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck), print_blob=True
-)
+some = settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck), print_blob=True)
 SMALL = Dialect(statement_budget=300, recursion_limit=20)
 
 
