@@ -28,8 +28,8 @@ class ServedBox:
 
     Attributes:
         controller: the box without its ports.
-        log: of everything that was said.
-        backlog: the connections that have not read all they were sent; they keep themselves up to date in it.
+        log: programs, errors, modes, text messages, clients.
+        backlog: the connections with bytes in their outbox; they enter and leave it themselves.
     """
 
     def __init__(

@@ -51,7 +51,7 @@ class PortSet:
             The numbers. That of Modbus may be missing: it is one that needs privileges.
 
         Raises:
-            PortError: one of them cannot be opened; `close` gives back the others.
+            PortError: one of them cannot be opened; `close` closes the others.
         """
         self._spare.take()
         for name, port in self._ports.items():
@@ -75,9 +75,5 @@ class PortSet:
         """Listen; lockstep does not wait for clients of the control API, and they do not fill the log."""
         box = self._box
         backlog = set[Connection]() if name == CONTROL else box.backlog
-        notice = _keep_quiet if name == CONTROL else box.notice
+        notice = (lambda text: None) if name == CONTROL else box.notice
         return Listener(self._loop, self._host, number, port, backlog, notice, name, self._spare)
-
-
-def _keep_quiet(text: str) -> None:
-    """Write nothing."""

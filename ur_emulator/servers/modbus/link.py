@@ -1,4 +1,4 @@
-"""The connection to one Modbus unit: connects, asks for what its signals want, connects anew when it breaks.
+"""The connection to one Modbus unit: sends the requests of its signals, and connects again when it breaks.
 
 All times are real time; the caller passes the clock. Bytes that are not Modbus, answers that were not asked
 for, and silence end the connection, and a new one is made; an exception or a wrong answer is no valid answer.
@@ -20,10 +20,10 @@ from ur_emulator.servers.modbus.requests import SentRequest, problem_of, request
 
 # A signal may be without a valid answer for this long [s].
 TOLERANCE = 2.0
-# A connection that is not made, or a request that is not answered, after this long is given up [s].
+# Limits for making a connection, and for an answer [s].
 CONNECT_TIMEOUT = 2.0
 ANSWER_TIMEOUT = 1.0
-# Wait before the next attempt to connect [s]: doubled each time until one has answered.
+# Pause before the next attempt to connect [s]: doubled each time until the unit answers.
 FIRST_RETRY = 0.1
 LAST_RETRY = 2.0
 # Requests that a unit may have without an answer, unless it is in sequential mode.
@@ -45,7 +45,7 @@ class _Waiting:
 
 
 class ModbusLink:
-    """One unit's connection (see controller.modbus_signals.ModbusUnit)."""
+    """One unit's connection (see `controller.io.modbus_signals.ModbusUnit`)."""
 
     def __init__(self, name: str, connect: Callable[[], ScriptSocket], period_s: float) -> None:
         """Prepare; nothing is connected before something is wanted.
@@ -69,7 +69,7 @@ class ModbusLink:
         self._own_requests: list[tuple[int, bytes]] = []
         self._under_way: dict[int, SentRequest] = {}
         self._transaction = 0
-        self._heard_at = -math.inf
+        self._answered_at = -math.inf
         self._n_unexpected = 0
         self.is_released = False
 
@@ -115,13 +115,7 @@ class ModbusLink:
     # --- the loop
 
     def advance(self, now: float) -> float:
-        """Do what can be done at `now` [s]; return when to be called next, if nothing comes before.
-
-        Args:
-            now: monotonic time.
-            codec: None while it is not loaded.
-            problem: why it will never be.
-        """
+        """Do what can be done at monotonic time `now` [s]; return when to be called next at the latest."""
         for signal in self._wanted:
             if signal not in self._waiting:
                 self._waiting[signal] = _Waiting(now)
@@ -151,7 +145,7 @@ class ModbusLink:
             return False
         if self._connect_by != math.inf:
             self._connect_by = math.inf
-            self._heard_at = now
+            self._answered_at = now
             self._n_unexpected = 0
             self._why = _SILENT
         return True
@@ -185,7 +179,7 @@ class ModbusLink:
             if self._n_unexpected > MAX_UNEXPECTED:
                 self._fail(now, "sends answers that were not asked for")
             return
-        self._heard_at = now
+        self._answered_at = now
         self._n_unexpected = 0
         self._pause = FIRST_RETRY
         signal = request.signal
@@ -204,11 +198,11 @@ class ModbusLink:
             signal.value = value
 
     def _give_up_silent(self, now: float) -> None:
-        """End what has waited too long: one request if the unit has been heard since, else the connection."""
+        """End what has waited too long: the request if the unit has answered another since, else the link."""
         for transaction, request in tuple(self._under_way.items()):
             if now < request.sent_at + ANSWER_TIMEOUT:
                 continue
-            if self._heard_at <= request.sent_at:
+            if self._answered_at <= request.sent_at:
                 self._fail(now, _SILENT)
                 return
             del self._under_way[transaction]

@@ -16,10 +16,10 @@ from ur_emulator.servers.scripts.xmlrpc_client import XmlRpcServer
 from ur_emulator.servers.tcp.buffered_socket import BufferedSocket
 
 _READ_SIZE = 64 * 1024
-# Bytes a script may have in flight to a peer that does not read; further sends fail.
+# Bytes of a script that may wait for a peer that does not read; further sends fail.
 _SEND_LIMIT = 256 * 1024
-# Bytes that may wait for a script that does not read; beyond, the peer is held back. Above the longest text
-# that a read waits for (socket_functions.MAX_INBOX).
+# Bytes that may wait for a script that does not read; then the box stops reading from the peer. Above the
+# longest text that a read waits for (socket_functions.MAX_INBOX).
 _INBOX_LIMIT = 2 << 20
 _IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOULDBLOCK", errno.EINPROGRESS)}
 
@@ -49,7 +49,7 @@ class ScriptConnection(BufferedSocket):
 
     @property
     def inbox(self) -> bytearray:
-        """Bytes that have come and were not read yet; asking lets a peer that was held back go on."""
+        """Bytes that have come and were not read yet; reading from the peer goes on with this call."""
         if not self._wants_data and self._sock is not None:
             self._wants_data = True
             self._watch()
