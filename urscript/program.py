@@ -19,7 +19,7 @@ from urscript.dialect import Dialect, dialect_for
 from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError
 from urscript.names.resolver import resolve
 from urscript.names.scopes import ResolvedProgram
-from urscript.run import runtime
+from urscript.run import positions, runtime
 from urscript.run.metering import Meter
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread
 from urscript.run.variables import UNDEFINED
@@ -242,15 +242,15 @@ class RunningProgram:
 
     def line(self, thread: ScriptThread) -> int:
         """Line of a suspended thread."""
-        return runtime.thread_line(thread, self.program.file_name)
+        return positions.thread_line(thread, self.program.file_name)
 
     def position(self, thread: ScriptThread) -> tuple[int, int]:
         """Line and column of a suspended thread."""
-        return runtime.thread_position(thread, self.program.file_name)
+        return positions.thread_position(thread, self.program.file_name)
 
     def _script_error(self, error: Exception) -> ScriptRuntimeError:
         program = self.program
-        return runtime.script_error(error, program.file_name, program.function_names, program.source)
+        return positions.script_error(error, program.file_name, program.function_names, program.source)
 
     def _fail_secondary(self) -> None:
         line, column = self.position(self._main)

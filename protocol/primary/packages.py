@@ -13,7 +13,7 @@ import struct
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
-from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.errors import RemoteProtocolError
 from protocol.primary.framing import (
     HEADER,
     PackageType,
@@ -35,7 +35,6 @@ from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import Since, since
 
 __all__ = [
-    "SAFETY_TOLERANCES",
     "SECONDARY_MESSAGES",
     "Package",
     "SafetyTolerances",
@@ -48,7 +47,7 @@ __all__ = [
 SECONDARY_MESSAGES: tuple[type[RobotMessage], ...] = (VersionMessage, StartupMessage)
 """The only robot messages that the secondary port carries."""
 
-SAFETY_TOLERANCES = (
+_SAFETY_TOLERANCES = (
     0.15,
     25.0,
     0.0,
@@ -65,7 +64,7 @@ SAFETY_TOLERANCES = (
 """Body of package type 24; undocumented. Source: a byte capture of a CB3 3.10; 3.3 did not send the
 package."""
 
-_TOLERANCES = struct.Struct(f">{len(SAFETY_TOLERANCES)}d")
+_TOLERANCES = struct.Struct(f">{len(_SAFETY_TOLERANCES)}d")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +77,7 @@ class SafetyTolerances:
 
     SINCE: ClassVar[Since] = since((3, 10))
 
-    values: tuple[float, ...] = SAFETY_TOLERANCES
+    values: tuple[float, ...] = _SAFETY_TOLERANCES
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,15 +99,9 @@ def encode_message_package(message: RobotMessage, version: SoftwareVersion) -> b
     return encode_package(PackageType.ROBOT_MESSAGE, encode_message(message, version))
 
 
-def encode_safety_tolerances(tolerances: SafetyTolerances | None = None) -> bytes:
+def encode_safety_tolerances() -> bytes:
     """A whole package of type 24."""
-    values = (tolerances or SafetyTolerances()).values
-    try:
-        return encode_package(PackageType.SAFETY_COMPLIANCE_TOLERANCES, _TOLERANCES.pack(*values))
-    except struct.error:
-        raise LocalProtocolError(
-            f"safety tolerances are {len(SAFETY_TOLERANCES)} numbers, not {values!r}"
-        ) from None
+    return encode_package(PackageType.SAFETY_COMPLIANCE_TOLERANCES, _TOLERANCES.pack(*_SAFETY_TOLERANCES))
 
 
 # --- receiving ---

@@ -229,9 +229,9 @@ class ExpressionCompiler:
 
     def array(self, target: Expression, scope: FunctionScope) -> Any:
         """The builtin array that `target` names, unless a variable hides it."""
-        if not isinstance(target, nodes.Name) or target.name in scope.locals:
+        if not isinstance(target, nodes.Name) or self._program.is_variable(target.name, scope):
             return None
-        return None if target.name in self._program.globals else self._catalogue.arrays.get(target.name)
+        return self._catalogue.arrays.get(target.name)
 
     # --- calls -------------------------------------------------------------------------------------------
 

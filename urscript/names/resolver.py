@@ -193,7 +193,7 @@ class _Resolver:
             self._expression(expression, scope, scope)
 
     def _is_pause(self, scope: FunctionScope) -> bool:
-        return self.dialect.has_pause and "pause" not in scope.locals | self.program.globals
+        return self.dialect.has_pause and not self.program.is_variable("pause", scope)
 
     def _expression(self, expression: Expression, scope: FunctionScope, runs_in: FunctionScope) -> None:
         """Look up the names of `expression` in `scope`; `runs_in` is the function that executes it."""
@@ -229,10 +229,10 @@ class _Resolver:
             self._expression(part, scope, runs_in)
 
     def _is_array(self, name: str, scope: FunctionScope) -> bool:
-        return name in self.catalogue.arrays and name not in scope.locals and name not in self.program.globals
+        return name in self.catalogue.arrays and not self.program.is_variable(name, scope)
 
     def _variable(self, name: str, span: Span, scope: FunctionScope) -> None:
-        if name in scope.locals or name in self.program.globals or name in self.catalogue.variables:
+        if self.program.is_variable(name, scope) or name in self.catalogue.variables:
             return
         if name in self.catalogue or scope.find_function(name) is not None:
             hint = f"'{name}' is a function, call it as {name}(...)"

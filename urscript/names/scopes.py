@@ -95,6 +95,10 @@ class ResolvedProgram:
     maybe_unassigned_globals: set[str] = field(default_factory=set)
     builtins: set[str] = field(default_factory=set)
 
+    def is_variable(self, name: str, scope: FunctionScope) -> bool:
+        """Whether `name` is a variable of the program in `scope`, so that it hides a builtin."""
+        return name in scope.locals or name in self.globals
+
     def scopes(self) -> list[FunctionScope]:
         """The program body and all functions."""
         return [self.main, *self.functions]
