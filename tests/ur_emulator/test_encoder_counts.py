@@ -31,7 +31,7 @@ def test_counts_outside_the_range(range_id, low, high):
         (text,) = texts(
             f"encoder_enable_set_tick_count(0, {range_id})", f"encoder_set_tick_count(0, {count})"
         )
-        assert f"allowed are {low} to {high}" in text
+        assert f"allowed: {low} to {high}" in text
     for count in (low, high):
         assert not texts(
             f"encoder_enable_set_tick_count(0, {range_id})", f"encoder_set_tick_count(0, {count:.1f})"
@@ -109,4 +109,4 @@ def test_old_forms_speak_of_the_first_encoder():
         "textmsg(get_conveyor_tick_count() == 0)",
     ) == ["True", "True", "True"]
     (text,) = texts("set_conveyor_tick_count(300, 1)")
-    assert "allowed are 0 to 255" in text
+    assert "allowed: 0 to 255" in text

@@ -87,4 +87,4 @@ def test_euromap_signals():
 
 def test_a_euromap_port_that_does_not_exist():
     (text,) = failure(run("get_euromap_input(32)"))
-    assert "allowed are 0 to 31" in text
+    assert "allowed: 0 to 31" in text

@@ -76,7 +76,7 @@ def test_a_secondary_program_is_no_program_start():
 def test_a_code_that_does_not_exist_is_an_error(kind):
     bench = Bench()
     bench.run(f"def p():\n  set_runstate_gp_{kind}_output_to_value(0, 4)\nend\n")
-    assert any("allowed are 0 to 3" in getattr(event, "text", "") for event in bench.events)
+    assert any("allowed: 0 to 3" in getattr(event, "text", "") for event in bench.events)
 
 
 def test_euromap_outputs_follow_the_program_too():
