@@ -24,7 +24,7 @@ def test_a_process_has_its_own_settings_again_after_its_last_box():
             assert (gc.get_threshold(), sys.getswitchinterval()) != before
         assert (gc.get_threshold(), sys.getswitchinterval()) != before
     assert (gc.get_threshold(), sys.getswitchinterval()) == before
-    assert gc.get_freeze_count() == frozen
+    assert gc.get_freeze_count() <= frozen  # what was frozen before may have gone
 
 
 def test_a_process_that_only_serves_collects_nothing_of_what_existed_before():
