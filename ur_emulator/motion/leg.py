@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from math import dist, sqrt
 
 from protocol.pose import Pose
-from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.models.robot_model import Vector3, Vector6, six
 from ur_emulator.motion.joint_path import JointLine, JointPath, ToolPath
 from ur_emulator.motion.path import PoseLine, PosePath
 from ur_emulator.motion.path_samples import Sample, reaches_end, sample_path
@@ -59,13 +59,10 @@ class Leg:
         sample = self.samples[max(0, bisect_right(self.samples, s, key=_way) - 1)]
         return six([q + (s - sample.s) * k for q, k in zip(sample.q, sample.slope, strict=True)])
 
-    def position(self, s: float) -> tuple[float, float, float]:
-        """Return where the tool is after the way s [m]."""
-        if isinstance(self.path, ToolPath):
-            x, y, z = self.path.path.at(s)[0][:3]
-        else:
-            x, y, z = self.tool.pose(self.path.at(s, ())[0])[:3]
-        return x, y, z
+    def position(self, s: float) -> Vector3:
+        """Return the position of the tool after the way s [m]."""
+        path = self.path
+        return (path.path.at(s)[0] if isinstance(path, ToolPath) else self.tool.pose(path.at(s, ())[0]))[:3]
 
     def with_duration(self, *, from_blend: bool = False) -> Leg:
         """Return the same leg with `v` and `a` such that it takes `t`, if `t` is given.
