@@ -93,13 +93,17 @@ class EventLoop:
         with suppress(KeyError, ValueError):
             self._selector.unregister(sock)
 
-    def expect_soon(self) -> None:
+    def expect_soon(self) -> bool:
         """Expect that a socket will be ready within a fraction of a millisecond.
 
         Sleeping and waking up takes longer than that, so the next wait polls first. When nothing comes in
         time (another process needs the processor), the next waits do not poll: twice as many each time.
+
+        Returns:
+            Whether the next wait polls: a processor is free.
         """
         self._expects_soon = True
+        return not self._skip
 
     # --- services
 

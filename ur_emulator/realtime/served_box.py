@@ -36,7 +36,7 @@ class ServedBox:
         self,
         controller: Controller,
         pacer: Pacer,
-        expect_soon: Callable[[], None],
+        expect_soon: Callable[[], bool],
         on_failure: Callable[[Exception], None],
     ) -> None:
         """Take over a controller.
@@ -44,7 +44,8 @@ class ServedBox:
         Args:
             controller: the box without its ports.
             pacer: decides when it ticks.
-            expect_soon: called when a script waits for bytes that a client is about to send.
+            expect_soon: called when a script waits for bytes that a client is about to send; returns whether
+                the client has a processor of its own.
             on_failure: called with the error that has ended a cycle; there will be no further one.
         """
         self._expect_soon = expect_soon
@@ -156,8 +157,8 @@ class ServedBox:
             if self._repeats and self.is_active:
                 if not self.waits_outside:
                     return now  # the next cycle may follow at once, after the sockets have had their turn
-                self.controller.plant.run_ahead()
-                self._expect_soon()
+                if self._expect_soon():
+                    self.controller.plant.run_ahead()
             return self._pacer.next_call(now)
         # While time stands still, every port repeats itself at its own rate, in real seconds: clients take
         # silence for a dead robot.
