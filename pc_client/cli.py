@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import typer
 
 from pc_client.commands import compare, doctor, draw, experiment, extract, movements, recordings, sweep
-from pc_client.errors import ClientError, full_message
+from pc_client.errors import ClientError, full_message, one_line
 from protocol.errors import ProtocolError
 
 app = typer.Typer(
@@ -88,5 +88,5 @@ def run(arguments: list[str] | None = None) -> int:
 
 
 def _complain(text: str, code: int) -> int:
-    print(f"ur-client: {' '.join(text.split())}", file=sys.stderr)
+    print(f"ur-client: {one_line(text)}", file=sys.stderr)
     return code

@@ -77,6 +77,22 @@ class SweepError(ClientError):
     """The configuration of a sweep makes no sense, or its folder cannot be used."""
 
 
+LONGEST_LINE = 1000
+"""Most characters of a message that are shown: what was given may be a whole file."""
+
+
+def one_line(error: BaseException | str) -> str:
+    """A message on one line that no terminal obeys: control characters escaped, cut at `LONGEST_LINE`."""
+    text = " ".join((error if isinstance(error, str) else full_message(error)).split())
+    text = text if len(text) <= LONGEST_LINE else f"{text[: LONGEST_LINE - 3]}..."
+    return printable(text)
+
+
+def printable(text: str) -> str:
+    """The text with all characters escaped that are not printed but obeyed; line breaks and tabs stay."""
+    return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
+
+
 def full_message(error: BaseException) -> str:
     """The message of an error and what was added to it on its way; a note that says it again replaces it."""
     text = str(error)

@@ -36,6 +36,7 @@ PART_COLOURS = (BLUE, ORANGE, GREEN, RED, "#444444")
 _STYLE = {
     "font.family": "DejaVu Sans",  # comes with matplotlib, so every machine draws the same letters
     "font.size": 9.0,
+    "text.parse_math": False,  # a name with two dollar signs is a name
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",

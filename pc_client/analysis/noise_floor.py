@@ -140,7 +140,7 @@ def _as_driven_like(first: Run, second: Run) -> Array | None:
 def _loop_of(run: Run) -> LoopModel | None:
     """The loop that the client identified; None in old recordings."""
     loop, delay = run.provenance.loop, run.provenance.identified_delay_s
-    if "lag_s" in loop:
+    if loop.keys() >= {"dead_time_s", "lag_s", "joint_spread_s"}:
         dead_time, lag, spread = (float(loop[x]) for x in ("dead_time_s", "lag_s", "joint_spread_s"))
         return LoopModel(dead_time, lag, spread, 0.0)
     return LoopModel.of_delay(delay, 0.0) if loop and delay is not None else None

@@ -19,7 +19,7 @@ from pc_client.analysis.budget import PARTS, SPLIT_HZ
 from pc_client.analysis.page import data_uri, render, report_libraries
 from pc_client.analysis.run import Run, analyse_run
 from pc_client.analysis.table import KINDS, Row, Table, build_table
-from pc_client.errors import RecordingError
+from pc_client.errors import CellError, RecordingError, one_line
 from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.cell_file import parse_cell
 from pc_client.recording.loader import Recording, load_recording
@@ -87,7 +87,9 @@ def build_tables(run_dir: Path | str, console: Console | None = None) -> Report:
         try:
             runs.append(analyse_run(_whole(load_recording(path))))
         except RecordingError as error:
-            left_out.append(f"{path.name}: {str(error).removeprefix(f'{path} ')}")
+            left_out.append(f"{path.name}: {one_line(error).removeprefix(str(path)).lstrip(': ')}")
+        except Exception as error:  # one file that nobody thought of must not cost the others
+            left_out.append(f"{path.name}: cannot be measured ({type(error).__name__}: {one_line(error)})")
     if not runs:
         raise RecordingError(f"{run_dir} holds no usable recording; {left_out[0]}")
     table = build_table(runs)
@@ -194,29 +196,40 @@ def provenance_facts(table: Table) -> Mapping[str, Any]:
         "controller settings": ", ".join(f"{k} = {v}" for k, v in sorted(first.controller_config.items())),
         "loop delay identified by the client": delay,
         **_loop_facts(table.loop),
-        "cell": (parse_cell(first.cell_text, "recording") if first.cell_text else NO_CELL).summary,
+        "cell": _cell_summary(first.cell_text),
         "client version": ", ".join(sorted({run.provenance.client_version for run in runs})),
         "runs": f"{len(runs)}, of {len(table.rows)} movements",
     }
 
 
+def _cell_summary(text: str) -> str:
+    """What stood around the arm and what it carried, in words."""
+    try:
+        return (parse_cell(text, "recording") if text else NO_CELL).summary
+    except CellError as error:
+        return f"cannot be read ({one_line(error)})"
+
+
 def _loop_facts(loop: Mapping[str, float | str]) -> Mapping[str, str]:
     """Return the identified loop and its margins as texts by name; nothing for old recordings."""
-    if not loop:
-        return {}
     facts: dict[str, str] = {}
-    if "lag_s" in loop:  # by a controller that tells dead time and lag apart
+    if loop.keys() >= {
+        "dead_time_s",
+        "lag_s",
+        "joint_spread_s",
+    }:  # by a controller that tells dead time and lag apart
         facts["identified loop"] = (
             f"dead time {1e3 * float(loop['dead_time_s']):.1f} ms, "
             f"lag {1e3 * float(loop['lag_s']):.1f} ms, "
             f"single joints within {1e3 * float(loop['joint_spread_s']):.1f} ms"
         )
-    facts |= {
-        "margins of the feedback": f"gain {float(loop['gain_margin']):.1f}, phase "
-        f"{float(loop['phase_margin_deg']):.0f}°, delay {1e3 * float(loop['delay_margin_s']):.0f} ms, "
-        f"sensitivity at most {float(loop['sensitivity_peak']):.2f}",
-    }
-    if "learning_cut_off_hz" in loop:
+    if loop.keys() >= {"gain_margin", "phase_margin_deg", "delay_margin_s", "sensitivity_peak"}:
+        facts["margins of the feedback"] = (
+            f"gain {float(loop['gain_margin']):.1f}, phase "
+            f"{float(loop['phase_margin_deg']):.0f}°, delay {1e3 * float(loop['delay_margin_s']):.0f} ms, "
+            f"sensitivity at most {float(loop['sensitivity_peak']):.2f}"
+        )
+    if loop.keys() >= {"learning_cut_off_hz", "learning_limited_by", "learning_contraction"}:
         facts["learning"] = (
             f"up to {float(loop['learning_cut_off_hz']):.1f} Hz (set by the {loop['learning_limited_by']}), "
             f"contraction {float(loop['learning_contraction']):.2f} a run"

@@ -25,7 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from pc_client.analysis.track import ShiftedReference, TcpTrack, speed, velocity
+from pc_client.analysis.track import MIN_MOVEMENT_ROWS, ShiftedReference, TcpTrack, speed, velocity
+from pc_client.errors import RecordingError
 
 # Where the best shift is looked for; loops on a UR arm lag 10-100 ms, a good preview can be slightly early.
 MIN_LAG_S, MAX_LAG_S = -0.1, 0.4
@@ -111,10 +112,18 @@ def shifted_pair(
     """Return reference and actual over the movement, both taken `lag_s` later at the robot.
 
     The window moves with the lag, so that the same piece of the reference is judged as without a shift.
+
+    Raises:
+        RecordingError: nearly nothing of the movement is left.
     """
     half_cycle = 0.5 * float(np.median(np.diff(track.t)))
     shifted_t = track.t - lag_s
     inside = np.flatnonzero((shifted_t > track.t_start - half_cycle) & (shifted_t < track.t_end + half_cycle))
+    if len(inside) < MIN_MOVEMENT_ROWS:
+        raise RecordingError(
+            f"{len(inside)} samples of movement are left after the best shift of {lag_s:.3f} s; "
+            f"at least {MIN_MOVEMENT_ROWS} are needed"
+        )
     window = slice(int(inside[0]), int(inside[-1]) + 1)
     t = track.t[window]
     return velocity_of(t, reference.at(lag_s, window)), velocity_of(t, track.p_actual[window])

@@ -7,6 +7,7 @@ arm gives a perfect figure. Nothing here smooths or shifts.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,21 @@ from pc_client.recording.loader import Recording
 
 # Fewer samples than this are no movement: 80 ms at 125 Hz.
 MIN_MOVEMENT_ROWS = 10
+
+SHORTEST_CYCLE, LONGEST_CYCLE = 0.5e-3, 0.05
+"""Median steps of time stamps outside are of no robot [s]: UR's control cycles are 8 and 2 ms."""
+
+_MOST = MappingProxyType(
+    {
+        "timestamp": 1e9,  # s: 30 years
+        "ref_t": 1e9,
+        "ref_tcp_position": 100.0,  # m
+        "actual_TCP_pose": 100.0,
+        "ref_q": 1e3,  # rad
+        "actual_q": 1e3,
+    }
+)
+"""What is measured, and the largest value that a robot can report."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,11 +79,21 @@ def track_of(recording: Recording) -> TcpTrack:
         RecordingError: signals are missing, or the movement phase is too short to be judged.
     """
     t = recording.t
-    rows = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)
+    with np.errstate(invalid="ignore"):  # endless times are refused below
+        rows = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)
     moving = np.flatnonzero(recording.rows_of(Phase.MOVEMENT)[rows])
     if len(moving) < MIN_MOVEMENT_ROWS:
         raise RecordingError(
             f"{recording.path} has {len(moving)} samples of movement; at least {MIN_MOVEMENT_ROWS} are needed"
+        )
+    for name, most in _MOST.items():
+        if not np.all(np.abs(recording.column(name)) <= most):  # NaN is not
+            raise RecordingError(f"{recording.path} has {name} with values beyond {most:g}, or not a number")
+    cycle = float(np.median(np.diff(t[rows])))
+    if not SHORTEST_CYCLE <= cycle <= LONGEST_CYCLE:
+        raise RecordingError(
+            f"{recording.path} has time stamps {cycle:g} s apart; {SHORTEST_CYCLE:g} to {LONGEST_CYCLE:g} s "
+            "are a robot's"
         )
     return TcpTrack(
         t=t[rows],

@@ -18,7 +18,7 @@ from pc_client.commands.options import (
     console,
     say,
 )
-from pc_client.errors import ClientError, RecordingError
+from pc_client.errors import ClientError, RecordingError, one_line
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -93,7 +93,7 @@ def extract(
     _show(outcomes, rows)
     errors = [*unusable, *(outcome.error for outcome in outcomes if outcome.error is not None)]
     for error in errors:
-        print(f"ur-client: {' '.join(error.split())}", file=sys.stderr)
+        print(f"ur-client: {one_line(error)}", file=sys.stderr)
     say(f"{len(rows)} of {len(rows) + len(errors)} recordings; results in {out}")
     if errors:
         raise typer.Exit(1)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
+from pc_client.errors import printable
 from pc_client.kinematics.cell import NO_CELL, Cell
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
+
+if TYPE_CHECKING:
+    from pc_client.analysis.report import Report
 
 console = Console(highlight=False)
 
@@ -87,11 +91,11 @@ YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before 
 
 
 def say(text: str) -> None:
-    """Print text as it is: no markup, no line breaks of our own."""
-    console.print(text, markup=False, soft_wrap=True)
+    """Print text as it is: no markup, no line breaks of our own, nothing that the terminal obeys."""
+    console.print(printable(text), markup=False, soft_wrap=True)
 
 
-def show_report(folder: Path) -> None:
+def show_report(folder: Path) -> Report:
     """Build tables and report from a folder of recordings, and print Table I beside the paper's."""
     from pc_client.analysis.report import build_report
 
@@ -100,6 +104,7 @@ def show_report(folder: Path) -> None:
     for line in report.left_out:
         say(line)
     say(f"report: {report.paths[-1]}")
+    return report
 
 
 def check_workers(workers: int | None, dask: str | None) -> None:

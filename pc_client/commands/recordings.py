@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pc_client.commands.options import console, say, show_report
+from pc_client.errors import RecordingError, one_line
 
 
 def report(
@@ -20,21 +21,38 @@ def report(
         typer.Option("--out", metavar="FILE", help="Page of several experiments; report.html by default."),
     ] = None,
 ) -> None:
-    """Build tables and report again from the recordings of an experiment; of several, one page more."""
+    """Build tables and report again from the recordings of an experiment; of several, one page more.
+
+    A recording that cannot be used is named and left out; the exit code is 1 then.
+    """
     if len(folders) == 1:
         if out is not None:
             raise typer.BadParameter(
                 f"--out is for several folders: the page of one is {folders[0]}/report.html"
             )
-        show_report(folders[0])
+        if show_report(folders[0]).left_out:
+            raise typer.Exit(1)
         return
     from pc_client.analysis.report import build_report
     from pc_client.analysis.side_by_side_page import build_side_by_side
 
     page = out or Path("report.html")
-    shown = build_side_by_side([build_report(folder, console) for folder in folders], page)
+    reports, left_out = [], []
+    for folder in folders:
+        try:
+            report = build_report(folder, console)
+        except RecordingError as error:
+            left_out.append(one_line(error))
+        else:
+            reports.append(report)
+            left_out += [f"{folder}: {line}" for line in report.left_out]
+    for line in left_out:
+        say(line)
+    shown = build_side_by_side(reports, page)
     console.print(shown.to_rich())
     say(f"report: {page}")
+    if left_out:
+        raise typer.Exit(1)
 
 
 def export(

@@ -9,12 +9,12 @@ Every other key is a field of `ControllerConfig`; `controller_fields` says what 
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
 from pc_client.control.controller_fields import FIELDS, changed
 from pc_client.errors import ControllerError
+from pc_client.input_files import parse_toml, read_text
 from pc_client.spelling import check_keys, nearest
 
 DEFAULT = "preview"
@@ -46,16 +46,9 @@ def read_controller(path: Path) -> ControllerConfig:
     Raises:
         ControllerError: the file cannot be read, a field does not exist or cannot hold its value.
     """
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ControllerError(
-            f"{path}: cannot be read ({error.strerror or error}); give a file that exists"
-        ) from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ControllerError(f"{path}: not TOML: {error}") from error
+    values = parse_toml(read_text(path, "controller"), str(path), "controller")
     check_keys(values, ("base", *FIELDS), f"{path}: ", ControllerError)
     base = values.pop("base", DEFAULT)
-    if base not in CONTROLLERS:
+    if not isinstance(base, str) or base not in CONTROLLERS:
         raise ControllerError(f"{path}: base: {base!r}; {nearest(str(base), CONTROLLERS)}")
     return changed(CONTROLLERS[base], values, lambda name: f"{path}: {name}")

@@ -14,6 +14,9 @@ from pc_client.movements.movement import Movement
 from pc_client.planning.plan import JointPlan, plan_movement
 from pc_client.recording.loader import load_recording
 
+_SHORTEST_HEAD = 1024
+"""A recording that is shorter [bytes] has no rows."""
+
 
 @dataclass(frozen=True, slots=True)
 class PlannedMovement:
@@ -138,8 +141,10 @@ def clear_folder(experiment: Experiment) -> None:
 def _refuse_to_lose(path: Path) -> None:
     try:
         provenance = load_recording(path).provenance
-    except RecordingError:  # cut off before it said anything: nothing is lost with it
-        return
+    except RecordingError as error:
+        if path.stat().st_size < _SHORTEST_HEAD:  # cut off before it said anything: nothing is lost with it
+            return
+        raise RecordingError(f"{error}; it is not overwritten, give another folder") from error
     if not provenance.simulated:
         whose = "of a real arm" if provenance.simulated is False else "of an arm that may be a real one"
         raise RecordingError(

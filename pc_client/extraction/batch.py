@@ -19,11 +19,15 @@ from pc_client.extraction.extract import ExtractOptions, extract
 from pc_client.extraction.files import parse_pen
 from pc_client.extraction.results import Row, StrokeRow, row_of, stroke_rows
 from pc_client.extraction.sources import PenSource, contents, pen_sources
+from pc_client.input_files import MIB
 
 __all__ = ["Job", "Outcome", "extract_many", "extract_sources", "run_job"]
 
-#: Jobs handed over and not yet done; enough for many workers, and few files in memory.
 _IN_FLIGHT = 128
+"""Jobs handed over and not yet done; enough for many workers."""
+
+_BYTES_IN_FLIGHT = 32 * MIB
+"""No further job is handed over while those that are not done hold more [bytes]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +74,9 @@ def run_job(job: Job) -> Outcome:
     """Read, extract, and draw where it is wanted."""
     try:
         recording = parse_pen(job.content, job.name, job.time_unit)
-    except RecordingError as error:
+        extraction = extract(recording, job.options)
+    except ClientError as error:
         return Outcome(job.name, error=str(error))
-    extraction = extract(recording, job.options)
     picture = None
     if job.with_picture and extraction.parts:
         from pc_client.extraction.figures import draw_extraction
@@ -127,7 +131,7 @@ def extract_sources(
         ClientError: the executor broke down.
     """
     outcomes: dict[int, Outcome] = {}
-    running: dict[Future[Outcome], tuple[int, str]] = {}
+    running: dict[Future[Outcome], tuple[int, Job]] = {}
 
     def keep(index: int, outcome: Outcome) -> None:
         outcomes[index] = outcome
@@ -135,16 +139,19 @@ def extract_sources(
 
     def collect(futures: Iterable[Future[Outcome]]) -> None:
         for future in futures:
-            index, name = running.pop(future)
-            keep(index, _result(future, name))
+            index, job = running.pop(future)
+            keep(index, _result(future, job.name))
 
     for index, (source, content) in enumerate(contents(sources)):
         if isinstance(content, RecordingError):
             keep(index, Outcome(source.name, error=str(content)))
             continue
         job = Job(source.name, content, options or ExtractOptions(), time_unit, index < n_pictures)
-        running[executor.submit(run_job, job)] = (index, source.name)
-        if len(running) >= _IN_FLIGHT:
+        running[executor.submit(run_job, job)] = (index, job)
+        while (
+            len(running) >= _IN_FLIGHT
+            or sum(len(job.content) for _, job in running.values()) > _BYTES_IN_FLIGHT
+        ):
             collect(wait(running, return_when=FIRST_COMPLETED).done)
     while running:
         collect(wait(running, return_when=FIRST_COMPLETED).done)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from pc_client.errors import RecordingError
 from pc_client.extraction.recording import PenPart, PenRecording, on_one_axis, ordered_part
+from pc_client.input_files import read_bytes
 
 __all__ = ["TIME_UNITS", "parse_pen", "read_pen"]
 
@@ -33,6 +34,10 @@ TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _LONGEST_STEP_S = 0.5
 #: A part that lasts longer, s, is a wrong unit or a broken clock.
 _LONGEST_PART_S = 7200.0
+#: More samples than this are refused: an extraction of as many takes minutes.
+MOST_SAMPLES = 400_000
+#: Farthest position and time, in the file's units, that a recorder writes; times in ns since 1970 are nearer.
+_FARTHEST = 1e19
 #: Gaps above this, s, are worth a remark.
 _GAP_S = 0.5
 #: Set between parts whose times overlap, s.
@@ -82,11 +87,7 @@ def read_pen(path: str | Path, time_unit: str | None = None) -> PenRecording:
     Raises:
         RecordingError: the file cannot be read or makes no sense; the message names file and line.
     """
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from error
-    return parse_pen(content, str(path), time_unit)
+    return parse_pen(read_bytes(Path(path), "pen"), str(path), time_unit)
 
 
 def parse_pen(content: bytes, name: str, time_unit: str | None = None) -> PenRecording:
@@ -116,6 +117,7 @@ def parse_pen(content: bytes, name: str, time_unit: str | None = None) -> PenRec
 
 def _rows(text: str, name: str) -> _Table:
     table = _Table([[]])
+    n_samples = 0
     for number, line in enumerate(text.splitlines(), start=1):
         cells = line.strip()
         if not cells or cells.startswith("#"):
@@ -134,6 +136,9 @@ def _rows(text: str, name: str) -> _Table:
                 f"{name}, line {number}: {len(fields)} columns after lines of {table.columns.count}; "
                 "give every sample the same columns"
             )
+        n_samples += 1
+        if n_samples > MOST_SAMPLES:
+            raise RecordingError(f"{name}: more than {MOST_SAMPLES} samples; cut the recording")
         places = (*table.columns.places, table.columns.time)
         table.parts[-1].append([_number(fields[place], name, number) for place in places])
     return table
@@ -183,9 +188,12 @@ def _number(field: str, name: str, line: int) -> float:
     if field.lower() in _MISSING:
         return math.nan
     try:
-        return float(field)
+        value = float(field)
     except ValueError:
         raise RecordingError(f'{name}, line {line}: "{field[:40]}" is not a number') from None
+    if abs(value) > _FARTHEST:
+        raise RecordingError(f'{name}, line {line}: "{field[:40]}" is more than {_FARTHEST:g}')
+    return value
 
 
 def _unit_of(parts: Sequence[NDArray[np.float64]], marked: bool) -> str:

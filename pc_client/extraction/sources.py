@@ -10,11 +10,23 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from pc_client.errors import RecordingError
+from pc_client.input_files import FILE_KINDS, MIB, read_bytes
 
 __all__ = ["PenSource", "contents", "pen_sources"]
 
 #: Files that are taken for recordings in a folder or an archive; a file that is named itself is always.
 SUFFIXES = (".csv", ".tsv", ".txt")
+
+MOST_MEMBERS = 100_000
+"""Files in one archive: three times those of Omniglot."""
+
+MOST_UNPACKED = 1024 * MIB
+"""What the recordings of one archive say they are unpacked [bytes]; Omniglot's have some 200 MiB."""
+
+_BROKEN_ARCHIVE = (
+    zipfile.BadZipFile, zlib.error, EOFError, KeyError, NotImplementedError, RuntimeError, ValueError,
+)  # fmt: skip
+"""What `zipfile` raises about an archive that is damaged, locked, or of a later form."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,16 +64,37 @@ def contents(sources: Iterable[PenSource]) -> Iterator[tuple[PenSource, bytes | 
         for source in sources:
             try:
                 if source.member is None:
-                    yield source, source.path.read_bytes()
+                    yield source, read_bytes(source.path, "pen")
                     continue
                 if archive is None or archive.filename != str(source.path):
                     opened.close()
                     archive = opened.enter_context(zipfile.ZipFile(source.path))
-                yield source, archive.read(source.member)
+                yield source, _unpack(archive, source.member)
+            except RecordingError as error:
+                yield source, error
             except OSError as error:
                 yield source, RecordingError(f"{source.name}: cannot be read ({error.strerror or error})")
-            except (zipfile.BadZipFile, zlib.error, KeyError, NotImplementedError, RuntimeError) as error:
+            except _BROKEN_ARCHIVE as error:
                 yield source, RecordingError(f"{source.name}: cannot be unpacked ({error})")
+
+
+def _unpack(archive: zipfile.ZipFile, member: str) -> bytes:
+    """One file of an archive, unpacked no further than its limit, whatever the archive says of its size.
+
+    Raises:
+        RecordingError: it is longer, or packed in a way that cannot be unpacked piece by piece.
+    """
+    info = archive.getinfo(member)
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise RecordingError(
+            f"{member}: cannot be unpacked (method {info.compress_type}); pack it by deflate"
+        )
+    most = FILE_KINDS["pen"].most_bytes
+    with archive.open(info) as packed:
+        content = packed.read(most + 1)
+    if len(content) > most:
+        raise RecordingError(f"{member}: longer than {most / MIB:g} MiB unpacked; give a shorter file")
+    return content
 
 
 def _sources(given: str | Path) -> Iterator[PenSource]:
@@ -82,15 +115,21 @@ def _sources(given: str | Path) -> Iterator[PenSource]:
 def _members(path: Path) -> list[str]:
     try:
         with zipfile.ZipFile(path) as archive:
-            names = archive.namelist()
+            files = archive.infolist()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except zipfile.BadZipFile as error:
+    except _BROKEN_ARCHIVE as error:
         raise RecordingError(f"{path}: no .zip archive ({error})") from error
+    unpacked = sum(file.file_size for file in files)
+    if len(files) > MOST_MEMBERS or unpacked > MOST_UNPACKED:
+        raise RecordingError(
+            f"{path}: {len(files)} files of {unpacked / MIB:.0f} MiB in all; allowed are {MOST_MEMBERS} "
+            f"files of {MOST_UNPACKED / MIB:.0f} MiB: unpack what is needed"
+        )
     # macOS packs a shadow of every file beside it.
     members = sorted(
         name
-        for name in names
+        for name in dict.fromkeys(file.filename for file in files)
         if PurePosixPath(name).suffix.lower() in SUFFIXES and "__MACOSX" not in PurePosixPath(name).parts
     )
     if not members:

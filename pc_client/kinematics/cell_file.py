@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from math import hypot, pi
 from pathlib import Path
 
 from pc_client.errors import CellError
+from pc_client.input_files import parse_toml, read_text
 from pc_client.kinematics.cell import SHAPES, Cell, Solid, Three, Tool, Wall
 from pc_client.toml_tables import TableReader
 
@@ -29,15 +29,7 @@ def load_cell(path: str | Path) -> Cell:
     Raises:
         CellError: unreachable file, or content that makes no sense, naming file and field.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise CellError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text") from error
-    except OSError as error:
-        raise CellError(
-            f"{path}: cannot be read ({error.strerror or error}); give a file that exists"
-        ) from error
-    return parse_cell(text, str(path))
+    return parse_cell(read_text(Path(path), "cell"), str(path))
 
 
 def parse_cell(text: str, source: str) -> Cell:
@@ -50,10 +42,7 @@ def parse_cell(text: str, source: str) -> Cell:
     Raises:
         CellError: the content makes no sense; names file and field.
     """
-    try:
-        table = TableReader(tomllib.loads(text), source, error_type=CellError)
-    except (ValueError, RecursionError) as error:  # ValueError: also of a number with thousands of digits
-        raise CellError(f"{source}: not TOML: {error}") from error
+    table = TableReader(parse_toml(text, source, "cell"), source, error_type=CellError)
     if (version := table.number("format")) != _FORMAT:
         raise table.error("format", f"{version:g}; this program reads format {_FORMAT}")
     name = _name(table)

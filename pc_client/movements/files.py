@@ -7,7 +7,6 @@ of what is wrong.
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,8 +15,9 @@ from types import MappingProxyType
 import numpy as np
 
 from pc_client.errors import MovementError
+from pc_client.input_files import parse_toml, read_text
 from pc_client.movements.law_tables import LAW_FIELDS, LAW_WORDS, law_lines, parse_law
-from pc_client.movements.movement import Movement
+from pc_client.movements.movement import Movement, check_duration, check_name
 from pc_client.movements.samples import SampledLaw, parse_samples, write_samples
 from pc_client.toml_tables import TableReader, toml_value
 
@@ -29,7 +29,6 @@ __all__ = [
     "library_path",
     "load_movement",
     "movement_text",
-    "read_text",
     "save_movement",
 ]
 
@@ -44,6 +43,9 @@ DEFAULT_SET = "paper"
 LIBRARY_SETS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {DEFAULT_SET: _TEN, "arcs": tuple(f"arcs/{name}" for name in _TEN)}
 )
+
+MOST_POINTS = 1000
+"""Most target points of a file: a page of handwriting has some 500."""
 
 _FORMAT = 1
 _FIELDS = f"format, name, kind, duration, stroke_durations, target_points, provenance, {LAW_FIELDS}"
@@ -117,24 +119,6 @@ def save_movement(movement: Movement, path: str | Path) -> None:
         ) from error
 
 
-def read_text(path: Path) -> str:
-    """The text of a file.
-
-    Raises:
-        MovementError: it cannot be read, or is not UTF-8.
-    """
-    try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise MovementError(
-            f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text"
-        ) from error
-    except OSError as error:
-        raise MovementError(
-            f"{path}: cannot be read ({error.strerror or error}); give a file that exists"
-        ) from error
-
-
 def movement_text(movement: Movement) -> str:
     """The TOML file of a movement with a law, complete and readable."""
     law = movement.law
@@ -167,15 +151,11 @@ def _read(path: Path) -> Movement:
     suffix = path.suffix.lower()
     if suffix not in (".toml", ".csv"):
         raise MovementError(f"{path}: movement files are .toml (parameters) or .csv (x, y, z, t samples)")
-    text = read_text(path)
+    text = read_text(path, "movement")
     if suffix == ".csv":
         law = parse_samples(text, str(path))
         return Movement(path.stem, law, np.array([law.duration]), {"file": path.name})
-    try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise MovementError(f"{path}: not TOML: {error}") from error
-    return _parse_movement(TableReader(values, str(path)), str(path))
+    return _parse_movement(TableReader(parse_toml(text, str(path), "movement"), str(path)), str(path))
 
 
 def _parse_movement(table: TableReader, source: str) -> Movement:
@@ -186,8 +166,12 @@ def _parse_movement(table: TableReader, source: str) -> Movement:
     points = table.points("target_points")
     provenance = table.table("provenance").facts() if "provenance" in table else {}
     duration = table.number("duration")
+    if len(points) > MOST_POINTS:
+        raise table.error("target_points", f"{len(points)} points; give {MOST_POINTS} at most")
     durations = np.array(table.numbers("stroke_durations")) if "stroke_durations" in table else None
     with _naming(source):
+        check_name(name)
+        check_duration(duration, f"movement {name}")
         law, durations = parse_law(kind, table, points, duration, durations)
         table.finish(_FIELDS)
         return Movement(name, law, durations, provenance)

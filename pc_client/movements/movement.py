@@ -23,7 +23,15 @@ from pc_client.movements.robotic import RoboticLaw
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Motion
 
-__all__ = ["Kind", "Movement", "MovementLaw", "MovementSample", "SampleColumns", "export_samples"]
+__all__ = [
+    "LONGEST_DURATION",
+    "Kind",
+    "Movement",
+    "MovementLaw",
+    "MovementSample",
+    "SampleColumns",
+    "export_samples",
+]
 
 #: Which law made a movement, as its file says it; "samples" were brought along.
 Kind = Literal["lognormal", "uniform", "minimum_jerk", "power_law", "samples"]
@@ -36,6 +44,45 @@ _KINDS: Mapping[type, Kind] = MappingProxyType(
         PowerLaw: "power_law",
     }
 )
+
+
+LONGEST_DURATION = 1200.0
+"""No movement lasts longer [s]: its recording could not be read back (`pc_client.input_files`)."""
+
+_NOT_IN_NAMES = frozenset('/\\:*?"<>|')
+_LONGEST_NAME = 100
+
+
+def check_name(name: str) -> None:
+    """Refuse a name of which no file name of the same folder can be made, on any system.
+
+    Raises:
+        MovementError: saying what is allowed.
+    """
+    if (
+        not 0 < len(name) <= _LONGEST_NAME
+        or name.startswith((".", "-"))
+        or not name.isprintable()
+        or not _NOT_IN_NAMES.isdisjoint(name)
+    ):
+        raise MovementError(
+            f"a movement is called {name[:_LONGEST_NAME]!r}: files are named after it, so give 1 to "
+            f"{_LONGEST_NAME} printed characters without {' '.join(sorted(_NOT_IN_NAMES))}, "
+            "and no dot or minus at the beginning"
+        )
+
+
+def check_duration(duration: float, whose: str) -> None:
+    """Refuse a time that no movement lasts.
+
+    Raises:
+        MovementError: saying what is allowed.
+    """
+    if not 0.0 < duration <= LONGEST_DURATION:  # NaN is not
+        raise MovementError(
+            f"{whose} with a duration of {duration:g} s: it must last longer than 0 s, "
+            f"and {LONGEST_DURATION:g} s at most"
+        )
 
 
 class MovementSample(NamedTuple):
@@ -100,12 +147,8 @@ class Movement:
 
     def __post_init__(self) -> None:
         durations = read_only(self.stroke_durations)
-        if not self.name:
-            raise MovementError("movement without a name: give it one")
-        if not (math.isfinite(self.duration) and self.duration > 0.0):
-            raise MovementError(
-                f"movement {self.name} with a duration of {self.duration} s: it must last longer than 0 s"
-            )
+        check_name(self.name)
+        check_duration(self.duration, f"movement {self.name}")
         if durations.ndim != 1 or not len(durations) or not np.all(durations > 0.0):
             raise MovementError(
                 f"movement {self.name} with stroke durations {durations.tolist()} s: give times above 0 s"

@@ -15,7 +15,7 @@ Source: ROS 2 interface definition, "field names"; https://mcap.dev/spec; OMG CD
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.errors import RecordingError
+from protocol.realtime.columns import COLUMNS
 
 
 class Phase(IntEnum):
@@ -79,10 +80,14 @@ MESSAGE_OPCODE = 0x05
 # What a Message record carries before its data: channel id u16, sequence u32, log and publish time u64.
 MESSAGE_HEAD_BYTES = 22
 
+MOST_NUMBERS = 2000
+"""Most numbers in a row: ten times those of the largest frame."""
+
+_COUNTS = {column.name: column.count for column in COLUMNS}
 _NUMPY_TYPES = {"float64": "<f8", "uint8": "u1"}
 _FIELD_NAME = re.compile(r"[a-z](?:_?[a-z0-9]+)*")  # as strict as Foxglove's ROS 2 parser
 _SCHEMA_LINE = re.compile(
-    r"(?P<type>\w+)(?:\[(?P<count>\d+)\])? (?P<field>\w+)  # (?P<name>\w+)(?: \[(?P<unit>.*)\])?"
+    r"(?P<type>\w+)(?:\[(?P<count>[0-9]{1,6})\])? (?P<field>\w+)  # (?P<name>\w+)(?: \[(?P<unit>.*)\])?"
 )
 
 
@@ -172,6 +177,24 @@ def schema_text(signals: Iterable[Signal]) -> str:
         unit = f" [{s.unit}]" if s.unit else ""
         lines.append(f"{s.type}{array} {s.field}  # {s.name}{unit}")
     return "\n".join(lines) + "\n"
+
+
+def check_row(signals: Sequence[Signal]) -> None:
+    """Refuse signals that no row can have.
+
+    Raises:
+        RecordingError: a name twice, none or too many numbers, or a signal of the robot with another number
+            of them than its frames have.
+    """
+    names = [signal.name for signal in signals]
+    n_numbers = sum(signal.count for signal in signals)
+    if len(set(names)) < len(names) or not 0 < n_numbers <= MOST_NUMBERS:
+        raise RecordingError(
+            f"{len(names)} signals of {n_numbers} numbers; give each once, at most {MOST_NUMBERS}"
+        )
+    for signal in signals:
+        if signal.count != _COUNTS.get(signal.name, signal.count) or not signal.count:
+            raise RecordingError(f"{signal.name} of {signal.count} numbers")
 
 
 def parse_schema_text(text: str) -> tuple[Signal, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -22,15 +22,18 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Metadata, Schema
 from mcap.records import Chunk as ChunkRecord
-from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
 from numpy.typing import NDArray
 
 from pc_client.errors import RecordingError
+from pc_client.input_files import read_bytes
 from pc_client.recording.layout import (
+    COMMAND_SIGNALS,
     MESSAGE_HEAD_BYTES,
+    REFERENCE_SIGNALS,
     Phase,
     Signal,
     Topic,
+    check_row,
     parse_schema_text,
 )
 from pc_client.recording.mcap_file import CHUNK_HEAD_BYTES, MAGIC, PROVENANCE_RECORD, SUMMARY_RECORD
@@ -101,29 +104,40 @@ def load_recording(path: Path | str) -> Recording:
         RecordingError: the file cannot be read, is no recording, or was cut before its first row's layout.
     """
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RecordingError(f"cannot read the recording {path}: {error.strerror or error}") from error
+    data = read_bytes(path, "recording")
     if not data.startswith(MAGIC):
         raise RecordingError(f"{path} is not a recording: an MCAP file begins with {MAGIC!r}")
     scan = _Scan()
     damage = scan.read(data)
-    if PROVENANCE_RECORD not in scan.metadata or not scan.topics:
-        raise RecordingError(f"{path} holds no recording of this package{': ' + damage if damage else ''}")
+    signals = tuple(signal for topic in scan.topics.values() for signal in topic.signals)
+    missing = _missing_signal(signals)
+    if PROVENANCE_RECORD not in scan.metadata or missing:
+        reason = damage or (f"no signal {missing!r}" if missing else "no provenance")
+        raise RecordingError(f"{path} holds no recording of this package: {reason}")
+    try:
+        provenance = Provenance.from_metadata(scan.metadata[PROVENANCE_RECORD])
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from error
     try:
         summary = {key: json.loads(text) for key, text in scan.metadata.get(SUMMARY_RECORD, {}).items()}
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         summary, damage = {}, damage or f"damaged: the summary cannot be read ({error})"
     return Recording(
         path=path,
-        provenance=Provenance.from_metadata(scan.metadata[PROVENANCE_RECORD]),
-        signals=tuple(s for topic in scan.topics.values() for s in topic.signals),
+        provenance=provenance,
+        signals=signals,
         summary=summary,
         complete=not damage,
         damage=damage,
         _columns=scan.columns(),
     )
+
+
+def _missing_signal(signals: Iterable[Signal]) -> str | None:
+    """The first signal that every recording has and this one has not, or not with as many numbers."""
+    counts = {signal.name: signal.count for signal in signals}
+    needed = {"timestamp": 1} | {signal.name: signal.count for signal in REFERENCE_SIGNALS + COMMAND_SIGNALS}
+    return next((name for name, count in needed.items() if counts.get(name) != count), None)
 
 
 class _Scan:
@@ -133,8 +147,7 @@ class _Scan:
         self.schemas: dict[int, Schema] = {}
         self.topics: dict[int, Topic] = {}
         self.metadata: dict[str, dict[str, str]] = {}
-        self.row_bytes: dict[int, int] = {}
-        self.bodies: dict[int, list[bytes]] = {}
+        self.rows: dict[int, _Rows] = {}
 
     def read(self, data: bytes) -> str:
         """Take in all whole records; return what is missing or damaged, "" when nothing is."""
@@ -157,9 +170,7 @@ class _Scan:
                         damage = "damaged: the checksum over all records is wrong"
                 elif in_rows:
                     self._take(opcode, data[start:end])
-            except CRCValidationError:
-                return f"damaged: checksum of the chunk at byte {position} is wrong"
-            except (McapError, ValueError, struct.error) as error:
+            except (McapError, RecordingError, ValueError, struct.error) as error:
                 return f"damaged: record at byte {position} cannot be read ({error})"
             position = end
             if opcode == Opcode.FOOTER:
@@ -169,10 +180,10 @@ class _Scan:
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """Return one array a signal; a row counts when all its messages are there."""
-        n_rows = min(len(bodies) for bodies in self.bodies.values())
+        n_rows = min(rows.count for rows in self.rows.values())
         columns: dict[str, NDArray[np.float64]] = {}
         for channel, topic in self.topics.items():
-            rows = np.frombuffer(b"".join(self.bodies[channel][:n_rows]), topic.body_dtype)
+            rows = np.frombuffer(self.rows[channel].data, topic.body_dtype, n_rows)
             for signal in topic.signals:
                 values = rows[signal.name].astype(np.float64)
                 columns[signal.name] = values[:, 0] if signal.count == 1 else values
@@ -188,18 +199,23 @@ class _Scan:
             if channel.schema_id not in self.schemas:
                 raise ValueError(f"topic {channel.topic} names the unknown schema {channel.schema_id}")
             schema = self.schemas[channel.schema_id]
-            self.topics[channel.id] = Topic(
-                channel.topic, schema.name, parse_schema_text(schema.data.decode())
-            )
-            self.row_bytes[channel.id] = self.topics[channel.id].body_dtype.itemsize
-            self.bodies.setdefault(channel.id, [])
+            topic = Topic(channel.topic, schema.name, parse_schema_text(schema.data.decode()))
+            if self.topics.get(channel.id, topic) != topic:
+                raise ValueError(f"channel {channel.id} is defined twice")
+            others = [known for number, known in self.topics.items() if number != channel.id]
+            check_row([signal for known in (*others, topic) for signal in known.signals])
+            self.topics[channel.id] = topic
+            self.rows.setdefault(channel.id, _Rows(topic.body_dtype.itemsize))
         elif opcode == Opcode.METADATA:
             metadata = Metadata.read(stream)
             self.metadata[metadata.name] = metadata.metadata
         elif opcode == Opcode.CHUNK:
             chunk = ChunkRecord.read(stream)
-            rows, size = get_chunk_data_stream(chunk, validate_crc=True)
-            self._take_messages(rows.read(size))
+            if chunk.compression:
+                raise ValueError(f"packed by {chunk.compression[:20]!r}; this package does not pack rows")
+            if chunk.uncompressed_crc not in (0, crc32(chunk.data)):
+                raise ValueError("its checksum is wrong")
+            self._take_messages(chunk.data)
         elif opcode == Opcode.MESSAGE:
             self._take_message(body)
 
@@ -216,9 +232,28 @@ class _Scan:
 
     def _take_message(self, body: bytes) -> None:
         (channel,) = _CHANNEL_ID.unpack_from(body)
-        if channel not in self.bodies:
+        if channel not in self.rows:
             raise ValueError(f"a message names the unknown channel {channel}")
-        row = body[MESSAGE_HEAD_BYTES + _CDR_HEAD_BYTES :]
-        if len(row) != self.row_bytes[channel]:
-            raise ValueError(f"a message has {len(row)} bytes, its topic needs {self.row_bytes[channel]}")
-        self.bodies[channel].append(row)
+        row, rows = body[MESSAGE_HEAD_BYTES + _CDR_HEAD_BYTES :], self.rows[channel]
+        if len(row) != rows.size:
+            raise ValueError(f"a message has {len(row)} bytes, its topic needs {rows.size}")
+        rows.data += row
+
+
+class _Rows:
+    """The rows of one topic, one behind the other.
+
+    Args:
+        size: bytes of a row, at least 1.
+    """
+
+    __slots__ = ("data", "size")
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self.data = bytearray()
+
+    @property
+    def count(self) -> int:
+        """Whole rows."""
+        return len(self.data) // self.size

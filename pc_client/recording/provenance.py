@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from pc_client.errors import RecordingError
@@ -98,11 +99,13 @@ class Provenance:
             if text is None:
                 continue
             try:
-                values[item.name] = text if item.type == "str" else json.loads(text)
-            except ValueError as error:
+                values[item.name] = value = text if item.type == "str" else json.loads(text)
+            except (ValueError, RecursionError) as error:
                 raise RecordingError(
                     f"provenance {item.name!r} cannot be read: {text[:60]!r} is not JSON"
                 ) from error
+            if not _HOLDS[str(item.type)](value) or (item.name in _WORDS and not _is_word(text)):
+                raise RecordingError(f"provenance {item.name!r} is {text[:60]!r}, must be {item.type}")
         if "target_points" in values:
             points: list[list[float]] = values["target_points"]  # type: ignore[assignment]
             values["target_points"] = tuple((p[0], p[1], p[2]) for p in points)
@@ -110,3 +113,54 @@ class Provenance:
             return cls(**values)  # type: ignore[arg-type]
         except TypeError as error:
             raise RecordingError(f"the recording's provenance is incomplete: {error}") from error
+
+
+def _is_number(value: object) -> bool:
+    return not isinstance(value, bool) and (
+        (isinstance(value, int) and abs(value) < 1 << 63)
+        or (isinstance(value, float) and math.isfinite(value))
+    )
+
+
+def _is_plain(value: object) -> bool:
+    return value is None or isinstance(value, bool | str) or _is_number(value)
+
+
+def _is_fact(item: tuple[str, object]) -> bool:
+    name, value = item
+    if name == "learning_limited_by":
+        return isinstance(value, str)
+    if name in ("dead_time_s", "lag_s", "joint_spread_s"):
+        return _is_number(value) and 0.0 <= value <= 1.0  # type: ignore[operator]
+    return _is_number(value) or value == math.inf  # margins may be endless
+
+
+def _is_point(value: object) -> bool:
+    return isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))
+
+
+def _is_word(text: str) -> bool:
+    return len(text) <= MOST_LETTERS and text.isprintable()
+
+
+MOST_LETTERS = 200
+"""Longest name in a provenance: movement, controller, robot."""
+
+_WORDS = ("movement", "kind", "controller", "robot_model", "firmware", "serial", "pace", "client_version")
+
+_HOLDS: Mapping[str, Callable[[object], bool]] = {
+    "str": lambda value: True,
+    "int": lambda value: isinstance(value, int) and _is_number(value),
+    "int | None": lambda value: value is None or (isinstance(value, int) and _is_number(value)),
+    "bool | None": lambda value: value is None or isinstance(value, bool),
+    "float": _is_number,
+    "float | None": lambda value: value is None or _is_number(value),
+    "Mapping[str, float | int | bool | str | None]": lambda value: (
+        isinstance(value, dict) and all(map(_is_plain, value.values()))
+    ),
+    "Mapping[str, float | str]": lambda value: isinstance(value, dict) and all(map(_is_fact, value.items())),
+    "tuple[tuple[float, float, float], ...]": lambda value: (
+        isinstance(value, list) and all(map(_is_point, value))
+    ),
+}
+"""What a value of each type in `Provenance` may be, as JSON."""

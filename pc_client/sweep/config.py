@@ -6,7 +6,6 @@ file, the key and what is allowed. Nothing has been started then.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
 from pc_client.control.controller_fields import FIELDS
 from pc_client.errors import MovementError, SweepError
+from pc_client.input_files import parse_toml, read_text
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.kinematics.robot_model import ROBOTS
@@ -90,15 +90,7 @@ def read_config(path: Path) -> SweepConfig:
         ControllerError: a field of the controller cannot hold a value.
         MovementError: a movement file makes no sense.
     """
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SweepError(
-            f"{path}: cannot be read ({error.strerror or error}); give a file that exists"
-        ) from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SweepError(f"{path}: not TOML: {error}") from error
-    return _parse(_Reader(values, str(path)), path)
+    return _parse(_Reader(parse_toml(read_text(path, "sweep"), str(path), "sweep"), str(path)), path)
 
 
 def _parse(reader: _Reader, path: Path) -> SweepConfig:
@@ -172,8 +164,8 @@ def _movements(reader: _Reader, folder: Path) -> tuple[MovementFile, ...]:
             )
         try:
             name = load_movement(path).name
-            files.append(MovementFile(name, path.name, path.read_text(encoding="utf-8")))
-        except (OSError, MovementError) as error:
+            files.append(MovementFile(name, path.name, read_text(path, "movement")))
+        except MovementError as error:
             raise MovementError(f"{reader.source}: movements: {error}") from error
     check_distinct([file.name for file in files], f"{reader.source}: movements")
     return tuple(files)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pc_client.errors import SweepError
+from pc_client.input_files import read_bytes
 from pc_client.sweep.case import Case
 from pc_client.sweep.outcome import Outcome
 
@@ -45,9 +46,9 @@ class SweepFolder:
         A failed case is tried again: the robot may answer now. So is one whose recordings shall stay now.
         """
         try:
-            stored = json.loads((self.path / _case_file(case)).read_text(encoding="utf-8"))
+            stored = json.loads(read_bytes(self.path / _case_file(case), "outcome"))
             outcome = Outcome(stored["status"], stored["error"], tuple(stored["rows"]))
-        except (OSError, ValueError, KeyError, TypeError):  # not there, or not ours
+        except (SweepError, ValueError, KeyError, TypeError, RecursionError):  # not there, or not ours
             return None
         if outcome.status == "failed":
             return None
@@ -93,9 +94,8 @@ class SweepFolder:
             try:
                 partial.write_bytes(content)
                 partial.replace(path)
-            except OSError:
+            finally:  # Ctrl-C too leaves no part of a file
                 partial.unlink(missing_ok=True)
-                raise
         except OSError as error:
             raise SweepError(
                 f"cannot write {path}: {error.strerror or error}; make room or give another "

@@ -86,9 +86,7 @@ def test_every_timing_and_corner_survives_saving(tmp_path: Path) -> None:
     points = np.array([[0.3, 0.0, 0.2], [0.35, 0.1, 0.2], [0.3, 0.1, 0.3], [0.3, 0.2, 0.2]])
     timings = (TwoSidedTiming(0.1, 1.0, 0.1, 3.0), LiteralTiming(0.6, 1.0, 1.5), Lognormal(0.2, 0.5, 0.1))
     law = SigmaLognormal(points, tuple(Stroke(timing, 0.1 / 3.0, 2.0) for timing in timings), 4.0)
-    human = Movement(
-        'odd "name" \\ ü\x7f', law, np.array([1.0, 1.0, 2.0]), {"a key": 'x "y"', "n": 3, "f": 0.1}
-    )
+    human = Movement("odd name, ü", law, np.array([1.0, 1.0, 2.0]), {"a key": 'x "y"', "n": 3, "f": 0.1})
     law = RoboticLaw(points, human.stroke_durations, (0.15,), "blend", 0.02)
     blended = Movement("blended", law, human.stroke_durations)
     for movement in (human, blended):

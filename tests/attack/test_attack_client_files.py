@@ -1,0 +1,374 @@
+"""The client against hostile files: damaged, crafted, packed to burst. Always one line, never a traceback."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import struct
+import sys
+import tracemalloc
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from zlib import crc32
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.data_stream import RecordBuilder
+from mcap.records import Channel, Chunk, Header, Metadata, Schema
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "pc_client"))
+from recording_samples import SIGNALS, provenance, record_movement
+
+from pc_client import cli
+from pc_client.analysis.report import build_tables
+from pc_client.analysis.run import analyse_run
+from pc_client.control.controller_file import read_controller
+from pc_client.errors import ClientError, MovementError, RecordingError, one_line
+from pc_client.experiment.prepare import _refuse_to_lose
+from pc_client.extraction.files import MOST_SAMPLES, parse_pen
+from pc_client.extraction.sources import contents, pen_sources
+from pc_client.input_files import FILE_KINDS, MIB, read_bytes
+from pc_client.kinematics.cell_file import load_cell
+from pc_client.movements.files import LIBRARY_FOLDER, load_movement
+from pc_client.recording.layout import row_layout, schema_text
+from pc_client.recording.loader import load_recording
+from pc_client.recording.mcap_file import MAGIC
+from pc_client.sweep.config import read_config
+
+QUIET = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record_movement(tmp_path_factory.mktemp("whole") / "a.mcap", duration=0.2, rest=0.1)
+
+
+def complaint(act: Callable[..., object], *arguments: object) -> str:
+    """The line of the project's error, "" when there is none; any other error ends the test."""
+    try:
+        act(*arguments)
+    except ClientError as error:
+        return one_line(error)
+    return ""
+
+
+def measure(path: Path) -> None:
+    """All that a report does with one file."""
+    analyse_run(load_recording(path))
+
+
+def crafted(
+    *, topics=None, facts=None, compression="", rows=b"", schema=None, twice=False, size=None
+) -> bytes:
+    """A recording with parts that nobody wrote."""
+    builder = RecordBuilder()
+    builder.write(MAGIC)
+    Header(profile="ros2", library="x").write(builder)
+    for number, topic in enumerate(topics or row_layout(SIGNALS).topics, start=1):
+        text = schema_text(topic.signals) if schema is None or number > 1 else schema
+        Schema(id=number, data=text.encode(), encoding="ros2msg", name="x").write(builder)
+        for _ in range(1 + twice):
+            Channel(id=number, topic=topic.name, message_encoding="cdr", metadata={}, schema_id=number).write(
+                builder
+            )
+            if twice:
+                Schema(id=number, data=b"float64 x  # x\n", encoding="ros2msg", name="x").write(builder)
+    Metadata(name="provenance", metadata={**provenance().to_metadata(), **(facts or {})}).write(builder)
+    Chunk(
+        compression=compression,
+        data=rows,
+        message_start_time=0,
+        message_end_time=0,
+        uncompressed_crc=crc32(rows),
+        uncompressed_size=len(rows) if size is None else size,
+    ).write(builder)
+    return builder.end()
+
+
+DEEP = "[" * 100_000
+LOOP = {"gain_margin": 1.0, "phase_margin_deg": 1.0, "delay_margin_s": 1.0, "sensitivity_peak": 1.0}
+CRAFTED = {
+    "empty schema": crafted(schema=""),
+    "no numbers": crafted(schema="float64[0] timestamp  # timestamp\n"),
+    "endless row": crafted(schema="float64[999999] timestamp  # timestamp\n"),
+    "number of a thousand digits": crafted(schema=f"float64[{'9' * 1000}] timestamp  # timestamp\n"),
+    "arabic digits": crafted(schema="float64[٣] timestamp  # timestamp\n"),
+    "name twice": crafted(schema="float64 a  # timestamp\nfloat64 b  # timestamp\n"),
+    "no time stamp": crafted(schema="float64 a  # a\n"),
+    "scalar pose": crafted(
+        schema="float64 timestamp  # timestamp\nfloat64 actual_tcp_pose  # actual_TCP_pose\n"
+    ),
+    "topic defined twice": crafted(twice=True),
+    "no topics": crafted(topics=row_layout(SIGNALS).topics[:1]),
+    "packed": crafted(compression="lz4", rows=b"\x04\x22\x4d\x18", size=1 << 40),
+    "unknown packing": crafted(compression="\x1b[2J", rows=b"x"),
+    "wrong type of a number": crafted(facts={"repetition": '"one"'}),
+    "a list for a number": crafted(facts={"cycle_time_s": "[]"}),
+    "NaN": crafted(facts={"identified_delay_s": "NaN"}),
+    "endless integer": crafted(facts={"seed": "9" * 400}),
+    "more digits than are read": crafted(facts={"seed": "9" * 5000}),
+    "a text for settings": crafted(facts={"controller_config": '"x"'}),
+    "nested settings": crafted(facts={"controller_config": '{"name": [1]}'}),
+    "deep JSON": crafted(facts={"loop": DEEP}),
+    "texts in the loop": crafted(facts={"loop": json.dumps({**LOOP, "gain_margin": "x"})}),
+    "endless dead time": crafted(facts={"loop": '{"dead_time_s": 1e300, "lag_s": 0.1, "joint_spread_s": 0}'}),
+    "points that are none": crafted(facts={"target_points": "[[1, 2]]"}),
+    "points of texts": crafted(facts={"target_points": '[["a", "b", "c"]]'}),
+    "points that are a number": crafted(facts={"target_points": "7"}),
+    "simulated is a text": crafted(facts={"simulated": '"no"'}),
+    "long name": crafted(facts={"movement": "x" * 100_000}),
+    "name that a terminal obeys": crafted(facts={"movement": "\x1b]0;evil\x07"}),
+    "length beyond all": MAGIC + b"\x06" + struct.pack("<Q", (1 << 64) - 1) + b"x",
+    "chunk that is cut in its head": MAGIC + b"\x06" + struct.pack("<Q", 3) + b"abc",
+    "nothing": MAGIC,
+}
+
+
+@pytest.mark.parametrize("name", CRAFTED)
+def test_a_crafted_recording_is_refused_in_one_line(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(CRAFTED[name])
+    line = complaint(load_recording, path) or load_recording(path).damage
+    assert line.isprintable()
+    assert line
+
+
+@QUIET
+@given(data=st.data())
+def test_flipped_and_cut_recordings_never_end_in_tracebacks(
+    tmp_path: Path, whole: Path, data: st.DataObject
+) -> None:
+    spoilt = bytearray(whole.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        # Half of the places in the head, where a byte means most.
+        place = data.draw(st.integers(0, data.draw(st.sampled_from([4000, len(spoilt) - 1]))))
+        spoilt[place] = data.draw(st.integers(0, 255))
+    path = tmp_path / "a.mcap"
+    path.write_bytes(spoilt[: data.draw(st.integers(len(spoilt) // 2, len(spoilt)))])
+    assert complaint(measure, path).isprintable()
+
+
+VALUES = (float("nan"), float("inf"), -float("inf"), 1e300, -1e300, 0.0, 5e-324)
+
+
+@QUIET
+@given(
+    signal=st.sampled_from(
+        ["timestamp", "ref_t", "ref_q", "ref_tcp_position", "actual_q", "actual_TCP_pose"]
+    ),
+    value=st.sampled_from(VALUES),
+    rows=st.sampled_from([slice(None), slice(20, 21), slice(10, 40, 2)]),
+)
+def test_values_that_no_robot_reports_are_refused(
+    whole: Path, signal: str, value: float, rows: slice
+) -> None:
+    recording = load_recording(whole)
+    recording.column(signal)[rows] = value
+    line = complaint(analyse_run, recording)
+    assert line or value in (0.0, 5e-324)
+
+
+def test_one_bad_file_does_not_end_the_report_of_the_others(
+    tmp_path: Path, whole: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "good_r1.mcap").write_bytes(whole.read_bytes())
+    for number, data in enumerate(CRAFTED.values()):
+        (tmp_path / f"bad_{number:02}.mcap").write_bytes(data)
+    report = build_tables(tmp_path)
+    assert len(report.table.rows) == 1
+    assert [line.split(":")[0] for line in report.left_out] == [
+        f"bad_{k:02}.mcap" for k in range(len(CRAFTED))
+    ]
+    monkeypatch.setattr("pc_client.commands.recordings.show_report", lambda folder: report)
+    assert cli.run(["report", str(tmp_path)]) == 1
+
+
+def test_a_fault_of_ours_in_one_file_is_named_and_does_not_end_the_report(
+    tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.mcap").write_bytes(whole.read_bytes())
+
+    def fails_once(recording, of=analyse_run):
+        if recording.path.name == "a.mcap":
+            raise ZeroDivisionError("x\x1b[2J")
+        return of(recording)
+
+    monkeypatch.setattr("pc_client.analysis.report.analyse_run", fails_once)
+    assert build_tables(tmp_path).left_out == ("a.mcap: cannot be measured (ZeroDivisionError: x\\x1b[2J)",)
+
+
+def test_recordings_that_cannot_be_read_are_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(CRAFTED["wrong type of a number"])
+    with pytest.raises(RecordingError, match="not overwritten"):
+        _refuse_to_lose(path)
+
+
+def test_a_file_beyond_its_limit_is_refused_before_it_is_in_memory(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        file.truncate(8 << 30)  # of holes
+    for kind, limit in FILE_KINDS.items():
+        if limit.most_bytes <= 16 * MIB:
+            tracemalloc.start()
+            with pytest.raises(limit.error, match="longer than"):
+                read_bytes(path, kind)
+            assert tracemalloc.get_traced_memory()[1] < 3 * limit.most_bytes
+            tracemalloc.stop()
+
+
+def test_only_regular_files_are_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.mcap")
+    for path in (tmp_path / "a.mcap", tmp_path, Path("/dev/zero"), Path("a\0b")):
+        with pytest.raises(RecordingError, match="cannot be read"):
+            load_recording(path)
+
+
+# ---- archives and pen recordings
+
+
+def zipped(path: Path, files: dict[str, bytes], method: int = zipfile.ZIP_DEFLATED) -> Path:
+    with zipfile.ZipFile(path, "w", method, compresslevel=9) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return path
+
+
+@pytest.mark.parametrize("lies", [False, True])
+def test_an_archive_that_bursts_is_unpacked_no_further_than_its_limit(tmp_path: Path, lies: bool) -> None:
+    path = zipped(tmp_path / "a.zip", {"a.csv": bytes(64 * MIB), "b.csv": b"0,0,0\n1,1,1\n"})
+    if lies:  # say in both heads that the file is small
+        data = path.read_bytes()
+        path.write_bytes(data.replace(struct.pack("<I", 64 * MIB), struct.pack("<I", 1000)))
+    tracemalloc.start()
+    outcomes = list(contents(pen_sources([path])))
+    assert tracemalloc.get_traced_memory()[1] < 4 * FILE_KINDS["pen"].most_bytes
+    tracemalloc.stop()
+    assert isinstance(outcomes[0][1], RecordingError)
+    assert outcomes[1][1] == b"0,0,0\n1,1,1\n"
+
+
+def test_ways_of_packing_that_cannot_be_unpacked_piece_by_piece_are_refused(tmp_path: Path) -> None:
+    path = zipped(tmp_path / "a.zip", {"a.csv": bytes(MIB)}, zipfile.ZIP_BZIP2)
+    ((_, content),) = contents(pen_sources([path]))
+    assert "pack it by deflate" in str(content)
+
+
+def test_an_archive_of_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = zipped(tmp_path / "a.zip", {f"{k}.csv": b"0,0,0" for k in range(4)})
+    monkeypatch.setattr("pc_client.extraction.sources.MOST_MEMBERS", 3)
+    with pytest.raises(RecordingError, match=r"4 files of 0 MiB in all; allowed are 3"):
+        pen_sources([path])
+
+
+@QUIET
+@given(data=st.data())
+def test_damaged_archives(tmp_path: Path, data: st.DataObject) -> None:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a.csv", b"0,0,0\n1,1,.1\n" * 9)
+    spoilt = bytearray(packed.getvalue())
+    for _ in range(data.draw(st.integers(1, 5))):
+        spoilt[data.draw(st.integers(0, len(spoilt) - 1))] = data.draw(st.integers(0, 255))
+    path = tmp_path / "a.zip"
+    path.write_bytes(spoilt)
+    complaint(lambda: list(contents(pen_sources([path]))))
+
+
+NUMBERS = st.one_of(
+    st.floats(), st.integers(-(10**400), 10**400), st.sampled_from(["", "nan", "-", "１", "1_0"])
+)
+
+
+@QUIET
+@given(lines=st.lists(st.lists(NUMBERS, min_size=1, max_size=5), max_size=8), noise=st.binary(max_size=20))
+def test_pen_recordings_of_any_numbers(lines: list[list[object]], noise: bytes) -> None:
+    text = "\n".join(",".join(map(str, line)) for line in lines).encode()
+    for content in (text, noise + text, text + noise):
+        assert complaint(parse_pen, content, "a.csv")[:5] in ("a.csv", "")
+
+
+def test_samples_of_a_pen_recording_are_counted() -> None:
+    with pytest.raises(RecordingError, match=f"more than {MOST_SAMPLES} samples"):
+        parse_pen(b"0,0,0\n" * (MOST_SAMPLES + 1), "a.csv")
+
+
+# ---- TOML
+
+LIBRARY = (LIBRARY_FOLDER / "paper" / "lognorm_4_1.toml").read_text()
+READERS = {
+    "movement": (load_movement, LIBRARY),
+    "uniform": (load_movement, (LIBRARY_FOLDER / "paper" / "uniform_4_1.toml").read_text()),
+    "cell": (load_cell, (ROOT / "examples" / "cell.toml").read_text()),
+    "controller": (read_controller, 'base = "paper"\ngain_p = 10.0\nlearns = true\n'),
+    "sweep": (read_config, 'movements = ["uniform_4_1"]\nseeds = [1]\n[controller]\ngain_p = [1.0, 2.0]\n'),
+}
+ODD = [
+    "nan",
+    "inf",
+    "1e308",
+    "-1",
+    "0",
+    "5e-324",
+    "9" * 5000,
+    '""',
+    "[]",
+    "{}",
+    "true",
+    "1979-05-27",
+    '"\\u0000"',
+]
+
+
+@pytest.mark.parametrize(
+    "name", ["../../evil", "/etc/evil", "a/b", "a\\\\b", "..", ".x", "-rf", "", "x" * 300, "a\\u0000"]
+)
+def test_a_name_never_leaves_the_folder_of_the_recordings(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(LIBRARY.replace('"lognorm_4_1"', f'"{name}"'))
+    with pytest.raises(MovementError, match="name"):
+        load_movement(path)
+
+
+def test_a_movement_of_years_is_refused_before_it_is_planned(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    lines = [("duration = 1e300" if line.startswith("duration") else line) for line in LIBRARY.splitlines()]
+    path.write_text("\n".join(lines))
+    with pytest.raises(MovementError, match="1200 s at most"):
+        load_movement(path)
+
+
+@pytest.mark.parametrize("kind", READERS)
+@pytest.mark.parametrize("text", ["x = " + "[" * 5000, "x = " + "9" * 5000, "\0", "a" + ".a" * 5000 + " = 1"])
+def test_toml_that_no_parser_likes(tmp_path: Path, kind: str, text: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(text)
+    with pytest.raises(ClientError):
+        READERS[kind][0](path)
+
+
+@pytest.mark.parametrize("kind", READERS)
+@settings(QUIET, max_examples=40)
+@given(data=st.data())
+def test_toml_with_odd_values_and_flipped_bytes(tmp_path: Path, kind: str, data: st.DataObject) -> None:
+    read, text = READERS[kind]
+    if data.draw(st.booleans()):
+        lines = text.splitlines()
+        places = [k for k, line in enumerate(lines) if "=" in line]
+        for _ in range(data.draw(st.integers(1, 3))):
+            place = data.draw(st.sampled_from(places))
+            lines[place] = f"{lines[place].partition('=')[0]} = {data.draw(st.sampled_from(ODD))}"
+        content = "\n".join(lines).encode()
+    else:
+        spoilt = bytearray(text.encode())
+        for _ in range(data.draw(st.integers(1, 4))):
+            spoilt[data.draw(st.integers(0, len(spoilt) - 1))] = data.draw(st.integers(0, 255))
+        content = bytes(spoilt)
+    path = tmp_path / "m.toml"
+    path.write_bytes(content)
+    assert complaint(read, path).isprintable()
