@@ -31,7 +31,7 @@ def test_with_the_right_payload_the_arm_stays_where_it_is(fidelity):
 @pytest.mark.parametrize(("load", "declared", "sign"), [(1.0, 0.0, -1), (0.0, 1.0, +1)])
 def test_with_a_wrong_payload_it_drifts_down_or_up(load, declared, sign):
     bench = above_table(f"  set_payload({declared}, [0, 0, 0])\n  sleep(1)\n" + FREE, z=0.25)
-    bench.controller.plant.hang(load)
+    bench.controller.plant.attach_load(load)
     bench.tick(200)
     before = place(bench)
     bench.tick(400)
@@ -41,7 +41,7 @@ def test_with_a_wrong_payload_it_drifts_down_or_up(load, declared, sign):
 
 def test_the_force_estimate_feels_what_hangs_undeclared():
     bench = above_table("  sleep(100)", z=0.25, fidelity="ideal")
-    bench.controller.plant.hang(2.0, (0.0, 0.0, 0.1))
+    bench.controller.plant.attach_load(2.0, (0.0, 0.0, 0.1))
     bench.tick(100)
     assert bench.now.actual_tcp_force[2] == pytest.approx(-2.0 * 9.81, abs=0.5)
 
@@ -49,7 +49,7 @@ def test_the_force_estimate_feels_what_hangs_undeclared():
 def test_entering_with_a_grossly_wrong_payload_is_a_protective_stop_unless_unchecked():
     for mode, codes in (("freedrive_mode", [(156, 0)]), ("freedrive_mode_no_incorrect_payload_check", [])):
         bench = above_table(f"  sleep(1)\n  {mode}()\n  sleep(100)", z=0.35)
-        bench.controller.plant.hang(2.8)
+        bench.controller.plant.attach_load(2.8)
         bench.tick(180)
         assert reported(bench) == codes
         assert (bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP) == bool(codes)

@@ -20,13 +20,13 @@ POSE = (0.0, 0.0, 1.5, 0.0, 0.0, 0.0)
 EVENTS = {
     "nothing": lambda plant: None,
     "payload": lambda plant: plant.set_payload(1.0, (0.0, 0.0, 0.05)),
-    "hang": lambda plant: plant.hang(0.5),
+    "hang": lambda plant: plant.attach_load(0.5),
     "push": lambda plant: plant.push((5.0, 0.0, -3.0)),
     "end of push": lambda plant: plant.push((0.0, 0.0, 0.0)),
     "obstacle": lambda plant: plant.obstacles.put("ball", "sphere", (0.1,), POSE),
     "no obstacle": lambda plant: plant.obstacles.remove("ball"),
     "look": lambda plant: (plant.q_true, plant.qd_true, plant.flange_position, plant.contact_wrench),
-    "trim rests": lambda plant: plant.rest_trim(),
+    "trim rests": lambda plant: plant.hold_trim(),
     "reset": lambda plant: plant.reset(HOME),
 }
 MODES = {

@@ -79,7 +79,7 @@ def test_moments_are_those_of_the_model_and_know_the_payload():
     "act",
     [
         lambda plant: plant.push((50.0, 0.0, 0.0)),
-        lambda plant: plant.hang(3.0),
+        lambda plant: plant.attach_load(3.0),
         lambda plant: plant.obstacles.put("box", "sphere", (0.1,), (0.4, 0.0, 0.3, 0.0, 0.0, 0.0)),
     ],
 )

@@ -38,4 +38,4 @@ class AttachPayload(CommandOperation):
     )
 
     def apply(self, box: Box) -> None:
-        box.plant.hang(self.mass, self.cog)
+        box.plant.attach_load(self.mass, self.cog)

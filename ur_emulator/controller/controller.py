@@ -279,7 +279,7 @@ class Controller:
         self.safety.handle(SafetyEvent.PROTECTIVE_STOP)
         if violation.blocked:
             state.motion.place(actual_q)
-            self.plant.rest_trim()
+            self.plant.hold_trim()
 
 
 def _make_state(

@@ -1,1 +1,1 @@
-"""The arm as physics: drives, friction, gears, links, contacts and what the sensors make of them."""
+"""The arm as physics: drives, friction, gears, links, contacts and sensors."""

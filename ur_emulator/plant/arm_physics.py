@@ -1,4 +1,4 @@
-"""ArmPhysics: one arm as MuJoCo moves it, what acts on it, and the way back by one cycle.
+"""ArmPhysics: one arm in MuJoCo, the forces on it, and the state of one cycle before.
 
 The hinges are the motor side of the gears.
 """
@@ -40,8 +40,8 @@ class ArmPhysics:
         torque: of the drives in the last sub-step (6,) [Nm].
         flange_position: (3,) in the base frame [m], at the start of the last sub-step.
         flange_rotation: (3, 3), likewise.
-        loads: what pushes the flange and hangs on it.
-        obstacles: what stands around the arm.
+        loads: payload and push at the flange.
+        obstacles: around the arm.
         servos: of the joints.
     """
 
@@ -77,12 +77,12 @@ class ArmPhysics:
 
     @property
     def has_diverged(self) -> bool:
-        """Whether the state is no longer one of an arm."""
+        """Whether the simulation has diverged."""
         return not self.qd.dot(self.qd) < _RUNAWAY**2
 
     @property
     def contact_wrench(self) -> NDArray[np.float64]:
-        """What table and base press on the arm (6,), at the flange in base axes [N, Nm]: the truth."""
+        """True contact wrench of table and base on the arm (6,), at the flange in base axes [N, Nm]."""
         return contact_wrench(self.model, self.data, self.flange_position)
 
     def place(self, q: NDArray[np.float64]) -> None:
@@ -104,17 +104,17 @@ class ArmPhysics:
         return int(data.ncon) > 0
 
     def run(self, drives: Drives, capture_at: int, captured: NDArray[np.float64]) -> None:
-        """Let the sub-steps of a cycle pass.
+        """Advance by the sub-steps of a cycle.
 
         Args:
-            drives: what moves the joints.
+            drives: of the joints.
             capture_at: number of the sub-step whose raw sensors are wanted.
             captured: takes them, see `sensors.REC_SIMULATED`.
         """
         model, data, ctrl, step = self.model, self.data, self._ctrl, mujoco.mj_step
         self._frictionloss[:] = drives.coulomb
         self.servos.bias[:] = drives.bias
-        if self.loads.is_felt:
+        if self.loads.is_unexpected:
             self.loads.apply()
         for row in drives.control:
             ctrl[:] = row
@@ -123,10 +123,10 @@ class ArmPhysics:
                 captured[:] = self._raw
             capture_at -= 1
 
-    def remember(self) -> None:
-        """Keep the present state for `take_back`."""
+    def store_state(self) -> None:
+        """Store the present state for `restore_state`."""
         mujoco.mj_copyData(self._before, self.model, self.data)
 
-    def take_back(self) -> None:
-        """Return to the state that was remembered."""
+    def restore_state(self) -> None:
+        """Return to the stored state."""
         mujoco.mj_copyData(self.data, self.model, self._before)

@@ -1,8 +1,8 @@
-"""CommandPath: from the controller's target, once a cycle, to what the servos are told, every sub-step.
+"""CommandPath: from the controller's target, once a cycle, to the control of the servos, every sub-step.
 
-Three things happen on the way. The drives interpolate between the targets of successive cycles (cubic in
-position, so that it agrees with the target speeds; linear in speed and torque). They do so some dead time
-later. And their set-point filter, a first-order lag, rounds what arrives. The slow outer loop trims the rest.
+The path has three stages. The drives interpolate between the targets of successive cycles (cubic in
+position, so that it agrees with the target speeds; linear in speed and torque). They do so after the dead
+time. Their set-point filter is a first-order lag. The slow outer loop trims the remaining error.
 
 All of it is linear in the targets, and so is the law of the servos. One matrix, built once from the plain
 definition below, does a whole cycle of all joints in one product:
@@ -20,7 +20,7 @@ definition below, does a whole cycle of all joints in one product:
 | control, n times           | q + lead qd + deflection + trim at the start of each sub-step         |
 | q, qd, deflection, trim, 0 | the first rows of the inputs of the next cycle                        |
 
-A torque goes down the path as the deflection of the servo that gives it: torque / kp. This module does not
+A torque passes the path as the deflection of the servo that gives it: torque / kp. This module does not
 know the arm.
 """
 
@@ -57,7 +57,7 @@ class CommandPath:
         newest_acts_later: the outputs of a cycle do not depend on its target.
         speeds: (3, 6) [rad/s]: the caller's row for the actual speeds; the speed of the newest target; that
             of the set-point at the start of the last sub-step.
-        control: what the servos are told at the start of each sub-step (n_substeps, 6) [rad].
+        control: of the servos at the start of each sub-step (n_substeps, 6) [rad].
         q_final: set-point position at the end of the cycle (6,) [rad].
         trim: shift of the servos in this cycle (6,) [rad].
     """
@@ -103,12 +103,12 @@ class CommandPath:
         q_motor: NDArray[np.float64],
         qd: NDArray[np.float64] | None = None,
     ) -> None:
-        """Start anew, as if the present motion had always been so.
+        """Restart, as if the present motion had lasted for ever.
 
         Args:
             q: newest target (6,) [rad].
             deflection: of the servos (6,) [rad].
-            q_motor: where the motors are (6,) [rad]; what they are away from the set-point is trimmed.
+            q_motor: motor positions (6,) [rad]; their difference from the set-point is trimmed.
             qd: speed of the target (6,) [rad/s]; None for rest.
         """
         speed = np.zeros(6) if qd is None else qd
@@ -134,7 +134,7 @@ class CommandPath:
         """End the cycle: make room for the next target.
 
         Args:
-            error: of the joints (6,) [rad], to be trimmed away from the next cycle on; None: the trim rests.
+            error: of the joints (6,) [rad], to be trimmed from the next cycle on; None: the trim is held.
         """
         self._kept[:] = self._final
         self._older[:] = self._younger
@@ -146,7 +146,7 @@ _PACK = Struct("18d").pack_into
 
 
 def path_responses(n_substeps: int, substep: float, dead_substeps: int, lag: float) -> NDArray[np.float64]:
-    """Return what each input of the path of one joint does to its set-point; arguments as `trace_cycle`.
+    """Return the response of one joint's set-point to each input of its path; arguments as `trace_cycle`.
 
     Returns:
         (3, n_substeps + 1, n): q, qd, deflection at the start of each sub-step and at the end of the cycle by

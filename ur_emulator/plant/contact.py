@@ -1,4 +1,4 @@
-"""What the surroundings do to the arm: contact forces as one wrench at the flange."""
+"""Contact forces of the surroundings on the arm, as one wrench at the flange."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 def contact_wrench(
     model: mujoco.MjModel, data: mujoco.MjData, flange: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Sum up what fixed bodies (table, base, obstacles) press on the arm.
+    """Return the sum of the contact forces of fixed bodies (table, base, obstacles) on the arm.
 
-    Contacts between two links of the arm do not count: they push nothing from outside.
+    Contacts between two links of the arm do not count: they are internal forces.
 
     Args:
         model: the plant's model.

@@ -1,15 +1,15 @@
-"""Drives: from the controller's target to what the joint servos are told in every sub-step.
+"""Drives: from the controller's target to the control of the joint servos in every sub-step.
 
-The controller sends position, speed and the torque of its rigid-body model down the command path. A servo
+The controller sends position, speed and the torque of its rigid-body model through the command path. A servo
 gives
 
     tau = kp (control - q) - kv qd + bias,   control = q_set + lead qd_set + tau_set / kp + trim
 
 with lead = kv / kp. The law itself lives in MuJoCo's actuators (`physics.py`); `control` comes from the
 command path, the bias compensates friction at qd_set. `trim` is the slow outer loop: it integrates the error
-at the joint's own encoder, so that gear error, wrong masses and left-over friction vanish at rest.
+at the joint's own encoder, so that gear error, wrong masses and remaining friction are compensated at rest.
 
-While the arm is guided by hand there is no set-point: see `HandGuiding`.
+In freedrive there is no set-point: see `Freedrive`.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from ur_emulator.models.calibration import Calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, six
 from ur_emulator.plant.command_path import CommandPath
+from ur_emulator.plant.freedrive import Freedrive
 from ur_emulator.plant.friction import Friction
-from ur_emulator.plant.hand_guiding import HandGuiding
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
 from ur_emulator.plant.physics import ServoGains
 from ur_emulator.plant.plant_state import Target
 
-_INTEGRAL_TIME = 0.12  # s; assumed: rest within a few tenths of a second, as arms of this kind settle
-TARGET_MAX = 1e6  # rad, rad/s, rad/s²; far beyond sense, small enough for arithmetic
+_INTEGRAL_TIME = 0.12  # s; assumed: arms of this kind settle within a few tenths of a second
+TARGET_MAX = 1e6  # rad, rad/s, rad/s²; far above any real target, small enough for arithmetic
 
 
 class Drives:
     """The six drives and the controller's torque model that feeds them.
 
-    A cycle is `command`, `advance`, `keep`, or for an arm that is guided by hand `guide` alone. Only `keep`
-    takes a cycle for done: the others may be repeated. Where `target_acts_later`, `advance` may come first;
+    A cycle is `command`, `advance`, `keep`, or in freedrive `drive_freely` alone. Only `keep` ends a
+    cycle: the others may be repeated. Where `target_acts_later`, `advance` may come first;
     `command` is followed by `evaluate_friction` then, for `target_current`.
 
     Args:
@@ -52,7 +52,7 @@ class Drives:
         period: control cycle [s].
 
     Attributes:
-        target_acts_later: the dead time keeps the target of a cycle out of it.
+        target_acts_later: by the dead time, the target of a cycle does not act in it.
         actual_speed: (6,) [rad/s], for the caller to fill before `advance`: it sets the true friction.
         control: n_substeps rows (6,), what to write to MuJoCo's `ctrl` before each sub-step of this cycle:
             angles for the servos [rad], torques while the joints are free [Nm].
@@ -75,7 +75,7 @@ class Drives:
         period: float,
     ) -> None:
         self._dynamics = InverseDynamics(robot, calibration)
-        self._guiding = HandGuiding(robot)
+        self._guiding = Freedrive(robot)
         n_substeps = round(period / substep)
         self._path = path = CommandPath(
             n_substeps, substep, dead_substeps, fidelity.drive_lag, gains.lead, period / _INTEGRAL_TIME
@@ -103,30 +103,30 @@ class Drives:
         """Declare the payload to the controller's model: mass [kg], centre in the flange frame [m]."""
         self._dynamics.set_payload(mass, cog)
 
-    def take_over(self, q: NDArray[np.float64], q_motor: NDArray[np.float64]) -> None:
+    def hold(self, q: NDArray[np.float64], q_motor: NDArray[np.float64]) -> None:
         """Hold the arm at rest: joints at q, motors at q_motor, (6,) each [rad]."""
         still = np.zeros(6)
         self._path.reset(q, self._dynamics.evaluate(q, still, still) * self._per_kp, q_motor)
 
-    def take_over_moving(self, target: Target, q_motor: NDArray[np.float64]) -> None:
+    def follow_moving(self, target: Target, q_motor: NDArray[np.float64]) -> None:
         """Follow a target that begins now, the motors being at q_motor (6,) [rad].
 
-        The servo begins without a torque of its own: what the motors are away from the set-point is trimmed
-        away and then pulled in as fast as any other error.
+        The servo begins without a torque of its own: the difference of the motors from the set-point is
+        trimmed, and then reduced as any other error.
         """
         q, qd = np.array(target.q), np.array(target.qd)
         moment = self._dynamics.evaluate(q, qd, np.zeros(6))
         self._path.reset(q - self._period * qd, moment * self._per_kp, q_motor, qd)
 
     def release(self) -> None:
-        """Carry nothing: the brakes do."""
+        """Give no torque: the brakes hold the arm."""
         self.target_moment = self.target_current = ZERO6
 
     def command(self, target: Target) -> bool:
-        """Take the target of this cycle.
+        """Set the target of this cycle.
 
         Returns:
-            False when the target is not finite or absurd; nothing has changed then.
+            False when the target is not finite or far too large; nothing has changed then.
         """
         if not hypot(*target.q, *target.qd, *target.qdd) < TARGET_MAX:
             return False
@@ -154,7 +154,7 @@ class Drives:
         """Set `target_moment` and `target_current` for a target, (6,) each, that the arm follows by itself.
 
         Returns:
-            False when the target is not finite or absurd; nothing has changed then.
+            False when the target is not finite or far too large; nothing has changed then.
         """
         if not hypot(*q, *qd, *qdd) < TARGET_MAX:
             return False
@@ -171,8 +171,8 @@ class Drives:
         np.multiply(current, self._per_torque, current)
         self.target_current = six(current.tolist())
 
-    def guide(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> None:
-        """Fill `control` for an arm that is guided by hand, with joints at q (6,) [rad], qd (6,) [rad/s]."""
+    def drive_freely(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> None:
+        """Fill `control` for an arm in freedrive, with joints at q (6,) [rad], qd (6,) [rad/s]."""
         still = np.zeros(6)
         gravity = self._dynamics.evaluate(q, still, still)
         self._friction.evaluate(np.array([qd, qd, qd]))
@@ -182,7 +182,7 @@ class Drives:
         self.target_moment = six(gravity.tolist())
         self.target_current = six((torque * self._per_torque).tolist())
 
-    def presses(self, q_motor: NDArray[np.float64]) -> bool:
-        """True when some servo of a resting arm, motors at q_motor (6,) [rad], pushes against something."""
+    def are_pressing(self, q_motor: NDArray[np.float64]) -> bool:
+        """True when a servo of a resting arm, motors at q_motor (6,) [rad], presses against an obstacle."""
         effort = self._kp * (self.q_final + self._path.trim - q_motor)
         return bool((np.abs(effort) > self._pressing).any())

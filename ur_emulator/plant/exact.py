@@ -1,8 +1,8 @@
-"""ExactPlant: an arm without physics, which is where it is asked to be, as in the maker's simulator.
+"""ExactPlant: an arm without physics, always at its target, as in the maker's simulator.
 
 What is measured equals the target to the last bit, in the cycle of the target. Currents and torques are those
 that the controller's model expects. Nothing acts on the arm: no load but the declared payload, no push, no
-contact, no hand. A resting arm reads gravity on its accelerometer, a moving one too.
+contact, no hand. The accelerometer reads gravity alone, also in motion.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class ExactPlant(Plant):
         self._qd = ZERO6
 
     def step(self, target: Target | None, mode: ControlMode = ControlMode.POSITION) -> None:
-        """Be at the target; see `Plant.step`. Without one, and when guided by hand, the arm stands still.
+        """Move to the target; see `Plant.step`. Without one, and in freedrive, the arm stands still.
 
         Raises:
             PlantError: the target is not finite.
@@ -65,7 +65,7 @@ class ExactPlant(Plant):
         self._physics.qd[:] = self._qd
 
     def run_ahead(self) -> None:
-        """Do nothing: where this arm is depends on the target alone."""
+        """Do nothing: the position depends on the target alone."""
 
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
@@ -90,7 +90,7 @@ class ExactPlant(Plant):
             )
         return self._state
 
-    def hang(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
+    def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
         """Refuse: no load acts on this arm.
 
         Raises:
@@ -109,7 +109,7 @@ class ExactPlant(Plant):
 
 
 class _NoObstacles(Obstacles):
-    """None stands around this arm: it would go through them."""
+    """This arm has no obstacles: it would pass through them."""
 
     def put(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
         """Refuse.

@@ -1,7 +1,7 @@
-"""Joint friction: the physics' own, and the controller's slightly wrong idea of it.
+"""Joint friction: the true one, and the controller's model of it, which is not exact.
 
 Viscous friction is a joint damping in MuJoCo, Coulomb friction its frictionloss, whose size follows the
-speed: real joints lose two thirds of it towards standstill (see the robot's numbers), which is also why they
+speed: real joints lose two thirds of it towards standstill (see the robot's numbers), so they
 do not stick and slip. The controller compensates friction in its feed-forward with parameters that are off by
 what `Fidelity.friction_error` says.
 """
@@ -22,7 +22,7 @@ class Friction:
     """Evaluates true Coulomb friction and the controller's compensation together, once a cycle.
 
         size(qd) = coulomb - lost exp(-|qd| / coulomb speed)
-        belief(qd) = size(qd) tanh(qd / reversal speed) + viscous qd
+        model(qd) = size(qd) tanh(qd / reversal speed) + viscous qd
 
     Attributes:
         coulomb: true size of the Coulomb friction (6,) [Nm].
@@ -32,11 +32,11 @@ class Friction:
 
     def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
         errors = 1.0 + fidelity.friction_error * random_stream(seed, "friction").standard_normal((2, 6))
-        # A model worse than that would have been caught at commissioning.
+        # Greatest error of the model [1]: a worse one would be found at commissioning.
         errors = errors.clip(0.3, 1.7)
         viscous = np.array(robot.viscous) * errors[0]
         believed = np.array(robot.coulomb) * errors[1]
-        # One row a use: the truth at the actual speed, beliefs at the target's and at the set-point's speed.
+        # One row a use: the true size at the actual speed, the model at the speeds of target and set-point.
         # Constants have the full shape: broadcasting costs twice the arithmetic at this size.
         self._coulomb = np.array([robot.coulomb, believed, believed])
         self._lost = self._coulomb * (1.0 - robot.coulomb_standstill)

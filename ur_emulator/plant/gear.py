@@ -1,6 +1,6 @@
 """GearRipple: the kinematic transmission error of the strain wave gears.
 
-A strain wave gear does not divide exactly: the joint runs ahead of and behind the motor by up to a tenth of a
+The ratio of a strain wave gear is not constant: the joint leads and lags the motor by up to a tenth of a
 milliradian, once and twice per motor turn, i.e. 101 and 202 times per joint turn. The motor is what the drive
 holds; the joint is what the encoder at the output reports. The phases are the box's own, by its seed; the
 sizes are those of its fidelity.
@@ -40,7 +40,7 @@ class GearRipple:
         sizes = [[slopes[0] / first, 0.0, slopes[1] / second, 0.0], [0.0, slopes[0], 0.0, slopes[1]]]
         self._sizes = np.kron(sizes, np.eye(6))
         self._waves = np.zeros(24)
-        # What the joint has beyond the motor: error and, after `apply`, speed.
+        # Difference of joint and motor: position and, after `apply`, speed.
         self._sum = np.zeros(12)
         self.error: NDArray[np.float64] = self._sum[:6]
         self.slope: NDArray[np.float64] = self._sum[6:]

@@ -1,7 +1,7 @@
-"""InverseDynamics: the torque that the controller's own model of the arm asks for.
+"""InverseDynamics: the torque by the controller's own model of the arm.
 
 The model has the calibrated geometry, the table's masses, the declared payload and the rotors' inertia, but
-neither friction nor the true masses of the arm: where it is wrong, the joint loops must make up for it.
+neither friction nor the true masses of the arm: the joint loops compensate its errors.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class InverseDynamics:
         """Result of the last evaluation (6,) [Nm]."""
 
     def set_payload(self, mass: float, cog: Vector3) -> None:
-        """Declare what hangs at the flange: mass [kg], centre of gravity in the flange frame [m]."""
+        """Set the payload at the flange: mass [kg], centre of gravity in the flange frame [m]."""
         set_payload_body(self._model, mass, cog)
 
     def evaluate(

@@ -1,4 +1,4 @@
-"""Loads: what pushes the flange and hangs on it, as the physics has it and as the controller believes."""
+"""Loads: payload and push at the flange, true ones and those that the controller assumes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Loads:
         data: its state.
 
     Attributes:
-        is_felt: something acts that the controller does not expect: see `wrench`.
+        is_unexpected: something acts that the controller does not expect: see `wrench`.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -37,10 +37,10 @@ class Loads:
         self._push_wrench = np.zeros(6)
         self._hung: tuple[float, Vector3] | None = None
         self._declared: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
-        self.is_felt = False
+        self.is_unexpected = False
 
     def declare(self, mass: float, cog: Vector3) -> None:
-        """Take what the controller is told: it hangs there too unless `hang` has put something else there.
+        """Set the payload that the controller assumes, and the true one unless `attach` has set it.
 
         Raises:
             PlantError: when the mass [kg] is negative or a number is not finite.
@@ -50,8 +50,8 @@ class Loads:
         if self._hung is None:
             set_payload_body(self._model, mass, cog)
 
-    def hang(self, mass: float, cog: Vector3) -> None:
-        """Hang a payload on the flange without a word to the controller; from now on it decides.
+    def attach(self, mass: float, cog: Vector3) -> None:
+        """Set the true payload, of which the controller does not know.
 
         Raises:
             PlantError: when the mass [kg] is negative or a number is not finite.
@@ -59,7 +59,7 @@ class Loads:
         check_payload(mass, cog)
         self._hung = (mass, cog)
         set_payload_body(self._model, mass, cog)
-        self.is_felt = True
+        self.is_unexpected = True
 
     def push(self, force: Sequence[float], point: Sequence[float] | None) -> None:
         """Push from now on; see `Plant.push`."""
@@ -72,10 +72,10 @@ class Loads:
         self._push = force_base if force_base.any() else None
         self._push_point = at
         self._data.xfrc_applied[self._flange_link] = 0.0
-        self.is_felt = self._push is not None or self._hung is not None
+        self.is_unexpected = self._push is not None or self._hung is not None
 
     def apply(self) -> None:
-        """Bring the push to the body that MuJoCo wants it at, for the pose at the start of this cycle."""
+        """Apply the push to its body in MuJoCo, for the pose at the start of this cycle."""
         force = self._push
         if force is None:
             return

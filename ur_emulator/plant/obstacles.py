@@ -1,6 +1,6 @@
-"""Obstacles: fixed shapes that come and go while the arm works.
+"""Obstacles: fixed shapes that can be added and removed at run time.
 
-MuJoCo's models do not grow at run time. So the model has SLOTS shapes from the beginning, on a fixed body of
+MuJoCo's models have a fixed size. So the model has SLOTS shapes from the beginning, on a fixed body of
 their own; those that are not in use collide with nothing and are skipped as a whole when none is in use.
 """
 
@@ -31,7 +31,7 @@ class Shape:
     Attributes:
         geom: MuJoCo's type.
         to_mujoco: its sizes, as `AddObstacle` has them, as MuJoCo's sizes.
-        half_extent: half edges of the smallest box around it [m]; infinite for what has no end.
+        half_extent: half edges of the smallest box around it [m]; infinite for a plane.
     """
 
     geom: mujoco.mjtGeom
@@ -71,11 +71,11 @@ def add_slots(spec: mujoco.MjSpec) -> None:
 
 
 class Obstacles:
-    """Those that stand around one arm.
+    """The obstacles of one arm.
 
     Args:
         model: of the arm, with slots for them.
-        q: where the hinges are (6,) [rad], kept up to date by the physics: nothing can be put into the arm.
+        q: hinge angles (6,) [rad], kept up to date by the physics: an obstacle must not overlap the arm.
     """
 
     def __init__(self, model: mujoco.MjModel, q: NDArray[np.float64]) -> None:
@@ -87,11 +87,11 @@ class Obstacles:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Their names, in the order in which they came."""
+        """Their names, in the order in which they were added."""
         return tuple(self._slots)
 
     def put(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
-        """Put an obstacle somewhere; one of the same name gives way to it.
+        """Add an obstacle; one of the same name is replaced.
 
         Args:
             name: to remove it by.
@@ -100,7 +100,7 @@ class Obstacles:
             pose: of its middle in the base frame [m, rad].
 
         Raises:
-            RefusedError: the arm is there, or there are too many; all stays as it was.
+            RefusedError: it would overlap the arm, or there are too many; nothing changes.
         """
         slot = next(i for i in range(SLOTS + 1) if i not in self._slots.values())
         if slot == SLOTS and name not in self._slots:
@@ -121,7 +121,7 @@ class Obstacles:
         self._slots[name] = slot
 
     def remove(self, name: str) -> None:
-        """Take an obstacle away; one that does not stand there is none."""
+        """Remove an obstacle, if it exists."""
         slot = self._slots.pop(name, None)
         if slot is not None:
             self._hide(slot)

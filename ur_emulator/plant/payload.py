@@ -1,4 +1,4 @@
-"""Hanging a payload on the flange of a compiled MuJoCo arm."""
+"""The payload body of a compiled MuJoCo arm."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ur_emulator.errors import PlantError
 from ur_emulator.models.mjcf import PAYLOAD
 from ur_emulator.models.robot_model import Vector3
 
-_DENSITY = 2700.0  # kg/m³, aluminium: gives a payload without a stated inertia a believable one
+_DENSITY = 2700.0  # kg/m³, aluminium: gives a payload without a stated inertia a plausible one
 
 
 def check_payload(mass: float, cog: Vector3) -> None:
-    """Refuse what is no payload.
+    """Check a payload.
 
     Raises:
         PlantError: when the mass is negative or a number is not finite.

@@ -1,7 +1,7 @@
 """The plant's MuJoCo model: the mechanism with hull, friction, drives, table and raw sensors.
 
 The law of the joint servos is that of MuJoCo's actuators, force = kp (ctrl - q) - kv qd + bias, so that it
-acts within every sub-step, in C, and implicitly in speed. The drives say what goes into `ctrl` and `bias`.
+acts within every sub-step, in C, and implicitly in speed. The drives give `ctrl` and `bias`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the t
 _FRICTION_SOLREF = (0.02, 1.0)
 _FRICTION_SOLIMP = (0.1, 0.1, 0.001, 0.5, 2.0)
 
-# What is guided by hand would creep under the softness above. There the friction holds, up to its size.
+# In freedrive a joint would creep with the soft constraint above. There the friction holds, up to its size.
 _STICTION_SOLIMP = (0.999, 0.999, 0.001, 0.5, 2.0)
 
 # Contacts give like a tool and a table of some elasticity: 0.1 mm under 20 N, 0.4 mm under 120 N. Harder ones
@@ -64,9 +64,9 @@ class ServoGains:
 
 
 class JointServos:
-    """Switches the joints of a compiled model between their servos and being free.
+    """Switches the joints of a compiled model between servo control and freedrive.
 
-    Free means: actuators give `ctrl` as it is, and friction holds what stands still.
+    Free: the actuators give `ctrl` as torque, and friction holds resting joints.
 
     Attributes:
         bias: torque beside the law (6,) [Nm].
@@ -80,7 +80,7 @@ class JointServos:
         self.bias: NDArray[np.float64] = self._law[:, 0]
 
     def set_free(self, free: bool) -> None:
-        """Free the joints, or give them back to their servos."""
+        """Free the joints, or return them to servo control."""
         self._gain[:, 0] = 1.0 if free else self._servo_gain[:, 0]
         self._law[:] = 0.0 if free else self._servo_law
         self._solimp[:] = _STICTION_SOLIMP if free else _FRICTION_SOLIMP
@@ -104,7 +104,7 @@ def build_physics(
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     # Round friction cones: on a pyramid a drawn tool jumps from edge to edge.
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    # A diverged state must reach the caller instead of being reset behind his back. Islands and the midphase
+    # A diverged state must reach the caller instead of being reset silently. Islands and the midphase
     # are for scenes with many bodies and only cost time here.
     off = mujoco.mjtDisableBit
     option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_ISLAND | off.mjDSBL_MIDPHASE

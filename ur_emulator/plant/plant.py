@@ -2,14 +2,14 @@
 
 A cycle is: target -> controller's model torque -> command path (delay, interpolation, lag) -> joint servos
 and physics in sub-steps -> a record of true values -> sensors. The plant knows nothing of programs, modes or
-safety; it does what it is told or raises `PlantError`. It reads no clock, and its only chance comes from the
+safety; it follows its targets or raises `PlantError`. It reads no clock, and all randomness comes from the
 seed: equal seeds and equal targets give bit-identical states.
 
 Where the dead time is at least a cycle, no target acts within its own cycle: the arm can move before the
-target is known (`run_ahead`), while a client works on it. What acts on the arm meanwhile takes that back.
+target is known (`run_ahead`), while a client computes it. A change of the loads meanwhile undoes that.
 
-The arm has three ways to be driven (`ControlMode`): by position; by position with the slow outer loop of the
-servos at rest, for the contacts of force mode; and guided by hand, where no joint holds a position.
+The arm has three control modes (`ControlMode`): position; force, with the slow outer loop of the servos held;
+and freedrive, where no joint holds a position.
 
 Angles: the physics' hinge is the motor side of the gear, which the drive holds; the joint is there plus the
 gear's transmission error. Links move with the hinge: collisions leave out that error of 0.1 mrad.
@@ -49,7 +49,7 @@ class Plant:
     Args:
         robot: type of the arm; its generation has the control cycle and the physics step.
         fidelity: how imperfect it is.
-        seed: which one of all such arms; fixes calibration, gear phases, delays and noise.
+        seed: of calibration, gear phases, delays and noise.
 
     Attributes:
         calibration: the factory calibration of this arm, for the controller's kinematics.
@@ -84,7 +84,6 @@ class Plant:
         # The measurement is taken in this sub-step of a cycle and reported so many cycles later.
         age_substeps = max(1, round(fidelity.feedback_age / substep))
         self._capture_at = -age_substeps % self._n_substeps
-        # The record of this cycle stands last; the oldest one is read.
         # The first record is that of this cycle; the next one, which is the oldest, is read.
         self._records = deque(Record() for _ in range(1 + (age_substeps - 1) // self._n_substeps))
         self._read_at = 1 % len(self._records)
@@ -94,15 +93,15 @@ class Plant:
         # Below this no joint can be at its torque limit [A].
         self._unsaturated = min(map(truediv, robot.tau_max, robot.torque_constant))
         self._mode = ControlMode.POSITION
-        # In force mode and after it, until the arm is moved away; see `rest_trim`.
-        self._trim_rests = False
+        # In force mode and after it, until the arm is moved away; see `hold_trim`.
+        self._trim_is_held = False
         self._error = np.zeros(6)
         self._braked = True
         self._saturated_before = self._saturated_now = False
         self._control_current = ZERO6
         self._rest = Record()
         self._state: PlantState | None = None
-        # The next cycle has run, but was not kept.
+        # The next cycle is computed, but not completed.
         self._is_ahead = False
         self.reset(robot.home_q)
 
@@ -110,40 +109,40 @@ class Plant:
 
     @property
     def obstacles(self) -> Obstacles:
-        """What stands around the arm."""
-        self._take_back()
+        """Obstacles around the arm."""
+        self._undo_run_ahead()
         return self._physics.obstacles
 
     @property
     def q_true(self) -> NDArray[np.float64]:
         """True joint angles (6,) now [rad]; no real controller knows them."""
-        self._take_back()
+        self._undo_run_ahead()
         self._gear.evaluate(self._physics.q)
         return self._physics.q + self._gear.error
 
     @property
     def qd_true(self) -> NDArray[np.float64]:
         """True joint speeds (6,) now [rad/s]."""
-        self._take_back()
+        self._undo_run_ahead()
         self._gear.evaluate(self._physics.q)
         return self._physics.qd * (1.0 + self._gear.slope)
 
     @property
     def n_contacts(self) -> int:
         """Number of contact points of the arm with itself, its base or the table."""
-        self._take_back()
+        self._undo_run_ahead()
         return self._physics.n_contacts
 
     @property
     def flange_position(self) -> NDArray[np.float64]:
         """True position of the flange (3,) in the base frame [m], at the start of the last sub-step."""
-        self._take_back()
+        self._undo_run_ahead()
         return self._physics.flange_position.copy()
 
     @property
     def contact_wrench(self) -> NDArray[np.float64]:
-        """What table and base press on the arm (6,), at the flange in base axes [N, Nm]: the truth."""
-        self._take_back()
+        """True contact wrench of table and base on the arm (6,), at the flange in base axes [N, Nm]."""
+        self._undo_run_ahead()
         return self._physics.contact_wrench
 
     def reset(self, q: Sequence[float]) -> None:
@@ -156,7 +155,7 @@ class Plant:
         if angles.shape != (6,) or not np.isfinite(angles).all():
             raise PlantError(f"joint angles {list(q)} given: six finite numbers are needed")
         self.cycle = 0
-        self._take_back()
+        self._undo_run_ahead()
         self._physics.place(self._gear.motor_position(angles))
         self._sensors.reset()
         self._engage_brakes()
@@ -170,7 +169,7 @@ class Plant:
         return self._physics.touches(q)
 
     def set_payload(self, mass: float, cog: Vector3) -> None:
-        """Declare a payload to the controller; it hangs on the flange unless `hang` has put another there.
+        """Set the payload that the controller assumes, and the true one unless `attach_load` has set it.
 
         Args:
             mass: [kg].
@@ -179,12 +178,12 @@ class Plant:
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
-        self._take_back()
+        self._undo_run_ahead()
         self._physics.loads.declare(mass, cog)
         self._drives.set_payload(mass, cog)
 
-    def hang(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
-        """Hang a payload on the flange without a word to the controller: what it believes may be wrong.
+    def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
+        """Set the true payload at the flange, of which the controller does not know.
 
         From now on `set_payload` only declares.
 
@@ -195,15 +194,15 @@ class Plant:
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
-        self._take_back()
-        self._physics.loads.hang(mass, cog)
+        self._undo_run_ahead()
+        self._physics.loads.attach(mass, cog)
 
-    def rest_trim(self) -> None:
-        """Let the slow outer loop of the servos rest until the target moves, where the arm presses something.
+    def hold_trim(self) -> None:
+        """Hold the trim of the servos until the target moves, if the arm presses against an obstacle.
 
-        It would press harder and harder for the sake of its encoders.
+        Otherwise its integral would raise the contact force more and more.
         """
-        self._trim_rests = True
+        self._trim_is_held = True
 
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
         """Push the flange from now on; a zero force ends it.
@@ -215,7 +214,7 @@ class Plant:
         Raises:
             PlantError: when a number is not finite.
         """
-        self._take_back()
+        self._undo_run_ahead()
         self._physics.loads.push(force, point)
 
     # --- the cycle ---
@@ -226,8 +225,8 @@ class Plant:
         Args:
             target: set-point for the end of this cycle; the drives act on it from the beginning of the cycle
                 plus the dead time. None puts or keeps the brakes on: the joints stand still.
-            mode: how the arm is driven. TEACH leaves it to the hand that pushes it; the target does not
-                count then, but the first one afterwards should be where the arm is.
+            mode: control mode. In TEACH (freedrive) the target has no effect, but the first one afterwards
+                should be at the measured position.
 
         Raises:
             PlantError: the target is not finite, or the simulation diverged and needs a reset.
@@ -241,10 +240,10 @@ class Plant:
             self._release_brakes()
         if mode is not self._mode:
             self._switch(mode, target)
-        elif self._trim_rests and mode is ControlMode.POSITION and any(target.qd):
-            self._trim_rests = False
+        elif self._trim_is_held and mode is ControlMode.POSITION and any(target.qd):
+            self._trim_is_held = False
         if mode is ControlMode.TEACH:
-            self._drives.guide(self._physics.q, self._physics.qd)
+            self._drives.drive_freely(self._physics.q, self._physics.qd)
         elif not self._drives.command(target):
             raise PlantError(
                 f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
@@ -258,23 +257,23 @@ class Plant:
         self._keep()
 
     def run_ahead(self) -> None:
-        """Let the arm move for the next cycle already, if nothing that is unknown yet acts on it.
+        """Compute the arm's next cycle, if nothing that is still unknown acts in it.
 
-        `step` does what is left then; its results are the same to the last bit.
+        `step` completes the cycle; the results are the same to the last bit.
         """
         drives = self._drives
         if not (drives.target_acts_later and self._state) or self._braked or self._is_ahead:
             return
-        if self._mode is not ControlMode.TEACH and not self._physics.loads.is_felt:
-            self._physics.remember()
+        if self._mode is not ControlMode.TEACH and not self._physics.loads.is_unexpected:
+            self._physics.store_state()
             self._run()
             self._is_ahead = True
 
-    def _take_back(self) -> None:
+    def _undo_run_ahead(self) -> None:
         """Undo `run_ahead`."""
         if self._is_ahead:
             self._is_ahead = False
-            self._physics.take_back()
+            self._physics.restore_state()
 
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
@@ -291,7 +290,7 @@ class Plant:
         return self._state
 
     def _run(self) -> None:
-        """Let the arm move for a cycle and read its sensors; nobody knows of it before `_keep`."""
+        """Advance the arm by a cycle and read its sensors; `_keep` completes the cycle."""
         physics, drives, gear = self._physics, self._drives, self._gear
         record, error = self._records[0], self._error
         is_guided = self._mode is ControlMode.TEACH
@@ -302,7 +301,7 @@ class Plant:
         np.multiply(physics.torque, self._per_torque, self._currents)
         self._control_current = six(self._currents.tolist())
         gear.apply(record)
-        record.wrench[:] = physics.loads.wrench if physics.loads.is_felt else 0.0
+        record.wrench[:] = physics.loads.wrench if physics.loads.is_unexpected else 0.0
         if physics.data.ncon:
             record.wrench += physics.contact_wrench
         if is_guided:
@@ -313,7 +312,7 @@ class Plant:
         self._reading = self._sensors.read(self._records[self._read_at])
 
     def _keep(self) -> None:
-        """Take the cycle that ran for done."""
+        """Complete the cycle that was computed."""
         physics, currents = self._physics, self._control_current
         if physics.has_diverged:
             raise PlantError(
@@ -326,7 +325,7 @@ class Plant:
             map(ge, map(abs, physics.torque.tolist()), self.robot.tau_max)
         )
         if self._mode is not ControlMode.TEACH:
-            trims = not (self._saturated_now or (self._trim_rests and self._presses))
+            trims = not (self._saturated_now or (self._trim_is_held and self._is_pressing))
             self._drives.keep(self._error if trims else None)
         self._keep_reading()
 
@@ -336,26 +335,26 @@ class Plant:
         self._thermometers.step(self._reading.actual_current)
 
     @property
-    def _presses(self) -> bool:
-        """True in force mode, and after it while the joints press against something."""
-        return self._mode is ControlMode.FORCE or self._drives.presses(self._physics.q)
+    def _is_pressing(self) -> bool:
+        """True in force mode, and after it while the joints press against an obstacle."""
+        return self._mode is ControlMode.FORCE or self._drives.are_pressing(self._physics.q)
 
-    # --- ways to be driven ---
+    # --- control modes ---
 
     def _switch(self, mode: ControlMode, target: Target) -> None:
-        """Change the way that the arm is driven, without a jump of the torques."""
-        self._take_back()
+        """Change the control mode without a jump of the torques."""
+        self._undo_run_ahead()
         was_guided, self._mode = self._mode is ControlMode.TEACH, mode
         self._physics.servos.set_free(mode is ControlMode.TEACH)
         if was_guided:
-            self._drives.take_over_moving(target, self._physics.q)
-        self._trim_rests = mode is ControlMode.FORCE or (self._trim_rests and not was_guided)
+            self._drives.follow_moving(target, self._physics.q)
+        self._trim_is_held = mode is ControlMode.FORCE or (self._trim_is_held and not was_guided)
 
     # --- brakes ---
 
     def _stand_still(self) -> None:
-        """Let a cycle pass with the brakes on."""
-        self._take_back()
+        """Advance by a cycle with the brakes on."""
+        self._undo_run_ahead()
         if not self._braked:
             self._engage_brakes()
         self._records[0].values[:] = self._rest.values
@@ -365,7 +364,7 @@ class Plant:
     def _engage_brakes(self) -> None:
         """Stand still at once, wherever the arm is."""
         self._braked = True
-        self._trim_rests = False
+        self._trim_is_held = False
         if self._mode is not ControlMode.POSITION:
             self._mode = ControlMode.POSITION
             self._physics.servos.set_free(False)
@@ -378,6 +377,6 @@ class Plant:
         self._rest.values[REC_ACCELERATION] = GRAVITY * self._physics.flange_rotation[2]
 
     def _release_brakes(self) -> None:
-        """Hand the load over to the drives, at the pose in which the brakes hold it."""
+        """Let the drives hold the arm, at the pose in which the brakes hold it."""
         self._braked = False
-        self._drives.take_over(self._rest.q, self._physics.q)
+        self._drives.hold(self._rest.q, self._physics.q)

@@ -1,4 +1,4 @@
-"""What goes into the plant and what comes out of it, once a control cycle."""
+"""Input and output of the plant, once a control cycle."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Target(Protocol):
 
 
 class PlantState(NamedTuple):
-    """What the control box reads from its arm after a cycle; names as in RTDE where one exists.
+    """The state of the arm after a cycle, as the control box reads it; names as in RTDE where one exists.
 
     The first group is measured: noisy, and as old as the feedback age. The second group is computed inside
     the box for the present target. The third tells the safety system about the present moment.

@@ -1,6 +1,6 @@
-"""Sensors: what the box reads of the arm, with the noise, grain and filters of the real ones.
+"""Sensors: the measurements of the arm, with noise, quantisation and filters as on real arms.
 
-Input is a record of true values of some moment (see the REC slices); output are plain floats. All chance
+Input is a record of true values of some moment (see the REC slices); output are plain floats. All noise
 comes in blocks from seeded streams, so equal seeds and equal motions give equal bits.
 """
 
@@ -63,7 +63,7 @@ class Record:
 
 
 class Reading(NamedTuple):
-    """What the sensors say; names, units and order as in `PlantState`."""
+    """Measurements; names, units and order as in `PlantState`."""
 
     actual_q: Vector6
     actual_qd: Vector6
@@ -112,7 +112,7 @@ class Sensors:
         self._work = np.zeros(6)
 
     def reset(self) -> None:
-        """Forget the state of the filters; the random stream goes on."""
+        """Reset the filters; the random stream continues."""
         self._speeds = ZERO6
 
     def read(self, record: Record) -> Reading:
@@ -145,7 +145,7 @@ class Sensors:
         )
 
     def keep(self) -> None:
-        """Go on to the next cycle."""
+        """Advance to the next cycle."""
         self._at += 1
         self._speeds = self._next_speeds
 

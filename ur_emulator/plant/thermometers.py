@@ -1,4 +1,4 @@
-"""Thermometers: joint temperatures that follow the work of the motors, slowly and without chance.
+"""Thermometers: joint temperatures that follow the heat of the motors; deterministic.
 
 Source: production log of a UR3 (UCI "UR3 CobotOps"): 28 to 45 °C, wrists hottest. Time constant and heat per
 current are assumed.
@@ -20,7 +20,7 @@ _STEPS_PER_DEGREE = 16.0
 
 
 class Thermometers:
-    """Six thermometers; `reading` holds what they show [°C]."""
+    """Six thermometers; `reading` has their values [°C]."""
 
     def __init__(self, period: float) -> None:
         self._every = max(1, round(_INTERVAL / period))
@@ -30,7 +30,7 @@ class Thermometers:
         self.reading = _IDLE
 
     def step(self, current: Sequence[float]) -> None:
-        """Go on by one cycle with these motor currents (6,) [A]."""
+        """Advance by one cycle with these motor currents (6,) [A]."""
         self._countdown -= 1
         if self._countdown:
             return

@@ -1,8 +1,8 @@
 """The loop: it waits for sockets or the next deadline, calls back, and lets the boxes advance.
 
 One thread owns the loop and all that is registered with it; other threads may only use
-`call_soon_threadsafe`. The loop knows no robot: a service is anything that says when it wants to be called
-next.
+`call_soon_threadsafe`. The loop knows no robot: a service is anything with `advance`, which returns when it
+must be called next.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ _Ready = tuple[selectors.SelectorKey, int]
 
 
 class Service(Protocol):
-    """Something that advances in the loop."""
+    """A part that advances in the loop."""
 
     def advance(self, now: float) -> float:
-        """Do what is due at monotonic time `now` [s]; return when to be called next at the latest."""
+        """Advance to monotonic time `now` [s]; return the time of the next call at the latest."""
         ...
 
 
@@ -51,7 +51,7 @@ class EventLoop:
 
     Attributes:
         is_running: `run` has been called, or will be at once; it has not returned.
-        tasks: what takes longer than a cycle, done in a process beside this one.
+        tasks: work that takes longer than a cycle, done in another process.
     """
 
     def __init__(self, *, precise: bool = True) -> None:

@@ -1,4 +1,4 @@
-"""Settings of the Python interpreter that a control loop needs; they are the process's own again afterwards.
+"""Settings of the Python interpreter for a control loop; the settings before are restored afterwards.
 
 While the garbage collector runs, nothing else does. A thread with long work, such as the user's own beside
 `with ControlBox()`, shares the interpreter with the loop, so turns must be short.

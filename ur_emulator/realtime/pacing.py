@@ -35,11 +35,11 @@ class Pace(Enum):
 
 
 class Situation(Protocol):
-    """What a pacer needs to know of its box; asked only when it matters."""
+    """State of the box for its pacer."""
 
     @property
     def is_active(self) -> bool:
-        """Something is going on: a command waits, a program runs, the arm moves."""
+        """The box is active: a command waits, a program runs, the arm moves."""
         ...
 
     @property
@@ -53,11 +53,11 @@ class Situation(Protocol):
         ...
 
     def give_up_readers(self) -> None:
-        """Wait no longer for the clients that are behind; they lose frames until they have caught up."""
+        """Stop waiting for the clients that are behind; they lose frames until they have caught up."""
         ...
 
     def fell_behind(self, n_cycles: int) -> None:
-        """Take note: the machine was too slow, real time is so many cycles further than the box."""
+        """Report that the machine was too slow: real time is so many cycles ahead of the box."""
         ...
 
 
@@ -138,7 +138,7 @@ class LockstepPacer:
         self._last_tick = -math.inf
 
     def may_tick(self, now: float, situation: Situation) -> bool:
-        """True when something is going on and nothing outside holds time still."""
+        """True when the box is active and no script waits for the outside."""
         if not situation.is_active:
             self._outside.restart()
             self._readers.restart()

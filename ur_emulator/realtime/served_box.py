@@ -16,7 +16,7 @@ from ur_emulator.realtime.pacing import Pacer, RealtimePacer
 
 
 class Publisher(Protocol):
-    """What acts after every cycle."""
+    """A part that publishes every cycle."""
 
     def publish(self, snapshot: Snapshot) -> None:
         """Send what is due for this cycle."""
@@ -39,7 +39,7 @@ class ServedBox:
         expect_soon: Callable[[], bool],
         on_failure: Callable[[Exception], None],
     ) -> None:
-        """Take over a controller.
+        """Serve a controller.
 
         Args:
             controller: the box without its ports.
@@ -66,7 +66,7 @@ class ServedBox:
     def attach(
         self, publishers: Iterable[Publisher], listeners: Iterable[Callable[[Event], None]] = ()
     ) -> None:
-        """Name who is called.
+        """Register publishers and listeners.
 
         Args:
             publishers: after every cycle, in this order.

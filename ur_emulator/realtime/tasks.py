@@ -1,4 +1,4 @@
-"""The long tasks of the services of one loop: done one after the other in a process beside it."""
+"""Long tasks of the services of one loop: done one after the other in another process."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TaskDone = Callable[[Any, Exception | None], None]
 
 
 class Watcher(Protocol):
-    """What a task queue needs of its loop."""
+    """The part of a loop that a task queue uses."""
 
     def watch(self, sock: socket.socket, events: int, callback: Callable[[int], None]) -> None:
         """Call `callback(events)` whenever `sock` is ready."""
@@ -60,7 +60,7 @@ class TaskQueue:
             self._start()
 
     def submit(self, done: TaskDone, function: Callable[..., Any], *arguments: Any) -> Task:
-        """Have something done that takes longer than a cycle.
+        """Submit a task that takes longer than a cycle.
 
         Args:
             done: called in the loop with its result, never before this returns.
@@ -73,7 +73,7 @@ class TaskQueue:
         return task
 
     def drop(self, task: Task) -> None:
-        """Forget a task; one that is being done ends, and its process with it. Harmless after its end."""
+        """Drop a task; one in progress ends with its process. No effect after its end."""
         if task is self._current:
             self._current = None
             if self._process is not None:
@@ -86,7 +86,7 @@ class TaskQueue:
                 self._waiting.remove(task)
 
     def close(self) -> None:
-        """Forget all tasks; the process stays for the next loop if it is idle."""
+        """Drop all tasks; the process stays for the next loop if it is idle."""
         self._waiting.clear()
         process, self._process = self._process, None
         if process is not None:
@@ -97,7 +97,7 @@ class TaskQueue:
                 process.end()
         self._current = None
         for killed in tuple(self._killed):
-            self._bury(killed)
+            self._release(killed)
 
     # --- how
 
@@ -133,7 +133,7 @@ class TaskQueue:
         try:
             answer = process.receive()
         except EOFError:
-            code = self._bury(process)
+            code = self._release(process)
             if process is self._process:
                 self._process = None
                 if self._current is not None:
@@ -152,7 +152,7 @@ class TaskQueue:
             task.done(result, error)
             self._begin_next()
 
-    def _bury(self, process: WorkerProcess) -> int:
+    def _release(self, process: WorkerProcess) -> int:
         """Release what is left of a process that has ended or is killed; return its exit code."""
         self._killed.discard(process)
         self._loop.unwatch(process.sock)

@@ -1,4 +1,4 @@
-"""A process that does long tasks for a loop, so that they cost it no cycle: both ends of the pipe.
+"""WorkerProcess: does long tasks for a loop, so that they delay no cycle: both ends of the pipe.
 
 A task is a function that can be imported and its arguments, pickled; the answer is what it returns or raises.
 The process lives as long as this one: it ends when the pipe is closed. It is in a session of its own, where

@@ -1,4 +1,4 @@
-"""HandGuiding: what the drives do while somebody guides the arm by hand.
+"""Freedrive: the torque of the drives while a person guides the arm by hand.
 
 No joint holds a position. The drives carry the arm against gravity, as the controller's model with the
 declared payload knows it, take away a part of the friction, and push back near the limits of a joint's range
@@ -16,21 +16,21 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.robot_model import RobotModel
 
-# Part of the believed Coulomb friction that the drives take away. Whatever the belief is worth (see
-# `Friction`, off by 70 % at most) less than the true friction is compensated: a joint never runs by itself.
+# Part of the modelled Coulomb friction that is compensated. With any error of the model (see `Friction`,
+# 70 % at most) it is less than the true friction: a joint never moves by itself.
 FRICTION_SHARE = 0.5
 # The push back begins this far before the end of the range [rad], and at this part of the rated speed.
 RANGE_MARGIN = 0.15
 SPEED_MARGIN = 0.7
 # It has grown to this part of the rated torque at the limit.
 LIMIT_SHARE = 0.6
-# At the end of the range a resting joint feels only a part of that; all of it while it moves on outwards at
-# this speed [rad/s]. A mere spring would throw the arm back.
+# The torque on a resting joint is only a part of that; it is full while the joint moves outwards at this
+# speed [rad/s]. A spring alone would throw the arm back.
 _REST_SHARE, _FULL_SPEED = 0.3, 0.1
 
 
-class HandGuiding:
-    """The torque of the drives of an arm that is guided by hand.
+class Freedrive:
+    """Torque of the drives in freedrive.
 
     Args:
         robot: gives ranges, rated speeds and torques.
