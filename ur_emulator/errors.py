@@ -3,7 +3,7 @@
 EmulatorError
 ├── ModelError        an unknown robot or fidelity name, or numbers that make no arm
 ├── KinematicsError   arguments of the controller's own kinematics make no sense
-├── PlantError        the physics cannot go on: a target that is no number, or a diverged simulation
+├── PlantError        the physics cannot go on: a target that is not a number, or a diverged simulation
 ├── ProgramFileError  a program or installation file cannot be used
 │   └── FileMissingError      there is no such file
 ├── ControlError      an operation of the control API was not done

@@ -103,7 +103,7 @@ def counted_up(count: int, options: BoxOptions) -> list[BoxOptions]:
     With free ports (`port_base` None) one host is enough for all.
 
     Raises:
-        EmulatorError: the host is no address from which `count` can be counted.
+        EmulatorError: the host is not an address from which `count` can be counted.
     """
     if not 1 <= count <= MAX_BOXES:
         raise EmulatorError(f"{count} boxes asked for: 1 to {MAX_BOXES} are possible")

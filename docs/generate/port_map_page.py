@@ -23,7 +23,7 @@ The same in all versions of CB3. Functions 1 and 2 read coils, 3 and 4 registers
 | sizes that do not match, a coil that is neither 0xFF00 nor 0 | 3 |
 
 Writes act in the next control cycle and are answered after it, so that a client reads what it has written.
-What is no Modbus ends the connection. Port 502 needs privileges on most systems: without them
+What is not Modbus ends the connection. Port 502 needs privileges on most systems: without them
 `ur-emulator serve` says so in one line and serves all other ports; `--port-base N` moves it with them.
 """
 

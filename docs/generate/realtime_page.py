@@ -19,7 +19,7 @@ generation, data loggers and MATLAB read it, and they write script lines into th
 ([scripts.md](scripts.md)); nothing is answered there. Port 30013 sends the same and ignores what it is sent.
 
 A frame is its size in bytes (a 32-bit integer, itself included) and then 64-bit floats, all big-endian. There
-is no type and no version: the size is the only hint. A frame of an older version is the beginning of a newer
+has no type and no version: the size is the only hint. A frame of an older version is the beginning of a newer
 one. A client that does not read loses whole frames, never parts, and holds up nobody.
 """
 

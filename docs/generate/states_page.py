@@ -72,7 +72,7 @@ button sooner cuts it at once.
 _MATRIX = """
 ### From mode to mode
 
-Where only the cause of the mode in the head of the column stands; `.` is no change.
+Where only the cause of the mode in the head of the column stands; `.` means no change.
 """
 
 _SPEEDS = """

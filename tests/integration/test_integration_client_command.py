@@ -27,7 +27,7 @@ FAR = "t,x,y,z\n" + "".join(f"{0.2 * i:.1f},{0.3 + 0.05 * i:.2f},0.1,0.3\n" for 
 MOVEMENT_FILES = {
     "empty.toml": ("", "empty.toml"),
     "empty.csv": ("", "empty.csv"),
-    "no.toml": ("this is no TOML [", "no.toml"),
+    "no.toml": ("this is not TOML [", "no.toml"),
     "other.toml": ("[tool]\nname = 3\n", "other.toml"),
     "nan.csv": (FAR.replace("0.30,", "nan,"), "nan"),
     "words.csv": (FAR.replace("0.1,", "left,"), "left"),

@@ -80,7 +80,7 @@ def test_another_wrench_is_taken_on_without_letting_go():
 
 
 def test_what_is_pressed_against_at_the_start_counts_as_contact():
-    """A force beyond the precision of the estimate is no error of it: entering twice does not press twice."""
+    """A force beyond the precision of the estimate is not an error of it: entering twice does not press twice."""
     bench = above_table(pressing(30) + "  sleep(4)\n  end_force_mode()\n" + pressing(30) + "  sleep(100)")
     forces, _ = truth(bench, 1300)
     assert forces[-200:, 2].mean() == pytest.approx(30.0, abs=5.0)

@@ -112,7 +112,7 @@ def test_a_script_file_is_one_program(text, program):
 @pytest.mark.parametrize(
     ("data", "problem"),
     [
-        (b"x = 1\0", "is no text"),
+        (b"x = 1\0", "is not text"),
         (b"#" * (5 << 20), "more than 4194304 bytes"),
         (b"#" * (40 << 20), "more than 33554432 bytes"),
     ],
@@ -127,7 +127,7 @@ def test_script_files_that_are_none(tmp_path, data, problem):
 def test_files_of_other_kinds_are_no_programs(tmp_path):
     (tmp_path / "notes.txt").write_text("x = 1")
     with pytest.raises(
-        ProgramFileError, match=r"notes\.txt is no program: its name must end in \.urp or \.script"
+        ProgramFileError, match=r"notes\.txt is not a program: its name must end in \.urp or \.script"
     ):
         load_program(ProgramFolder(tmp_path), "notes.txt")
 

@@ -290,7 +290,7 @@ def test_a_file_without_compression_is_read_too(tmp_path):
         ('<Wait type="Condition"><expression><Riddle/></expression></Wait>', "<Riddle> in an expression cannot"),
         ('<Popup type="Balloon"/>', "a popup of type 'Balloon' cannot"),
         ('<Assignment valueSource="Operator"/>', "an assignment from 'Operator' cannot"),
-        (f'<Assignment><variable name="a b"/>{expression("1")}</Assignment>', "'a b' is no name of a variable"),
+        (f'<Assignment><variable name="a b"/>{expression("1")}</Assignment>', "'a b' is not the name of a variable"),
         (f'<Assignment><variable reference="../../Nothing[3]"/>{expression("1")}</Assignment>', "'../../Nothing\\[3\\]' of <variable> leads nowhere"),
         (f'<Assignment><variable reference="/etc/passwd"/>{expression("1")}</Assignment>', "leads nowhere"),
         (f'<Assignment><variable reference="../variable"/>{expression("1")}</Assignment>', "lead in a circle"),
@@ -311,11 +311,11 @@ def test_what_nobody_knows_is_an_error_that_names_it(tmp_path, nodes, problem):
 @pytest.mark.parametrize(
     ("data", "problem"),
     [
-        (b"", "is no XML that PolyScope has written"),
+        (b"", "is not XML that PolyScope has written"),
         (b"\x1f\x8b" + bytes(30), "is damaged"),
         (urp("<Halt/>")[:-20], "is damaged: it ends too early"),
-        (gzip.compress(b"<URProgram>"), "is no XML"),
-        (gzip.compress(b"<Installation/>"), "is no program: it is a <Installation>, not a <URProgram>"),
+        (gzip.compress(b"<URProgram>"), "is not XML"),
+        (gzip.compress(b"<Installation/>"), "is not a program: it is a <Installation>, not a <URProgram>"),
         (gzip.compress(b"<URProgram/>"), "there is no <MainProgram> in it"),
         (gzip.compress(bytes(40 << 20)), "has more than 33554432 bytes unpacked"),
         (

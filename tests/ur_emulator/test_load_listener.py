@@ -179,5 +179,5 @@ def test_silent_clients_are_asked_whether_they_are_still_there(loop):
 
 
 def test_an_address_of_another_machine_is_told_from_a_taken_port(loop):
-    with pytest.raises(PortError, match=r"192\.0\.2\.1 is no address of this machine"):
+    with pytest.raises(PortError, match=r"192\.0\.2\.1 is not an address of this machine"):
         Listener(loop, "192.0.2.1", 0, Clients(), set(), print, "dashboard")

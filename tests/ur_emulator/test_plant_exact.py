@@ -87,7 +87,7 @@ def test_what_would_act_on_the_arm_is_refused_in_one_line(act):
     plant = ExactPlant(UR3, EXACT, 0)
     with pytest.raises(RefusedError, match="nothing acts on an arm of fidelity exact"):
         act(plant)
-    plant.push((0.0, 0.0, 0.0))  # no push is no force
+    plant.push((0.0, 0.0, 0.0))  # a zero force ends it
 
 
 def test_a_refused_push_takes_no_time():

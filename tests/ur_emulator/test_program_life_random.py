@@ -86,7 +86,7 @@ def test_commands_in_any_order(steps):
     last = None
     for event in bench.events:
         if type(event) in NEXT:
-            # A pause that is taken back before the arm rests is no news, but its end is.
+            # A pause that is taken back before the arm rests is not news, but its end is.
             allowed = NEXT[last] | ({ProgramResumed} if last in (ProgramStarted, ProgramResumed) else set())
             assert type(event) in allowed
             last = type(event)

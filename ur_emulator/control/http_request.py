@@ -119,11 +119,11 @@ def _from_body(content_type: str, body: bytes) -> dict[str, Any]:
     try:
         arguments = json.loads(body, parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
-        raise HttpError(400, f"the body is no JSON: {' '.join(str(error).split())[:100]}") from None
+        raise HttpError(400, f"the body is not JSON: {' '.join(str(error).split())[:100]}") from None
     if not isinstance(arguments, dict):
         raise HttpError(400, "the body must be a JSON object, such as {}")
     return arguments
 
 
 def _refuse(word: str) -> Any:
-    raise ValueError(f"{word} is no number")
+    raise ValueError(f"{word} is not a number")

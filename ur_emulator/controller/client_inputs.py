@@ -57,7 +57,7 @@ class ClientInputs:
         self._values: dict[str, Any] = {}
 
     def get(self, name: str, default: Any) -> Any:
-        """Return the last value of a variable that is no register; `default` before the first."""
+        """Return the last value of a variable that is not a register; `default` before the first."""
         return self._values.get(name, default)
 
     def write(self, values: Iterable[tuple[str, Any]]) -> None:

@@ -123,7 +123,7 @@ class RobotGeneration:
         """Return a version of this generation's software from its text.
 
         Raises:
-            ModelError: the text is no version, or one of another generation.
+            ModelError: the text is not a version, or one of another generation.
         """
         try:
             version = SoftwareVersion.parse(text)

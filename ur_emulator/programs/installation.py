@@ -64,7 +64,7 @@ def load_installation(folder: ProgramFolder, name: str) -> Installation:
             raise
         return Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME), ExternalControlPc())
     if file.path.suffix != SUFFIX:
-        raise ProgramFileError(f"{file.path.name} is no installation: its name must end in {SUFFIX}")
+        raise ProgramFileError(f"{file.path.name} is not an installation: its name must end in {SUFFIX}")
     tree = read_xml(file.path)
     data: dict[str, str] = {}
     for part in tree.root.iter("Contributed"):

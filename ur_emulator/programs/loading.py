@@ -101,11 +101,13 @@ def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
         return LoadedProgram(file.wire_path, None, (script,))
     if file.path.suffix != PROGRAM_SUFFIX:
         raise ProgramFileError(
-            f"{file.path.name} is no program: its name must end in {PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
+            f"{file.path.name} is not a program: its name must end in {PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
         )
     tree = read_xml(file.path)
     if tree.root.tag != ROOT:
-        raise ProgramFileError(f"{file.path.name} is no program: it is a <{tree.root.tag}>, not a <{ROOT}>")
+        raise ProgramFileError(
+            f"{file.path.name} is not a program: it is a <{tree.root.tag}>, not a <{ROOT}>"
+        )
     installation = installation_of(folder, tree, file)
     saved = file.path.with_suffix(SCRIPT_SUFFIX)
     if saved.is_file() and not uses_external_control(tree):

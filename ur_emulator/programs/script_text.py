@@ -20,7 +20,7 @@ def read_script(path: Path) -> str:
     """
     data = read_bytes(path)
     if b"\0" in data:
-        raise ProgramFileError(f"{path.name} is no text: it has zero bytes")
+        raise ProgramFileError(f"{path.name} is not text: it has zero bytes")
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:

@@ -88,7 +88,7 @@ def variable_name(tree: XmlTree, element: Element | None) -> str:
     """
     name = "" if element is None else tree.resolve(element).get("name", "")
     if not _IDENTIFIER.fullmatch(name):
-        raise ProgramFileError(f"{tree.name}: {name!r} is no name of a variable")
+        raise ProgramFileError(f"{tree.name}: {name!r} is not the name of a variable")
     return name
 
 

@@ -90,7 +90,7 @@ def read_xml(path: Path) -> XmlTree:
             parser.feed(data[start : start + _BITE])
         root: Element = parser.close()
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise ProgramFileError(f"{path.name} is no XML that PolyScope has written: {error}") from None
+        raise ProgramFileError(f"{path.name} is not XML that PolyScope has written: {error}") from None
     return XmlTree(path.name, root)
 
 

@@ -121,7 +121,7 @@ _idle: list[WorkerProcess] = []
 def prestart_process() -> None:
     """Let a process be idle when the next loop starts: it takes a moment to load the compiler.
 
-    One that cannot be started is no error before there is a task for it.
+    One that cannot be started is not an error before there is a task for it.
     """
     if not _idle:
         with suppress(OSError):

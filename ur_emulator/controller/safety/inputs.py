@@ -2,7 +2,7 @@
 
 Commands and configurable inputs may activate a function at the same time; it ends when none of them does.
 Source: UR3/CB3 user manual, safety I/O: low is the safe state, both channels of a pair are looked at. That a
-pair whose channels differ is no fault is chosen.
+pair whose channels differ is not a fault is chosen.
 """
 
 from __future__ import annotations

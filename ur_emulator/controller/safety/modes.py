@@ -47,7 +47,7 @@ class ModeRow:
         mode: its number.
         arm: what it does to the arm.
         program: what it does to the program.
-        latches: its cause is no button or input that somebody releases.
+        latches: its cause is not a button or input that somebody releases.
         way_out: what to do about it, for messages.
         why: source of the above.
     """

@@ -170,7 +170,7 @@ class ModbusLink:
             while self._socket is not None and (frame := take_frame(inbox)) is not None:
                 self._take(frame, now)
         except RemoteProtocolError:
-            self._fail(now, "sends what is no Modbus")
+            self._fail(now, "sends what is not Modbus")
 
     def _take(self, frame: ModbusFrame, now: float) -> None:
         request = self._under_way.pop(frame.transaction, None)

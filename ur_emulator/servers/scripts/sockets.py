@@ -80,7 +80,7 @@ class ScriptConnection(BufferedSocket):
             if _can_call_from(self._own_address, address):
                 self._sock.bind((self._own_address, 0))
             code = self._sock.connect_ex((address, port))
-        except (OSError, OverflowError):  # descriptors are out, or that is no address
+        except (OSError, OverflowError):  # descriptors are out, or that is not an address
             code = errno.EINVAL
         if self._sock is not None and code in _IN_PROGRESS:
             self._loop.watch(self._sock, selectors.EVENT_WRITE, self._on_connected)

@@ -68,7 +68,7 @@ class XmlRpcTransport(xmlrpc.client.Transport):
         try:
             url = urlsplit(self._url)
             if url.scheme != "http" or not url.netloc:
-                return None, f"{self._url} is no address, write http://host:port/path"
+                return None, f"{self._url} is not an address, write http://host:port/path"
             body = xmlrpc.client.dumps(arguments, method).encode()
             values = self.request(url.netloc, url.path or DEFAULT_PATH, body)
         except xmlrpc.client.Fault as fault:

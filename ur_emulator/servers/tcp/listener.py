@@ -166,7 +166,7 @@ def _listening_socket(host: str, number: int) -> socket.socket:
             ) from None
         if error.errno == errno.EADDRNOTAVAIL:
             raise PortError(
-                f"cannot listen on {host}:{number}: {host} is no address of this machine; "
+                f"cannot listen on {host}:{number}: {host} is not an address of this machine; "
                 "take one of its own, or add it (on macOS: sudo ifconfig lo0 alias ADDRESS)"
             ) from None
         raise PortError(
