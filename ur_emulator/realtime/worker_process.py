@@ -20,12 +20,12 @@ from contextlib import suppress
 from ur_emulator.errors import WorkerError
 
 # Processor time that a task may take [s]; the process ends itself beyond it.
-TASK_LIMIT = 30.0
+TASK_LIMIT = 60.0
 # Bytes of the length in front of a task and of an answer, big-endian.
 _HEAD = 8
 _READ_SIZE = 1 << 18
-# The trees of a long program are no garbage: a tenth of the time would go into looking for some.
-_GC_THRESHOLD = (100_000, 20, 100)
+# The collector looks when so many objects are new: the trees of a long program are no garbage before its end.
+_MANY_OBJECTS = 300_000
 _CODE = "import sys; sys.path[:] = {path!r}; from ur_emulator.realtime.worker_process import work; work()"
 
 
@@ -78,7 +78,7 @@ class WorkerProcess:
         try:
             self._outbox = self._outbox[self.sock.send(self._outbox) :]
         except BlockingIOError:
-            pass
+            gc.collect()
         except OSError:
             self._outbox = memoryview(b"")
 
@@ -171,7 +171,7 @@ def work() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     prepare()  # now, so that the first program does not wait for it
     gc.freeze()
-    gc.set_threshold(*_GC_THRESHOLD)
+    gc.set_threshold(_MANY_OBJECTS)
     with socket.socket(fileno=sys.stdin.fileno()) as sock, sock.makefile("rwb") as stream, suppress(OSError):
         while head := stream.read(_HEAD):
             task = stream.read(int.from_bytes(head, "big"))
