@@ -27,10 +27,10 @@ from ur_emulator.commands.programs import (
     StopProgram,
 )
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
-from ur_emulator.controller.io.lines import CONFIGURABLE_SHIFT, TOOL_SHIFT
+from ur_emulator.controller.io.lines import CONFIGURABLE, TOOL
 from urscript import compile_program
 
-_SHIFTS = {"c": CONFIGURABLE_SHIFT, "t": TOOL_SHIFT}
+_SHIFTS = {"c": CONFIGURABLE.first, "t": TOOL.first}
 _PLAIN = {
     "stop": StopProgram,
     "unlock": UnlockProtectiveStop,

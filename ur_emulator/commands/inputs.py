@@ -10,39 +10,24 @@ from typing import Literal
 from ur_emulator.commands.operation import CommandOperation
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box
-from ur_emulator.controller.io.lines import (
-    ANALOG_RANGE,
-    CONFIGURABLE_SHIFT,
-    N_CONFIGURABLE,
-    N_STANDARD,
-    N_TOOL,
-    TOOL_SHIFT,
-)
+from ur_emulator.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.errors import ArgumentError, RefusedError
-
-DigitalGroup = Literal["standard", "configurable", "tool"]
-# Groups of digital inputs: (lowest bit of the digital word, number of inputs).
-DIGITAL_GROUPS: dict[DigitalGroup, tuple[int, int]] = {
-    "standard": (0, N_STANDARD),
-    "configurable": (CONFIGURABLE_SHIFT, N_CONFIGURABLE),
-    "tool": (TOOL_SHIFT, N_TOOL),
-}
 
 
 class SetDigitalInput(CommandOperation):
     """Let a digital input be high or low from now on."""
 
-    group: DigitalGroup = parameter("which inputs")
+    group: Literal["standard", "configurable", "tool"] = parameter("which inputs")
     n: int = parameter("number of the input: 0 to 7, of the tool 0 to 1", low=0, high=7)
     level: bool = parameter("high or low")
 
     def check_together(self) -> None:
-        count = DIGITAL_GROUPS[self.group][1]
+        count = DIGITAL_GROUPS[self.group].count
         if self.n >= count:
             raise ArgumentError(f"{self.group} digital input {self.n} given: allowed are 0 to {count - 1}")
 
     def apply(self, box: Box) -> None:
-        box.state.io.write_digital_in(DIGITAL_GROUPS[self.group][0] + self.n, self.level)
+        box.state.io.write_digital_in(DIGITAL_GROUPS[self.group].bits[self.n], self.level)
 
 
 class SetAnalogInput(CommandOperation):

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from protocol.primary.messages import RequestedType
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.commands.inputs import DIGITAL_GROUPS
 from ur_emulator.models.robot_model import Vector3, Vector6
 
 if TYPE_CHECKING:
     from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.io.lines import DIGITAL_GROUPS
 
 # Slower than this counts as standing still [rad/s]: more than what the sensors make of an arm at rest.
 STANDING_SPEED = 0.01
@@ -135,6 +135,5 @@ def take_state(controller: Controller) -> BoxState:
 
 def _levels(word: int) -> Levels:
     return {
-        group: tuple(bool(word >> (shift + n) & 1) for n in range(count))
-        for group, (shift, count) in DIGITAL_GROUPS.items()
+        name: tuple(bool(word >> bit & 1) for bit in group.bits) for name, group in DIGITAL_GROUPS.items()
     }

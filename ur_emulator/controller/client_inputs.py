@@ -12,14 +12,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from ur_emulator.controller.clock import Clock
-from ur_emulator.controller.io.lines import (
-    CONFIGURABLE_SHIFT,
-    N_CONFIGURABLE,
-    N_STANDARD,
-    N_TOOL,
-    TOOL_SHIFT,
-    InputOutput,
-)
+from ur_emulator.controller.io.lines import DIGITAL_GROUPS, DigitalGroup, InputOutput
 from ur_emulator.controller.io.registers import N_BOOLEAN, N_FLOAT, N_INTEGER, N_PACKED, Registers
 from ur_emulator.controller.io.watchdogs import Watchdogs
 from ur_emulator.controller.safety.speed_scaling import SpeedScaling
@@ -87,12 +80,12 @@ class ClientInputs:
             act(self)
 
 
-def _digital_group(group: str, shift: int, size: int) -> Callable[[ClientInputs], None]:
-    mask_name, value_name = f"{group}_digital_output_mask", f"{group}_digital_output"
+def _digital_outputs(group: DigitalGroup) -> Callable[[ClientInputs], None]:
+    mask_name, value_name = f"{group.name}_digital_output_mask", f"{group.name}_digital_output"
 
     def act(inputs: ClientInputs) -> None:
-        mask = (inputs.get(mask_name, 0) & (1 << size) - 1) << shift
-        inputs.io.write_digital_outputs(inputs.get(value_name, 0) << shift, mask)
+        mask = inputs.get(mask_name, 0) << group.first & group.mask
+        inputs.io.write_digital_outputs(inputs.get(value_name, 0) << group.first, mask)
 
     return act
 
@@ -116,11 +109,6 @@ def _keep(inputs: ClientInputs) -> None:
     """Only keep the value: a script can enable its use."""
 
 
-_DIGITAL_GROUPS = (
-    ("standard", 0, N_STANDARD),
-    ("configurable", CONFIGURABLE_SHIFT, N_CONFIGURABLE),
-    ("tool", TOOL_SHIFT, N_TOOL),
-)
 # What a write to a variable that is not a register does.
 _ACTS: dict[str, Callable[[ClientInputs], None]] = {
     "speed_slider_mask": _set_speed_slider,
@@ -131,6 +119,5 @@ _ACTS: dict[str, Callable[[ClientInputs], None]] = {
     "standard_analog_output_1": _set_analog_outputs,
     "external_force_torque": _keep,
 }
-for _group, _shift, _size in _DIGITAL_GROUPS:
-    _act = _digital_group(_group, _shift, _size)
-    _ACTS[f"{_group}_digital_output_mask"] = _ACTS[f"{_group}_digital_output"] = _act
+for _name, _group in DIGITAL_GROUPS.items():
+    _ACTS[f"{_name}_digital_output_mask"] = _ACTS[f"{_name}_digital_output"] = _digital_outputs(_group)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import exp
 
 from protocol.ur_types import JointMode
-from ur_emulator.controller.io.lines import N_TOOL, TOOL_SHIFT
+from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
 
 # What one high output of the box or one switched output of the tool carries [A]: a PLC's input.
 OUTPUT_CURRENT = 0.006
@@ -18,8 +18,7 @@ TOOL_RESISTANCE = 400.0
 # The masterboard goes from the temperature of the room to this much above, exponentially [degree C, s].
 ROOM_TEMPERATURE, BOARD_RISE, BOARD_TIME = 24.0, 8.0, 900.0
 
-_BOX_OUTPUTS = (1 << TOOL_SHIFT) - 1
-_TOOL_OUTPUTS = (1 << N_TOOL) - 1 << TOOL_SHIFT
+_BOX_OUTPUTS = STANDARD.mask | CONFIGURABLE.mask
 
 # The tool has fewer modes than a joint: what it reports when the last joint is in one of the others.
 TOOL_MODES: dict[int, JointMode] = {
@@ -39,7 +38,7 @@ def tool_current(voltage: float, digital_out: int) -> float:
     """Return the current out of the tool's supply [A]; 0 while it is off."""
     if not voltage:
         return 0.0
-    return voltage / TOOL_RESISTANCE + OUTPUT_CURRENT * (digital_out & _TOOL_OUTPUTS).bit_count()
+    return voltage / TOOL_RESISTANCE + OUTPUT_CURRENT * (digital_out & TOOL.mask).bit_count()
 
 
 def board_temperature(uptime: float) -> float:

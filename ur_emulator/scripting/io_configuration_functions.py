@@ -7,7 +7,7 @@ from typing import Any
 
 from ur_emulator.controller.io.configuration import IoConfiguration, OutputKind
 from ur_emulator.controller.io.euromap import N_EUROMAP, Euromap
-from ur_emulator.controller.io.lines import CURRENT, N_STANDARD, N_TOOL, VOLTAGE, AnalogLine, InputOutput
+from ur_emulator.controller.io.lines import CURRENT, STANDARD, TOOL, VOLTAGE, AnalogLine, InputOutput
 from ur_emulator.controller.io.run_states import RunState
 from urscript.errors import ScriptRuntimeError
 
@@ -30,8 +30,8 @@ _BOX_RANGES = {0: VOLTAGE, 2: VOLTAGE}
 _TOOL_RANGES = {0: VOLTAGE, 1: VOLTAGE, 2: CURRENT}
 # The outputs that the undocumented list forms speak of, in the order of the old numbering.
 _LISTED_OUTPUTS = (
-    *((OutputKind.STANDARD, i) for i in range(N_STANDARD)),
-    *((OutputKind.TOOL, i) for i in range(N_TOOL)),
+    *((OutputKind.STANDARD, i) for i in range(STANDARD.count)),
+    *((OutputKind.TOOL, i) for i in range(TOOL.count)),
 )
 
 
@@ -106,7 +106,7 @@ def _runstates(configuration: IoConfiguration) -> dict[str, Function]:
         name = f"set_runstate_{output}_to_value"
         functions[name] = setter(kind, name)
     for name, listed in (
-        ("set_runstate_standard_digital_outputs", _LISTED_OUTPUTS[:N_STANDARD]),
+        ("set_runstate_standard_digital_outputs", _LISTED_OUTPUTS[: STANDARD.count]),
         ("set_runstate_outputs", _LISTED_OUTPUTS),
     ):
         functions[name] = set_listed(listed, name)

@@ -5,30 +5,13 @@ The catalogue has checked that a line or register exists; its number may be a fl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, MutableSequence
+from collections.abc import Callable, Mapping, MutableSequence, Sequence
 from typing import Any
 
-from ur_emulator.controller.io.lines import (
-    CONFIGURABLE_SHIFT,
-    N_CONFIGURABLE,
-    N_STANDARD,
-    N_TOOL,
-    TOOL_SHIFT,
-    AnalogLine,
-    InputOutput,
-)
+from ur_emulator.controller.io.lines import DIGITAL_GROUPS, STANDARD_AND_TOOL, AnalogLine, InputOutput
 from ur_emulator.controller.io.registers import Registers
 
 Function = Callable[..., Any]
-
-# Groups of the digital word: (name in the builtins, first bit, number of lines).
-_DIGITAL_GROUPS = (
-    ("standard", 0, N_STANDARD),
-    ("configurable", CONFIGURABLE_SHIFT, N_CONFIGURABLE),
-    ("tool", TOOL_SHIFT, N_TOOL),
-)
-# Lines of the deprecated get_digital_in(n) and related builtins: 0..7 standard, 8..9 tool.
-_DEPRECATED_BITS = (*range(N_STANDARD), TOOL_SHIFT, TOOL_SHIFT + 1)
 
 
 def io_functions(io: InputOutput) -> Mapping[str, Function]:
@@ -37,21 +20,20 @@ def io_functions(io: InputOutput) -> Mapping[str, Function]:
 
 
 def _digital(io: InputOutput) -> dict[str, Function]:
-    def reader(read: Callable[[int], bool], bits: tuple[int, ...]) -> Function:
+    def reader(read: Callable[[int], bool], bits: Sequence[int]) -> Function:
         return lambda thread, n: read(bits[int(n)])
 
-    def writer(bits: tuple[int, ...]) -> Function:
+    def writer(bits: Sequence[int]) -> Function:
         return lambda thread, n, b: io.write_digital_out(bits[int(n)], b)
 
     functions: dict[str, Function] = {}
-    for group, first, size in _DIGITAL_GROUPS:
-        bits = tuple(range(first, first + size))
-        functions[f"get_{group}_digital_in"] = reader(io.read_digital_in, bits)
-        functions[f"get_{group}_digital_out"] = reader(io.read_digital_out, bits)
-        functions[f"set_{group}_digital_out"] = writer(bits)
-    functions["get_digital_in"] = reader(io.read_digital_in, _DEPRECATED_BITS)
-    functions["get_digital_out"] = reader(io.read_digital_out, _DEPRECATED_BITS)
-    functions["set_digital_out"] = writer(_DEPRECATED_BITS)
+    for name, group in DIGITAL_GROUPS.items():
+        functions[f"get_{name}_digital_in"] = reader(io.read_digital_in, group.bits)
+        functions[f"get_{name}_digital_out"] = reader(io.read_digital_out, group.bits)
+        functions[f"set_{name}_digital_out"] = writer(group.bits)
+    functions["get_digital_in"] = reader(io.read_digital_in, STANDARD_AND_TOOL)
+    functions["get_digital_out"] = reader(io.read_digital_out, STANDARD_AND_TOOL)
+    functions["set_digital_out"] = writer(STANDARD_AND_TOOL)
     return functions
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from ur_emulator.controller.io.lines import CONFIGURABLE_SHIFT, TOOL_SHIFT, InputOutput
+from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL, InputOutput
 from ur_emulator.controller.io.modbus_signals import ModbusSignals
 from ur_emulator.controller.io.registers import Registers
 from ur_emulator.controller.io.run_states import RunState, level
@@ -29,15 +29,12 @@ class OutputKind(IntEnum):
     EUROMAP = 7
 
 
-# First bit of the digital word for the groups in it.
-_SHIFT = {OutputKind.STANDARD: 0, OutputKind.CONFIGURABLE: CONFIGURABLE_SHIFT, OutputKind.TOOL: TOOL_SHIFT}
-
-
-_INPUT_SHIFT = {
-    "standard_digital": 0,
-    "configurable_digital": CONFIGURABLE_SHIFT,
-    "tool_digital": TOOL_SHIFT,
+_OUTPUTS = {
+    OutputKind.STANDARD: STANDARD,
+    OutputKind.CONFIGURABLE: CONFIGURABLE,
+    OutputKind.TOOL: TOOL,
 }
+_INPUTS = {f"{group.name}_digital": group for group in (STANDARD, CONFIGURABLE, TOOL)}
 
 
 @dataclass(slots=True)
@@ -80,7 +77,7 @@ class IoConfiguration:
     def _is_high(self, group: str, index: int) -> bool:
         if group == "gp_boolean":
             return self.registers.inputs.booleans[index]
-        return self.io.read_digital_in(_INPUT_SHIFT[group] + index)
+        return self.io.read_digital_in(_INPUTS[group].bits[index])
 
     def rule(self, kind: OutputKind, index: int) -> RunState:
         """What an output does when programs start and stop."""
@@ -125,4 +122,4 @@ class IoConfiguration:
             case OutputKind.EUROMAP:
                 self.io.euromap.write_output(index, is_high)
             case _:
-                self.io.write_digital_out(_SHIFT[kind] + index, is_high)
+                self.io.write_digital_out(_OUTPUTS[kind].bits[index], is_high)

@@ -10,11 +10,42 @@ from dataclasses import dataclass, field
 
 from ur_emulator.controller.io.euromap import Euromap
 
-N_STANDARD = 8
-N_CONFIGURABLE = 8
-N_TOOL = 2
-CONFIGURABLE_SHIFT = 8
-TOOL_SHIFT = 16
+
+@dataclass(frozen=True, slots=True)
+class DigitalGroup:
+    """Digital lines side by side, inputs as well as outputs.
+
+    Attributes:
+        name: in builtins, RTDE variables and the control API.
+        first: bit of the first line in the digital word.
+        count: number of lines.
+    """
+
+    name: str
+    first: int
+    count: int
+
+    @property
+    def bits(self) -> range:
+        """Bits of the lines in the digital word."""
+        return range(self.first, self.first + self.count)
+
+    @property
+    def mask(self) -> int:
+        """The bits as a mask of the digital word."""
+        return (1 << self.count) - 1 << self.first
+
+    def levels(self, word: int) -> int:
+        """Return the levels of the lines in a digital word, the first line in the lowest bit."""
+        return (word & self.mask) >> self.first
+
+
+STANDARD = DigitalGroup("standard", 0, 8)
+CONFIGURABLE = DigitalGroup("configurable", 8, 8)
+TOOL = DigitalGroup("tool", 16, 2)
+DIGITAL_GROUPS = {group.name: group for group in (STANDARD, CONFIGURABLE, TOOL)}
+# Bits of the lines that old builtins and the Modbus map number from 0: 0-7 standard, 8-9 tool.
+STANDARD_AND_TOOL = (*STANDARD.bits, *TOOL.bits)
 
 CURRENT, VOLTAGE = 0, 1
 # Full range of an analogue line by domain: (lowest, highest) value.

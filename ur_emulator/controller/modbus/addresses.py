@@ -5,19 +5,17 @@ The map itself, and what it rests on, are in `robot_map`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import SafetyMode
-from ur_emulator.controller.io.lines import CONFIGURABLE_SHIFT, N_CONFIGURABLE, N_STANDARD, N_TOOL, TOOL_SHIFT
+from ur_emulator.controller.io.lines import STANDARD, TOOL
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety.modes import EMERGENCY_MODES
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 
 WORD_MAX = 0xFFFF
-# Bits of the box and the tool side by side: 0-7 standard, 8-9 tool.
-N_BOX_BITS = N_STANDARD + N_TOOL
 
 Reader = Callable[[ControllerState, int], float]
 """Returns the value at an offset within a row."""
@@ -30,32 +28,27 @@ Writer = Callable[[ControllerState, int, int], None]
 
 def box_word(word: int) -> int:
     """Return the standard and tool bits of the digital word, side by side."""
-    return word & (1 << N_STANDARD) - 1 | (word >> TOOL_SHIFT & (1 << N_TOOL) - 1) << N_STANDARD
+    return STANDARD.levels(word) | TOOL.levels(word) << STANDARD.count
 
 
-def box_bit(offset: int) -> int:
-    """Return the bit of the digital word for a bit of the map: 0-7 standard, 8-9 tool."""
-    return offset if offset < N_STANDARD else offset - N_STANDARD + TOOL_SHIFT
-
-
-def write_bits(bit_of: Callable[[int], int], size: int, forced: bool | None = None) -> Writer:
+def write_bits(bits: Sequence[int], forced: bool | None = None) -> Writer:
     """Write outputs from a word; with `forced`, only those whose bit is set, to that value."""
 
     def write(state: ControllerState, offset: int, value: int) -> None:
-        for i in range(size):
+        for i, bit in enumerate(bits):
             is_set = bool(value >> i & 1)
             if forced is None or is_set:
-                state.io.write_digital_out(bit_of(i), is_set if forced is None else forced)
+                state.io.write_digital_out(bit, is_set if forced is None else forced)
 
     return write
 
 
-def write_bit(bit_of: Callable[[int], int], size: int, forced: bool | None = None) -> Writer:
+def write_bit(bits: Sequence[int], forced: bool | None = None) -> Writer:
     """Write one output from a coil; with `forced`, only when the coil is written True, to that value."""
 
     def write(state: ControllerState, offset: int, value: int) -> None:
-        if offset < size and (forced is None or value):
-            state.io.write_digital_out(bit_of(offset), bool(value) if forced is None else forced)
+        if offset < len(bits) and (forced is None or value):
+            state.io.write_digital_out(bits[offset], bool(value) if forced is None else forced)
 
     return write
 
@@ -68,26 +61,6 @@ def in_bit(state: ControllerState, offset: int) -> int:
 def out_bit(state: ControllerState, offset: int) -> int:
     """Read one output."""
     return box_word(state.io.digital_out) >> offset & 1
-
-
-def configurable(word: int) -> int:
-    """Return the configurable bits of the digital word."""
-    return word >> CONFIGURABLE_SHIFT & (1 << N_CONFIGURABLE) - 1
-
-
-def configurable_bit(offset: int) -> int:
-    """Return the bit of the digital word for a configurable line."""
-    return CONFIGURABLE_SHIFT + offset
-
-
-def tool_bit(offset: int) -> int:
-    """Return the bit of the digital word for a line of the tool."""
-    return TOOL_SHIFT + offset
-
-
-def tool_word(word: int) -> int:
-    """Return the bits of the tool in the digital word."""
-    return word >> TOOL_SHIFT & (1 << N_TOOL) - 1
 
 
 # --- analogue lines, by the name of their list

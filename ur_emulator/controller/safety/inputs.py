@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import Enum
 
-from ur_emulator.controller.io.lines import CONFIGURABLE_SHIFT
+from ur_emulator.controller.io.lines import CONFIGURABLE
 from ur_emulator.controller.safety.modes import SafetyEvent
 
-N_INPUT_PAIRS = 4
+N_INPUT_PAIRS = CONFIGURABLE.count // 2
 
 
 class SafetyInput(Enum):
@@ -112,7 +112,7 @@ class SafetyInputs:
         """Read the inputs that are set up."""
         high = dict.fromkeys(self.assigned.values(), True)
         for pair, function in self.assigned.items():
-            lines = digital_in >> (CONFIGURABLE_SHIFT + 2 * pair) & 3
+            lines = digital_in >> (CONFIGURABLE.first + 2 * pair) & 3
             high[function] = high[function] and lines == 3
         pressed = high.get(SafetyInput.EMERGENCY_STOP) is False
         if pressed != (("system", "input") in self._pressed):
