@@ -10,6 +10,7 @@ from pc_client.control.pi_feedforward import PiState, step_pi
 from pc_client.control.reference import ReferencePoint, ReferenceTable
 from pc_client.control.state_estimate import StateEstimator
 from pc_client.control.tool_guard import ToolGuard
+from pc_client.kinematics.agreement import check_flange
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.recording.layout import Phase
 
@@ -54,6 +55,7 @@ class Tracker:
         "_estimator",
         "_guard",
         "_last_stamp",
+        "_model",
         "_qd_max",
         "_reference",
         "_start",
@@ -70,6 +72,7 @@ class Tracker:
         self._reference = reference
         self._estimator = estimator
         self._config = config
+        self._model = model
         self._guard = ToolGuard(reference, model, config.path_tolerance, config.angle_tolerance)
         self._qd_max = tuple(limit * config.speed_share for limit in model.limits.qd_max)
         self._state = PiState()
@@ -82,6 +85,14 @@ class Tracker:
     def qd_max(self) -> tuple[float, ...]:
         """(6,) the largest speeds that a step can command [rad/s]."""
         return self._qd_max
+
+    def check_report(self, q: Sequence[float], pose: Sequence[float]) -> None:
+        """Refuse a report whose joint angles (6,) [rad] and TCP pose (6,) [m, rad] do not belong together.
+
+        Raises:
+            DriverError: they are further apart than `kinematics.agreement` allows.
+        """
+        check_flange(self._model, q, pose)
 
     def step(self, stamp: float, q: Sequence[float]) -> TrackerStep:
         """Answer a new frame with a command.

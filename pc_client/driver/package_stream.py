@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from pc_client.driver.transport import Network, Transport
+from pc_client.driver.transport import MOST_WAITING, Network, Transport
 from pc_client.driver.watchdog import software
 from pc_client.errors import DriverError, RobotStoppedError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
 from protocol.patience import LONGEST_STEP, Patience
 from protocol.primary.framing import SubPackage
+from protocol.primary.layout import CartesianInfo, RobotModeData
 from protocol.primary.messages import (
     ErrorCodeMessage,
     ReportLevel,
@@ -24,7 +25,7 @@ from protocol.primary.messages import (
     VersionMessage,
     decode_message,
 )
-from protocol.primary.setup import ConfigurationData
+from protocol.primary.setup import ConfigurationData, KinematicsInfo
 from protocol.primary.state import decode_sub_package, split_state
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import OLDEST
@@ -38,6 +39,9 @@ _HEADER_SIZE = 5
 _ROBOT_STATE = 16
 _ROBOT_MESSAGE = 20
 _LONGEST_PACKAGE = 1 << 20
+_KEPT = {record.SUB_TYPE for record in (RobotModeData, CartesianInfo, ConfigurationData, KinematicsInfo)}
+"""Sub-packages of a state that somebody asks for."""
+
 _OLDEST = SoftwareVersion(3, 3)
 """Form of messages before the version is known."""
 
@@ -54,7 +58,7 @@ class PackageStream:
         version: software of the controller, once its version message came.
     """
 
-    __slots__ = ("_buffer", "_early", "_name", "_network", "_newest", "_transport", "version")
+    __slots__ = ("_buffer", "_early", "_name", "_network", "_newest", "_transport", "_unread", "version")
 
     def __init__(self, transport: Transport, network: Network, name: str) -> None:
         self._transport = transport
@@ -64,6 +68,7 @@ class PackageStream:
         self._early: list[RobotMessage] = []
         self.version: SoftwareVersion | None = None
         self._newest: dict[int, bytes] = {}
+        self._unread = 0  # bytes since a poll found nothing more
 
     def wait_for_version(self) -> SoftwareVersion:
         """Return the controller's software version from its greeting.
@@ -112,11 +117,11 @@ class PackageStream:
         """Messages that have arrived, without waiting.
 
         Raises:
-            DriverError: the connection broke, or it carries another protocol.
+            DriverError: the connection broke, carries another protocol, or floods us.
         """
-        messages, self._early = self._early, []
         while (more := self._read(0.0)) is not None:
-            messages += more
+            self._early += more
+        messages, self._early, self._unread = self._early, [], 0
         return messages
 
     def send_program(self, text: str) -> None:
@@ -138,12 +143,20 @@ class PackageStream:
             raise DriverError(f"the robot closed the {self._name} connection")
         if data is None:
             return None
+        self._unread += len(data)
+        if self._unread > MOST_WAITING:
+            raise DriverError(
+                f"the {self._name} port floods us: more than {MOST_WAITING >> 20} MiB at once; a robot sends "
+                "20 kB a second: restart it, or look what else answers there"
+            )
         messages: list[RobotMessage] = []
         try:
             self._buffer.feed(data)
             while (package := self._buffer.next_frame()) is not None:
                 if package[4] == _ROBOT_STATE:
-                    self._newest.update(split_state(package[_HEADER_SIZE:]))
+                    for sub_type, body in split_state(package[_HEADER_SIZE:]):
+                        if sub_type in _KEPT:
+                            self._newest[sub_type] = body
                 if package[4] != _ROBOT_MESSAGE:
                     continue
                 message = decode_message(package[_HEADER_SIZE:], self.version or _OLDEST)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from pc_client.driver.transport import Network, Transport
+from pc_client.driver.transport import MOST_WAITING, Network, Transport
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
@@ -22,6 +22,9 @@ FRAME_TIMEOUT = 1.0
 STOPPED_TIMEOUT = 120.0
 """The same for a robot whose time waits for its clients [s]: its arm does not move unattended, so a box that
 is stopped or gets no processor is sat out. Longer than the box itself has patience with others."""
+
+LATEST_STAMP = 1e9
+"""No controller has been on for longer [s]: 30 years."""
 
 _STEP = 0.5 * LONGEST_STEP
 """How long one look at the connection waits [s]: all of it counts as patience."""
@@ -115,7 +118,14 @@ class RealtimeClient:
             DriverError: as `receive`.
         """
         taken: Arrival | None = None
+        n_bytes = 0
         while data := self._transport.receive(0.0):
+            n_bytes += len(data)
+            if n_bytes > MOST_WAITING:
+                raise DriverError(
+                    f"the realtime port floods us: more than {MOST_WAITING >> 20} MiB at once; a robot sends "
+                    "150 kB a second: restart it, or look what else answers there"
+                )
             try:
                 self._buffer.feed(data)
                 first = self._buffer.next_frame()
@@ -125,9 +135,8 @@ class RealtimeClient:
             except RemoteProtocolError as error:
                 raise DriverError(f"the realtime port sends no realtime frames: {error}") from error
             if taken is not None:
-                arrival = Arrival(
-                    taken.new + arrival.new, arrival.latest, taken.n_heartbeats + arrival.n_heartbeats
-                )
+                taken.new.extend(arrival.new)
+                arrival = Arrival(taken.new, arrival.latest, taken.n_heartbeats + arrival.n_heartbeats)
             taken = arrival
         return taken
 
@@ -164,6 +173,11 @@ class RealtimeClient:
         while raw is not None:
             frame = layout.decode(raw)
             stamp: float = frame.timestamp
+            if not 0.0 <= stamp <= LATEST_STAMP:  # NaN is not
+                raise DriverError(
+                    f"the robot's frame has the time stamp {stamp:g} s, allowed are 0 to {LATEST_STAMP:g} s: "
+                    "restart the control box"
+                )
             if stamp != self.last_stamp:
                 new.append(frame)
                 self.last_stamp = stamp

@@ -20,6 +20,9 @@ program could hold it by chance (Linux from 32768 on, Windows and macOS from 491
 DIAL_TIMEOUT = 5.0
 """A program that has not dialled back after this [s] cannot reach us."""
 
+_MOST_CALLERS = 100
+"""More calls than this between two programs are no robot's."""
+
 _POLL = 0.02
 """How long one look at the listening socket waits [s]; in between we look after the other connections."""
 
@@ -58,9 +61,19 @@ class ReverseServer:
         return self._listener.port
 
     def forget_callers(self) -> None:
-        """Close calls that nobody waits for any more; to be called before a program is started."""
-        while (caller := self._listener.accept(0.0)) is not None:
+        """Close calls that nobody waits for any more; to be called before a program is started.
+
+        Raises:
+            DriverError: they do not end.
+        """
+        for _ in range(_MOST_CALLERS):
+            if (caller := self._listener.accept(0.0)) is None:
+                return
             caller.close()
+        raise DriverError(
+            f"more than {_MOST_CALLERS} callers wait at {self._address}:{self.port}; the robot has one "
+            "program: look who else calls, or give another --reverse-port"
+        )
 
     def accept_program(self, meanwhile: Callable[[], None], timeout: float = DIAL_TIMEOUT) -> Transport:
         """Wait for the program's call and its hello.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from pc_client.driver.dashboard_query import ask_dashboard
@@ -19,6 +20,7 @@ from protocol.ur_types import (
     parse_serial,
 )
 
+_MODEL_NAME = re.compile(r"UR[0-9]{1,3}[a-zA-Z]{0,10}")
 _SERIAL, _MODEL = "get serial number", "get robot model"
 
 UNKNOWN = "unknown"
@@ -80,7 +82,7 @@ def read_robot_info(network: Network, host: str, dashboard_port: int, primary: P
     model = answers.get(_MODEL, "")
     return RobotInfo(
         version,
-        model if model.startswith("UR") else _model_in(configuration),
+        model if _MODEL_NAME.fullmatch(model) else _model_in(configuration),
         UNKNOWN if serial is None else serial.text,
         _is_simulated(serial, configuration, primary.newest(KinematicsInfo)),
         None if serial is None else serial.seed,

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.realtime_client import RealtimeClient
-from pc_client.driver.robot_info import RobotInfo, read_robot_info
+from pc_client.driver.robot_info import UNKNOWN, RobotInfo, read_robot_info
 from pc_client.driver.rtde_query import ask_rtde
 from pc_client.driver.transport import Network
+from pc_client.errors import DriverError
 from protocol.primary.layout import CartesianInfo, RobotModeData
 from protocol.primary.setup import ConfigurationData
 from protocol.realtime.layout import RealtimeFrame
@@ -80,6 +81,21 @@ def make_report(
         slider=reported_slider(primary),
         tcp_offset=None if cartesian is None else cartesian.tcp_offset,
         payload=payload,
+    )
+
+
+def check_arm(info: RobotInfo, primary: PackageStream) -> None:
+    """Refuse a robot that calls itself one arm on the dashboard server and another on port 30001.
+
+    Raises:
+        DriverError: they differ.
+    """
+    configuration = primary.newest(ConfigurationData)
+    if configuration is None or info.model in (UNKNOWN, configured := _name(configuration.robot_type)):
+        return
+    raise DriverError(
+        f"the robot's arm is {info.model} (dashboard), {configured} (port 30001), must be one of them; "
+        "look which arm it is, and set it so in the installation"
     )
 
 

@@ -21,6 +21,9 @@ CONNECT_TIMEOUT = 2.0
 REPLY_TIMEOUT = 1.0
 """Longest wait for one package [s]. Source: UR's RTDE client in Python."""
 
+_MOST_PACKAGES = 100
+"""Packages that are read before the first one with data."""
+
 _RATE = 125.0
 """Packages a second: as many as a CB3 sends, the first one is enough."""
 
@@ -56,9 +59,10 @@ def _first_value(events: _Events, name: str) -> RtdeValue | None:
                 return None
             case SetupOutputsReply(types) if not REFUSALS.isdisjoint(types):
                 return None
-    while not isinstance(event := events.next(), DataReceived):
-        pass
-    return event.values[0]
+    for _ in range(_MOST_PACKAGES):
+        if isinstance(event := events.next(), DataReceived):
+            return event.values[0]
+    return None
 
 
 class _Events:
@@ -82,12 +86,13 @@ class _Events:
             RemoteProtocolError: this is no RTDE.
         """
         deadline = self._network.now() + REPLY_TIMEOUT
-        while True:
+        while self._network.now() <= deadline:
             event = self._rtde.next_event()
             if event is not None and not isinstance(event, RtdeTextMessage):
                 return event
             if event is None:
                 data = self._connection.receive(REPLY_TIMEOUT)
-                if not data or self._network.now() > deadline:
-                    raise DriverError("the RTDE port says nothing")
+                if not data:
+                    break
                 self._rtde.receive_data(data)
+        raise DriverError("the RTDE port says nothing of use")

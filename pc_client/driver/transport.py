@@ -18,6 +18,11 @@ RECEIVE_SIZE = 16384
 """Bytes taken at once: more than ten realtime frames, so one call shows all that is waiting."""
 
 
+MOST_WAITING = 16 << 20
+"""More than this never waits on one connection [bytes]: Linux keeps 6 MiB for the receiver and 4 MiB for the
+sender. A peer that sends more while it is read without a pause floods us."""
+
+
 EAGER_TIME = 300e-6
 """How long to look again and again before sleeping [s]: twice a cycle of an emulated box in lockstep."""
 

@@ -21,13 +21,14 @@ from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import receiver_script
 from pc_client.driver.reverse_server import DIAL_TIMEOUT, ReverseServer
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
-from pc_client.driver.robot_report import RobotReport, make_report, read_payload, reported_slider
+from pc_client.driver.robot_report import RobotReport, check_arm, make_report, read_payload, reported_slider
 from pc_client.driver.stop_script import STOP_WORD, stop_script
 from pc_client.driver.transport import Network, TcpNetwork, Transport
 from pc_client.driver.velocity_stream import RowSink, StreamReport, VelocityStream, collector_paused
 from pc_client.driver.waiting import REST_TIMEOUT, wait_for_rest, wait_until
 from pc_client.driver.watchdog import (
     ProgramEndedError,
+    check_angles,
     check_idle,
     check_safety,
     check_slider,
@@ -118,8 +119,14 @@ class UrDriver:
         return self._frames.receive().latest
 
     def actual_q(self) -> NDArray[np.float64]:
-        """Joint positions (6,) as reported now [rad]."""
-        q: NDArray[np.float64] = self.read_frame().actual_q
+        """Joint positions (6,) as reported now [rad].
+
+        Raises:
+            DriverError: no frames come, or one reports what is no angle.
+        """
+        frame = self.read_frame()
+        check_angles(frame)
+        q: NDArray[np.float64] = frame.actual_q
         return q.copy()
 
     def report(self) -> RobotReport:
@@ -137,12 +144,13 @@ class UrDriver:
 
         Raises:
             RobotStoppedError: safety mode or robot mode forbids it.
-            DriverError: a program is running, or the speed slider was moved.
+            DriverError: a program is running, the speed slider was moved, or the ports name different arms.
         """
         frame = self.read_frame()
         check_safety(frame)
         check_idle(frame)
         self._primary.poll()
+        check_arm(self.info, self._primary)
         check_slider(reported_slider(self._primary))
         return frame
 

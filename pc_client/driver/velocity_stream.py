@@ -17,7 +17,7 @@ from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import READ_TIMEOUT
 from pc_client.driver.transport import Network, Transport
-from pc_client.driver.watchdog import check_streaming, is_at_full_speed
+from pc_client.driver.watchdog import check_angles, check_streaming, is_at_full_speed
 from pc_client.errors import DriverError
 from protocol.patience import Patience
 from protocol.realtime.layout import RealtimeFrame
@@ -37,7 +37,11 @@ _LONGEST_RISE = 125
 """New frames in which the speed scaling must have reached 1 after the program started: a second of a CB3."""
 
 _HOUSEKEEPING = 16
-"""New frames between two looks at the other connections: an eighth of a second, as robot states come."""
+"""New frames between two looks at the other connections, and at whether angles and pose belong together: an
+eighth of a second, as robot states come."""
+
+_SHORTEST_GAP = 0.1
+"""Time stamps are at least this share of a cycle apart; rows of a run are as many as its time allows."""
 
 
 @dataclass(slots=True)
@@ -113,6 +117,8 @@ class VelocityStream:
             step = tracker.step(stamp, frame.actual_q.tolist())
             if step.finished:
                 break
+            if report.n_commands % _HOUSEKEEPING == 0:
+                tracker.check_report(frame.actual_q.tolist(), frame.actual_tcp_pose.tolist())
             check_command(step.qd_cmd, limits)
             try:
                 send(encode_velocity(VelocityMode.VELOCITY, step.qd_cmd))
@@ -136,6 +142,7 @@ class VelocityStream:
             if len(new) > 1:
                 report.late_frames += len(new) - 1
                 for late in new[:-1]:
+                    check_angles(late)
                     on_row(late, tracker.observe(late.timestamp))
             frame = new[-1]
             _check_silence(stamp, last_stamp)
@@ -198,10 +205,11 @@ class VelocityStream:
         for frame in new:
             stamp = frame.timestamp
             gap = stamp - last_stamp
-            if gap <= 0.0:
+            if gap < _SHORTEST_GAP * self._period:
+                back = "back " if gap < 0.0 else ""
                 raise DriverError(
-                    f"the robot's frames jump back from {last_stamp:.3f} s to {stamp:.3f} s: "
-                    "the stream is broken"
+                    f"the robot's frames jump {back}from {last_stamp:.6f} s to {stamp:.6f} s, a cycle is "
+                    f"{self._period:g} s: the stream is broken"
                 )
             if gap > 1.5 * self._period:
                 report.lost_frames += round(gap / self._period) - 1

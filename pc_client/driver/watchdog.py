@@ -11,6 +11,9 @@ RUNNING = float(RobotMode.RUNNING)
 PLAYING = float(ProgramState.PLAYING)
 SAFE_MODES = (float(SafetyMode.NORMAL), float(SafetyMode.REDUCED))
 
+_FARTHEST = 100.0
+"""No joint angle is larger [rad]; joints turn by two turns at most."""
+
 REST_SPEED = 0.01
 """Below this joint speed [rad/s] the arm rests: 0.6 deg/s, above the noise of a standing joint."""
 
@@ -138,6 +141,20 @@ def check_slider(fraction: float | None) -> None:
         raise DriverError(speed_slider(fraction).complaint)
 
 
+def check_angles(frame: RealtimeFrame) -> None:
+    """Refuse joint angles that are none.
+
+    Raises:
+        DriverError: one is not a number, or more than any joint turns.
+    """
+    q = frame.actual_q.tolist()
+    if not all(-_FARTHEST < value < _FARTHEST for value in q):  # NaN is not
+        raise DriverError(
+            f"the robot reports joint angles of {q} rad, possible are +-{_FARTHEST:g} rad: "
+            "restart the control box"
+        )
+
+
 def check_streaming(frame: RealtimeFrame) -> None:
     """Check a frame of a running stream.
 
@@ -179,7 +196,7 @@ def is_at_rest(frame: RealtimeFrame) -> bool:
 def _name(kind: type[SafetyMode] | type[RobotMode] | type[ProgramState], value: float) -> str:
     try:
         return kind(int(value)).name
-    except ValueError:
+    except (ValueError, OverflowError):
         return f"{value:g} (unknown)"
 
 

@@ -23,10 +23,9 @@ from pc_client.driver.watchdog import (
     speed_slider,
 )
 from pc_client.errors import DriverError
+from pc_client.kinematics.agreement import ROTATION_TOLERANCE, flange_difference
 from pc_client.kinematics.cell import NO_CELL, Cell
-from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
-from protocol.pose import T_to_pose, pose_inv, pose_trans
 from protocol.ur_types import JOINT_NAMES
 
 _OFFSET_TOLERANCE = (1e-4, 1e-3)
@@ -34,10 +33,6 @@ _OFFSET_TOLERANCE = (1e-4, 1e-3)
 
 _PAYLOAD_TOLERANCE = 0.05
 """Of the mass [kg]. Its weight is 0.5 N, a sixth of the noise of the controller's own force estimate."""
-
-_ROTATION_TOLERANCE = 0.02
-"""Between the reported flange and the model's [rad]: twice what three real UR3e calibrations come to, 8 mrad.
-A choice: docs/fidelity.md."""
 
 Check = Callable[[RobotReport, RobotModel | None], Condition]
 """Holds one thing that a robot reports against what is needed."""
@@ -114,17 +109,15 @@ def forward_kinematics(report: RobotReport, model: RobotModel | None) -> Conditi
     frame = report.frame
     if model is None:
         return Condition("flange pose", "", "that of the model", "plan for the arm that answers", None)
-    offset = report.tcp_offset or (0.0,) * 6
-    flange = pose_trans(tuple(frame.actual_tcp_pose.tolist()), pose_inv(offset))
-    computed = T_to_pose(tcp_pose(model, frame.actual_q))
-    distance, angle = _size(pose_trans(pose_inv(computed), flange))
+    q, pose = frame.actual_q.tolist(), frame.actual_tcp_pose.tolist()
+    distance, angle = flange_difference(model, q, pose, report.tcp_offset or (0.0,) * 6)
     most = model.description.position_tolerance
     return Condition(
         "flange pose",
         f"{distance * 1e3:.1f} mm, {angle * 1e3:.1f} mrad from the {model.name.upper()} model",
-        f"within {most * 1e3:g} mm, {_ROTATION_TOLERANCE * 1e3:g} mrad",
+        f"within {most * 1e3:g} mm, {ROTATION_TOLERANCE * 1e3:g} mrad",
         "this is another arm than the model's, or its calibration or TCP is wrong",
-        distance <= most and angle <= _ROTATION_TOLERANCE,
+        distance <= most and angle <= ROTATION_TOLERANCE,
     )
 
 

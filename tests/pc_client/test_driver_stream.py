@@ -300,6 +300,7 @@ class Spoilt:
 
     def __init__(self, act, after=60):
         self.inner, self.act, self.left = tracker(), act, after
+        self.check_report = self.inner.check_report
 
     def step(self, stamp, q):
         self.left -= 1
