@@ -44,7 +44,7 @@ class FileKind:
 FILE_KINDS: Mapping[str, FileKind] = MappingProxyType(
     {
         "recording": FileKind(256 * MIB, RecordingError, "23 minutes of rows; a movement lasts 20 at most"),
-        "pen": FileKind(16 * MIB, RecordingError, "half an hour of samples at 200 Hz, 40 characters each"),
+        "pen": FileKind(8 * MIB, RecordingError, "16 minutes of samples at 200 Hz, 40 characters each"),
         "movement": FileKind(8 * MIB, MovementError, "20 minutes of samples at 100 Hz, 60 characters each"),
         "cell": FileKind(MIB, CellError, "100 bodies have less than 0.1 MiB"),
         "controller": FileKind(MIB, ControllerError, "all fields have less than 0.01 MiB"),

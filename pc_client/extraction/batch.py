@@ -26,7 +26,7 @@ __all__ = ["Job", "Outcome", "extract_many", "extract_sources", "run_job"]
 _IN_FLIGHT = 128
 """Jobs handed over and not yet done; enough for many workers."""
 
-_BYTES_IN_FLIGHT = 32 * MIB
+_BYTES_IN_FLIGHT = 16 * MIB
 """No further job is handed over while those that are not done hold more [bytes]."""
 
 

@@ -12,6 +12,7 @@ in ms, of 8000 in us. Files with START or BREAK are in s or ms.
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from collections.abc import Sequence
@@ -35,7 +36,7 @@ _LONGEST_STEP_S = 0.5
 #: A part that lasts longer, s, is a wrong unit or a broken clock.
 _LONGEST_PART_S = 7200.0
 #: More samples than this are refused: an extraction of as many takes minutes.
-MOST_SAMPLES = 400_000
+MOST_SAMPLES = 200_000
 #: Farthest position and time, in the file's units, that a recorder writes; times in ns since 1970 are nearer.
 _FARTHEST = 1e19
 #: Gaps above this, s, are worth a remark.
@@ -118,7 +119,7 @@ def parse_pen(content: bytes, name: str, time_unit: str | None = None) -> PenRec
 def _rows(text: str, name: str) -> _Table:
     table = _Table([[]])
     n_samples = 0
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(io.StringIO(text, newline=None), start=1):
         cells = line.strip()
         if not cells or cells.startswith("#"):
             continue
