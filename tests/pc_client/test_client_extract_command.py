@@ -84,7 +84,10 @@ def test_broken_files_are_a_line_each_and_the_rest_is_done(here, capsys):
 def test_nothing_that_can_be_used_still_gives_a_list(here, capsys):
     assert cli.run(["extract", "gone.csv", "--out", "out"]) == 1
     assert rows(here / "out") == []
-    assert capsys.readouterr().err == "ur-client: gone.csv: cannot be read (No such file or directory)\n"
+    assert (
+        capsys.readouterr().err
+        == "ur-client: gone.csv: cannot be read (No such file or directory); give a file that exists\n"
+    )
 
 
 def test_archives_and_folders(here):
