@@ -138,6 +138,7 @@ FINE = {
     "W116": [
         body("x = 1", "movej([x, x, x, x, x, x])", "movel(p[x, 0, 0, 0, 0, 0], t=x)", "set_tcp(p[0, 0, 0, 0, 0, 0])"),
         body("def sleep(t):", "return t", "end", 'sleep("1")'),
+        body('set_tcp(p["a", 0, 0, 0, 0, 0])'),  # not a pose: the run says so
         body("speedl([0, 0, 0, 0, 0, 0], 1, t=0.1)", "set_payload(0.5)", "set_payload(0.5, [0, 0, 0])", "textmsg([[1, 2], [3, 4]])"),
     ],
     "W115": [body('x = rpc_factory("xmlrpc", "http://a")', "x.append(2)")],
