@@ -13,24 +13,11 @@ from functools import partial
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import ControlMode, RobotMode
-from ur_emulator.controller.client_inputs import ClientInputs
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.command import Command
-from ur_emulator.controller.compliance.compliance import Compliance
 from ur_emulator.controller.compliance.flange_push import FlangePush
-from ur_emulator.controller.compliance.force_sense import ForceSense
-from ur_emulator.controller.error_settings import ErrorSettings
-from ur_emulator.controller.events import ErrorReported, EventQueue, RobotModeChanged
-from ur_emulator.controller.io.configuration import IoConfiguration
-from ur_emulator.controller.io.encoders import Encoders
-from ur_emulator.controller.io.lines import InputOutput
-from ur_emulator.controller.io.modbus_memory import MapMemory
-from ur_emulator.controller.io.modbus_signals import ModbusSignals
-from ur_emulator.controller.io.registers import Registers
-from ur_emulator.controller.io.watchdogs import WatchdogAction, Watchdogs
-from ur_emulator.controller.operator import Operator
-from ur_emulator.controller.past_cycles import PastCycles
-from ur_emulator.controller.program_requests import ProgramRequests
+from ur_emulator.controller.events import ErrorReported, RobotModeChanged
+from ur_emulator.controller.io.watchdogs import WatchdogAction
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
@@ -41,12 +28,10 @@ from ur_emulator.controller.safety.limit_checks import (
     find_violation,
 )
 from ur_emulator.controller.safety.modes import SafetyEvent
-from ur_emulator.controller.safety.safety_state import UNLOCK_DELAY, SafetyState
-from ur_emulator.controller.safety.speed_scaling import SpeedScaling
+from ur_emulator.controller.safety.safety_state import UNLOCK_DELAY
 from ur_emulator.controller.safety_system import SafetySystem
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.controller.state import ControllerState
-from ur_emulator.controller.tool_settings import ToolSettings
+from ur_emulator.controller.state import ControllerState, make_state
 from ur_emulator.errors import RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
@@ -103,7 +88,7 @@ class Controller:
         # counts, and the delay must have passed.
         self._unlock_cycles = generation.cycles(UNLOCK_DELAY) + 2
         motion = ArmMotion(q, robot.stop_deceleration)
-        self.state = _make_state(
+        self.state = make_state(
             robot,
             ArmModel(robot, draw_calibration(fidelity, seed)),
             seed,
@@ -280,50 +265,6 @@ class Controller:
         if violation.blocked:
             state.motion.place(actual_q)
             self.plant.hold_trim()
-
-
-def _make_state(
-    robot: RobotModel,
-    arm: ArmModel,
-    seed: int,
-    clock: Clock,
-    motion: ArmMotion,
-    mode: RobotModeMachine,
-    place_arm: Callable[[Vector6], bool],
-    version: tuple[int, int],
-) -> ControllerState:
-    """Return the parts of a controller, made in the order in which they need each other."""
-    io, registers, safety, speed = InputOutput(), Registers(), SafetyState(), SpeedScaling()
-    past = PastCycles(clock.generation)
-    modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
-    io_configuration = IoConfiguration(io, registers, modbus)
-    return ControllerState(
-        robot=robot,
-        arm=arm,
-        seed=seed,
-        clock=clock,
-        motion=motion,
-        place_arm=place_arm,
-        mode=mode,
-        safety=safety,
-        speed=speed,
-        tool=ToolSettings(),
-        io=io,
-        registers=registers,
-        io_configuration=io_configuration,
-        client_inputs=ClientInputs(io, registers, speed, watchdogs, clock),
-        watchdogs=watchdogs,
-        encoders=Encoders(),
-        modbus=modbus,
-        modbus_map=MapMemory(version),
-        compliance=Compliance(motion, mode, safety, io_configuration, past),
-        force_sense=ForceSense(clock.generation),
-        operator=Operator(),
-        error_settings=ErrorSettings(),
-        requests=ProgramRequests(),
-        past=past,
-        events=EventQueue(),
-    )
 
 
 def _place_arm(plant: Plant | ExactPlant, motion: ArmMotion, q: Vector6) -> bool:

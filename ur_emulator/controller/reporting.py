@@ -6,7 +6,7 @@ from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.compliance.external_sensor import VARIABLE
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import JOINT_VECTORS
-from ur_emulator.controller.snapshot import BoxRecord, Snapshot
+from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.motion.target import JointTarget
@@ -36,16 +36,15 @@ def make_snapshot(
         wrench,
         tcp if any(tcp) else None,
     )
-    return Snapshot._make((clock.tick, clock.time, *target, *sensed, *box_record(state, programs), space))
-
-
-def box_record(state: ControllerState, programs: Programs) -> BoxRecord:
-    """Return the box without its arm at the end of a cycle."""
     mode, safety_mode = state.mode.mode, state.safety.mode
     speed, tool, io, compliance = state.speed, state.tool, state.io, state.compliance
     payload = tool.payload
     analog, euromap = io.analog, io.euromap
-    return BoxRecord(
+    return Snapshot(
+        clock.tick,
+        clock.time,
+        *target,
+        *sensed,  # type: ignore[arg-type]  # mypy takes the second tuple for one of any length
         robot_mode=int(mode),
         joint_mode=JOINT_VECTORS[mode, safety_mode],
         safety_mode=int(safety_mode),
@@ -69,4 +68,5 @@ def box_record(state: ControllerState, programs: Programs) -> BoxRecord:
         euromap_inputs=euromap.inputs,
         euromap_outputs=euromap.outputs,
         registers=state.registers.values(),
+        space=space,
     )

@@ -1,7 +1,7 @@
 """Everything that any port can publish at the end of a cycle, frozen.
 
-A snapshot is the records of its owners one after the other: the motion's target, what the plant's sensors
-read, the state of the box; and the arm in space, which is computed when somebody reads it. Names are those of
+A snapshot has the records of its owners one after the other: the target of the motion, the measurements of
+the plant, the state of the box; and the arm in space, which is computed when it is read. Names are those of
 the realtime columns, lower-cased (`actual_TCP_pose` on the wire is `actual_tcp_pose` here), so that a frame
 is a pure function of a snapshot and a layout table.
 """
@@ -22,34 +22,6 @@ from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6
 # Bus voltage and idle current of the box; modelled, chosen from captures of resting arms (48 V bus).
 BUS_VOLTAGE = 48.0
 IDLE_CURRENT = 0.25
-
-
-class BoxRecord(NamedTuple):
-    """The box without its arm at the end of a cycle: modes, program, lines, settings, registers."""
-
-    robot_mode: int
-    joint_mode: tuple[int, ...]
-    safety_mode: int
-    speed_scaling: float
-    target_speed_fraction: float
-    runtime_state: int
-    program_name: str
-    script_control_line: int
-    control_mode: int
-    is_guided_by_input: bool
-    buttons: int
-    payload: float
-    payload_cog: Vector3
-    payload_inertia: Vector6
-    tcp_offset: Vector6
-    actual_digital_input_bits: int
-    actual_digital_output_bits: int
-    analog_values: tuple[float, ...]
-    analog_domains: tuple[int, ...]
-    tool_output_voltage: int
-    euromap_inputs: int
-    euromap_outputs: int
-    registers: RegisterValues
 
 
 class _Fields(NamedTuple):
@@ -74,7 +46,7 @@ class _Fields(NamedTuple):
     joint_control_output: Vector6
     torque_saturated: bool
     position_error: Vector6
-    # --- BoxRecord; analogue lines in the order standard inputs, standard outputs, tool inputs
+    # --- the box; analogue lines in the order standard inputs, standard outputs, tool inputs
     robot_mode: int
     joint_mode: tuple[int, ...]
     safety_mode: int

@@ -90,3 +90,47 @@ class ControllerState:
     requests: ProgramRequests
     past: PastCycles
     events: EventQueue
+
+
+def make_state(
+    robot: RobotModel,
+    arm: ArmModel,
+    seed: int,
+    clock: Clock,
+    motion: ArmMotion,
+    mode: RobotModeMachine,
+    place_arm: Callable[[Vector6], bool],
+    version: tuple[int, int],
+) -> ControllerState:
+    """Return the parts of a controller, made in the order in which they need each other."""
+    io, registers, safety, speed = InputOutput(), Registers(), SafetyState(), SpeedScaling()
+    past = PastCycles(clock.generation)
+    modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
+    io_configuration = IoConfiguration(io, registers, modbus)
+    return ControllerState(
+        robot=robot,
+        arm=arm,
+        seed=seed,
+        clock=clock,
+        motion=motion,
+        place_arm=place_arm,
+        mode=mode,
+        safety=safety,
+        speed=speed,
+        tool=ToolSettings(),
+        io=io,
+        registers=registers,
+        io_configuration=io_configuration,
+        client_inputs=ClientInputs(io, registers, speed, watchdogs, clock),
+        watchdogs=watchdogs,
+        encoders=Encoders(),
+        modbus=modbus,
+        modbus_map=MapMemory(version),
+        compliance=Compliance(motion, mode, safety, io_configuration, past),
+        force_sense=ForceSense(clock.generation),
+        operator=Operator(),
+        error_settings=ErrorSettings(),
+        requests=ProgramRequests(),
+        past=past,
+        events=EventQueue(),
+    )
