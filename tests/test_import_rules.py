@@ -27,7 +27,7 @@ MAY_HAVE_EFFECTS = {
 }
 # Inside a package: each part imports those before it, also for types only; those on one line import each other.
 BOX_ORDER = (
-    {"errors"},
+    {"budgets", "errors"},
     {"models"},
     {"kinematics"},
     {"motion"},

@@ -24,6 +24,7 @@ from protocol.rtde.server_connection import MAX_REQUEST_SIZE
 from protocol.script_channel import MAX_LINE, MAX_PROGRAM
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator import ControlBox
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.power import PowerOn, ReleaseBrakes
 from ur_emulator.commands.programs import StartProgram, StopProgram
 from ur_emulator.commands.push import AttachPayload, Push
@@ -41,7 +42,6 @@ from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS
 from ur_emulator.programs.compiling import compile_text
 from ur_emulator.servers.modbus.server import MAX_INBOX
 from ur_emulator.servers.rtde_port import MAX_WAITING as MAX_RTDE_WAITING
-from ur_emulator.servers.tcp.connection import OUTBOX_LIMIT
 from urscript import compile_program
 
 # Hostile clients of one port at a time.
@@ -406,7 +406,7 @@ class FuzzBox:
                 wire.connection for wire in (*self.hostile[name], self.witnesses[name]) if wire.is_open
             }
             for connection in known:
-                assert len(connection._outbox) <= OUTBOX_LIMIT + 4096, name
+                assert len(connection._outbox) <= BUDGETS.outbox_bytes + 4096, name
         assert all(connection.is_open for connection in self.served.backlog)
         for session in self.ports["rtde"]._sessions.values():
             assert session.is_lost or len(session.protocol._buffer) <= 2 * MAX_REQUEST_SIZE

@@ -5,11 +5,10 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp.buffered_socket import BufferedSocket
 
-# Bytes that may wait for a client that does not read; further packages are dropped for it.
-OUTBOX_LIMIT = 64 * 1024
 # Kernel buffer for sending: small, so that a slow reader gets fresh data and a silent one costs little
 # memory.
 SEND_BUFFER = 64 * 1024
@@ -50,7 +49,7 @@ class Connection(BufferedSocket):
             on_close: called once when the connection is gone, for whatever reason.
             backlog: the connection is in this set while something waits in its outbox.
         """
-        super().__init__(loop, OUTBOX_LIMIT, _READ_SIZE)
+        super().__init__(loop, BUDGETS.outbox_bytes, _READ_SIZE)
         self._on_data = on_data
         self._on_close = on_close
         self._backlog = backlog

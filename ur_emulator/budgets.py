@@ -1,0 +1,55 @@
+"""What clients and programs may use of a box: the only table of these limits. SECURITY.md is made from it.
+
+A budget bounds a client, a port, a program or the box as a whole. What comes on top of it is refused with one
+line in the log, or gets slower itself; others do not notice it. Limits that belong to a wire format stay with
+the format (`protocol`), limits of the language with the language (`urscript.dialect`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from typing import Any, Final
+
+KIB: Final = 1 << 10
+MIB: Final = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetRow:
+    """A row of the table.
+
+    Attributes:
+        name: of the field of `Budgets`.
+        limit: in `unit`.
+        unit: bytes, seconds, clients and so on.
+        scope: what it bounds: a client, a port, a program, a box.
+        beyond: what happens to what comes on top.
+    """
+
+    name: str
+    limit: float
+    unit: str
+    scope: str
+    beyond: str
+
+
+def _budget(limit: float, unit: str, scope: str, beyond: str) -> Any:
+    return field(default=limit, metadata={"unit": unit, "scope": scope, "beyond": beyond})
+
+
+@dataclass(frozen=True, slots=True)
+class Budgets:
+    """All budgets; a comment says where a figure comes from."""
+
+    # A client that stops reading for half a second finds all it missed.
+    outbox_bytes: int = _budget(64 * KIB, "bytes", "a client", "further packages to it are dropped")
+
+
+BUDGETS: Final = Budgets()
+
+
+def rows() -> Iterator[BudgetRow]:
+    """Yield the rows of the table, in the order of the fields."""
+    for one in fields(Budgets):
+        yield BudgetRow(one.name, getattr(BUDGETS, one.name), **one.metadata)
