@@ -3,6 +3,8 @@
 import selectors
 import socket
 import threading
+import time
+from itertools import pairwise
 from types import SimpleNamespace
 
 import pytest
@@ -53,6 +55,64 @@ def test_a_socket_that_was_closed_in_the_same_turn_is_not_called(pairs, number_i
     for sock in spare:
         sock.close()
     assert len(called) == 1
+
+
+class Due:
+    """A service that is due so often [s]; stops its loop after so many turns. Notes each turn in a story."""
+
+    def __init__(self, loop, story, period, turns):
+        self._loop, self._story, self._period, self._turns = loop, story, period, turns
+
+    def advance(self, now):
+        self._story.append("service")
+        if self._story.count("service") > self._turns:
+            self._loop.stop()
+        return now + self._period
+
+
+def until_due(loop, story, name, period):
+    """Return a callback that takes longer than the service may wait."""
+
+    def callback(events=0):
+        story.append(name)
+        end = time.monotonic() + 2 * period
+        while time.monotonic() < end:
+            pass
+
+    return callback
+
+
+@pytest.mark.parametrize("period", [0.002, 0.0], ids=["in time", "late"])
+def test_a_service_is_called_between_long_callbacks_and_nobody_has_two_turns_in_a_round(pairs, period):
+    loop, story = EventLoop(), []
+    for name, (near, far) in zip("ab", pairs, strict=True):
+        far.send(b"x")  # never read: ready in every round
+        loop.watch(near, selectors.EVENT_READ, until_due(loop, story, name, period + 0.001))
+    loop.add(Due(loop, story, period, 9))
+    loop.run()
+    loop.close()
+    turns = [name for name in story if name != "service"]
+    assert sorted(turns[:2]) == ["a", "b"]
+    assert turns == (turns[:2] * 9)[: len(turns)]
+    assert all({a, b} != {"a", "b"} for a, b in pairwise(story))
+
+
+def test_calls_that_call_themselves_again_do_not_keep_sockets_and_services_waiting(pairs):
+    loop, story = EventLoop(), []
+    near, far = pairs[0]
+    far.send(b"x")
+    loop.watch(near, selectors.EVENT_READ, lambda events: story.append("socket"))
+
+    def again():
+        story.append("call")
+        loop.call_soon(again)
+
+    loop.call_soon(again)
+    loop.add(Due(loop, story, 0.0, 50))
+    loop.run()
+    loop.close()
+    assert abs(story.count("call") - story.count("socket")) <= 1
+    assert story.count("call") > 9
 
 
 class BareRunner(LoopRunner):

@@ -3,6 +3,11 @@
 One thread owns the loop and all that is registered with it; other threads may only use
 `call_soon_threadsafe`. The loop knows no robot: a service is anything with `advance`, which returns when it
 must be called next.
+
+Callbacks go in rounds: every socket that is ready and every call that waits gets one turn in a round. When a
+service is due the round is interrupted, and goes on after the service: no crowd of clients delays a cycle,
+and no client keeps another from its turn. So a callback must be short: what remains to be done goes into the
+next round by `call_soon`.
 """
 
 from __future__ import annotations
@@ -15,6 +20,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Protocol
 
 from ur_emulator.realtime.interpreter import loop_settings
@@ -29,6 +35,8 @@ _COARSE = 0.050
 WAKE_UP = 400e-6
 # select() takes descriptors below this number only.
 _SELECT_LIMIT = 1024
+# How long callbacks run when a service is late already, or always due [s].
+_LATE_TURN = 500e-6
 # How long to poll for an expected event [s]: a client in lockstep answers in half of it.
 _POLL_TIME = 200e-6
 # Most waits in a row without polling, after polls that failed.
@@ -63,6 +71,7 @@ class EventLoop:
         self._selector = selectors.DefaultSelector()
         self._services: list[Service] = []
         self._calls: deque[Callable[[], None]] = deque()
+        self._round: deque[Callable[[], None]] = deque()
         self._stopping = False
         self.is_running = False
         self._thread = 0
@@ -116,6 +125,12 @@ class EventLoop:
         if service in self._services:
             self._services.remove(service)
 
+    # --- calls
+
+    def call_soon(self, call: Callable[[], None]) -> None:
+        """Run `call` in the next round, after the sockets that are ready then; in the loop's thread."""
+        self._calls.append(call)
+
     # --- other threads
 
     @property
@@ -159,29 +174,52 @@ class EventLoop:
         self._wake_end.close()
 
     def _dispatch(self, deadline: float) -> None:
-        """Wait for a ready socket until `deadline`, then run all callbacks that are ready."""
+        """Go on with the round, or wait for the next one until `deadline`; stop when a service is due."""
+        if not self._round:
+            ready = self._wait(deadline)
+            self._round.extend(partial(self._call_back, key, events) for key, events in ready)
+            self._round.extend(self._calls.popleft() for _ in range(len(self._calls)))
+        end = self._end_of_turn(deadline)
+        while self._round:
+            self._round.popleft()()
+            if time.monotonic() >= end:
+                return
+
+    def _call_back(self, key: selectors.SelectorKey, events: int) -> None:
+        """Call back for a socket that was ready at the beginning of the round, and still wants to know."""
+        # A callback before this one may have closed the socket, and another may have its number by now.
+        now = self._selector.get_map().get(key.fd)
+        if now is not None and now.fileobj is key.fileobj and events & now.events:
+            now.data(events & now.events)
+
+    def _end_of_turn(self, deadline: float) -> float:
+        """Return until when callbacks may run."""
+        now, lead = time.monotonic(), self._lead
+        if now < deadline - lead:
+            return deadline - lead
+        return deadline if now < deadline else now + _LATE_TURN
+
+    @property
+    def _lead(self) -> float:
+        """How long before a deadline a service may use the loop [s]."""
+        return WAKE_UP / max(1, len(self._services))
+
+    def _wait(self, deadline: float) -> list[_Ready]:
+        """Wait for ready sockets until `deadline`; not at all if calls wait."""
         timeout = max(0.0, deadline - time.monotonic()) if not self._calls else 0.0
         ready = self._poll(timeout) if self._expects_soon else []
-        if not ready:
-            if self._descriptor is not None and 0.0 < timeout < _COARSE:
-                ready = self._wait_precisely(self._descriptor, deadline)
-            else:
-                ready = self._selector.select(timeout)
-        watched = self._selector.get_map()
-        for key, events in ready:
-            # A callback before this one may have closed the socket, and another may have its number by now.
-            now = watched.get(key.fd)
-            if now is not None and now.fileobj is key.fileobj:
-                key.data(events)
-        while self._calls:
-            self._calls.popleft()()
+        if ready:
+            return ready
+        if self._descriptor is not None and 0.0 < timeout < _COARSE:
+            return self._wait_precisely(self._descriptor, deadline)
+        return self._selector.select(timeout)
 
     def _wait_precisely(self, descriptor: int, deadline: float) -> list[_Ready]:
         """Wait for a deadline to some microseconds: sleep for most of it, watch the clock for the rest.
 
         Between the two it returns, so that services can use the rest.
         """
-        sleep = deadline - time.monotonic() - WAKE_UP / max(1, len(self._services))
+        sleep = deadline - time.monotonic() - self._lead
         if sleep > 0.0:
             ready: list[_Ready] = []
             if descriptor < _SELECT_LIMIT:
