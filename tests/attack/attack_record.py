@@ -1,0 +1,102 @@
+"""What an attack is, how it is run, what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from box_under_attack import BoxUnderAttack, Seen, serving, watching
+
+Run = Callable[[BoxUnderAttack, float], str | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Attack:
+    """A row of the table.
+
+    Attributes:
+        name: of its function.
+        what: what is done.
+        limit: what stops it: a limit and what happens beyond it; "" where nothing is refused.
+        run: does it, for about so many seconds, never for more than a minute; may return a remark. An
+            `AssertionError` or `OSError` says that the box has not behaved.
+        options: of `ur-emulator serve`.
+        prelude: Python code that the process of the box runs first.
+        unread_log: stderr is a pipe that nobody reads.
+        is_short: it also makes sense within a second, and belongs to `make test`.
+    """
+
+    name: str
+    what: str
+    limit: str
+    run: Run
+    options: tuple[str, ...] = ()
+    prelude: str = ""
+    unread_log: bool = False
+    is_short: bool = True
+
+
+@dataclass(slots=True)
+class Section:
+    """The attacks of a module.
+
+    Attributes:
+        title: what they have in common.
+        attacks: in the order of the table.
+    """
+
+    title: str
+    attacks: list[Attack] = field(default_factory=list)
+
+    def attack(self, what: str, limit: str = "", **settings: object) -> Callable[[Run], Run]:
+        """Add the function below as an attack; see `Attack`."""
+
+        def add(run: Run) -> Run:
+            name = run.__name__.replace("_", " ")
+            self.attacks.append(Attack(name, what, limit, run, **settings))
+            return run
+
+        return add
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of an attack.
+
+    Attributes:
+        seen: by the bystanders.
+        problems: a line each; none if the box has withstood.
+        remark: of the attack.
+        stop_s: from SIGTERM to the end of the process.
+    """
+
+    seen: Seen
+    problems: tuple[str, ...]
+    remark: str
+    stop_s: float
+
+
+def served(attack: Attack):
+    """Serve a box that an attack may begin with."""
+    return serving(*attack.options, prelude=attack.prelude, unread_log=attack.unread_log)
+
+
+def withstands(attack: Attack, box: BoxUnderAttack, seconds: float) -> list[str]:
+    """Attack a box; return its problems, during the attack and afterwards."""
+    return [*_attacked(attack, box, seconds)[1], *box.problems()]
+
+
+def watched(attack: Attack, seconds: float) -> Outcome:
+    """Attack a box of its own, with bystanders."""
+    with served(attack) as box:
+        with watching(box) as seen:
+            remark, problems = _attacked(attack, box, seconds)
+        problems += box.problems()
+        return Outcome(seen, tuple(problems), remark, box.stop())
+
+
+def _attacked(attack: Attack, box: BoxUnderAttack, seconds: float) -> tuple[str, list[str]]:
+    try:
+        return attack.run(box, seconds) or "", []
+    except (AssertionError, OSError, EOFError) as error:
+        return "", [str(error) or type(error).__name__]

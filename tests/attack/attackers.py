@@ -1,0 +1,171 @@
+"""What attacks are made of: floods, silent crowds, peers that scripts dial, requests over HTTP."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import selectors
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+
+from box_under_attack import CONTROL_PORT, PATIENCE, BoxUnderAttack
+
+RESET = struct.pack("ii", 1, 0)
+_TURN = 1 << 16
+
+
+def flood(
+    box: BoxUnderAttack,
+    port: str,
+    data: bytes,
+    seconds: float,
+    *,
+    clients: int = 8,
+    reads: bool = True,
+    most: int = 64 << 20,
+) -> int:
+    """Send the same bytes again and again over some connections; one that the box closes is replaced.
+
+    Args:
+        box: to be flooded.
+        port: by its name.
+        data: what each connection sends.
+        seconds: how long.
+        clients: how many connections.
+        reads: they read what comes.
+        most: bytes in total.
+
+    Returns:
+        Bytes that the box's machine has taken.
+    """
+    sent, end = 0, time.monotonic() + seconds
+    events = selectors.EVENT_WRITE | (selectors.EVENT_READ if reads else 0)
+    at: dict[socket.socket, int] = {}
+    with selectors.DefaultSelector() as selector, ExitStack() as stack:
+
+        def join() -> None:
+            with suppress(OSError):
+                sock = stack.enter_context(box.connect(port, 2.0))
+                sock.setblocking(False)
+                at[sock] = 0
+                selector.register(sock, events)
+
+        for _ in range(clients):
+            join()
+        while sent < most and (now := time.monotonic()) < end:
+            if len(at) < clients:
+                join()
+            for key, ready in selector.select(min(0.1, end - now)):
+                sock = key.fileobj
+                try:
+                    if ready & selectors.EVENT_READ and not sock.recv(_TURN):
+                        raise ConnectionError
+                    if ready & selectors.EVENT_WRITE:
+                        n = sock.send(memoryview(data)[at[sock] : at[sock] + _TURN])
+                        at[sock] = (at[sock] + n) % len(data)
+                        sent += n
+                except BlockingIOError:
+                    pass
+                except OSError:
+                    selector.unregister(sock)
+                    sock.close()
+                    del at[sock]
+    return sent
+
+
+@contextmanager
+def crowd(box: BoxUnderAttack, port: str, n: int, data: bytes = b"") -> Iterator[list[socket.socket]]:
+    """Connect so many clients that each send this and read nothing; those that are refused are left out."""
+    with ExitStack() as stack:
+        clients = []
+        for _ in range(n):
+            with suppress(OSError):
+                sock = stack.enter_context(box.connect(port, 2.0))
+                sock.settimeout(0.2)
+                with suppress(TimeoutError):
+                    sock.sendall(data)
+                clients.append(sock)
+        yield clients
+
+
+def reset(sock: socket.socket) -> None:
+    """Close with RST instead of FIN."""
+    with suppress(OSError):
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+    sock.close()
+
+
+def until(condition: Callable[[], bool], what: str) -> float:
+    """Wait until a condition holds; return how long that took [s]."""
+    began = time.monotonic()
+    while not condition():
+        assert time.monotonic() < began + PATIENCE, f"not within {PATIENCE:g} s: {what}"
+        time.sleep(0.02)
+    return time.monotonic() - began
+
+
+def plays(box: BoxUnderAttack) -> bool:
+    """Return whether a program runs."""
+    return box.ask("running")[0] == "Program running: true"
+
+
+@contextmanager
+def peer(serve: Callable[[socket.socket], None]) -> Iterator[int]:
+    """Listen for scripts; each connection gets a thread that serves it. Gives the port."""
+    with socket.create_server(("127.0.0.1", 0), backlog=512) as server, ExitStack() as stack:
+
+        def handle(client: socket.socket) -> None:
+            with client, suppress(OSError):
+                serve(client)
+
+        def accept() -> None:
+            with suppress(OSError):
+                while True:
+                    client = server.accept()[0]
+                    client.settimeout(PATIENCE)
+                    stack.callback(reset, client)
+                    threading.Thread(target=handle, args=(client,), daemon=True).start()
+
+        threading.Thread(target=accept, daemon=True).start()
+        try:
+            yield server.getsockname()[1]
+        finally:
+            server.shutdown(socket.SHUT_RDWR)
+
+
+def request(
+    box: BoxUnderAttack, method: str, path: str, body: object = None, **headers: str
+) -> tuple[int, object]:
+    """Ask the control API; return the status and the JSON of the answer.
+
+    Args:
+        box: to be asked.
+        method: GET or POST.
+        path: behind `/v1/`.
+        body: sent as JSON, bytes as they are.
+        headers: `_` stands for `-`.
+    """
+    connection = http.client.HTTPConnection(box.host, CONTROL_PORT, timeout=PATIENCE)
+    data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
+    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    try:
+        connection.request(method, f"/v1/{path}", data, {"Content-Type": "application/json", **given})
+        answer = connection.getresponse()
+        return answer.status, json.loads(answer.read())
+    finally:
+        connection.close()
+
+
+def post(box: BoxUnderAttack, path: str, body: bytes) -> bytes:
+    """Return the bytes of a request that posts JSON."""
+    head = f"POST /v1/{path} HTTP/1.1\r\nHost: {box.host}\r\nContent-Type: application/json\r\n"
+    return f"{head}Content-Length: {len(body)}\r\n\r\n".encode() + body
+
+
+def get(box: BoxUnderAttack, path: str) -> bytes:
+    """Return the bytes of a request that reads."""
+    return f"GET /v1/{path} HTTP/1.1\r\nHost: {box.host}\r\n\r\n".encode()

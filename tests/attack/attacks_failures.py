@@ -1,0 +1,116 @@
+"""Attacks on the loop itself: whatever fails in a callback must end the connection or the program, not the box."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack, suppress
+
+from attack_record import Section
+from attackers import crowd, flood, get, reset, until
+from box_under_attack import BoxUnderAttack
+
+FAILURES = Section("One boundary for failures")
+
+_FEW_DESCRIPTORS = "import resource\nresource.setrlimit(resource.RLIMIT_NOFILE, (96, 96))"
+# A file beside that of `--ready-file` takes the threads away.
+_NO_THREADS = """
+import os, threading
+_start, _flag = threading.Thread.start, os.path.dirname(sys.argv[sys.argv.index("--ready-file") + 1]) + "/no-threads"
+def start(thread):
+    if os.path.exists(_flag):
+        raise RuntimeError("can't start new thread")
+    _start(thread)
+threading.Thread.start = start
+"""
+_WRITES = ("saveLog", "generate flight report", "generate support file .")
+
+
+@FAILURES.attack(
+    "Clients take all descriptors (limit: 96), then a dashboard that is connected has the box write files",
+    "further clients are closed; the writing is refused with one line",
+    prelude=_FEW_DESCRIPTORS,
+)
+def descriptors_exhausted(box: BoxUnderAttack, seconds: float) -> None:
+    with box.connect("dashboard") as sock, sock.makefile("rw", newline="\n") as dashboard:
+        dashboard.readline()
+        with crowd(box, "primary", 100):
+            for _ in range(max(1, round(seconds))):
+                for line in _WRITES:
+                    dashboard.write(line + "\n")
+                    dashboard.flush()
+                    assert dashboard.readline(), f"{line} closed the dashboard"
+
+
+@FAILURES.attack(
+    "No thread can be started; scripts open sockets by name and call XML-RPC",
+    "the call fails",
+    prelude=_NO_THREADS,
+)
+def threads_exhausted(box: BoxUnderAttack, seconds: float) -> None:
+    flag = box.errors.with_name("no-threads")
+    flag.touch()
+    try:
+        for _ in range(max(2, round(seconds))):
+            box.run('socket_open("localhost", 9)', 'rpc_factory("xmlrpc", "http://127.0.0.1:9").f()')
+            box.ask("programState")
+            time.sleep(0.2)
+    finally:
+        flag.unlink()
+
+
+@FAILURES.attack(
+    "64 clients of the control API ask for the log, do not read and are reset while others come",
+    "the client that has been silent longest is closed",
+)
+def control_clients_that_go(box: BoxUnderAttack, seconds: float) -> None:
+    for _ in range(max(2, round(seconds))):
+        with crowd(box, "control", 64, 4 * get(box, "log")) as clients:
+            for client in clients[::2]:
+                reset(client)
+            with crowd(box, "control", 20, get(box, "state")):
+                pass
+
+
+@FAILURES.attack(
+    "`--log` goes to a pipe that nobody reads; dashboards add lines of 500 bytes",
+    "lines are left out",
+    options=("--log",),
+    unread_log=True,
+)
+def unread_log(box: BoxUnderAttack, seconds: float) -> None:
+    line = b"addToLog " + b"x" * 500 + b"\n"
+    flood(box, "dashboard", 50 * line, seconds, clients=4, most=4 << 20)
+
+
+@FAILURES.attack(
+    "A program is stopped, replaced and stopped again while its sockets connect and its file is loaded",
+)
+def programs_in_all_states(box: BoxUnderAttack, seconds: float) -> None:
+    (box.programs / "spin.script").write_text("while True:\n  sync()\nend\n")
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        box.ask("load spin.script", "play", "stop", "play", "pause", "load nothing.urp", "stop")
+        box.run('socket_open("127.0.0.1", 9)', "while True:", "  sync()", "end")
+        box.send("secondary", "stop program\n")
+    until(lambda: box.ask("running")[0].endswith("false"), "the program stops")
+
+
+@FAILURES.attack("Clients of all ports are reset in the middle of what they send and of what they get")
+def resets(box: BoxUnderAttack, seconds: float) -> None:
+    said = {
+        "dashboard": b"addToLog a\nload x.urp\n",
+        "primary": b"def f():\n",
+        "realtime": b"def f():\n  sync()\nend\n",
+        "rtde": b"\0\5V\0\2\0\3",
+        "modbus": bytes.fromhex("0001000000060103008000020001"),
+        "control": get(box, "log")[:-3],
+    }
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        with ExitStack() as stack:
+            for port, data in said.items():
+                for _ in range(4):
+                    with suppress(OSError):
+                        sock = box.connect(port)
+                        stack.callback(reset, sock)
+                        sock.sendall(data)

@@ -1,0 +1,106 @@
+"""Bystanders of an attack, each in a process of its own: a reader of port 30003, and a timer that also looks at memory.
+
+    python bystander.py stream HOST PORT
+    python bystander.py timer PID
+
+Both print "ready", go on until their standard input is closed, then print one JSON object: `Stream`, `Timer`.
+"""
+
+import json
+import os
+import select
+import socket
+import struct
+import sys
+import time
+from contextlib import suppress
+from itertools import pairwise
+
+import psutil
+
+PERIOD = 0.008  # s
+_LOOK_EVERY = 5  # periods between two looks at the memory
+_CHILDREN_EVERY = 25  # periods between two searches for worker processes; they cost most
+_HEAD = struct.Struct(">id")
+_MB = 1e6
+
+
+def stream(host, port):
+    """Read frames.
+
+    Returns:
+        rate: robot time per real time; gap_ms: longest time without a frame; lost: cycles without a frame; closed:
+        the box has ended the stream.
+    """
+    sock = socket.create_connection((host, port), timeout=10.0)
+    stamps, arrivals, buffer, closed = [], [], bytearray(), False
+    _begin()
+    while sys.stdin not in (ready := select.select([sys.stdin] + [sock] * (not closed), [], [])[0]):
+        data = _received(sock) if ready else b""
+        now = time.monotonic()
+        closed = not data
+        buffer += data
+        while len(buffer) >= _HEAD.size and len(buffer) >= (size := _HEAD.unpack_from(buffer)[0]):
+            stamps.append(_HEAD.unpack_from(buffer)[1])
+            arrivals.append(now)
+            del buffer[:size]
+    arrivals.append(time.monotonic())  # a stream that stood still at the end has a gap there
+    gaps = [after - before for before, after in pairwise(arrivals)]
+    cycles = {round(stamp / PERIOD) for stamp in stamps}
+    passed = max(arrivals[-2] - arrivals[0], arrivals[-1] - arrivals[0] - 2 * PERIOD) if stamps else 0.0
+    return {
+        "rate": (stamps[-1] - stamps[0]) / passed if passed else 0.0,
+        "gap_ms": 1e3 * max(gaps, default=0.0),
+        "lost": max(cycles) - min(cycles) + 1 - len(cycles) if cycles else 0,
+        "closed": closed,
+    }
+
+
+def timer(pid):
+    """Wake up every 8 ms, and look at the memory of a process and of its children.
+
+    Returns:
+        gap_ms: longest time between two wakes; box_mb, worker_mb: most memory that the process held, and most that
+        its children held together.
+    """
+    box, children, worker_peak, k = psutil.Process(pid), [], 0, 0
+    began = last = time.monotonic()
+    gap = 0.0
+    _begin()
+    while not select.select([sys.stdin], [], [], max(0.0, began + k * PERIOD - time.monotonic()))[0]:
+        now = time.monotonic()
+        gap, last = max(gap, now - last), now
+        with suppress(psutil.Error):
+            if k % _CHILDREN_EVERY == 0:
+                children = box.children()
+            if k % _LOOK_EVERY == 0:
+                worker_peak = max(worker_peak, sum(peak_memory(child.pid) for child in children))
+        # What the looks cost is no gap of the host.
+        last += time.monotonic() - now
+        k = max(k + 1, round((last - began) / PERIOD))
+    return {"gap_ms": 1e3 * gap, "box_mb": peak_memory(pid) / _MB, "worker_mb": worker_peak / _MB}
+
+
+def peak_memory(pid):
+    """Return the most memory that a process has held at once [bytes], 0 for one that has ended."""
+    with suppress(OSError), open(f"/proc/{pid}/status") as status:
+        for line in status:
+            if line.startswith("VmHWM:"):
+                return 1024 * int(line.split()[1])
+    return 0
+
+
+def _received(sock):
+    try:
+        return sock.recv(1 << 16)
+    except OSError:
+        return b""
+
+
+def _begin():
+    os.write(1, b"ready\n")
+
+
+if __name__ == "__main__":
+    role, *rest = sys.argv[1:]
+    print(json.dumps(stream(rest[0], int(rest[1])) if role == "stream" else timer(int(rest[0]))))
