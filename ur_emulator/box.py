@@ -73,6 +73,7 @@ class Box(BoxOperations):
         port_base: int | None = 0,
         programs: str | PathLike[str] | None = None,
         control_port: int | None = None,
+        control_token: str | None = None,
         *,
         loop: EventLoop | None = None,
         phase: float = 0.0,
@@ -93,6 +94,7 @@ class Box(BoxOperations):
             programs: folder of programs and installations, for the dashboard's `load`; None for none.
             control_port: number of the port for the control API over HTTP (docs/control.md); 0: a free one,
                 None: none.
+            control_token: what requests on that port must show; None: nothing, on a loopback address only.
             loop: shared with other boxes; None gives the box its own.
             phase: which part of a period its cycles lie after those of the first box of the loop.
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).
@@ -109,7 +111,7 @@ class Box(BoxOperations):
         software = generation.software(asked)
         imperfections = generation.fidelity(fidelity)
         named_pace = parse_pace(pace)
-        check_options(host, speed, seed, programs, control_port)
+        check_options(host, speed, seed, programs, control_port, control_token)
         prestart_process()  # it loads the compiler while the box is assembled
         self.host = host
         self.port_base = port_base or 0
@@ -182,8 +184,9 @@ class Box(BoxOperations):
         self._wanted_control_port = control_port
         if control_port is not None:
             from ur_emulator.control.http_port import HttpPort
+            from ur_emulator.control.http_request import Gate
 
-            ports[CONTROL] = HttpPort(self._access, self._operations, host)
+            ports[CONTROL] = HttpPort(self._access, self._operations, Gate(host, control_token))
         self._port_set = PortSet(self._loop, host, self._box, ports)
         self.is_shut_down = False
         self.failure: Exception | None = None

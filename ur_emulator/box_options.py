@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from ipaddress import ip_address
 from os import PathLike
 from pathlib import Path
 from typing import TypedDict
 
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
+from ur_emulator.control.token import check_token
 from ur_emulator.errors import EmulatorError
 from ur_emulator.realtime.pacing import Pace
 
@@ -28,10 +30,16 @@ class BoxOptions(TypedDict, total=False):
     port_base: int | None
     programs: str | PathLike[str] | None
     control_port: int | None
+    control_token: str | None
 
 
 def check_options(
-    host: str, speed: float, seed: int, programs: str | PathLike[str] | None, control_port: int | None
+    host: str,
+    speed: float,
+    seed: int,
+    programs: str | PathLike[str] | None,
+    control_port: int | None,
+    control_token: str | None,
 ) -> None:
     """Check the arguments that need no table.
 
@@ -50,6 +58,20 @@ def check_options(
         raise EmulatorError(
             f"control port {control_port} given: 1 to {MAX_PORT} are ports, 0 takes a free one"
         )
+    check_token(control_token)
+    if control_port is not None and control_token is None and not is_loopback(host):
+        raise EmulatorError(
+            f"control port on {host}, which other machines can reach: give it a token "
+            "(--token, control_token), or listen on a loopback address"
+        )
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether an address is one that only this machine reaches; other names than localhost are not."""
+    try:
+        return host.lower() == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def standard_ports(base: int) -> Ports:

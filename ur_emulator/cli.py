@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from protocol.errors import ProtocolError
+from ur_emulator.control.token import TOKEN_VARIABLE
 
 if TYPE_CHECKING:
     from ur_emulator.box import Box
@@ -68,6 +69,15 @@ def serve(
             help="Open the control API over HTTP on this port, for `ur-emulator ctl` (its default: 29900)."
         ),
     ] = None,
+    token: Annotated[
+        str | None,
+        typer.Option(
+            help="What requests to the control API must show; better in the environment, "
+            "where other users of the machine do not see it.",
+            envvar=TOKEN_VARIABLE,
+            show_envvar=True,
+        ),
+    ] = None,
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
@@ -83,6 +93,7 @@ def serve(
     raise_descriptor_limit()
     prestart_process()  # it loads the compiler while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
+    from ur_emulator.box_options import is_loopback
     from ur_emulator.emulator import ControlBox
     from ur_emulator.errors import EmulatorError
     from ur_emulator.realtime.interpreter import freeze_existing_objects
@@ -100,6 +111,7 @@ def serve(
             port_base=port_base,
             programs=programs,
             control_port=control_port,
+            control_token=token,
         )
         for name in (signal.SIGINT, signal.SIGTERM):
             signal.signal(name, lambda number, frame: rack.stop())
@@ -116,6 +128,11 @@ def serve(
     if notices:
         others = f" ({len(notices) - 1} more boxes say the like)" if len(notices) > 1 else ""
         sys.stderr.write(f"ur-emulator: {notices[0]}{others}\n")
+    if not is_loopback(host):
+        sys.stderr.write(
+            f"ur-emulator: other machines can reach {host}: whoever reaches port {rack[0].ports.secondary} "
+            "(30002) runs programs here, which may connect to anything; let a firewall decide who\n"
+        )
     for k, box in enumerate(rack):
         print(
             f"{robot.upper()} {box.generation.name} {version or box.generation.default_version} "

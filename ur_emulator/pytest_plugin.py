@@ -35,6 +35,7 @@ OPTIONS = (
     "port_base",
     "programs",
     "control_port",
+    "control_token",
     "standard_ports",
 )
 DEFAULTS: dict[str, Any] = {"pace": "lockstep", "port_base": None}

@@ -8,6 +8,7 @@ from ur_emulator.commands.operation import Operation
 from ur_emulator.commands.parameters import Kind, Parameter
 from ur_emulator.control.http_client import DEFAULT_PORT
 from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.control.token import TOKEN_VARIABLE
 
 _INTRODUCTION = f"""\
 # The control API
@@ -37,18 +38,21 @@ all are `EmulatorError`s with one line that says what to do. They return the num
 ## HTTP
 
 Off unless asked for: `ur-emulator serve --control-port {DEFAULT_PORT}`, or `ControlBox(control_port=0)` for a free port,
-whose number is `box.control_port` then. It listens on the host of the box. There is no password: whoever reaches the
-port controls the box, so leave it on a loopback address.
+whose number is `box.control_port` then. It listens on the host of the box. With a token, every request must show it
+in the header `Authorization: Bearer TOKEN` (401 otherwise): `ur-emulator serve --token TOKEN`,
+`ControlBox(control_token="TOKEN")`, or the environment variable `{TOKEN_VARIABLE}` of `ur-emulator serve` and
+`ur-emulator ctl`, which other users of the machine do not see. On a loopback address the token may be left out:
+whoever reaches the port controls the box then. On any other address a control port needs one.
 
 - `GET /v1/operations` lists everything below as JSON.
 - `POST` takes a JSON object (content type `application/json`); without a body all defaults are taken.
-- The answer is a JSON object; an error is `{{"error": "one line"}}` with status 400 (does not fit), 403 (see below),
-  404 (no such operation), 405 (GET and POST confused), 409 (the box is not in a state for it), 413 (too long:
+- The answer is a JSON object; an error is `{{"error": "one line"}}` with status 400 (does not fit), 401 (no token),
+  403 (see below), 404 (no such operation), 405 (GET and POST confused), 409 (the box is not in a state for it), 413 (too long:
   1 MiB of body) or 431 (16 KiB of header).
 - Connections are kept alive; one request of a client is answered after the other. The box keeps 64 connections and
   closes the one that has been silent longest for a new one.
 - Pages in a browser cannot reach the box: `Host` must be the address that it listens on, or `localhost` (403
-  otherwise, against DNS rebinding), and requests of foreign origins are refused.
+  otherwise, against DNS rebinding), and requests of foreign origins are refused (`Origin`, `Sec-Fetch-Site`).
 
 ```sh
 curl http://127.0.0.1:{DEFAULT_PORT}/v1/state
@@ -57,8 +61,8 @@ curl -H 'Content-Type: application/json' -d '{{"group": "standard", "n": 3, "lev
 
 ## Command line
 
-`ur-emulator ctl OPERATION [--option value ...] [--host H] [--control-port {DEFAULT_PORT}] [--json]`. Exit code 0: done; 1: refused, or
-no box answers; 2: wrong usage. `ctl log --follow` goes on until Ctrl-C; `ctl run_program --script-file FILE` sends a
+`ur-emulator ctl OPERATION [--option value ...] [--host H] [--control-port {DEFAULT_PORT}] [--token TOKEN] [--json]`. Exit code 0:
+done; 1: refused, or no box answers; 2: wrong usage. `ctl log --follow` goes on until Ctrl-C; `ctl run_program --script-file FILE` sends a
 file of this machine; `ctl OPERATION --help` lists the options.
 
 ## Operations

@@ -1,6 +1,7 @@
 """`ur-emulator serve` from the outside: exit codes, one-line errors, signals, the ready file."""
 
 import dataclasses
+import os
 import signal
 import socket
 import subprocess
@@ -23,6 +24,7 @@ from integration_support import (
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage
 from protocol.ur_types import Ports
 from ur_emulator import ControlBox
+from ur_emulator.control.token import TOKEN_VARIABLE
 from ur_emulator.errors import EmulatorError
 
 
@@ -139,6 +141,18 @@ def test_ports_are_free_again_at_once(tmp_path):
         frames.next()
     again = command("ur_emulator", "serve", "--port-base", box.base, "--ready-file", "/nowhere/ready.json")
     assert "cannot listen" not in again.complaint()
+
+
+def test_beyond_loopback_a_control_port_demands_a_token_and_the_user_is_warned(tmp_path):
+    check_complaint(serve("--host", "0.0.0.0", "--control-port", "0"), "--token")
+    environment = {**os.environ, TOKEN_VARIABLE: "correct-horse"}
+    with serving(tmp_path, "--host", "0.0.0.0", "--control-port", "0", env=environment) as box:
+        box.process.send_signal(signal.SIGINT)
+        told = finish(box.process)
+    assert told.code == 0
+    assert told.err.count("\n") == 1
+    assert "(30002)" in told.err
+    assert "correct-horse" not in told.out + told.err
 
 
 def test_the_log_goes_to_stderr_if_asked_for(tmp_path):

@@ -11,6 +11,7 @@ from control_support import control_box
 from ur_emulator.control.command_line import main, make_parser, plain
 from ur_emulator.control.http_client import ControlClient
 from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.control.token import TOKEN_VARIABLE
 from ur_emulator.errors import ControlError
 
 
@@ -209,6 +210,20 @@ def ur_emulator_main():
         return done.returncode, done.stdout, done.stderr
 
     return run
+
+
+def test_the_token_comes_from_the_option_or_from_the_environment(capsys, monkeypatch):
+    with control_box(control_token="s3cret/+") as box:
+        words = ["close_popups", "--host", box.host, "--control-port", str(box.control_port)]
+        assert main(words) == 1
+        assert "Authorization: Bearer" in capsys.readouterr().err
+        assert main([*words, "--token", "S3cret/+"]) == 1
+        assert main([*words, "--token", "s3cret/+"]) == 0
+        monkeypatch.setenv(TOKEN_VARIABLE, "s3cret/+")
+        assert main(words) == 0
+        assert main([*words, "--token", "other"]) == 1
+    assert main(["state", "--token", "a\nb"]) == 2
+    assert capsys.readouterr().err.endswith("200 printed characters of ASCII, no blanks\n")
 
 
 def test_python_may_ask_over_http_as_well(box):

@@ -198,9 +198,10 @@ def test_the_own_address_and_localhost_are_taken(http, host):
 
 
 def test_a_box_on_all_addresses_takes_any_address_but_no_name():
-    with control_box(host="0.0.0.0") as box, Http(box) as http:
-        assert http.ask("GET", "/v1/state", host="192.168.7.7:80")[0] == 200
-        assert http.ask("GET", "/v1/state", host="evil.example")[0] == 403
+    token = ["Authorization: Bearer abc"]
+    with control_box(host="0.0.0.0", control_token="abc") as box, Http(box) as http:
+        assert http.ask("GET", "/v1/state", host="192.168.7.7:80", headers=token)[0] == 200
+        assert http.ask("GET", "/v1/state", host="evil.example", headers=token)[0] == 403
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1:1", "http://[", ""])
@@ -208,6 +209,19 @@ def test_a_page_of_another_origin_is_refused(http, origin):
     status, answer = http.ask("POST", "/v1/power_off", headers=[f"Origin: {origin}"])
     assert status == 403
     assert "pages" in answer["error"]
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site", "", "Cross-Site", "none, cross-site"])
+def test_a_page_of_another_site_is_refused(http, site):
+    for method, path in (("POST", "/v1/power_off"), ("GET", "/v1/state")):
+        status, answer = http.ask(method, path, headers=[f"Sec-Fetch-Site: {site}"])
+        assert status == 403
+        assert "pages" in answer["error"]
+
+
+def test_what_a_browser_itself_asks_is_answered(http):
+    for site in ("none", "same-origin"):
+        assert http.ask("GET", "/v1/state", headers=[f"Sec-Fetch-Site: {site}"])[0] == 200
 
 
 def test_a_request_without_a_host_is_refused(http):

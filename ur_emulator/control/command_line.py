@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -16,7 +17,8 @@ from typing import Any, NoReturn
 from ur_emulator.commands.parameters import Kind, Parameter
 from ur_emulator.control.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
 from ur_emulator.control.operations import OPERATIONS, make
-from ur_emulator.errors import ArgumentError, ControlError
+from ur_emulator.control.token import TOKEN_VARIABLE, check_token
+from ur_emulator.errors import ControlError, EmulatorError
 
 PROGRAM = "ur-emulator ctl"
 # Pause between two requests of a log that is followed [s].
@@ -34,11 +36,13 @@ def main(words: Sequence[str]) -> int:
     """Run one command; return the exit code."""
     given = vars(make_parser().parse_args(words))
     name = given.pop("operation")
-    client = ControlClient(given.pop("host", DEFAULT_HOST), given.pop("control_port", DEFAULT_PORT))
+    token = given.pop("token", os.environ.get(TOKEN_VARIABLE) or None)
+    client = ControlClient(given.pop("host", DEFAULT_HOST), given.pop("control_port", DEFAULT_PORT), token)
     as_json, follow = given.pop("json", False), given.pop("follow", False)
     try:
+        check_token(token)
         arguments = _arguments(name, given)
-    except (ArgumentError, OSError, UnicodeError) as error:
+    except (EmulatorError, OSError, UnicodeError) as error:
         return _complain(error, 2)
     try:
         if follow:
@@ -57,6 +61,7 @@ def make_parser() -> argparse.ArgumentParser:
     common = _Parser(add_help=False, argument_default=argparse.SUPPRESS)
     common.add_argument("--host", help=f"address of the box ({DEFAULT_HOST})")
     common.add_argument("--control-port", type=int, metavar="N", help=f"its control port ({DEFAULT_PORT})")
+    common.add_argument("--token", metavar="T", help=f"its token (else that in {TOKEN_VARIABLE})")
     common.add_argument("--json", action="store_true", help="print the result as JSON")
     parser = _Parser(prog=PROGRAM, description="Do something to a box that runs.", parents=[common])
     commands = parser.add_subparsers(dest="operation", required=True, metavar="OPERATION")

@@ -20,9 +20,17 @@ PATIENCE = 60.0
 class ControlClient:
     """One box, one connection for every question."""
 
-    def __init__(self, host: str = DEFAULT_HOST, port: int = DEFAULT_PORT) -> None:
+    def __init__(self, host: str = DEFAULT_HOST, port: int = DEFAULT_PORT, token: str | None = None) -> None:
+        """Ask a box.
+
+        Args:
+            host: its address.
+            port: its control port.
+            token: of that port, None if it has none.
+        """
         self.host = host
         self.port = port
+        self._headers = {} if token is None else {"Authorization": f"Bearer {token}"}
 
     def perform(self, name: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """Have an operation done; return its result.
@@ -39,11 +47,10 @@ class ControlClient:
         try:
             if OPERATIONS[name].only_reads:
                 query = f"?{urlencode(given)}" if given else ""
-                connection.request("GET", f"/v1/{name}{query}")
+                connection.request("GET", f"/v1/{name}{query}", headers=self._headers)
             else:
-                connection.request(
-                    "POST", f"/v1/{name}", json.dumps(given), {"Content-Type": "application/json"}
-                )
+                headers = {"Content-Type": "application/json", **self._headers}
+                connection.request("POST", f"/v1/{name}", json.dumps(given), headers)
             response = connection.getresponse()
             result = json.loads(response.read())
         except (OSError, http.client.HTTPException, ValueError) as error:

@@ -14,7 +14,15 @@ from typing import Any
 import h11
 
 from ur_emulator.box_log import LogEntry
-from ur_emulator.control.http_request import JSON, LIST, MAX_HEADER, HttpError, check_head, parse_request
+from ur_emulator.control.http_request import (
+    JSON,
+    LIST,
+    MAX_HEADER,
+    Gate,
+    HttpError,
+    check_head,
+    parse_request,
+)
 from ur_emulator.control.operations import describe
 from ur_emulator.control.runner import OperationRunner
 from ur_emulator.controller.events import LogAdded
@@ -36,13 +44,13 @@ class HttpPort:
     Args:
         access: to the box.
         runner: does the operations.
-        host: address that the port is bound to.
+        gate: decides whose requests are answered.
     """
 
-    def __init__(self, access: BoxAccess, runner: OperationRunner, host: str) -> None:
+    def __init__(self, access: BoxAccess, runner: OperationRunner, gate: Gate) -> None:
         self._access = access
         self._runner = runner
-        self._host = host.lower()
+        self._gate = gate
         # The one that has been silent longest first.
         self._sessions: dict[Connection, _HttpSession] = {}
 
@@ -51,7 +59,7 @@ class HttpPort:
         if len(self._sessions) >= MAX_CLIENTS:
             idle = [other for other, session in self._sessions.items() if not session.is_busy]
             (idle or list(self._sessions))[0].close()
-        self._sessions[connection] = _HttpSession(connection, self._access, self._runner, self._host)
+        self._sessions[connection] = _HttpSession(connection, self._access, self._runner, self._gate)
         connection.allow_half_close(self.ended)
 
     def received(self, connection: Connection, data: bytes) -> None:
@@ -79,11 +87,13 @@ class _HttpSession(Session):
         n_requests: how many have been read.
     """
 
-    def __init__(self, connection: Connection, access: BoxAccess, runner: OperationRunner, host: str) -> None:
+    def __init__(
+        self, connection: Connection, access: BoxAccess, runner: OperationRunner, gate: Gate
+    ) -> None:
         super().__init__(connection, access.steps)
         self._access = access
         self._runner = runner
-        self._host = host
+        self._gate = gate
         self.http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEADER)
         self.n_requests = 0
         self._request: h11.Request | None = None
@@ -146,9 +156,9 @@ class _HttpSession(Session):
         """Do what a request asks for, and answer it."""
         assert self._request is not None
         try:
-            name, arguments = parse_request(self._request, body, self._host)
+            name, arguments = parse_request(self._request, body, self._gate)
         except HttpError as error:
-            self._finish(error.status, {"error": str(error)}, error.allow)
+            self._finish(error.status, {"error": str(error)}, *error.headers)
             return
         if name == LIST:
             self._finish(200, {"operations": describe()})
@@ -169,11 +179,11 @@ class _HttpSession(Session):
 
     # --- answers
 
-    def _finish(self, status: int, result: Any, allow: str = "") -> None:
+    def _finish(self, status: int, result: Any, *more: tuple[str, str]) -> None:
         """Send an answer; then the next request may be read."""
         if not self.connection.is_open:
             return
-        self._respond(status, result, allow)
+        self._respond(status, result, *more)
         if self.http.our_state is h11.MUST_CLOSE:
             self.connection.close_when_sent()
         elif self.http.our_state is h11.DONE and self.http.their_state is h11.DONE:
@@ -183,21 +193,18 @@ class _HttpSession(Session):
     def _reject(self, status: int, text: str) -> None:
         """Answer with an error after which nothing more can be read, and close."""
         if self.http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            self._respond(status, {"error": " ".join(text.split())}, close=True)
+            self._respond(status, {"error": " ".join(text.split())}, ("Connection", "close"))
         self.connection.close_when_sent()
 
-    def _respond(self, status: int, result: Any, allow: str = "", close: bool = False) -> None:
+    def _respond(self, status: int, result: Any, *more: tuple[str, str]) -> None:
         body = json.dumps(result, default=_as_json).encode() + b"\n"
         headers = [
             ("Content-Type", JSON),
             ("Content-Length", str(len(body))),
             ("Cache-Control", "no-store"),
             ("X-Content-Type-Options", "nosniff"),
+            *more,
         ]
-        if allow:
-            headers.append(("Allow", allow))
-        if close:
-            headers.append(("Connection", "close"))
         events: list[h11.Event] = [h11.Response(status_code=status, headers=headers)]
         if self._request is None or self._request.method != b"HEAD":
             events.append(h11.Data(data=body))

@@ -1,13 +1,15 @@
 """What a request to the control API asks for: an operation and its arguments, or why it is refused.
 
 Web pages must not control a box. So a request must name the address of the box as its host (another name that
-resolves to 127.0.0.1 is refused), and must not come from a page of another origin.
+resolves to 127.0.0.1 is refused), and must not come from a page of another origin. Where the port has a
+token, a request must show it.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from ipaddress import ip_address
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
@@ -16,11 +18,14 @@ import h11
 
 from ur_emulator.commands.operation import Operation
 from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.control.token import shows_token
 
 MAX_HEADER = 16 * 1024
 PREFIX = "/v1/"
 LIST = "operations"
 JSON = "application/json"
+# What a browser says of where a request comes from: from the user, or from a page of this box.
+_OWN_SITES = ("none", "same-origin")
 
 
 class HttpError(Exception):
@@ -28,13 +33,49 @@ class HttpError(Exception):
 
     Attributes:
         status: code of the answer.
-        allow: method that is allowed, "" where that was not the error.
+        headers: what the answer says beside its text.
     """
 
-    def __init__(self, status: int, text: str, allow: str = "") -> None:
+    def __init__(self, status: int, text: str, *headers: tuple[str, str]) -> None:
         super().__init__(text)
         self.status = status
-        self.allow = allow
+        self.headers = headers
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """Whose requests are answered.
+
+    Attributes:
+        own_host: address that the port is bound to.
+        token: what each request must show; None: nothing.
+    """
+
+    own_host: str
+    token: str | None
+
+    def check(self, headers: Mapping[str, str]) -> None:
+        """Refuse the requests of web pages, and those without the token.
+
+        Raises:
+            HttpError: says why.
+        """
+        host = headers.get("host", "")
+        if not _is_own(host, self.own_host.lower()):
+            raise HttpError(
+                403, f"host {ascii(host)[:60]} given: name the box by its address or as localhost"
+            )
+        origin = headers.get("origin")
+        if origin is not None and origin != f"http://{host}":
+            raise HttpError(403, f"pages of {ascii(origin)[:60]} may not control this box")
+        if headers.get("sec-fetch-site", "none") not in _OWN_SITES:
+            raise HttpError(403, "pages of other sites may not control this box")
+        if self.token is not None and not shows_token(headers.get("authorization", ""), self.token):
+            raise HttpError(
+                401,
+                "this port needs its token: send the header Authorization: Bearer TOKEN",
+                ("WWW-Authenticate", "Bearer"),
+            )
 
 
 def check_head(request: h11.Request) -> None:
@@ -49,13 +90,13 @@ def check_head(request: h11.Request) -> None:
         raise HttpError(431, f"the header is longer than {MAX_HEADER} bytes")
 
 
-def parse_request(request: h11.Request, body: bytes, own_host: str) -> tuple[str, Mapping[str, Any]]:
+def parse_request(request: h11.Request, body: bytes, gate: Gate) -> tuple[str, Mapping[str, Any]]:
     """Return the name of what a request asks for, and its arguments.
 
     Args:
         request: the head.
         body: all of it.
-        own_host: address that the port is bound to.
+        gate: decides whether it is answered.
 
     Returns:
         The name of an operation, or `LIST`; the arguments are not checked yet.
@@ -64,7 +105,7 @@ def parse_request(request: h11.Request, body: bytes, own_host: str) -> tuple[str
         HttpError: it is refused.
     """
     headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in request.headers}
-    _check_origin(headers, own_host)
+    gate.check(headers)
     path, _, query = request.target.decode("latin-1").partition("?")
     name = path.removeprefix(PREFIX) if path.startswith(PREFIX) else ""
     operation = OPERATIONS.get(name)
@@ -73,21 +114,12 @@ def parse_request(request: h11.Request, body: bytes, own_host: str) -> tuple[str
     method = request.method.decode("latin-1")
     allowed = "GET" if operation is None or operation.only_reads else "POST"
     if method != allowed:
-        raise HttpError(405, f"{name} is asked with {allowed}, not {method[:20]}", allowed)
+        raise HttpError(405, f"{name} is asked with {allowed}, not {method[:20]}", ("Allow", allowed))
     if operation is None:
         return name, {}
     if method == "GET":
         return name, _from_query(operation, query)
     return name, _from_body(headers.get("content-type", ""), body)
-
-
-def _check_origin(headers: Mapping[str, str], own_host: str) -> None:
-    host = headers.get("host", "")
-    if not _is_own(host, own_host):
-        raise HttpError(403, f"host {ascii(host)[:60]} given: name the box by its address or as localhost")
-    origin = headers.get("origin")
-    if origin is not None and origin != f"http://{host}":
-        raise HttpError(403, f"pages of {ascii(origin)[:60]} may not control this box")
 
 
 def _is_own(host: str, own_host: str) -> bool:
