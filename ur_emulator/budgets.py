@@ -45,6 +45,17 @@ class Budgets:
     # A client that stops reading for half a second finds all it missed.
     outbox_bytes: int = _budget(64 * KIB, "bytes", "a client", "further packages to it are dropped")
 
+    # --- variables and labels of running programs, as port 30001 reports them ---
+
+    # A client that connects gets all names and values; so many take 1 ms.
+    variables_reported: int = _budget(2_000, "variables", "a program", "the others are not reported")
+    variable_bytes: int = _budget(256 * KIB, "bytes", "all values of a program", "the others go as none")
+    # Updates come at 10 Hz. An element takes 2 µs.
+    variables_per_update: int = _budget(500, "variables", "an update", "the others follow in the next one")
+    variable_elements_per_update: int = _budget(
+        1_000, "elements", "the changed values of an update", "the others follow in the next one"
+    )
+
 
 BUDGETS: Final = Budgets()
 

@@ -14,7 +14,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 from urscript.catalogue import CB3_3_15, Catalogue
-from urscript.compile.compiler import compile_resolved
+from urscript.compile.compiler import CompiledCode, compile_resolved
 from urscript.dialect import Dialect, dialect_for
 from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError
 from urscript.names.resolver import resolve
@@ -98,9 +98,8 @@ def _resolve(
 
 
 def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -> CompiledProgram:
-    file_name = f"<urscript {program.name}>"
     try:
-        compiled = compile_resolved(program, catalogue, dialect, file_name)
+        compiled = compile_resolved(program, catalogue, dialect, f"<urscript {program.name}>")
     except RecursionError:
         raise _too_deep(program.source) from None
     return CompiledProgram(
@@ -109,13 +108,10 @@ def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -
         source=program.source,
         dialect=dialect,
         catalogue=catalogue,
-        code=compiled.code,
-        constants=compiled.constants,
+        compiled=compiled,
         builtins=frozenset(program.builtins),
         globals=frozenset(program.globals),
         declared_globals=tuple(program.declared_globals),
-        function_names=compiled.function_names,
-        file_name=file_name,
     )
 
 
@@ -130,7 +126,7 @@ class CompiledProgram:
     Attributes:
         name: The `def` name; of a one-line program the function it calls.
         kind: "def" (primary), "sec" (secondary), or "statement".
-        code: Python's code object, marshalled; executed, it defines the functions.
+        compiled: Its functions.
         builtins: Builtin functions it uses.
         globals: Its global variables.
         declared_globals: Those that are declared with `global`, in the order of the text.
@@ -141,13 +137,10 @@ class CompiledProgram:
     source: Source
     dialect: Dialect
     catalogue: Catalogue
-    code: bytes
-    constants: dict[str, Any]
+    compiled: CompiledCode
     builtins: frozenset[str]
     globals: frozenset[str]
     declared_globals: tuple[str, ...]
-    function_names: dict[str, str]
-    file_name: str
 
     def start(self, host: Host) -> RunningProgram:
         """A new run on `host`; it begins with its first `step`."""
@@ -183,9 +176,9 @@ class RunningProgram:
         self._scheduler = Scheduler(self._namespace, program.dialect.statement_budget, host.thread_ended)
         self._namespace.update(runtime.flow_namespace(self._scheduler, self._namespace, meter))
         self._namespace.update(runtime.builtin_namespace(program.builtins, program.catalogue, host, meter))
-        self._namespace.update(program.constants)
+        self._namespace.update(program.compiled.constants)
         self._namespace.update(dict.fromkeys((f"g_{name}" for name in program.globals), UNDEFINED))
-        exec(marshal.loads(program.code), self._namespace)
+        exec(marshal.loads(program.compiled.code), self._namespace)
         self._main = self._scheduler.start(self._namespace["main"], program.name, None)
 
     @property
@@ -240,17 +233,12 @@ class RunningProgram:
         """
         return self._namespace[f"g_{name}"]
 
-    def line(self, thread: ScriptThread) -> int:
-        """Line of a suspended thread."""
-        return positions.thread_line(thread, self.program.file_name)
-
     def position(self, thread: ScriptThread) -> tuple[int, int]:
         """Line and column of a suspended thread."""
-        return positions.thread_position(thread, self.program.file_name)
+        return positions.thread_position(thread, self.program.compiled)
 
     def _script_error(self, error: Exception) -> ScriptRuntimeError:
-        program = self.program
-        return positions.script_error(error, program.file_name, program.function_names, program.source)
+        return positions.script_error(error, self.program.compiled, self.program.source)
 
     def _fail_secondary(self) -> None:
         line, column = self.position(self._main)

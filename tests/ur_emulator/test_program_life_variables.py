@@ -1,5 +1,7 @@
 """Global variables and labels of programs on port 30001."""
 
+from dataclasses import replace
+
 import pytest
 from box_support import VERSION, Bench, MessageReader, connect
 
@@ -15,15 +17,17 @@ from protocol.primary.messages import (
 from protocol.primary.packages import decode_package
 from protocol.primary.program import GlobalVariablesSetup, GlobalVariablesUpdate
 from protocol.primary.state import RobotState
-from protocol.primary.values import TypedValue, ValueType
+from protocol.primary.values import TypedValue, ValueType, encode_value
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.programs import StopProgram
 from ur_emulator.models.cb3 import CB3
-from ur_emulator.servers.primary.label_reporter import LabelReporter, parse_label
+from ur_emulator.servers.primary import variable_reporter
+from ur_emulator.servers.primary.label_reporter import MAX_THREADS, LabelReporter, parse_label
 from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder
-from ur_emulator.servers.primary.variable_reporter import MAX_BODY, MAX_VALUE, PER_UPDATE, typed_value
+from ur_emulator.servers.primary.variable_reporter import MAX_BODY, MAX_VALUE, size_of, typed_value
 from urscript import Matrix, Pose
 
 FOREVER = "  while True:\n    sync()\n  end\nend\n"
@@ -298,18 +302,79 @@ def test_a_value_too_large_for_a_client_goes_as_none():
 def test_thousands_of_variables_take_turns_and_all_come():
     bench = PortBench()
     client = bench.client()
-    n = 3 * PER_UPDATE + 7
+    n = 3 * BUDGETS.variables_per_update + 7
     text = "".join(f"  global v{i} = {i}\n" for i in range(n))
     bench.start(f"def p():\n{text}" + FOREVER)
     bench.tick(14)
-    assert 0 < len(values_of(client.packages())) <= PER_UPDATE
+    assert 0 < len(values_of(client.packages())) <= BUDGETS.variables_per_update
     bench.tick(60)
     rest = values_of(client.packages())
     assert rest[n - 1] == n - 1
-    assert len(rest) >= n - PER_UPDATE
+    assert len(rest) >= n - BUDGETS.variables_per_update
+
+
+def large_values(n, length):
+    """A program that gives `n` variables lists of `length` numbers, new ones every 10 cycles."""
+    literal = "[" + "1, " * (length - 1) + "1]"
+    text = "".join(f"  global v{i} = {literal}\n" for i in range(n))
+    changes = "".join(f"    v{i} = v{i} + 1\n" for i in range(n))
+    return f"def p():\n{text}  while True:\n{changes}    sleep(0.08)\n  end\nend\n"
+
+
+def test_an_update_encodes_a_bounded_number_of_elements_and_all_take_turns(monkeypatch):
+    encoded = []
+    monkeypatch.setattr(
+        variable_reporter,
+        "encode_value",
+        lambda value, version: encoded.append(value) or encode_value(value, version),
+    )
+    bench = PortBench()
+    client = bench.client()
+    bench.start(large_values(12, 400))
+    most, known = 0, {}
+    for _ in range(100):
+        encoded.clear()
+        bench.tick()
+        most = max(most, sum(len(value.value) for value in encoded if value.type is ValueType.LIST))
+        known |= values_of(client.packages())
+    assert 0 < most < BUDGETS.variable_elements_per_update + 400
+    assert set(known) == set(range(12))
+
+
+def test_a_value_that_cannot_fit_is_not_encoded_at_all():
+    many, text = [1] * 50_000, "x" * 60_000
+    for value in (many, text, [text] * 3_000, Matrix([[1.0] * 300] * 300), [[1] * 3_000] * 3_000):
+        size, elements = size_of(value, MAX_VALUE)
+        assert size > MAX_VALUE
+        assert elements <= MAX_VALUE or isinstance(value, Matrix)
+    assert size_of([1, 2.5, True, "abc"], MAX_VALUE) == (4 + 1 + 1 + 1 + 6, 5)
+
+
+def test_all_values_of_a_program_have_a_limit_together(monkeypatch):
+    monkeypatch.setattr(variable_reporter, "BUDGETS", replace(BUDGETS, variable_bytes=3_000))
+    bench = PortBench()
+    client = bench.client()
+    bench.start(large_values(4, 400))
+    bench.tick(40)
+    known = values_of(client.packages())
+    assert [i for i, value in known.items() if value is not None] == [0]
 
 
 # --- labels
+
+
+def test_long_labels_of_many_threads_stay_within_a_package():
+    bench = PortBench()
+    client = bench.client()
+    label = f'    $ 1 "{"x" * 5_000}"\n'
+    runs = "  run t()\n" * 100
+    bench.start(f"def p():\n  thread t():\n{label}    sleep(9)\n  end\n{runs}" + FOREVER)
+    bench.tick(3)
+    assert max(map(len, client.sent)) <= 4096
+    assert [len(p.threads) for p in client.packages() if isinstance(p, ProgramThreadsMessage)] == [
+        MAX_THREADS
+    ]
+
 
 LABELLED = (
     'def p():\n  thread t():\n    $ 9 "Thread 1" "noBreak"\n    sleep(0.1)\n    $ 10 "Wait: 0.1"\n    sleep(9)\n  end\n  run t()\n'

@@ -233,11 +233,15 @@ def test_inputs_are_free_as_soon_as_their_owner_is_gone(bench):
     assert other.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 1
 
 
-def test_the_script_line_is_wanted_from_the_recipe_on(bench):
+def test_the_script_line_is_wanted_while_a_recipe_has_it(bench):
     bench.client("timestamp")
     assert not bench.controller.programs.reports_line
-    bench.client("script_control_line")
+    one, other = bench.client("script_control_line"), bench.client("script_control_line")
     assert bench.controller.programs.reports_line
+    one.close()
+    assert bench.controller.programs.reports_line
+    other.ask(M.SetupOutputs(("timestamp",), 125.0))
+    assert not bench.controller.programs.reports_line
 
 
 # --- clients that misbehave

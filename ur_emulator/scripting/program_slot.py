@@ -81,7 +81,7 @@ class ProgramSlot:
         """Line of the primary program's main thread as sent, the `def` line being 1; 0 without a program."""
         if self._primary is None:
             return 0
-        return self._primary.line(self._primary.threads[0])
+        return self._primary.position(self._primary.threads[0])[0]
 
     @property
     def waits_outside(self) -> bool:

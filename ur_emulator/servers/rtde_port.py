@@ -22,7 +22,7 @@ from ur_emulator.servers.tcp.connection import Connection
 
 # Sender of text messages.
 SOURCE = "RTDE"
-# The one variable that costs something to find: only looked up once a client has asked for it.
+# The one variable that costs something to find: only looked up while a client asks for it.
 _SCRIPT_LINE = "script_control_line"
 # What one client may cost in a turn, about 1 ms; more would delay the control cycle. A unit is what a
 # data package costs; bytes that make no sense cost as they are taken apart, in portions.
@@ -87,15 +87,17 @@ class RtdePort:
         reply = session.protocol.reply(in_use)
         if isinstance(request, SetupInputs) and len(session.protocol.input_recipes) > n_recipes:
             self._owners.update(dict.fromkeys(request.names, connection))
-        if isinstance(request, SetupOutputs) and _SCRIPT_LINE in request.names:
-            self._access.controller.programs.reports_line = True
+        if isinstance(request, SetupOutputs):
+            session.wants_line = _SCRIPT_LINE in request.names
         session.restart()
         self._find_streams()
         if not connection.send(reply):
             connection.close()  # without its reply, everything after would answer the wrong request
 
     def _find_streams(self) -> None:
-        self._streams = tuple(s for s in self._sessions.values() if s.encode is not None)
+        sessions = self._sessions.values()
+        self._streams = tuple(s for s in sessions if s.encode is not None)
+        self._access.controller.programs.reports_line = any(s.wants_line for s in sessions)
 
 
 class _RtdeSession(Session):
@@ -104,6 +106,7 @@ class _RtdeSession(Session):
     Attributes:
         protocol: what it has asked for.
         encode: makes its data packages; None while it gets none. Sessions with the same recipe have the same.
+        wants_line: its recipe has the line that the program executes.
         inbox: bytes that were not read yet.
         is_lost: it has sent bytes that are not RTDE; it gets a text message, then the connection is closed.
     """
@@ -122,6 +125,7 @@ class _RtdeSession(Session):
         software = access.identity.software
         self.protocol = RtdeServerConnection(software.version, software.rtde_outputs, software.rtde_inputs)
         self.encode: Callable[[Snapshot], bytes] | None = None
+        self.wants_line = False
         self.inbox = bytearray()
         self.is_lost = False
         self._access = access

@@ -59,7 +59,7 @@ class LineTracer:
 
     def _enter_frame(self, frame: FrameType, event: str, argument: Any) -> Any:
         """Called by Python for every frame that is entered or resumed: only the script's are followed."""
-        if frame.f_code.co_filename != self._program.file_name:
+        if frame.f_code.co_filename != self._program.compiled.file_name:
             return None
         self._last = None
         return self._line

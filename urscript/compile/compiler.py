@@ -18,6 +18,7 @@ from typing import Any
 from urscript.catalogue import Catalogue
 from urscript.compile.expressions import ExpressionCompiler
 from urscript.compile.inference import SCALARS, StaticTypes
+from urscript.compile.positions import PositionTable, position_tables
 from urscript.compile.python_tree import (
     call,
     charge_statements,
@@ -44,11 +45,15 @@ class CompiledCode:
         code: Python's code object, marshalled; executed, it defines the functions.
         constants: Values the code refers to by name.
         function_names: Python function -> function of the script.
+        positions: Python function -> positions of its instructions in the script.
+        file_name: The pseudo file name of the functions.
     """
 
     code: bytes
     constants: dict[str, Any]
     function_names: dict[str, str]
+    positions: dict[str, PositionTable]
+    file_name: str
 
 
 def compile_resolved(
@@ -76,7 +81,9 @@ def compile_resolved(
             column=(error.offset or 0) + 1,
             source=program.source,
         ) from None
-    return CompiledCode(marshal.dumps(code), expressions.constants, function_names)
+    return CompiledCode(
+        marshal.dumps(code), expressions.constants, function_names, position_tables(code), file_name
+    )
 
 
 def _cost(block: Block) -> int:

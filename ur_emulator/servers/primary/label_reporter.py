@@ -8,10 +8,15 @@ from __future__ import annotations
 
 import re
 from functools import lru_cache
+from itertools import islice
 
 from protocol.primary.messages import ProgramLabelMessage, ProgramThreadsMessage, RobotMessage, ThreadLabel
 from protocol.ur_types import SoftwareVersion
 from urscript import RunningProgram
+
+# Characters of a label or a name, and threads, that a message tells of: clients hold packages of 4096 bytes.
+MAX_TEXT = 60
+MAX_THREADS = 30
 
 _LABEL = re.compile(r'\s*(-?\d{1,9})\s*"([^"]*)"')
 
@@ -20,7 +25,7 @@ _LABEL = re.compile(r'\s*(-?\d{1,9})\s*"([^"]*)"')
 def parse_label(line: str) -> tuple[int, str] | None:
     """Return number and text of a label line, given without its `$`; None for one that is malformed."""
     found = _LABEL.match(line)
-    return (int(found[1]), found[2]) if found else None
+    return (int(found[1]), found[2][:MAX_TEXT]) if found else None
 
 
 class LabelReporter:
@@ -53,11 +58,12 @@ class LabelReporter:
         """
         if self._run is None:
             return None
-        labels = tuple(
-            ThreadLabel(label_id=label[0], text=label[1], thread_name=thread.name)
+        found = (
+            ThreadLabel(label_id=label[0], text=label[1], thread_name=thread.name[:MAX_TEXT])
             for thread in self._run.threads[: None if self._tells_of_threads else 1]
             if thread.label and (label := parse_label(thread.label)) is not None
         )
+        labels = tuple(islice(found, MAX_THREADS))
         if labels == self._sent:
             return None
         self._sent = labels

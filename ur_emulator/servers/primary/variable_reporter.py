@@ -21,6 +21,7 @@ from protocol.primary.program import (
 )
 from protocol.primary.values import MAX_NESTING, TypedValue, ValueType, encode_value, value_codes
 from protocol.ur_types import SoftwareVersion
+from ur_emulator.budgets import BUDGETS
 from urscript import Matrix, Pose, RunningProgram, ScriptThread
 from urscript.run.variables import UNDEFINED
 
@@ -28,12 +29,33 @@ from urscript.run.variables import UNDEFINED
 MAX_BODY = 1900
 # A value that would not fit into a client's package goes as none.
 MAX_VALUE = 4000
-# Variables that are reported at all (the index has 16 bits), and looked at in one update: an update must not
-# cost a cycle.
-MAX_VARIABLES = 10_000
-PER_UPDATE = 500
+# Characters that take as long as another element.
+_CHARACTERS = 512
 
 _NONE = TypedValue(ValueType.NONE)
+
+
+def size_of(value: Any, most: int) -> tuple[int, int]:
+    """Return at least how many bytes a value takes on the wire, and how many elements are encoded for it.
+
+    Args:
+        value: of a script.
+        most: the bytes at which counting ends; so it takes no longer than encoding a value that fits.
+    """
+    if isinstance(value, str):
+        return len(value) + 3, 1 + len(value) // _CHARACTERS
+    if isinstance(value, Matrix):
+        rows, columns = value.shape
+        return 5 * rows * columns + 5, rows * columns
+    if not isinstance(value, list):
+        return 1, 1
+    size, elements = len(value), 1
+    for item in value if size <= most else ():
+        item_size, item_elements = size_of(item, most - size)
+        size, elements = size + item_size, elements + item_elements
+        if size > most:
+            break
+    return size, elements
 
 
 def typed_value(value: Any, depth: int = 0) -> TypedValue:
@@ -76,6 +98,7 @@ class VariableReporter:
         self._seen: list[Any] = []
         self._sent: list[bytes] = []
         self._next = 0
+        self._room = 0
 
     @property
     def is_empty(self) -> bool:
@@ -85,10 +108,11 @@ class VariableReporter:
     def begin(self, run: RunningProgram) -> None:
         """Turn to the variables of a run; nothing is known of their values."""
         self._read = run.read_global
-        self._names = run.program.declared_globals[:MAX_VARIABLES]
+        self._names = run.program.declared_globals[: BUDGETS.variables_reported]
         self._seen = [UNDEFINED] * len(self._names)
         self._sent = [self._none] * len(self._names)
         self._next = 0
+        self._room = BUDGETS.variable_bytes
 
     def end(self) -> None:
         """Forget the run."""
@@ -115,39 +139,53 @@ class VariableReporter:
     def changes(self, timestamp: int, *, at_once: bool = False) -> list[bytes]:
         """Return the packages with what has changed since it was sent.
 
+        The elements that are encoded are bounded; the next update goes on where this one ends.
+
         Args:
             timestamp: microseconds since controller start.
-            at_once: read all variables; otherwise a part of a long list.
+            at_once: look at all variables; otherwise at a part of a long list.
         """
         read, names, seen, sent = self._read, self._names, self._seen, self._sent
         if read is None or not names:
             return []
-        begin, end = (0, len(names)) if at_once else (self._next, min(len(names), self._next + PER_UPDATE))
-        self._next = 0 if end == len(names) else end
+        first = 0 if at_once else self._next
+        end = len(names) if at_once else min(len(names), first + BUDGETS.variables_per_update)
+        elements = BUDGETS.variable_elements_per_update
         changed = []
-        for i in range(begin, end):
+        for i in range(first, end):
             value = read(names[i])
             if value is not seen[i]:
+                if elements <= 0:
+                    end = i
+                    break
                 seen[i] = value
-                data = self._encode(value)
+                data, cost = self._encode(value, len(sent[i]))
+                elements -= cost
                 if data != sent[i]:
+                    self._room += len(sent[i]) - len(data)
                     sent[i] = data
                     changed.append(i)
+        self._next = 0 if end == len(names) else end
         packages: list[bytes] = []
         for _, run in groupby(enumerate(changed), lambda pair: pair[1] - pair[0]):
             indices = [i for _, i in run]
             packages += self._packages(timestamp, indices[0], [sent[i] for i in indices])
         return packages
 
-    def _encode(self, value: Any) -> bytes:
+    def _encode(self, value: Any, replaced: int) -> tuple[bytes, int]:
+        """Encode a value in the place of one of `replaced` bytes; return it, and the elements it cost."""
+        most = min(MAX_VALUE, self._room + replaced)
+        size, elements = size_of(value, most)
+        if size > most:
+            return self._none, elements
         typed = typed_value(value)
         if typed.type not in self._codes:
-            return self._none
+            return self._none, elements
         try:
             data = encode_value(typed, self._version)
         except LocalProtocolError:
-            return self._none
-        return data if len(data) <= MAX_VALUE else self._none
+            return self._none, elements
+        return (data if len(data) <= most else self._none), elements
 
     def _packages(self, timestamp: int, start: int, values: Sequence[bytes]) -> list[bytes]:
         return [encode_values(timestamp, first, part) for first, part in _parcels(start, values)]
