@@ -119,7 +119,7 @@ class Box(BoxOperations):
         self.serial_number = simulated_serial(model.robot_type, seed)
         self._free_ports = port_base is None
         self._loop = loop or EventLoop(precise=named_pace is Pace.REALTIME)
-        self._network = LoopNetwork(self._loop, generation.period_s, host)
+        self._network = LoopNetwork(self._loop, generation.period_s, self._report, host)
         controller = Controller(
             model,
             imperfections,
@@ -217,7 +217,7 @@ class Box(BoxOperations):
             done: called in that cycle, in the thread of the box: with its result and None, or with
                 None and the `RefusedError`.
         """
-        self._loop.call_soon_threadsafe(lambda: self._box.submit(command, done))
+        self._loop.call_soon_threadsafe(lambda: self._box.submit(command, done), self._fail)
 
     def _perform(self, name: str, arguments: Mapping[str, Any]) -> Any:
         return self._operations.perform(name, arguments)
@@ -260,7 +260,7 @@ class Box(BoxOperations):
     def _shut_down(self) -> None:
         """Close the box as one that was switched off, after what is under way in the loop."""
         self.is_shut_down = True
-        self._loop.call_soon_threadsafe(lambda: self.on_end())
+        self._loop.call_soon_threadsafe(lambda: self.on_end(), self._fail)
 
     def _fail(self, error: Exception) -> None:
         """End the box because of an error in a cycle."""
@@ -268,6 +268,9 @@ class Box(BoxOperations):
         text = f"the box has ended: {type(error).__name__}: {error}"
         self._box.log.write(self._access.snapshot.tick, "Controller", text, ReportLevel.FAULT)
         self.on_end()
+
+    def _report(self, what: str, error: Exception) -> None:
+        self._box.report(what, error)
 
     def close(self) -> None:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""

@@ -71,7 +71,7 @@ class ScriptBox:
             model,
             model.generation.fidelity(fidelity),
             seed,
-            partial(ProgramSlot, network=LoopNetwork(self._loop, model.generation.period_s)),
+            partial(ProgramSlot, network=LoopNetwork(self._loop, model.generation.period_s, _raise)),
             version=(software[0], software[1]),
         )
         self._answers = deque(answers)
@@ -163,6 +163,10 @@ class _Run:
             self._loop.stop()
         return now
 
+    def failed(self, error: Exception) -> None:
+        """Let an error end the run."""
+        raise error
+
     def _wait(self, now: float) -> None:
         if self._waits_since == math.inf:
             self._waits_since = now
@@ -243,6 +247,11 @@ class _Run:
     def _report(self, kind: ReportKind, text: str, line: int = 0, column: int = 0) -> None:
         time = max(0, self._cycles - 1) * self._controller.period_s
         self._send(Report(time, kind, text, line, column))
+
+
+def _raise(what: str, error: Exception) -> None:
+    """Let an error end the run, whatever it belongs to."""
+    raise error
 
 
 def _parsed(text: str, kind: RequestedType, request_id: int) -> AnswerRequest | None:

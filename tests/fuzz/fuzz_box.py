@@ -70,7 +70,7 @@ class _AtOnce:
         # Most of the time would go into compiling the same programs again and again.
         self.compile_text = lru_cache(maxsize=300)(compile_text)
 
-    def submit(self, done, function, *arguments):
+    def submit(self, done, failed, function, *arguments):
         def work():
             try:
                 result = (self.compile_text if function is compile_text else function)(*arguments)
@@ -79,7 +79,7 @@ class _AtOnce:
             else:
                 done(result, None)
 
-        self.loop.call_soon_threadsafe(work)
+        self.loop.call_soon_threadsafe(work, failed)
 
     def drop(self, task):
         pass
@@ -147,6 +147,7 @@ class FuzzBox:
         self.served, self.pacer = box._box, _Pacer()
         self.served._pacer = self.pacer
         self.served._on_failure = _raise
+        self.served.report = lambda what, error: _raise(error)
         self.controller = self.served.controller
         self.controller.programs._network = FakeNetwork()
         self.ports = box._port_set._ports

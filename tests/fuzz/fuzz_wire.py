@@ -64,7 +64,7 @@ class FakeLoop:
     def __init__(self):
         self.watched = {}
 
-    def watch(self, sock, events, callback):
+    def watch(self, sock, events, callback, failed):
         assert not sock.is_closed, "a closed socket is watched"
         self.watched[sock] = (events, callback)
 
@@ -79,6 +79,10 @@ class FakeLoop:
                 callback(ready)
 
 
+def _raise(what, error):
+    raise error
+
+
 class Wire:
     """A client of one port: what it sends arrives in the pieces in which it is sent."""
 
@@ -86,7 +90,7 @@ class Wire:
         self.loop, self.port = loop, port
         self.sock = FakeSocket(number)
         self.n_closed = 0
-        self.connection = Connection(loop, self.sock, port.received, self._closed, backlog)
+        self.connection = Connection(loop, self.sock, port.received, self._closed, backlog, _raise)
         port.opened(self.connection)
 
     def _closed(self, connection):

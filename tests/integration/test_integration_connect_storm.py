@@ -105,7 +105,7 @@ def everybody_has_gone(box):
 def between_cycles(box, ask):
     """Let the loop's thread answer: nothing is half done then."""
     answers = queue.Queue()
-    box._loop.call_soon_threadsafe(lambda: answers.put(ask()))
+    box._loop.call_soon_threadsafe(lambda: answers.put(ask()), answers.put)
     return answers.get(timeout=TIMEOUT)
 
 

@@ -139,7 +139,7 @@ def test_one_box_can_be_closed_and_the_others_go_on():
     with ControlBox.many(2, pace="realtime", port_base=None) as (one, two):
         with connect(one, "dashboard") as gone, Frames(two) as frames:
             assert gone.recv(100).startswith(b"Connected")
-            one._loop.call_soon_threadsafe(one.close)
+            one._loop.call_soon_threadsafe(one.close, pytest.fail)
             assert is_closed(gone)
             for _ in range(20):
                 frames.new()
@@ -154,7 +154,9 @@ def test_an_error_ends_its_own_box_only_and_is_raised_at_the_end():
     one, two = rack.__enter__()
     with connect(one, "dashboard") as gone, Frames(two) as frames:
         assert gone.recv(100).startswith(b"Connected")
-        one._loop.call_soon_threadsafe(lambda: setattr(one._box.controller, "tick", lambda _: 1 // 0))
+        one._loop.call_soon_threadsafe(
+            lambda: setattr(one._box.controller, "tick", lambda _: 1 // 0), pytest.fail
+        )
         assert is_closed(gone)
         assert any("the box has ended: ZeroDivisionError" in str(entry) for entry in one.log)
         for _ in range(20):
@@ -169,8 +171,8 @@ def test_a_box_that_compiles_is_closed_without_waiting_for_it():
     """Another box of the loop would miss its cycles meanwhile; its programs wait no longer either."""
     with ControlBox.many(2, pace="lockstep", port_base=None) as (one, two):
         endless = one._access.in_worker(signal.pause)
-        one._loop.call_soon_threadsafe(lambda: one._access.start_alone(endless))
-        one._loop.call_soon_threadsafe(one.close)
+        one._loop.call_soon_threadsafe(lambda: one._access.start_alone(endless), pytest.fail)
+        one._loop.call_soon_threadsafe(one.close, pytest.fail)
         with Frames(two) as frames:
             frames.raw()
             send(two, "secondary", MOVE)

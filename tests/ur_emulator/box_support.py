@@ -148,7 +148,10 @@ def bare_access(software, controller, commands):
     def submit(command, done=None):
         commands.append(command if done is None else Submitted(command, done))
 
-    box = SimpleNamespace(controller=controller, submit=submit, announce=lambda event: None)
+    def report(what, error):
+        raise error
+
+    box = SimpleNamespace(controller=controller, submit=submit, announce=lambda event: None, report=report)
     return BoxAccess(BoxIdentity(software, "UR3", "20993000007"), box, None, None)
 
 

@@ -54,7 +54,7 @@ def loop():
 
 def listen(loop, clients, notices=None, **options):
     notices = [] if notices is None else notices
-    return Listener(loop, "127.0.0.1", 0, clients, set(), notices.append, "dashboard", **options)
+    return Listener(loop, "127.0.0.1", 0, clients, set(), notices.append, pytest.fail, "dashboard", **options)
 
 
 def close_all(port, clients, *socks):
@@ -180,4 +180,4 @@ def test_silent_clients_are_asked_whether_they_are_still_there(loop):
 
 def test_an_address_of_another_machine_is_told_from_a_taken_port(loop):
     with pytest.raises(PortError, match=r"192\.0\.2\.1 is not an address of this machine"):
-        Listener(loop, "192.0.2.1", 0, Clients(), set(), print, "dashboard")
+        Listener(loop, "192.0.2.1", 0, Clients(), set(), print, pytest.fail, "dashboard")

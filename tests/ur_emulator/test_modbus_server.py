@@ -355,6 +355,9 @@ class FakeConnection:
     def close(self):
         self.is_open = False
 
+    def failed(self, error):
+        raise error
+
 
 def bare_port():
     bench = Bench()
@@ -412,11 +415,11 @@ def forbid_low_ports(monkeypatch):
 def test_a_forbidden_port_is_told_from_a_taken_one(monkeypatch):
     loop = EventLoop()
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(PortError) as error:
-        Listener(loop, "127.0.0.1", taken.getsockname()[1], None, set(), print, "modbus")
+        Listener(loop, "127.0.0.1", taken.getsockname()[1], None, set(), print, pytest.fail, "modbus")
     assert not isinstance(error.value, PortPermissionError)
     forbid_low_ports(monkeypatch)
     with pytest.raises(PortPermissionError, match=r"port 502 on 127\.0\.0\.1 needs privileges"):
-        Listener(loop, "127.0.0.1", 502, None, set(), print, "modbus")
+        Listener(loop, "127.0.0.1", 502, None, set(), print, pytest.fail, "modbus")
     loop.close()
 
 

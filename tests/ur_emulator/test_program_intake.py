@@ -17,7 +17,7 @@ class Tasks:
     def __init__(self):
         self.begun, self.dropped = [], []
 
-    def submit(self, done, function, *arguments):
+    def submit(self, done, failed, function, *arguments):
         self.begun.append((done, arguments[0]))
         return done
 
@@ -61,16 +61,12 @@ def test_what_needs_no_compiling_waits_for_the_programs_before_it(intake, tasks,
     assert not intake._waiting
 
 
-@pytest.mark.parametrize(
-    ("error", "why"),
-    [(WorkerError("it has ended: try again"), "it has ended: try again"), (KeyError("x"), "KeyError('x')")],
-)
-def test_a_program_that_is_not_compiled_is_refused_and_the_next_one_goes_on(intake, tasks, done, error, why):
+def test_a_program_that_is_not_compiled_is_refused_and_the_next_one_goes_on(intake, tasks, done):
     intake.take("one", [program("a"), program("b")])
-    tasks.finish(error=error)
+    tasks.finish(error=WorkerError("it has ended: try again"))
     tasks.finish(ScriptFailed(2, 3, "wrong"))
     assert done == [
-        ScriptFailed(1, 1, f"the program cannot be compiled: {why}"),
+        ScriptFailed(1, 1, "the program cannot be compiled: it has ended: try again"),
         ScriptFailed(2, 3, "wrong"),
     ]
 

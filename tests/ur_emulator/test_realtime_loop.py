@@ -26,7 +26,7 @@ def pairs():
 
 def run_once(loop):
     """Let the loop take one turn."""
-    loop.call_soon_threadsafe(loop.stop)
+    loop.call_soon_threadsafe(loop.stop, pytest.fail)
     loop.run()
     loop.close()
 
@@ -46,11 +46,16 @@ def test_a_socket_that_was_closed_in_the_same_turn_is_not_called(pairs, number_i
                     new, far = socket.socketpair()
                     spare.extend((new, far))
                     assert number in (new.fileno(), far.fileno())
-                    loop.watch(new if new.fileno() == number else far, selectors.EVENT_READ, called.append)
+                    loop.watch(
+                        new if new.fileno() == number else far,
+                        selectors.EVENT_READ,
+                        called.append,
+                        pytest.fail,
+                    )
 
     for near, far in pairs:
         far.send(b"x")
-        loop.watch(near, selectors.EVENT_READ, lambda events, near=near: ready(near))
+        loop.watch(near, selectors.EVENT_READ, lambda events, near=near: ready(near), pytest.fail)
     run_once(loop)
     for sock in spare:
         sock.close()
@@ -87,7 +92,7 @@ def test_a_service_is_called_between_long_callbacks_and_nobody_has_two_turns_in_
     loop, story = EventLoop(), []
     for name, (near, far) in zip("ab", pairs, strict=True):
         far.send(b"x")  # never read: ready in every round
-        loop.watch(near, selectors.EVENT_READ, until_due(loop, story, name, period + 0.001))
+        loop.watch(near, selectors.EVENT_READ, until_due(loop, story, name, period + 0.001), pytest.fail)
     loop.add(Due(loop, story, period, 9))
     loop.run()
     loop.close()
@@ -101,13 +106,13 @@ def test_calls_that_call_themselves_again_do_not_keep_sockets_and_services_waiti
     loop, story = EventLoop(), []
     near, far = pairs[0]
     far.send(b"x")
-    loop.watch(near, selectors.EVENT_READ, lambda events: story.append("socket"))
+    loop.watch(near, selectors.EVENT_READ, lambda events: story.append("socket"), pytest.fail)
 
     def again():
         story.append("call")
-        loop.call_soon(again)
+        loop.call_soon(again, pytest.fail)
 
-    loop.call_soon(again)
+    loop.call_soon(again, pytest.fail)
     loop.add(Due(loop, story, 0.0, 50))
     loop.run()
     loop.close()

@@ -38,6 +38,9 @@ class FakeConnection:
 
     close_when_sent = close
 
+    def failed(self, error):
+        raise error
+
     def say(self, data):
         self.port.received(self, data)
 

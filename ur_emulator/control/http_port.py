@@ -25,7 +25,6 @@ from ur_emulator.control.http_request import (
 )
 from ur_emulator.control.operations import describe
 from ur_emulator.control.runner import OperationRunner
-from ur_emulator.controller.events import LogAdded
 from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.session import Session
@@ -76,7 +75,7 @@ class HttpPort:
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; what it has begun takes its course."""
-        del self._sessions[connection]
+        self._sessions.pop(connection, None)
 
 
 class _HttpSession(Session):
@@ -111,9 +110,11 @@ class _HttpSession(Session):
         self.answer_requests()
 
     def _finished(self, _: None, error: Exception | None) -> None:
-        self.is_busy = False
-        if error is not None:
+        if isinstance(error, NotRunningError):
+            self.is_busy = False
             self._reject(503, str(error))
+        else:
+            super()._finished(None, error)
 
     def _serve(self) -> Steps[None]:
         """Answer the requests that have come, in order."""
@@ -126,10 +127,6 @@ class _HttpSession(Session):
             self._reject(error.error_status_hint, f"not understood: {error}")
         except HttpError as error:
             self._reject(error.status, str(error))
-        except Exception as error:  # a defect of ours must not end the box
-            text = f"a request of {self.connection.peer} could not be answered: {error!r}"
-            self._access.announce(LogAdded("Control", text))
-            self.connection.close()
 
     def _next_request(self) -> bytes | None:
         """Read the next request; return its body, None if more bytes are needed or no request will come."""

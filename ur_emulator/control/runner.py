@@ -14,7 +14,7 @@ from ur_emulator.control.operations import make
 from ur_emulator.control.step_operation import Context, StepOperation
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
-from ur_emulator.errors import ControlError, EmulatorError, NotRunningError
+from ur_emulator.errors import ControlError, NotRunningError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.steps import Steps, settle
 
@@ -56,7 +56,7 @@ class OperationRunner:
             if not self._is_closed:
                 self._context.access.steps.start(self.steps(name, arguments), settle(future))
 
-        self._loop.call_soon_threadsafe(start)
+        self._loop.call_soon_threadsafe(start, future.set_exception)
         try:
             return future.result()
         finally:
@@ -70,19 +70,14 @@ class OperationRunner:
             EmulatorError: it was not done.
         """
         access = self._context.access
-        try:
-            operation = make(name, arguments)
-            if operation.is_logged and not operation.only_reads:
-                access.announce(LogAdded("Control", _shown(name, arguments)))
-            if isinstance(operation, StepOperation):
-                return (yield from operation.steps(self._context))
-            assert isinstance(operation, Command)
-            result = yield from access.apply(operation)
-            return {**(result or {}), "tick": access.snapshot.tick}
-        except EmulatorError:
-            raise
-        except Exception as error:  # a defect of ours must not end the box
-            raise ControlError(f"the operation cannot be done: {error!r}") from error
+        operation = make(name, arguments)
+        if operation.is_logged and not operation.only_reads:
+            access.announce(LogAdded("Control", _shown(name, arguments)))
+        if isinstance(operation, StepOperation):
+            return (yield from operation.steps(self._context))
+        assert isinstance(operation, Command)
+        result = yield from access.apply(operation)
+        return {**(result or {}), "tick": access.snapshot.tick}
 
     def close(self) -> None:
         """Tell all threads that wait, after the steps have ended, that the box has ended."""

@@ -43,10 +43,7 @@ def compile_loaded(
     loaded: LoadedProgram, received: Mapping[ExternalControlPc, str], catalogue: Catalogue
 ) -> Outcome:
     """Compile a program from a file, with the parts that PCs have sent."""
-    try:
-        return compile_text(loaded.script(received.__getitem__), catalogue, loaded.file_name)
-    except Exception as error:  # a defect of ours must not end the box
-        return ScriptFailed(1, 1, f"{loaded.file_name} cannot be compiled: {error!r}")
+    return compile_text(loaded.script(received.__getitem__), catalogue, loaded.file_name)
 
 
 def load_and_compile(

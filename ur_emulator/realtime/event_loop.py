@@ -7,7 +7,8 @@ must be called next.
 Callbacks go in rounds: every socket that is ready and every call that waits gets one turn in a round. When a
 service is due the round is interrupted, and goes on after the service: no crowd of clients delays a cycle,
 and no client keeps another from its turn. So a callback must be short: what remains to be done goes into the
-next round by `call_soon`.
+next round by `call_soon`. An error in a callback ends its registration, its owner is told, and the loop goes
+on (see `barrier`).
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from typing import Protocol
+from typing import Protocol, cast
 
+from ur_emulator.realtime.barrier import Failed, guarded
 from ur_emulator.realtime.interpreter import loop_settings
 from ur_emulator.realtime.tasks import TaskQueue
 
@@ -44,6 +46,7 @@ _LONGEST_PAUSE = 32
 
 
 _Ready = tuple[selectors.SelectorKey, int]
+_Callback = Callable[[int], None]
 
 
 class Service(Protocol):
@@ -51,6 +54,10 @@ class Service(Protocol):
 
     def advance(self, now: float) -> float:
         """Advance to monotonic time `now` [s]; return the time of the next call at the latest."""
+        ...
+
+    def failed(self, error: Exception) -> None:
+        """Take notice of an error in `advance`: the service is not in the loop any more."""
         ...
 
 
@@ -81,7 +88,7 @@ class EventLoop:
         self._waker, self._wake_end = socket.socketpair()
         for end in (self._waker, self._wake_end):
             end.setblocking(False)
-        self.watch(self._wake_end, selectors.EVENT_READ, self._drain_wakes)
+        self.watch(self._wake_end, selectors.EVENT_READ, self._drain_wakes, _raise)
         # Sub-millisecond waits need the selector's own descriptor to be selectable; that is so for epoll
         # and kqueue.
         descriptor = getattr(self._selector, "fileno", None)
@@ -90,12 +97,15 @@ class EventLoop:
 
     # --- sockets
 
-    def watch(self, sock: socket.socket, events: int, callback: Callable[[int], None]) -> None:
-        """Call `callback(events)` whenever `sock` is ready for one of `events`; replaces an earlier watch."""
+    def watch(self, sock: socket.socket, events: int, callback: _Callback, failed: Failed) -> None:
+        """Call `callback(events)` whenever `sock` is ready for one of `events`; replaces an earlier watch.
+
+        After an error in it, `sock` is not watched any more, and `failed` is called with the error.
+        """
         try:
-            self._selector.register(sock, events, callback)
+            self._selector.register(sock, events, (callback, failed))
         except KeyError:
-            self._selector.modify(sock, events, callback)
+            self._selector.modify(sock, events, (callback, failed))
 
     def unwatch(self, sock: socket.socket) -> None:
         """Stop watching `sock`; harmless if it is not watched."""
@@ -127,9 +137,12 @@ class EventLoop:
 
     # --- calls
 
-    def call_soon(self, call: Callable[[], None]) -> None:
-        """Run `call` in the next round, after the sockets that are ready then; in the loop's thread."""
-        self._calls.append(call)
+    def call_soon(self, call: Callable[[], None], failed: Failed) -> None:
+        """Run `call` in the next round, after the sockets that are ready then; in the loop's thread.
+
+        An error in it goes to `failed`.
+        """
+        self._calls.append(partial(guarded, failed, call))
 
     # --- other threads
 
@@ -138,9 +151,9 @@ class EventLoop:
         """True in the thread that runs the loop."""
         return threading.get_ident() == self._thread
 
-    def call_soon_threadsafe(self, call: Callable[[], None]) -> None:
-        """Run `call` in the loop's thread, soon; beside `stop` the only method for other threads."""
-        self._calls.append(call)
+    def call_soon_threadsafe(self, call: Callable[[], None], failed: Failed) -> None:
+        """As `call_soon`, from any thread; beside `stop` the only method for other threads."""
+        self._calls.append(partial(guarded, failed, call))
         self._wake()
 
     def stop(self) -> None:
@@ -151,7 +164,7 @@ class EventLoop:
     # --- running
 
     def run(self) -> None:
-        """Run until `stop`. An exception in a callback or a service ends the loop and is raised here."""
+        """Run until `stop`; an error that nobody takes ends the loop and is raised here."""
         self.is_running = True
         self._thread = threading.get_ident()
         try:
@@ -160,7 +173,11 @@ class EventLoop:
                     now = time.monotonic()
                     deadline = now + 1.0
                     for service in tuple(self._services):
-                        deadline = min(deadline, service.advance(now))
+                        try:
+                            deadline = min(deadline, service.advance(now))
+                        except Exception as error:
+                            self.remove(service)
+                            service.failed(error)
                     self._dispatch(deadline)
         finally:
             self.is_running = False
@@ -190,7 +207,12 @@ class EventLoop:
         # A callback before this one may have closed the socket, and another may have its number by now.
         now = self._selector.get_map().get(key.fd)
         if now is not None and now.fileobj is key.fileobj and events & now.events:
-            now.data(events & now.events)
+            callback, failed = now.data
+            try:
+                callback(events & now.events)
+            except Exception as error:
+                self.unwatch(cast(socket.socket, now.fileobj))
+                failed(error)
 
     def _end_of_turn(self, deadline: float) -> float:
         """Return until when callbacks may run."""
@@ -254,3 +276,8 @@ class EventLoop:
     def _drain_wakes(self, events: int) -> None:
         with suppress(BlockingIOError):
             self._wake_end.recv(4096)
+
+
+def _raise(error: Exception) -> None:
+    """Let an error end the loop."""
+    raise error

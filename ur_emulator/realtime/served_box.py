@@ -12,6 +12,7 @@ from ur_emulator.controller.command import Command, Done, Submitted
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.realtime.barrier import Failed, place_of
 from ur_emulator.realtime.pacing import Pacer, RealtimePacer
 
 
@@ -37,7 +38,7 @@ class ServedBox:
         controller: Controller,
         pacer: Pacer,
         expect_soon: Callable[[], bool],
-        on_failure: Callable[[Exception], None],
+        on_failure: Failed,
     ) -> None:
         """Serve a controller.
 
@@ -88,6 +89,11 @@ class ServedBox:
         """Write a line about a client into the log."""
         self.log.write(self.controller.snapshot.tick, "Client", text)
 
+    def report(self, what: str, error: Exception) -> None:
+        """Write into the log what an error of ours has ended."""
+        text = f"{what}: {place_of(error)}"
+        self.log.write(self.controller.snapshot.tick, "Controller", text, ReportLevel.FAULT)
+
     # --- what the pacer asks
 
     @property
@@ -131,17 +137,7 @@ class ServedBox:
     # --- the loop
 
     def advance(self, now: float) -> float:
-        """Tick if it is time to, or repeat the last frame if time stands still; return the next deadline.
-
-        An error in it ends this box, not the loop, which may have others.
-        """
-        try:
-            return self._advance(now)
-        except Exception as error:
-            self._on_failure(error)
-            return math.inf
-
-    def _advance(self, now: float) -> float:
+        """Tick if it is time to, or repeat the last frame if time stands still; return the next deadline."""
         if self._is_held:
             if now < self._pacer.publish_at:
                 return self._pacer.publish_at
@@ -165,6 +161,10 @@ class ServedBox:
         if self._repeats and now - self._last_frame >= self.controller.period_s:
             self._publish(self.controller.snapshot, now)
         return self._pacer.next_call(now)
+
+    def failed(self, error: Exception) -> None:
+        """End this box after an error in a cycle; the loop may have others."""
+        self._on_failure(error)
 
     def _publish(self, snapshot: Snapshot, now: float) -> None:
         self._last_frame = now

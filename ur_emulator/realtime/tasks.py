@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from ur_emulator.errors import WorkerError
+from ur_emulator.realtime.barrier import Failed, guarded
 from ur_emulator.realtime.worker_process import TASK_LIMIT, WorkerProcess, leave_process, take_process
 
 # Told of what has come of a task: its result and None, or None and what it raised.
@@ -23,25 +24,28 @@ TaskDone = Callable[[Any, Exception | None], None]
 class Watcher(Protocol):
     """The part of a loop that a task queue uses."""
 
-    def watch(self, sock: socket.socket, events: int, callback: Callable[[int], None]) -> None:
-        """Call `callback(events)` whenever `sock` is ready."""
+    def watch(
+        self, sock: socket.socket, events: int, callback: Callable[[int], None], failed: Failed
+    ) -> None:
+        """Call `callback(events)` whenever `sock` is ready, `failed` with an error in it."""
         ...
 
     def unwatch(self, sock: socket.socket) -> None:
         """Stop watching `sock`."""
         ...
 
-    def call_soon_threadsafe(self, call: Callable[[], None]) -> None:
-        """Run `call` in the loop, soon."""
+    def call_soon(self, call: Callable[[], None], failed: Failed) -> None:
+        """Run `call` in the loop, soon, and `failed` with an error in it."""
         ...
 
 
 @dataclass(eq=False, frozen=True, slots=True)
 class Task:
-    """A task: the pickled function with its arguments, and what is called at its end."""
+    """A task: the pickled function with its arguments, what is called at its end, and with an error there."""
 
     request: bytes
     done: TaskDone
+    failed: Failed
 
 
 class TaskQueue:
@@ -59,15 +63,16 @@ class TaskQueue:
         with suppress(OSError):  # the first task tries again, and gets the error
             self._start()
 
-    def submit(self, done: TaskDone, function: Callable[..., Any], *arguments: Any) -> Task:
+    def submit(self, done: TaskDone, failed: Failed, function: Callable[..., Any], *arguments: Any) -> Task:
         """Submit a task that takes longer than a cycle.
 
         Args:
             done: called in the loop with its result, never before this returns.
+            failed: called with an error in `done`.
             function: one that can be imported; it shares no memory with this process.
             arguments: of the function; what can be pickled.
         """
-        task = Task(pickle.dumps((function, arguments)), done)
+        task = Task(pickle.dumps((function, arguments)), done, failed)
         self._waiting.append(task)
         self._begin_next()
         return task
@@ -109,7 +114,7 @@ class TaskQueue:
 
     def _watch(self, process: WorkerProcess) -> None:
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if process.has_more else 0)
-        self._loop.watch(process.sock, events, partial(self._on_ready, process))
+        self._loop.watch(process.sock, events, partial(self._on_ready, process), partial(self._lose, process))
 
     def _begin_next(self) -> None:
         if self._current is not None or not self._waiting:
@@ -119,7 +124,7 @@ class TaskQueue:
             process = self._start()
         except OSError as error:
             problem = WorkerError(f"the process for it cannot be started ({error}): try again later")
-            self._loop.call_soon_threadsafe(lambda: self._finish(task, None, problem))
+            self._loop.call_soon(lambda: self._finish(task, None, problem), task.failed)
         else:
             process.send(task.request)
             self._watch(process)
@@ -133,11 +138,7 @@ class TaskQueue:
         try:
             answer = process.receive()
         except EOFError:
-            code = self._release(process)
-            if process is self._process:
-                self._process = None
-                if self._current is not None:
-                    self._finish(self._current, None, WorkerError(_reason(code)))
+            self._lose(process)
             return
         if answer is not None and process is self._process and self._current is not None:
             try:
@@ -146,10 +147,18 @@ class TaskQueue:
                 result, error = None, WorkerError(repr(problem))
             self._finish(self._current, result, error)
 
+    def _lose(self, process: WorkerProcess, error: Exception | None = None) -> None:
+        """Do without a process that has ended, or with which we failed; its task fails."""
+        code = self._release(process)
+        if process is self._process:
+            self._process = None
+            if self._current is not None:
+                self._finish(self._current, None, WorkerError(repr(error) if error else _reason(code)))
+
     def _finish(self, task: Task, result: Any, error: Exception | None) -> None:
         if task is self._current:
             self._current = None
-            task.done(result, error)
+            guarded(task.failed, task.done, result, error)
             self._begin_next()
 
     def _release(self, process: WorkerProcess) -> int:

@@ -17,7 +17,8 @@ import subprocess
 import sys
 from contextlib import suppress
 
-from ur_emulator.errors import WorkerError
+from ur_emulator.errors import EmulatorError, WorkerError
+from ur_emulator.realtime.barrier import place_of
 
 # Processor time that a task may take [s]; the process ends itself beyond it.
 TASK_LIMIT = 60.0
@@ -184,15 +185,17 @@ def work() -> None:
 
 
 def _answer(task: bytes) -> bytes:
-    """Do a task; return its result and its error, one of them None, pickled."""
+    """Do a task; return its result and its error, one of them None, pickled.
+
+    An error that is neither one of the emulator nor of the system is a defect of ours: a `WorkerError`.
+    """
     try:
         function, arguments = pickle.loads(task)
         return pickle.dumps((function(*arguments), None))
+    except (EmulatorError, OSError) as error:
+        return pickle.dumps((None, error))
     except Exception as error:
-        try:
-            return pickle.dumps((None, error))
-        except Exception:
-            return pickle.dumps((None, WorkerError(repr(error))))
+        return pickle.dumps((None, WorkerError(place_of(error))))
 
 
 def _framed(data: bytes) -> bytes:

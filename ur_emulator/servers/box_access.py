@@ -12,6 +12,7 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.errors import ControlError
 from ur_emulator.models.software import Software
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import ServedBox
@@ -48,7 +49,7 @@ class BoxAccess:
     def __init__(self, identity: BoxIdentity, box: ServedBox, loop: EventLoop, network: Network) -> None:
         self.identity = identity
         self.network = network
-        self.steps = StepRunner()
+        self.steps = StepRunner(self._failed)
         self._box = box
         self._loop = loop
 
@@ -83,7 +84,12 @@ class BoxAccess:
 
     def start_alone(self, steps: Steps[None]) -> None:
         """Begin with steps whose result is not used; a refusal stands in the log already."""
-        self.steps.start(steps, lambda result, error: None)
+
+        def finished(_: None, error: Exception | None) -> None:
+            if error is not None and not isinstance(error, ControlError):
+                self._box.report("a request is not done", error)
+
+        self.steps.start(steps, finished)
 
     def apply(self, command: Command) -> Steps[Any]:
         """Ask for something, and end after the cycle in which it was applied.
@@ -113,13 +119,17 @@ class BoxAccess:
             settled(result, error)
             self.steps.advance()
 
-        task = self._loop.tasks.submit(done, function, *arguments)
+        task = self._loop.tasks.submit(done, self._failed, function, *arguments)
         try:
             while not outcome.done():
                 yield
         finally:
             self._loop.tasks.drop(task)
         return outcome.result()
+
+    def _failed(self, error: Exception) -> None:
+        """Report an error in what was to follow steps or a task."""
+        self._box.report("an answer is lost", error)
 
     def close(self, error: Exception) -> None:
         """End all steps with an error, and the tasks that they wait for."""

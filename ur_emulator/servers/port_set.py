@@ -76,4 +76,4 @@ class PortSet:
         box = self._box
         backlog = set[Connection]() if name == CONTROL else box.backlog
         notice = (lambda text: None) if name == CONTROL else box.notice
-        return Listener(self._loop, self._host, number, port, backlog, notice, name, self._spare)
+        return Listener(self._loop, self._host, number, port, backlog, notice, box.report, name, self._spare)

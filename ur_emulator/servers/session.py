@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import partial
 
+from ur_emulator.errors import NotRunningError
+from ur_emulator.realtime.barrier import guarded
 from ur_emulator.servers.steps import StepRunner, Steps
 from ur_emulator.servers.tcp.connection import Connection
 
@@ -31,16 +34,18 @@ class Session(ABC):
         """Begin to answer what has arrived; harmless if that is under way."""
         if not self.is_busy:
             self.is_busy = True
-            self._steps.start(self._serve(), self._finished)
+            self._steps.start(self._serve(), partial(guarded, self.connection.failed, self._finished))
 
     @abstractmethod
     def _serve(self) -> Steps[None]:
         """Answer all requests that have arrived."""
 
     def _finished(self, _: None, error: Exception | None) -> None:
-        """All are answered, or the box has ended."""
+        """All are answered, or the box has ended, or an error of ours has ended the answering."""
         self.is_busy = False
-        if error is not None:
+        if isinstance(error, NotRunningError):
             self.connection.close()
+        elif error is not None:
+            self.connection.failed(error)
         elif self.connection.has_ended:
             self.connection.close_when_sent()

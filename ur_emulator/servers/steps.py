@@ -1,7 +1,8 @@
 """Work that takes several cycles, written as generators, and what advances it.
 
 A generator yields where it has to wait; it is continued after every cycle and when a task of the worker
-process has ended. So nothing waits for a clock, and a request is answered after it was done.
+process has ended. So nothing waits for a clock, and a request is answered after it was done. An error ends
+the steps in which it was raised, and who has begun them is told.
 """
 
 from __future__ import annotations
@@ -11,23 +12,25 @@ from concurrent.futures import Future
 from typing import Any, TypeVar
 
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.errors import EmulatorError
+from ur_emulator.realtime.barrier import Failed, guarded
 
 T = TypeVar("T")
 Steps = Generator[None, None, T]
-# Called with the result of the steps, or with the EmulatorError that ended them.
+# Called with the result of the steps, or with the error that ended them.
 Finished = Callable[[Any, Exception | None], None]
 
 
 class StepRunner:
     """Advances all steps of one box; in the thread of its loop."""
 
-    def __init__(self) -> None:
+    def __init__(self, failed: Failed) -> None:
+        """Begin with nothing; `failed` is called with an error of ours in the `finished` of steps."""
+        self._failed = failed
         self._under_way: list[tuple[Steps[Any], Finished]] = []
 
     def start(self, steps: Steps[Any], finished: Finished) -> None:
         """Begin with steps; `finished` may be called before this returns."""
-        if not _advance(steps, finished):
+        if not self._advance(steps, finished):
             self._under_way.append((steps, finished))
 
     def publish(self, snapshot: Snapshot) -> None:
@@ -38,14 +41,26 @@ class StepRunner:
     def advance(self) -> None:
         """Go on with everything that is under way."""
         under_way, self._under_way = self._under_way, []
-        self._under_way = [task for task in under_way if not _advance(*task)] + self._under_way
+        self._under_way = [task for task in under_way if not self._advance(*task)] + self._under_way
 
     def close(self, error: Exception) -> None:
         """End everything; `finished` is called with the error."""
         under_way, self._under_way = self._under_way, []
         for steps, finished in under_way:
-            steps.close()
-            finished(None, error)
+            guarded(self._failed, steps.close)
+            guarded(self._failed, finished, None, error)
+
+    def _advance(self, steps: Steps[Any], finished: Finished) -> bool:
+        """Take one step; return whether it was the last."""
+        try:
+            next(steps)
+        except StopIteration as end:
+            guarded(self._failed, finished, end.value, None)
+        except Exception as error:
+            guarded(self._failed, finished, None, error)
+        else:
+            return False
+        return True
 
 
 def settle(future: Future[Any]) -> Finished:
@@ -58,16 +73,3 @@ def settle(future: Future[Any]) -> Finished:
             future.set_exception(error)
 
     return finished
-
-
-def _advance(steps: Steps[Any], finished: Finished) -> bool:
-    """Take one step; return whether it was the last."""
-    try:
-        next(steps)
-    except StopIteration as end:
-        finished(end.value, None)
-    except EmulatorError as error:
-        finished(None, error)
-    else:
-        return False
-    return True

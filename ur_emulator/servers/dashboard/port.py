@@ -51,7 +51,7 @@ class DashboardPort:
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; what it has begun goes on."""
-        del self._sessions[connection]
+        self._sessions.pop(connection, None)
 
 
 class _DashboardSession(Session):

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 
 from ur_emulator.controller.io.modbus_signals import UnitAddress
+from ur_emulator.realtime.barrier import Report
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.network import ScriptSocket
 from ur_emulator.servers.modbus.link import ModbusLink
@@ -21,17 +22,25 @@ MAX_LINKS = 320
 class ModbusClient:
     """All connections to Modbus units of one box."""
 
-    def __init__(self, loop: EventLoop, connect: Callable[[str, int], ScriptSocket], period_s: float) -> None:
+    def __init__(
+        self,
+        loop: EventLoop,
+        connect: Callable[[str, int], ScriptSocket],
+        period_s: float,
+        report: Report,
+    ) -> None:
         """Prepare; nothing is connected before there is a unit.
 
         Args:
             loop: advances the connections.
             connect: begins to connect to a host and port.
             period_s: control cycle [s].
+            report: called with an error of ours and what it has ended.
         """
         self._loop = loop
         self._connect = connect
         self._period = period_s
+        self._report = report
         self._links: dict[UnitAddress, ModbusLink] = {}
 
     def unit(self, address: UnitAddress) -> ModbusLink:
@@ -56,6 +65,13 @@ class ModbusClient:
             if link.is_released and link.is_idle:
                 self._end(address)
         return next_time
+
+    def failed(self, error: Exception) -> None:
+        """Close all connections after an error of ours; programs see units that do not answer."""
+        self._report("the connections to Modbus units are closed", error)
+        for link in self._links.values():
+            link.give_up("is not asked any more")
+        self.close()
 
     def close(self) -> None:
         """Close all connections at once."""

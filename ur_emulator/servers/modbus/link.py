@@ -112,6 +112,12 @@ class ModbusLink:
             self._socket = None
         self._under_way.clear()
 
+    def give_up(self, why: str) -> None:
+        """Close at once, and mark all signals."""
+        self.close()
+        for signal in self._signals:
+            signal.trouble = f"{self._name} {why}"
+
     # --- the loop
 
     def advance(self, now: float) -> float:

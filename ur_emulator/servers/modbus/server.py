@@ -59,7 +59,7 @@ class ModbusPort:
 
     def closed(self, connection: Connection) -> None:
         """Forget the client."""
-        del self._sessions[connection]
+        self._sessions.pop(connection, None)
 
 
 class _ModbusSession(Session):

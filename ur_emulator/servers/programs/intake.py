@@ -25,8 +25,9 @@ from ur_emulator.commands.programs import (
 from ur_emulator.commands.safety import ConfirmSafety, UnlockProtectiveStop
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
-from ur_emulator.errors import ArgumentError, WorkerError
+from ur_emulator.errors import ArgumentError
 from ur_emulator.programs.compiling import compile_text
+from ur_emulator.realtime.barrier import place_of
 from ur_emulator.realtime.tasks import Task, TaskQueue
 from urscript.catalogue import Catalogue
 
@@ -107,18 +108,20 @@ class ProgramIntake:
                 done = partial(self._compiled, sender, cost)
                 is_secondary = item.kind == "sec"
                 self._compiling = self._tasks.submit(
-                    done, compile_text, item.text, self._catalogue, "<program>", is_secondary
+                    done, self._failed, compile_text, item.text, self._catalogue, "<program>", is_secondary
                 )
             else:
                 self._finish(_translate(item), sender, cost)
 
     def _compiled(self, sender: object, cost: int, outcome: Any, error: Exception | None) -> None:
         self._compiling = None
-        if error is not None:  # also a defect of ours must not swallow the program without a word
-            why = str(error) if isinstance(error, WorkerError) else repr(error)
-            outcome = ScriptFailed(1, 1, f"the program cannot be compiled: {why}")
+        if error is not None:
+            outcome = ScriptFailed(1, 1, f"the program cannot be compiled: {error}")
         self._finish(outcome if isinstance(outcome, ScriptFailed) else StartProgram(outcome), sender, cost)
         self._go_on()
+
+    def _failed(self, error: Exception) -> None:
+        self._announce(_warning(f"a program is lost: {place_of(error)}"))
 
     def _finish(self, result: Command | Event | None, sender: object, cost: int) -> None:
         """Hand on a result."""

@@ -83,7 +83,7 @@ class ProgramPlayer:
             loaded, ready = yield from self._access.in_worker(
                 load_and_compile, self.folder, name, self._catalogue
             )
-        except Exception as error:  # a defect of ours must not end the box
+        except (EmulatorError, OSError) as error:
             self._refuse(what, error)
         self.loaded, self._ready = loaded, ready
         self.installation = loaded.installation or self.installation
@@ -97,7 +97,7 @@ class ProgramPlayer:
         self._must_be_stopped(what)
         try:
             self.installation = yield from self._access.in_worker(load_installation, self.folder, name)
-        except Exception as error:  # as above
+        except (EmulatorError, OSError) as error:
             self._refuse(what, error)
         self._access.note(f"Loaded installation: {self.installation.wire_path}")
 

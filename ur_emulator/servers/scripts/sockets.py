@@ -9,6 +9,7 @@ import threading
 from weakref import WeakSet
 
 from ur_emulator.controller.io.modbus_signals import UnitAddress
+from ur_emulator.realtime.barrier import Report
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.modbus.client import ModbusClient
 from ur_emulator.servers.modbus.link import ModbusLink
@@ -27,16 +28,19 @@ _IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOU
 class ScriptConnection(BufferedSocket):
     """One client connection of a script."""
 
-    def __init__(self, loop: EventLoop, host: str, port: int, own_address: str = "") -> None:
+    def __init__(self, loop: EventLoop, host: str, port: int, report: Report, own_address: str = "") -> None:
         """Begin to connect; a name is looked up in a thread of its own, the loop never waits for it.
 
         Args:
             loop: watches the socket.
             host: name or address of the peer.
             port: of the peer.
+            report: called with an error of ours in what the peer has caused; it ends the connection.
             own_address: where to call from, if the peer can be reached from there; "" leaves it open.
         """
         super().__init__(loop, _SEND_LIMIT, _READ_SIZE)
+        self._peer = f"{host}:{port}"
+        self._report = report
         self._own_address = own_address
         self._inbox = bytearray()
         self.is_connecting = True
@@ -60,6 +64,11 @@ class ScriptConnection(BufferedSocket):
         super().close()
         self.is_connecting = False
 
+    def failed(self, error: Exception) -> None:
+        """Close after an error of ours, and report it; the script sees a peer that has closed."""
+        self._report(f"the connection of a script to {self._peer} is closed", error)
+        self.close()
+
     # --- connecting
 
     def _look_up(self, host: str, port: int) -> None:
@@ -67,9 +76,9 @@ class ScriptConnection(BufferedSocket):
         try:
             address = str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
         except (OSError, ValueError, OverflowError):
-            self._loop.call_soon_threadsafe(self.close)
+            self._loop.call_soon_threadsafe(self.close, self.failed)
         else:
-            self._loop.call_soon_threadsafe(lambda: self._connect(address, port))
+            self._loop.call_soon_threadsafe(lambda: self._connect(address, port), self.failed)
 
     def _connect(self, address: str, port: int) -> None:
         if not self.is_connecting:
@@ -83,7 +92,7 @@ class ScriptConnection(BufferedSocket):
         except (OSError, OverflowError):  # descriptors are out, or that is not an address
             code = errno.EINVAL
         if self._sock is not None and code in _IN_PROGRESS:
-            self._loop.watch(self._sock, selectors.EVENT_WRITE, self._on_connected)
+            self._loop.watch(self._sock, selectors.EVENT_WRITE, self._on_connected, self.failed)
         else:
             self.close()
 
@@ -131,23 +140,25 @@ def _can_call_from(own: str, address: str) -> bool:
 class LoopNetwork:
     """Opens script sockets in a loop."""
 
-    def __init__(self, loop: EventLoop, period_s: float, own_address: str = "") -> None:
+    def __init__(self, loop: EventLoop, period_s: float, report: Report, own_address: str = "") -> None:
         """Prepare; nothing is opened.
 
         Args:
             loop: watches the sockets.
             period_s: control cycle [s].
+            report: called with an error of ours and what it has ended.
             own_address: of the box. A robot calls from the address at which it is called, and clients that
                 listen for it check that.
         """
         self._loop = loop
+        self._report = report
         self._own_address = own_address
         self._sockets: WeakSet[ScriptConnection] = WeakSet()
-        self._modbus = ModbusClient(loop, self.open, period_s)
+        self._modbus = ModbusClient(loop, self.open, period_s, report)
 
     def open(self, host: str, port: int) -> ScriptConnection:
         """Begin to connect to `host`:`port`."""
-        opened = ScriptConnection(self._loop, host, port, self._own_address)
+        opened = ScriptConnection(self._loop, host, port, self._report, self._own_address)
         self._sockets.add(opened)
         return opened
 

@@ -32,6 +32,10 @@ class XmlRpcCall:
             raise RemoteCallError(self._error)
         return self._value
 
+    def failed(self, error: Exception) -> None:
+        """End the call with an error of ours."""
+        self.finish(None, repr(error))
+
     def finish(self, value: Any, error: str) -> None:
         """Take the end of the call; in the loop's thread."""
         self._value, self._error, self.is_done = value, error, True
@@ -91,5 +95,5 @@ class _Worker:
         while (job := self._jobs.get()) is not None:
             call, method, arguments = job
             value, error = transport.call(method, arguments)
-            self._loop.call_soon_threadsafe(partial(call.finish, value, error))
+            self._loop.call_soon_threadsafe(partial(call.finish, value, error), call.failed)
         transport.close()

@@ -68,6 +68,10 @@ class BufferedSocket(ABC):
         self._outbox.clear()
         self.is_open = self._can_send = False
 
+    @abstractmethod
+    def failed(self, error: Exception) -> None:
+        """End after an error of ours in what the socket has caused."""
+
     def _open(self, sock: socket.socket) -> None:
         """Begin with a connected, non-blocking socket."""
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -98,7 +102,7 @@ class BufferedSocket(ABC):
         if self._outbox:
             events |= selectors.EVENT_WRITE
         if events:
-            self._loop.watch(self._sock, events, self._on_ready)
+            self._loop.watch(self._sock, events, self._on_ready, self.failed)
         else:
             self._loop.unwatch(self._sock)
 

@@ -6,6 +6,7 @@ import socket
 from collections.abc import Callable
 
 from ur_emulator.budgets import BUDGETS
+from ur_emulator.realtime.barrier import Report
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp.buffered_socket import BufferedSocket
 
@@ -39,6 +40,7 @@ class Connection(BufferedSocket):
         on_data: Callable[[Connection, bytes], None],
         on_close: Callable[[Connection], None],
         backlog: set[Connection],
+        report: Report,
     ) -> None:
         """Take over a connected socket.
 
@@ -48,11 +50,13 @@ class Connection(BufferedSocket):
             on_data: called with what has come.
             on_close: called once when the connection is gone, for whatever reason.
             backlog: the connection is in this set while something waits in its outbox.
+            report: called with an error of ours in what the client has caused; it ends the connection.
         """
         super().__init__(loop, BUDGETS.outbox_bytes, _READ_SIZE)
         self._on_data = on_data
         self._on_close = on_close
         self._backlog = backlog
+        self._report = report
         self._closing = False
         self._on_end: Callable[[Connection], None] | None = None
         self.dropped = 0
@@ -105,6 +109,11 @@ class Connection(BufferedSocket):
             super().close()
             self._backlog.discard(self)
             self._on_close(self)
+
+    def failed(self, error: Exception) -> None:
+        """Close after an error of ours in what the client has caused, and report it."""
+        self._report(f"{self.peer} is disconnected", error)
+        self.close()
 
     def _received(self, data: bytes) -> None:
         self._on_data(self, data)

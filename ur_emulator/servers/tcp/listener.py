@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from ur_emulator.errors import PortError, PortPermissionError
+from ur_emulator.realtime.barrier import Report, guarded
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp.connection import Connection
 from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
@@ -39,7 +40,7 @@ class Port(Protocol):
         ...
 
     def closed(self, connection: Connection) -> None:
-        """A client is gone."""
+        """A client is gone, also one with which `opened` has failed."""
         ...
 
 
@@ -59,6 +60,7 @@ class Listener:
         port: Port,
         backlog: set[Connection],
         notice: Callable[[str], None],
+        report: Report,
         name: str,
         spare: SpareDescriptor | None = None,
     ) -> None:
@@ -71,6 +73,7 @@ class Listener:
             port: gets the clients.
             backlog: shared by all connections of a box, see Connection.
             notice: called with a text when a client connects or disconnects.
+            report: called with an error of ours and what it has ended.
             name: of the port, for notices.
             spare: refuses clients when no descriptor is left; without one they wait.
 
@@ -82,6 +85,7 @@ class Listener:
         self._port = port
         self._backlog = backlog
         self._notice = notice
+        self._report = report
         self._name = name
         self._spare = spare
         self._refuses = False
@@ -89,7 +93,7 @@ class Listener:
         self._sock = _listening_socket(host, number)
         self.connections: dict[Connection, None] = {}
         self.number: int = self._sock.getsockname()[1]
-        loop.watch(self._sock, selectors.EVENT_READ, self._accept)
+        loop.watch(self._sock, selectors.EVENT_READ, self._accept, self.failed)
 
     def close(self) -> None:
         """Stop listening, and close all connections."""
@@ -106,9 +110,14 @@ class Listener:
         if now >= self._paused_until:
             self._paused_until = None
             self._loop.remove(self)
-            self._loop.watch(self._sock, selectors.EVENT_READ, self._accept)
+            self._loop.watch(self._sock, selectors.EVENT_READ, self._accept, self.failed)
             return now
         return self._paused_until
+
+    def failed(self, error: Exception) -> None:
+        """Pause after an error of ours in accepting clients."""
+        self._report(f"{self._name} port {self.number} pauses", error)
+        self._pause()
 
     def _accept(self, events: int) -> None:
         for _ in range(MAX_AT_ONCE):
@@ -123,13 +132,15 @@ class Listener:
                 return
             self._refuses = False
             try:
-                connection = Connection(self._loop, client, self._port.received, self._closed, self._backlog)
+                connection = Connection(
+                    self._loop, client, self._port.received, self._closed, self._backlog, self._report
+                )
             except OSError:
                 client.close()  # closed by the client; some systems report it only now
                 continue
             self.connections[connection] = None
             self._notice(f"{connection.peer} connected to {self._name} port {self.number}")
-            self._port.opened(connection)
+            guarded(connection.failed, self._port.opened, connection)
 
     def _refuse(self, error: OSError) -> None:
         """Close the next client, or pause: the port stays readable, the loop would spin."""
@@ -138,12 +149,15 @@ class Listener:
                 raise error
             is_refused = self._spare.refuse_client(self._sock)
         except OSError:
-            self._loop.unwatch(self._sock)
-            self._loop.add(self)
+            self._pause()
             is_refused = True
         if is_refused and not self._refuses:
             self._refuses = True
             self._notice(f"clients are turned away from {self._name} port {self.number}: {error.strerror}")
+
+    def _pause(self) -> None:
+        self._loop.unwatch(self._sock)
+        self._loop.add(self)
 
     def _closed(self, connection: Connection) -> None:
         del self.connections[connection]

@@ -1,0 +1,235 @@
+"""The error barrier: an error ends what has caused it, the log says so in one line, and everybody else goes on."""
+
+import selectors
+import socket
+from types import SimpleNamespace
+
+import pytest
+from box_support import FrameReader, connect, listening_socket
+from control_support import Http, control_box
+from dashboard_support import Dashboard
+
+from protocol.primary.messages import ReportLevel
+from ur_emulator.control.reading import ReadState
+from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.servers.scripts.sockets import ScriptConnection
+from ur_emulator.servers.session import Session
+from ur_emulator.servers.tcp import listener
+
+DEFECT = "KeyError('defect') in fail, line "
+
+
+def fail(*args, **options):
+    raise KeyError("defect")
+
+
+# --- the loop alone
+
+
+@pytest.fixture
+def loop():
+    made = EventLoop()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def ready():
+    """A socket with a byte to read."""
+    near, far = socket.socketpair()
+    far.send(b"x")
+    with near, far:
+        yield near
+
+
+class Turns:
+    """Stops its loop after so many turns."""
+
+    def __init__(self, loop, n):
+        self._loop, self._left = loop, n
+
+    def advance(self, now):
+        self._left -= 1
+        if self._left < 0:
+            self._loop.stop()
+        return now
+
+    failed = pytest.fail
+
+
+def test_the_owner_of_a_socket_is_told_once_and_the_socket_is_watched_no_more(loop, ready):
+    errors = []
+    loop.watch(ready, selectors.EVENT_READ, fail, errors.append)
+    loop.add(Turns(loop, 5))
+    loop.run()
+    assert [repr(error) for error in errors] == ["KeyError('defect')"]
+    assert ready not in loop._selector.get_map()
+
+
+def test_a_callback_may_close_its_socket_before_it_fails(loop, ready):
+    errors = []
+
+    def end_and_fail(events):
+        loop.unwatch(ready)
+        ready.close()
+        fail()
+
+    loop.watch(ready, selectors.EVENT_READ, end_and_fail, errors.append)
+    loop.add(Turns(loop, 5))
+    loop.run()
+    assert len(errors) == 1
+
+
+def test_a_call_that_fails_keeps_no_other_from_its_turn(loop):
+    errors, done = [], []
+    loop.call_soon(fail, errors.append)
+    loop.call_soon_threadsafe(fail, errors.append)
+    loop.call_soon(lambda: done.append(1), pytest.fail)
+    loop.add(Turns(loop, 2))
+    loop.run()
+    assert (len(errors), done) == (2, [1])
+
+
+def test_a_service_that_fails_is_called_no_more(loop):
+    errors = []
+    loop.add(SimpleNamespace(advance=fail, failed=errors.append))
+    loop.add(Turns(loop, 5))
+    loop.run()
+    assert len(errors) == 1
+
+
+def test_an_error_that_nobody_takes_ends_the_loop(loop):
+    loop.call_soon(fail, lambda error: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        loop.run()
+
+
+# --- a box
+
+
+@pytest.fixture
+def box():
+    with control_box(pace="realtime") as running, connect(running, "realtime") as sock:
+        running.frames = FrameReader(sock)
+        running.frames.next()
+        yield running
+        stamps = [running.frames.next().timestamp for _ in range(10)]
+        assert len(set(stamps)) == 10
+        assert running.failure is None
+
+
+def faults(box):
+    return [entry.text for entry in box._log_entries() if entry.level is ReportLevel.FAULT]
+
+
+def is_closed(sock):
+    """Whether the box closes a connection; what it has said before is read."""
+    try:
+        while sock.recv(4096):
+            pass
+    except ConnectionResetError:
+        pass
+    return True
+
+
+def open_port(box, name):
+    if name == "control":
+        return Http(box).sock
+    return connect(box, name)
+
+
+PORTS = ("primary", "secondary", "realtime_ro", "rtde", "dashboard", "modbus", "control")
+
+
+@pytest.mark.parametrize("method", ["opened", "received"])
+@pytest.mark.parametrize("name", PORTS)
+def test_an_error_of_a_port_ends_the_connection_that_has_caused_it(box, name, method, monkeypatch):
+    port, connections = box._port_set._ports[name], box._port_set._listeners[name].connections
+    with open_port(box, name) as other:
+        until(box, lambda: connections)  # it is let in
+        with monkeypatch.context() as patch:
+            patch.setattr(port, method, fail)
+            with open_port(box, name) as sock:
+                sock.sendall(b"x")
+                assert is_closed(sock)
+                address = "{}:{}".format(*sock.getsockname())
+        (line,) = faults(box)
+        assert line.startswith(f"{address} is disconnected: {DEFECT}")
+        until(box, lambda: len(connections) == 1)
+        assert [c.peer for c in connections] == ["{}:{}".format(*other.getsockname())]
+
+
+def test_an_error_while_requests_are_answered_ends_their_connection(box, monkeypatch):
+    with Dashboard(box) as other, Dashboard(box) as dashboard:
+        with monkeypatch.context() as patch:
+            patch.setattr(box._port_set._ports["dashboard"]._answers, "answer", fail)
+            dashboard.send("robotmode")
+            assert dashboard.is_closed()
+        assert other.ask("robotmode") == "Robotmode: RUNNING"
+    (line,) = faults(box)
+    assert DEFECT in line
+
+
+def test_an_error_after_the_last_answer_ends_the_connection(box, monkeypatch):
+    with Dashboard(box) as dashboard:
+        with monkeypatch.context() as patch:
+            patch.setattr(Session, "_finished", fail)
+            assert dashboard.ask("robotmode") == "Robotmode: RUNNING"
+            assert dashboard.is_closed()
+        with Dashboard(box) as other:
+            assert other.ask("robotmode") == "Robotmode: RUNNING"
+    (line,) = faults(box)
+    assert DEFECT in line
+
+
+def test_an_error_of_an_operation_is_told_to_who_asked(box, monkeypatch):
+    monkeypatch.setattr(ReadState, "steps", fail)
+    with pytest.raises(KeyError, match="defect"):
+        box.state()
+    assert not faults(box)
+    with Http(box) as http:
+        http.send(http.request("GET", "/v1/state"))
+        assert is_closed(http.sock)
+    assert len(faults(box)) == 1
+
+
+def close_and_fail(loop, sock, *more):
+    sock.close()
+    fail()
+
+
+def test_an_error_in_accepting_costs_a_pause_of_that_port(box, monkeypatch):
+    with Dashboard(box) as inside:
+        with monkeypatch.context() as patch:
+            patch.setattr(listener, "Connection", close_and_fail)
+            with connect(box, "dashboard") as sock:
+                assert is_closed(sock)
+        assert inside.ask("robotmode") == "Robotmode: RUNNING"
+        with Dashboard(box) as later:
+            assert later.ask("robotmode") == "Robotmode: RUNNING"
+    (line,) = faults(box)
+    assert line.startswith(f"dashboard port {box.ports.dashboard} pauses: {DEFECT}")
+
+
+def test_an_error_after_a_task_is_told_to_who_has_asked_for_it(box, monkeypatch):
+    with connect(box, "secondary") as sock:
+        with monkeypatch.context() as patch:
+            patch.setattr(box._intake, "_finish", fail)
+            sock.sendall(b"def lost():\nend\n")
+            until(box, lambda: any("a program is lost" in entry.text for entry in box._log_entries()))
+        sock.sendall(b"def next():\n  textmsg(1)\nend\n")
+        until(box, lambda: any(entry.text == "1" for entry in box._log_entries()))
+
+
+def test_an_error_in_a_connection_of_a_script_closes_it(box, monkeypatch):
+    monkeypatch.setattr(ScriptConnection, "_on_connected", fail)
+    with listening_socket() as server, connect(box, "secondary") as sock:
+        port = server.getsockname()[1]
+        sock.sendall(f'def p():\n  textmsg(socket_open("127.0.0.1", {port}))\nend\n'.encode())
+        until(box, lambda: any(entry.text == "False" for entry in box._log_entries()))
+    (line,) = faults(box)
+    assert line.startswith(f"the connection of a script to 127.0.0.1:{port} is closed: {DEFECT}")
+
+
+def until(box, condition):
+    box.frames.until(lambda frame: condition())
