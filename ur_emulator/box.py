@@ -40,7 +40,8 @@ from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.programs.player import ProgramPlayer
 from ur_emulator.servers.realtime_port import RealtimePort
 from ur_emulator.servers.rtde_port import RtdePort
-from ur_emulator.servers.scripts.sockets import LoopNetwork
+from ur_emulator.servers.scripts.closed_ports import close_to_scripts, give_back
+from ur_emulator.servers.scripts.loop_network import LoopNetwork
 from ur_emulator.servers.tcp.listener import Port
 
 
@@ -242,6 +243,8 @@ class Box(BoxOperations):
             self.close()
             raise
         self.control_port = numbers.pop(CONTROL, 0)
+        if self.control_port:
+            close_to_scripts(self, self.control_port)
         self.ports = dataclasses.replace(self.ports, **{MODBUS: 0, **numbers})
         self._loop.add(self._box)
         self._loop.tasks.start()
@@ -281,3 +284,4 @@ class Box(BoxOperations):
         self._reports.close()
         self._network.close()
         self._port_set.close()
+        give_back(self)

@@ -56,6 +56,39 @@ class Budgets:
         1_000, "elements", "the changed values of an update", "the others follow in the next one"
     )
 
+    # --- sockets of scripts ---
+
+    # All that a box dials: sockets and remote procedures of scripts, Modbus units, External Control.
+    outgoing_connections: int = _budget(512, "connections", "a box", "`socket_open` returns False")
+    # Threads that wait for a name server are given up by the system after half a minute.
+    look_up_threads: int = _budget(8, "threads", "all boxes of a process", "names wait for their turn")
+    look_ups_at_once: int = _budget(2, "names", "a box", "names wait for their turn")
+    look_ups_waiting: int = _budget(64, "names", "a box", "`socket_open` returns False")
+    inbox_bytes: int = _budget(
+        MIB, "bytes", "a socket of a script", "nothing more is read; a read that finds no end drops them"
+    )
+    all_inboxes_bytes: int = _budget(
+        4 * MIB, "bytes", "all sockets of the scripts of a box", "no socket gets more than 4 KiB"
+    )
+    unsent_bytes: int = _budget(256 * KIB, "bytes", "a socket of a script", "a send returns False")
+    all_unsent_bytes: int = _budget(
+        4 * MIB, "bytes", "all sockets of the scripts of a box", "a send returns False"
+    )
+    # A read of a line looks at each byte once; a script that asks for more ends waits for the next cycle.
+    search_bytes: int = _budget(
+        256 * KIB,
+        "bytes searched",
+        "a cycle of a program",
+        "the read goes on in the next cycle",
+    )
+    external_control_time: float = _budget(
+        30.0, "s", "a PC that sends a program", "a program is played that shows what is wrong"
+    )
+    modbus_links: int = _budget(
+        320, "connections to Modbus units", "a box", "the oldest that no signal needs is closed"
+    )
+    modbus_requests: int = _budget(64, "requests that wait", "a Modbus unit", "the newest is lost")
+
 
 BUDGETS: Final = Budgets()
 

@@ -23,7 +23,7 @@ from ur_emulator.errors import ArgumentError
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.program_slot import ProgramSlot
-from ur_emulator.servers.scripts.sockets import LoopNetwork
+from ur_emulator.servers.scripts.loop_network import LoopNetwork
 from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 
 if TYPE_CHECKING:

@@ -30,6 +30,7 @@ class FakeSocket:
     """A script socket whose other end is the test."""
 
     def __init__(self):
+        self.problem = ""
         self.inbox = bytearray()
         self.sent = bytearray()
         self.is_connecting = False

@@ -15,6 +15,7 @@ class ChunkSocket:
     """A socket that connects between cycles, unless its peer refuses or is silent."""
 
     def __init__(self, peer, replies):
+        self.problem = ""
         self.inbox = bytearray()
         self.sent = bytearray()
         self.is_connecting = True

@@ -24,6 +24,7 @@ class PeerSocket:
     """A script's connection to a peer; None is a port where nobody listens."""
 
     def __init__(self, peer):
+        self.problem = ""
         self.inbox = bytearray()
         self.sent = bytearray()
         self.is_connecting = True

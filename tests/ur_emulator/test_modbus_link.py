@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.modbus import take_frame
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import ModbusSignal, SignalType, UnitAddress
 from ur_emulator.servers.modbus.link import (
     ANSWER_TIMEOUT,
     CONNECT_TIMEOUT,
     FIRST_RETRY,
     LAST_RETRY,
-    MAX_OWN_REQUESTS,
     MAX_UNDER_WAY,
     MAX_UNEXPECTED,
     TOLERANCE,
@@ -240,9 +240,9 @@ def test_own_requests_are_sent_as_they_are_and_their_answer_is_dropped(wire):
 
 def test_own_requests_are_lost_when_nobody_is_there_and_bounded_before():
     wire = Wire(refuse=True)
-    for i in range(MAX_OWN_REQUESTS + 5):
+    for i in range(BUDGETS.modbus_requests + 5):
         wire.link.send(1, 6, bytes([i]))
-    assert len(wire.link._own_requests) == MAX_OWN_REQUESTS
+    assert len(wire.link._own_requests) == BUDGETS.modbus_requests
     wire.link.release()
     wire.advance()
     assert wire.link.is_idle

@@ -12,6 +12,11 @@ class ScriptSocket(Protocol):
     """One TCP connection opened by a script. All calls return at once."""
 
     @property
+    def problem(self) -> str:
+        """Why there is no connection; "" while there is one, and if the peer refused."""
+        ...
+
+    @property
     def inbox(self) -> bytearray:
         """Bytes that have come and were not read yet; the reader takes them out of it."""
         ...

@@ -11,19 +11,20 @@ import struct
 from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.events import EventQueue, LogAdded
-from ur_emulator.scripting.network import Network, ScriptSocket
+from ur_emulator.scripting.network import Network
+from ur_emulator.scripting.socket_reader import SocketReader, TextSearch
+from urscript.dialect import LONGEST_STRING
 from urscript.errors import ScriptRuntimeError
-from urscript.run.waits import CHECKPOINT, Blocked
+from urscript.run.waits import CHECKPOINT, NEXT_CYCLE, Blocked, Wait
 from urscript.values import log_form
 
 # socket_open gives up after this [s of robot time]. Source: URScript manual, socket_open.
 OPEN_TIMEOUT = 2.0
 # Longest text that a string read returns [bytes]. Source: later edition of the manual, socket_read_string.
 MAX_STRING = 1024
-# Longest text without an end [bytes]: beyond it the read fails and the bytes are dropped.
-MAX_INBOX = 1 << 20
 
 Function = Callable[..., Any]
 
@@ -35,12 +36,14 @@ class ProgramSockets:
         self._clock = clock
         self._events = events
         self._network = network
-        self._sockets: dict[str, ScriptSocket] = {}
+        self._sockets: dict[str, SocketReader] = {}
+        self._searched = 0
+        self._searched_in = -1
 
     def close_all(self) -> None:
         """Close every socket; the program has ended."""
-        for socket in self._sockets.values():
-            socket.close()
+        for reader in self._sockets.values():
+            reader.socket.close()
         self._sockets.clear()
 
     def functions(self) -> Mapping[str, Function]:
@@ -63,34 +66,37 @@ class ProgramSockets:
 
     # --- opening, closing, sending
 
-    def _open(self, thread: object, address: str, port: int, name: str) -> Generator[Blocked, None, bool]:
-        old = self._sockets.pop(name, None)
-        if old is not None:
-            old.close()
+    def _open(self, thread: object, address: str, port: int, name: str) -> Generator[Wait, None, bool]:
+        self._close(thread, name)
+        socket = self._network.open(address, int(port))
         # Stored before it is open: a program that is killed meanwhile closes it.
-        socket = self._sockets[name] = self._network.open(address, int(port))
+        reader = self._sockets[name] = SocketReader(socket)
         expired = self._timer(OPEN_TIMEOUT)
         if socket.is_connecting:
             yield Blocked(lambda: not socket.is_connecting or expired(), outside=True)
+        elif not socket.is_open:
+            yield NEXT_CYCLE  # a loop of opens that fail at once must not fill the log
         if not socket.is_open or socket.is_connecting:
-            # Source: log of a real controller; "refused" is ours.
-            reason = "Connection timed out" if socket.is_connecting else "Connection refused"
+            # Source: log of a real controller; all others are ours.
+            reason = (
+                "Connection timed out" if socket.is_connecting else socket.problem or "Connection refused"
+            )
             text = f"Not able to open socket [{name}] to host: {address} at port: {port}: {reason}"
             self._events.append(LogAdded("Program", text))
             socket.close()
-            if self._sockets.get(name) is socket:
+            if self._sockets.get(name) is reader:
                 del self._sockets[name]
             return False
         return True
 
     def _close(self, thread: object, name: str) -> None:
-        socket = self._sockets.pop(name, None)
-        if socket is not None:
-            socket.close()
+        reader = self._sockets.pop(name, None)
+        if reader is not None:
+            reader.socket.close()
 
     def _send(self, name: str, data: bytes) -> bool:
-        socket = self._sockets.get(name)
-        return socket is not None and socket.send(data)
+        reader = self._sockets.get(name)
+        return reader is not None and reader.socket.send(data)
 
     def _send_byte(self, thread: object, value: int, name: str) -> bool:
         return self._send(name, bytes([int(value) & 0xFF]))
@@ -119,31 +125,50 @@ class ProgramSockets:
         end = clock.program_tick + math.ceil(timeout / clock.period_s)
         return lambda: clock.program_tick >= end
 
-    def _take(
-        self, name: str, timeout: float, find: Callable[[bytearray], int]
-    ) -> Generator[Blocked, None, bytes | None]:
-        """Wait until `find` sees a message in the inbox (its length, or 0) and take it; None on failure."""
-        socket = self._sockets.get(name)
-        if socket is None:
+    def _take(self, name: str, timeout: float, search: TextSearch) -> Generator[Wait, None, bytes | None]:
+        """Wait until a text is complete in the inbox and take it; None on failure."""
+        reader = self._sockets.get(name)
+        if reader is None:
             return None
-        inbox = socket.inbox
-        size = find(inbox)
-        if not size and socket.is_open:
-            expired = self._timer(timeout)
-            yield Blocked(
-                lambda: bool(find(inbox)) or not socket.is_open or len(inbox) > MAX_INBOX or expired(),
-                outside=True,
+        socket = reader.socket
+        expired = self._timer(timeout)
+
+        def is_over() -> bool:
+            return (
+                self._find(search, reader) > 0
+                or not socket.is_open
+                or len(socket.inbox) >= BUDGETS.inbox_bytes
+                or expired()
             )
-            size = find(inbox)
-        else:
+
+        has_waited = False
+        while True:
+            while not self._may_search():
+                yield NEXT_CYCLE
+            if is_over():
+                break
+            yield Blocked(lambda: not self._may_search() or is_over(), outside=True)
+            has_waited = True
+        if not has_waited:
             yield CHECKPOINT
-        if not size:
-            if len(inbox) > MAX_INBOX:
-                inbox.clear()
-            return None
-        data = bytes(inbox[:size])
-        del inbox[:size]
-        return data
+        size = self._find(search, reader)
+        if size:
+            return reader.take(size)
+        if len(socket.inbox) >= BUDGETS.inbox_bytes:
+            reader.take(BUDGETS.inbox_bytes)
+        return None
+
+    def _may_search(self) -> bool:
+        """Whether this program may look for the end of a text in this cycle."""
+        if self._searched_in != self._clock.tick:
+            self._searched_in, self._searched = self._clock.tick, 0
+        return self._searched < BUDGETS.search_bytes
+
+    def _find(self, search: TextSearch, reader: SocketReader) -> int:
+        before = search.n_searched
+        size = search.find(reader)
+        self._searched += search.n_searched - before
+        return size
 
     def _read_numbers(
         self, name: str, timeout: float, number: int, code: str, width: int
@@ -157,13 +182,14 @@ class ProgramSockets:
             code: of one of them for `struct`.
             width: its bytes.
         """
-        socket, clock, size = self._sockets.get(name), self._clock, width * number
+        reader, clock, size = self._sockets.get(name), self._clock, width * number
         failed = [0] + [-1] * number
-        if socket is None:
+        if reader is None:
             return failed
+        socket = reader.socket
         inbox = socket.inbox
         # Nothing to read is nothing that could come: it ends with the time-out.
-        enough = min(size, MAX_INBOX + 1) if size > 0 else MAX_INBOX + 1
+        enough = size if size > 0 else BUDGETS.inbox_bytes
         if len(inbox) < enough and socket.is_open:
             end = clock.program_tick + math.ceil(timeout / clock.period_s) if timeout > 0.0 else math.inf
             yield Blocked(
@@ -172,12 +198,10 @@ class ProgramSockets:
         else:
             yield CHECKPOINT
         if not 0 < size <= len(inbox):
-            if len(inbox) > MAX_INBOX:
-                inbox.clear()
+            if len(inbox) >= BUDGETS.inbox_bytes:
+                reader.take(BUDGETS.inbox_bytes)
             return failed
-        data = bytes(inbox[:size])
-        del inbox[:size]
-        return [number, *struct.unpack(f">{number}{code}", data)]
+        return [number, *struct.unpack(f">{number}{code}", reader.take(size))]
 
     def _read_binary_integer(
         self, thread: object, number: float, name: str, timeout: float
@@ -191,48 +215,38 @@ class ProgramSockets:
 
     def _read_ascii_float(
         self, thread: object, number: float, name: str, timeout: float
-    ) -> Generator[Blocked, None, list[float]]:
+    ) -> Generator[Wait, None, list[float]]:
         number = int(number)
-        data = yield from self._take(name, timeout, lambda inbox: inbox.find(b")") + 1)
+        data = yield from self._take(name, timeout, TextSearch(b"", b")"))
         failed: list[float] = [0, *([math.nan] * number)]
         if data is None:
             return failed
-        inside = data.decode("latin-1").rpartition("(")[2].rstrip(")")
+        inside = data[-MAX_STRING:].decode("latin-1").rpartition("(")[2].rstrip(")")
         try:
             values = [float(part) for part in inside.split(",")]
         except ValueError:
             return failed
         return [number, *values] if len(values) == number else failed
 
-    def _read_line(self, thread: object, name: str, timeout: float) -> Generator[Blocked, None, str]:
-        data = yield from self._take(name, timeout, lambda inbox: inbox.find(b"\n") + 1)
-        return "" if data is None else data.decode("latin-1").removesuffix("\n").removesuffix("\r")
+    def _read_line(self, thread: object, name: str, timeout: float) -> Generator[Wait, None, str]:
+        data = yield from self._take(name, timeout, TextSearch(b"", b"\n"))
+        line = b"" if data is None else data.removesuffix(b"\n").removesuffix(b"\r")
+        return line[:LONGEST_STRING].decode("latin-1")
 
     def _read_string(
         self, thread: object, name: str, prefix: str, suffix: str, interpret_escape: bool, timeout: float
-    ) -> Generator[Blocked, None, str]:
+    ) -> Generator[Wait, None, str]:
         start, end = (_delimiter(text, interpret_escape) for text in (prefix, suffix))
-
-        def find(inbox: bytearray) -> int:
-            begin = inbox.find(start) if start else 0
-            if begin < 0:
-                return 0
-            begin += len(start)
-            if not end:
-                return min(len(inbox), begin + MAX_STRING) if len(inbox) > begin else 0
-            stop = inbox.find(end, begin)
-            return stop + len(end) if stop >= 0 else 0
-
-        data = yield from self._take(name, timeout, find)
+        data = yield from self._take(name, timeout, TextSearch(start, end, MAX_STRING))
         if data is None:
             return ""
         text = data[data.find(start) + len(start) :] if start else data
         return (text.removesuffix(end) if end else text)[:MAX_STRING].decode("latin-1")
 
-    def _get_var(self, thread: object, variable: str, name: str) -> Generator[Blocked, None, int]:
+    def _get_var(self, thread: object, variable: str, name: str) -> Generator[Wait, None, int]:
         self._send(name, f"GET {variable}\n".encode("latin-1", "replace"))
-        data = yield from self._take(name, OPEN_TIMEOUT, lambda inbox: inbox.find(b"\n") + 1)
-        words = b"" if data is None else data
+        data = yield from self._take(name, OPEN_TIMEOUT, TextSearch(b"", b"\n"))
+        words = b"" if data is None or len(data) > MAX_STRING else data
         try:
             answered, value = words.decode("latin-1").split()
             return int(value) if answered == variable else 0

@@ -9,14 +9,12 @@ import math
 from collections.abc import Callable
 from functools import partial
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import UnitAddress
 from ur_emulator.realtime.barrier import Report
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.network import ScriptSocket
 from ur_emulator.servers.modbus.link import ModbusLink
-
-# Most connections, those included that were released and still wait for an answer.
-MAX_LINKS = 320
 
 
 class ModbusClient:
@@ -49,7 +47,7 @@ class ModbusClient:
         if link is None:
             if not self._links:
                 self._loop.add(self)
-            elif len(self._links) >= MAX_LINKS:
+            elif len(self._links) >= BUDGETS.modbus_links:
                 self._end_oldest_released()
             link = self._links[address] = ModbusLink(
                 str(address), partial(self._connect, *address), self._period

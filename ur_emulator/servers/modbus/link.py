@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from protocol.errors import RemoteProtocolError
 from protocol.modbus import ModbusFrame, decode_value, encode_frame, take_frame
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import ModbusSignal
 from ur_emulator.scripting.network import ScriptSocket
 from ur_emulator.servers.modbus.requests import SentRequest, problem_of, request_for
@@ -30,8 +31,6 @@ LAST_RETRY = 2.0
 MAX_UNDER_WAY = 16
 # Unexpected answers in a row after which the connection is closed.
 MAX_UNEXPECTED = 16
-# Own requests of programs that may wait for the connection; further ones are lost.
-MAX_OWN_REQUESTS = 64
 
 _SILENT = "does not answer"
 
@@ -93,7 +92,7 @@ class ModbusLink:
     def send(self, slave: int, function_code: int, data: bytes) -> None:
         """Send a request whose answer is not used."""
         self.is_released = False
-        if len(self._own_requests) < MAX_OWN_REQUESTS:
+        if len(self._own_requests) < BUDGETS.modbus_requests:
             self._own_requests.append((slave, bytes((function_code,)) + data))
 
     def release(self) -> None:
@@ -147,7 +146,8 @@ class ModbusLink:
             return False
         if not sock.is_open:
             has_stood = self._connect_by == math.inf
-            self._fail(now, "has closed the connection" if has_stood else "refuses the connection")
+            why = f"cannot be reached: {sock.problem}" if sock.problem else "refuses the connection"
+            self._fail(now, "has closed the connection" if has_stood else why)
             return False
         if self._connect_by != math.inf:
             self._connect_by = math.inf

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 
 from protocol.script_channel import MAX_PROGRAM
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.programs.installation import ExternalControlPc
 from ur_emulator.programs.script_writer import one_line
 from ur_emulator.scripting.network import Network
@@ -47,8 +48,8 @@ def request_program(
         while connection.is_connecting and clock() - since < CONNECT_LIMIT:
             yield
         if not connection.send(REQUEST):
-            problem = "it cannot be reached"
-        since = clock()
+            problem = connection.problem or "it cannot be reached"
+        begin = since = clock()
         while not problem:
             inbox = connection.inbox
             if inbox:
@@ -62,6 +63,8 @@ def request_program(
                 break
             if len(received) > MAX_PROGRAM:
                 problem = f"it sends more than {MAX_PROGRAM} bytes"
+            elif clock() - begin > BUDGETS.external_control_time:
+                problem = f"it has not sent all of it within {BUDGETS.external_control_time:g} s"
             yield
     finally:
         connection.close()

@@ -1,67 +1,103 @@
-"""Sockets that scripts open: the network that `scripting` asks for, made of non-blocking sockets."""
+"""The connections that a box opens for its scripts: non-blocking sockets with bounded buffers."""
 
 from __future__ import annotations
 
 import errno
 import selectors
 import socket
-import threading
-from weakref import WeakSet
+from functools import partial
 
-from ur_emulator.controller.io.modbus_signals import UnitAddress
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.realtime.barrier import Report
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers.modbus.client import ModbusClient
-from ur_emulator.servers.modbus.link import ModbusLink
-from ur_emulator.servers.scripts.xmlrpc_client import XmlRpcServer
+from ur_emulator.servers.scripts.buffers import SHARE, Buffers
+from ur_emulator.servers.scripts.closed_ports import is_closed
+from ur_emulator.servers.scripts.look_ups import LOOK_UPS, LookUp
 from ur_emulator.servers.tcp.buffered_socket import BufferedSocket
 
-_READ_SIZE = 64 * 1024
-# Bytes of a script that may wait for a peer that does not read; further sends fail.
-_SEND_LIMIT = 256 * 1024
-# Bytes that may wait for a script that does not read; then the box stops reading from the peer. Above the
-# longest text that a read waits for (socket_functions.MAX_INBOX).
-_INBOX_LIMIT = 2 << 20
+_READ_SIZE = 16 * 1024
 _IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOULDBLOCK", errno.EINPROGRESS)}
 
 
 class ScriptConnection(BufferedSocket):
-    """One client connection of a script."""
+    """One connection that a box has opened (see `scripting.network.ScriptSocket`).
 
-    def __init__(self, loop: EventLoop, host: str, port: int, report: Report, own_address: str = "") -> None:
-        """Begin to connect; a name is looked up in a thread of its own, the loop never waits for it.
+    Attributes:
+        is_connecting: the connection is being made.
+        problem: why there is no connection, if one could not be made.
+    """
+
+    def __init__(self, loop: EventLoop, buffers: Buffers, report: Report, own_address: str = "") -> None:
+        """Prepare; nothing is connected.
 
         Args:
             loop: watches the socket.
-            host: name or address of the peer.
-            port: of the peer.
+            buffers: counts the bytes of all connections of the box.
             report: called with an error of ours in what the peer has caused; it ends the connection.
             own_address: where to call from, if the peer can be reached from there; "" leaves it open.
         """
-        super().__init__(loop, _SEND_LIMIT, _READ_SIZE)
-        self._peer = f"{host}:{port}"
+        super().__init__(loop, BUDGETS.unsent_bytes, _READ_SIZE)
+        self._buffers = buffers
         self._report = report
+        self._peer = ""
         self._own_address = own_address
+        self._look_up: LookUp | None = None
         self._inbox = bytearray()
+        self._counted_unsent = 0
+        self.is_connecting = False
+        self.problem = ""
+
+    def begin(self, host: str, port: int) -> None:
+        """Begin to connect; the loop never waits for the look-up of a name."""
+        self._buffers.connections.add(self)
+        self._peer = f"{host}:{port}"
         self.is_connecting = True
-        if _is_numeric(host):
-            self._connect(host, port)
+        try:
+            address = socket.inet_ntoa(socket.inet_aton(host))
+        except (OSError, ValueError):  # no address, or no text that could be one
+            self._begin_look_up(host, port)
         else:
-            threading.Thread(
-                target=self._look_up, args=(host, port), name="script-lookup", daemon=True
-            ).start()
+            self._connect(address, port)
+
+    def refuse(self, problem: str) -> None:
+        """End the attempt to connect."""
+        self.problem = problem
+        self.close()
 
     @property
     def inbox(self) -> bytearray:
         """Bytes that have come and were not read yet; reading from the peer goes on with this call."""
-        if not self._wants_data and self._sock is not None:
-            self._wants_data = True
-            self._watch()
+        if not self._wants_data:
+            self.read_on()
         return self._inbox
+
+    @property
+    def n_received(self) -> int:
+        """Bytes that were not read yet."""
+        return len(self._inbox)
+
+    def read_on(self) -> None:
+        """Read from the peer, or stop reading, as the budgets say now."""
+        wants_data = self._buffers.may_receive(len(self._inbox))
+        if wants_data != self._wants_data and self.is_open:
+            self._wants_data = wants_data
+            self._watch()
+
+    def send(self, data: bytes) -> bool:
+        """Send what the kernel takes at once, keep the rest for later; False if there is no room for it."""
+        if not self._buffers.may_send(len(self._outbox), len(data)):
+            return False
+        is_sent = super().send(data)
+        self._count_unsent()
+        return is_sent
 
     def close(self) -> None:
         """Close; what has come can still be read."""
+        if self._look_up is not None:
+            LOOK_UPS.forget(self._look_up)
+            self._look_up = None
         super().close()
+        self._count_unsent()
         self.is_connecting = False
 
     def failed(self, error: Exception) -> None:
@@ -71,25 +107,36 @@ class ScriptConnection(BufferedSocket):
 
     # --- connecting
 
-    def _look_up(self, host: str, port: int) -> None:
-        """Find the address of a name; in its own thread, touching nothing but the loop's call queue."""
-        try:
-            address = str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
-        except (OSError, ValueError, OverflowError):
-            self._loop.call_soon_threadsafe(self.close, self.failed)
-        else:
-            self._loop.call_soon_threadsafe(lambda: self._connect(address, port), self.failed)
+    def _begin_look_up(self, host: str, port: int) -> None:
+        loop = self._loop
+        self._look_up = LookUp(
+            self._buffers,
+            host,
+            lambda address: loop.call_soon_threadsafe(partial(self._found, address, port), self.failed),
+        )
+        if not LOOK_UPS.start(self._look_up):
+            self.refuse(f"{BUDGETS.look_ups_waiting} names are being looked up already")
 
-    def _connect(self, address: str, port: int) -> None:
+    def _found(self, address: str, port: int) -> None:
         if not self.is_connecting:
             return  # closed while the name was looked up
+        self._look_up = None
+        if address:
+            self._connect(address, port)
+        else:
+            self.refuse("the name is not known")
+
+    def _connect(self, address: str, port: int) -> None:
+        if is_closed(address, port):
+            self.refuse("this is the port of the control API of a box, which scripts may not use")
+            return
         try:
             self._sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
             self._sock.setblocking(False)
             if _can_call_from(self._own_address, address):
                 self._sock.bind((self._own_address, 0))
             code = self._sock.connect_ex((address, port))
-        except (OSError, OverflowError):  # descriptors are out, or that is not an address
+        except (OSError, OverflowError):  # descriptors are out, or that is no port
             code = errno.EINVAL
         if self._sock is not None and code in _IN_PROGRESS:
             self._loop.watch(self._sock, selectors.EVENT_WRITE, self._on_connected, self.failed)
@@ -102,15 +149,16 @@ class ScriptConnection(BufferedSocket):
             self.close()
             return
         self.is_connecting = False
+        self._wants_data = True
         self._open(self._sock)
 
     # --- bytes
 
     def _received(self, data: bytes) -> None:
         self._inbox += data
-        if len(self._inbox) > _INBOX_LIMIT:
-            self._wants_data = False
-            self._watch()
+        self._buffers.received(len(data))
+        self._read_size = SHARE if self._buffers.is_full else _READ_SIZE
+        self.read_on()
 
     def _ended(self) -> None:
         self.close()
@@ -121,57 +169,19 @@ class ScriptConnection(BufferedSocket):
     def _sent(self) -> None:
         pass
 
+    def _flush(self) -> None:
+        super()._flush()
+        self._count_unsent()
 
-def _is_numeric(host: str) -> bool:
-    try:
-        socket.inet_aton(host)
-    except (OSError, ValueError):  # no address, or no text that could be one
-        return False
-    return True
+    def _count_unsent(self) -> None:
+        self._buffers.unsent += len(self._outbox) - self._counted_unsent
+        self._counted_unsent = len(self._outbox)
 
 
 def _can_call_from(own: str, address: str) -> bool:
     """Whether a call from our own address can reach an address: none leads out of the loopback network."""
-    if not _is_numeric(own) or own == "0.0.0.0":
+    try:
+        socket.inet_aton(own)
+    except OSError:
         return False
-    return own.startswith("127.") == address.startswith("127.")
-
-
-class LoopNetwork:
-    """Opens script sockets in a loop."""
-
-    def __init__(self, loop: EventLoop, period_s: float, report: Report, own_address: str = "") -> None:
-        """Prepare; nothing is opened.
-
-        Args:
-            loop: watches the sockets.
-            period_s: control cycle [s].
-            report: called with an error of ours and what it has ended.
-            own_address: of the box. A robot calls from the address at which it is called, and clients that
-                listen for it check that.
-        """
-        self._loop = loop
-        self._report = report
-        self._own_address = own_address
-        self._sockets: WeakSet[ScriptConnection] = WeakSet()
-        self._modbus = ModbusClient(loop, self.open, period_s, report)
-
-    def open(self, host: str, port: int) -> ScriptConnection:
-        """Begin to connect to `host`:`port`."""
-        opened = ScriptConnection(self._loop, host, port, self._report, self._own_address)
-        self._sockets.add(opened)
-        return opened
-
-    def remote_server(self, url: str) -> XmlRpcServer:
-        """Return an XML-RPC server; nothing is connected before its first call."""
-        return XmlRpcServer(self._loop, url)
-
-    def modbus_unit(self, address: UnitAddress) -> ModbusLink:
-        """Return the connection to a Modbus unit."""
-        return self._modbus.unit(address)
-
-    def close(self) -> None:
-        """Close everything, whatever the programs are doing."""
-        self._modbus.close()
-        for opened in tuple(self._sockets):
-            opened.close()
+    return own != "0.0.0.0" and own.startswith("127.") == address.startswith("127.")

@@ -1,0 +1,356 @@
+"""What the scripts of a box open to the outside, over real sockets: budgets of a box, and what they must not reach."""
+
+import socket
+import threading
+from contextlib import ExitStack
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from box_support import TIMEOUT, Bench, FrameReader, MessageReader, connect, listening_socket
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
+from ur_emulator import ControlBox
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.scripting import socket_functions
+from ur_emulator.scripting.socket_reader import SocketReader, TextSearch
+from ur_emulator.servers.scripts import buffers, look_ups, loop_network, sockets
+from ur_emulator.servers.scripts.buffers import SHARE
+from ur_emulator.servers.scripts.look_ups import LookUp, LookUps
+
+USERS = (buffers, look_ups, loop_network, sockets, socket_functions)
+
+
+def lower(monkeypatch, **budgets):
+    for module in USERS:
+        monkeypatch.setattr(module, "BUDGETS", replace(BUDGETS, **budgets))
+
+
+@pytest.fixture
+def box():
+    with ControlBox(pace="lockstep", port_base=None, control_port=0) as running:
+        yield running
+
+
+def program(*lines):
+    return ("def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n").encode()
+
+
+def log_lines(box, words):
+    return [entry.text for entry in box.log if words in entry.text]
+
+
+# --- how many
+
+
+def test_beyond_the_budget_of_connections_an_open_returns_false_and_says_why(box, monkeypatch):
+    lower(monkeypatch, outgoing_connections=3)
+    with listening_socket() as server, connect(box, "primary") as sock:
+        port = server.getsockname()[1]
+        opens = [f'textmsg(socket_open("127.0.0.1", {port}, "s{i}"))' for i in range(5)]
+        again = ('socket_close("s0")', f'textmsg(socket_open("127.0.0.1", {port}, "again"))')
+        sock.sendall(program(*opens, *again))
+        reader = MessageReader(sock)
+        said = [reader.message(TextMessage).text for _ in range(6)]
+    assert said == ["True"] * 3 + ["False"] * 2 + ["True"]
+    assert len(log_lines(box, "the box has 3 connections, close one first")) == 2
+
+
+def test_opens_that_fail_at_once_take_a_cycle_each():
+    bench = Bench()
+    bench.network.refuse = True
+    bench.start('def f():\n  while True:\n    socket_open("10.0.0.1", 1)\n  end\nend\n')
+    bench.tick(10)
+    assert len(bench.network.sockets) <= 12
+    assert bench.controller.programs.is_running
+
+
+# --- names
+
+
+class Resolver:
+    """A name server that answers when the test says so."""
+
+    def __init__(self, monkeypatch):
+        self.answer = threading.Event()
+        self.asked = []
+        self.threads = set()
+        self.first = threading.Event()
+        monkeypatch.setattr(look_ups, "socket", SimpleNamespace(**{**vars(socket), "getaddrinfo": self._ask}))
+
+    def end(self):
+        self.answer.set()
+        for thread in tuple(self.threads):
+            thread.join(TIMEOUT)
+
+    def _ask(self, host, *_):
+        self.asked.append(host)
+        self.threads.add(threading.current_thread())
+        self.first.set()
+        assert self.answer.wait(TIMEOUT)
+        return [(0, 0, 0, "", ("127.0.0.1", 0))]
+
+
+def test_a_box_has_a_share_of_the_look_ups_and_forgets_those_whose_script_is_gone(monkeypatch):
+    resolver = Resolver(monkeypatch)
+    names = LookUps()
+    found = []
+    asked = [LookUp("box", f"name{i}", found.append) for i in range(20)]
+    assert all(names.start(one) for one in asked)
+    other = LookUp("other box", "elsewhere", found.append)
+    assert names.start(other)
+    for one in asked[2:]:
+        names.forget(one)
+    resolver.end()
+    assert sorted(resolver.asked) == ["elsewhere", "name0", "name1"]
+    assert found == ["127.0.0.1"] * 3
+
+
+def test_a_thousand_names_wait_in_a_few_threads_and_none_is_lost(monkeypatch):
+    monkeypatch.setattr(look_ups, "BUDGETS", replace(BUDGETS, look_ups_waiting=100))
+    resolver = Resolver(monkeypatch)
+    names = LookUps()
+    done = threading.Semaphore(0)
+    asked = [LookUp(i // 100, f"name{i}", lambda address: done.release()) for i in range(1000)]
+    assert all(names.start(one) for one in asked)
+    resolver.answer.set()
+    assert all(done.acquire(timeout=TIMEOUT) for _ in asked)
+    assert len(resolver.threads) <= BUDGETS.look_up_threads
+    assert sorted(resolver.asked) == sorted(one.host for one in asked)
+
+
+def test_beyond_the_queue_and_without_threads_a_look_up_is_refused(monkeypatch):
+    resolver = Resolver(monkeypatch)
+    names = LookUps()
+    asked = [LookUp("box", "name", lambda address: None) for _ in range(BUDGETS.look_ups_waiting + 3)]
+    assert not all(names.start(one) for one in asked)
+    for one in asked:
+        names.forget(one)
+    resolver.end()
+
+    def start(self):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    assert not LookUps().start(asked[0])
+
+
+def test_two_hundred_scripts_that_wait_for_names_take_two_threads(monkeypatch):
+    resolver = Resolver(monkeypatch)
+    text = "def p():\n" + "".join(
+        f'  thread t{i}():\n    socket_open("name{i}.example", 80, "s{i}")\n  end\n  run t{i}()\n'
+        for i in range(180)
+    )
+    with ControlBox(port_base=None) as box, connect(box, "secondary") as sock:
+        sock.sendall((text + "  sleep(9)\nend\n").encode())
+        assert resolver.first.wait(TIMEOUT)
+        with connect(box, "realtime") as stream:
+            reader = FrameReader(stream)
+            for _ in range(20):
+                reader.next()
+        sock.sendall(b"stop program\n")
+        with connect(box, "primary") as primary:
+            primary.sendall(program('textmsg("next")'))
+            assert MessageReader(primary).message(TextMessage).text == "next"
+        resolver.end()
+    assert len(resolver.asked) <= BUDGETS.look_ups_at_once
+
+
+# --- bytes
+
+
+def flood(server, n, data):
+    """Accept n callers; each gets all of the data as fast as it takes it."""
+    senders = []
+    for _ in range(n):
+        peer, _ = server.accept()
+
+        def send(peer=peer):
+            with peer:
+                peer.sendall(data)
+
+        senders.append(threading.Thread(target=send, daemon=True))
+        senders[-1].start()
+    return senders
+
+
+def test_all_inboxes_together_are_bounded_and_held_back_is_not_lost(box, monkeypatch):
+    lower(monkeypatch, all_inboxes_bytes=200_000, inbox_bytes=100_000)
+    n, lines = 12, 30_000
+    data = b"".join(b"%07d\n" % i for i in range(lines))
+    network = box._network
+    with listening_socket() as server, connect(box, "primary") as sock:
+        opens = [f'socket_open("127.0.0.1", {server.getsockname()[1]}, "s{i}")' for i in range(n)]
+        check = (
+            "k = 0",
+            f"while k < {n}:",
+            '  name = str_cat("s", to_str(k))',
+            "  i = 0",
+            f"  while i < {lines}:",
+            "    if to_num(socket_read_line(name)) != i:",
+            '      textmsg("wrong ", i)',
+            "      halt",
+            "    end",
+            "    i = i + 1",
+            "  end",
+            "  k = k + 1",
+            "end",
+            'textmsg("all")',
+        )
+        sock.sendall(program(*opens, 'textmsg("open")', "sleep(1)", *check))
+        senders = flood(server, n, data)
+        reader = MessageReader(sock)
+        assert reader.message(TextMessage).text == "open"
+        most = 0
+        while not (said := log_lines(box, "all") + log_lines(box, "wrong")):
+            most = max(most, sum(one.n_received for one in tuple(network._buffers.connections)))
+        assert said == ["all"]
+        assert most <= 200_000 + n * (SHARE + sockets._READ_SIZE)
+        for sender in senders:
+            sender.join(TIMEOUT)
+
+
+def test_all_outboxes_together_are_bounded(box, monkeypatch):
+    lower(monkeypatch, all_unsent_bytes=100_000)
+    n = 8
+    with listening_socket() as server, connect(box, "primary") as sock:
+        opens = [f'socket_open("127.0.0.1", {server.getsockname()[1]}, "s{i}")' for i in range(n)]
+        double = (
+            's = "0123456789abcdef"',
+            "i = 0",
+            "while i < 10:",
+            "  s = s + s",
+            "  i = i + 1",
+            "end",
+        )
+        fill = [f'while socket_send_string(s, "s{i}"):\n    sync()\n  end' for i in range(n)]
+        sock.sendall(program(*opens, *double, *fill, 'textmsg("full")', "sleep(5)"))
+        with ExitStack() as peers:
+            for _ in range(n):
+                peers.enter_context(server.accept()[0])
+            reader = MessageReader(sock)
+            while reader.message(TextMessage).text != "full":
+                pass
+            held = [len(one._outbox) for one in tuple(box._network._buffers.connections)]
+            assert sum(held) == box._network._buffers.unsent
+            assert 0 < sum(held) <= 100_000
+            sock.sendall(b"stop program\n")
+            peers.close()
+        sock.sendall(program('textmsg("next")'))
+        while reader.message(TextMessage).text != "next":
+            pass
+    assert box._network._buffers.unsent == 0
+
+
+# --- reading
+
+
+@given(
+    st.binary(max_size=60).map(lambda data: bytes(b"ab;"[byte % 3] for byte in data)),
+    st.lists(st.integers(0, 60)),
+    st.sampled_from([b"", b"a", b"ab"]),
+    st.sampled_from([b";", b"a;", b"b;;"]),
+)
+def test_a_search_finds_the_same_however_the_bytes_come(data, cuts, start, end):
+    begin = data.find(start) + len(start) if start in data else -1
+    stop = data.find(end, begin) if begin >= 0 else -1
+    expected = stop + len(end) if stop >= 0 else 0
+    reader, search = SocketReader(SimpleNamespace(inbox=bytearray())), TextSearch(start, end)
+    found = 0
+    for before, after in zip([0, *sorted(cuts)], [*sorted(cuts), len(data)], strict=True):
+        reader.socket.inbox += data[before:after]
+        found = search.find(reader)
+    assert found == expected
+    assert search.n_searched <= len(data) + (len(cuts) + 2) * (len(start) + len(end))
+
+
+def test_a_search_begins_again_when_another_thread_has_read():
+    reader = SocketReader(SimpleNamespace(inbox=bytearray(b"abcdef")))
+    search = TextSearch(b"", b";")
+    assert not search.find(reader)
+    assert reader.take(5) == b"abcde"
+    reader.socket.inbox += b";rest of it"
+    assert search.find(reader) == 2
+
+
+class CountingInbox(bytearray):
+    """Counts the bytes that searches look at."""
+
+    searched = 0
+
+    def find(self, mark, begin=0):
+        found = super().find(mark, begin)
+        CountingInbox.searched += (len(self) if found < 0 else found) - begin
+        return found
+
+
+@pytest.mark.parametrize("is_open", [True, False], ids=["open", "closed by the peer"])
+def test_reads_that_find_no_end_in_a_full_inbox_go_on_in_later_cycles(is_open):
+    bench = Bench()
+    bench.start(
+        'def f():\n  socket_open("10.0.0.1", 1)\n  sync()\n  while True:\n'
+        '    socket_read_string(suffix="x", timeout=0.001)\n    socket_read_string(suffix="y", timeout=0.001)\n'
+        "    socket_read_ascii_float(1, timeout=0.001)\n  end\nend\n"
+    )
+    peer = bench.network.sockets[0]
+    peer.inbox = CountingInbox(b"z" * (BUDGETS.inbox_bytes - 1))
+    peer.is_open = is_open
+    bench.tick(2)
+    CountingInbox.searched = 0
+    bench.tick(20)
+    assert bench.controller.programs.is_running
+    assert BUDGETS.search_bytes < CountingInbox.searched <= 20 * (BUDGETS.search_bytes + BUDGETS.inbox_bytes)
+
+
+def test_a_line_that_comes_byte_by_byte_is_looked_at_once():
+    bench = Bench()
+    bench.start(
+        'def f():\n  socket_open("10.0.0.1", 1)\n  textmsg(str_len(socket_read_line(timeout=0)))\nend\n'
+    )
+    peer = bench.network.sockets[0]
+    peer.inbox = CountingInbox()
+    bench.tick()
+    CountingInbox.searched = 0
+    for _ in range(2000):
+        peer.inbox += b"z"
+        bench.tick()
+    peer.inbox += b"\n"
+    bench.tick(2)
+    assert [event.text for event in bench.events if hasattr(event, "text")][-1] == "2000"
+    assert CountingInbox.searched <= 2 * 2001
+
+
+# --- the control API
+
+
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1", "127.1", "127.0.0.9", "0.0.0.0", "0", "2130706433", "0x7f000001", "localhost"]
+)
+def test_scripts_cannot_connect_to_the_control_port(box, host):
+    with connect(box, "primary") as sock:
+        sock.sendall(program(f'textmsg(socket_open("{host}", {box.control_port}))'))
+        assert MessageReader(sock).message(TextMessage).text == "False"
+    [line] = log_lines(box, "Not able to open socket")
+    assert "control API" in line
+
+
+def test_nor_to_that_of_another_box_of_the_process_until_it_is_closed(box):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        with ControlBox(port_base=None, control_port=0) as other:
+            port = other.control_port
+            sock.sendall(program(f'textmsg(socket_open("127.0.0.1", {port}))'))
+            assert reader.message(TextMessage).text == "False"
+        with socket.create_server(("127.0.0.1", port)):
+            sock.sendall(program(f'textmsg(socket_open("127.0.0.1", {port}))'))
+            assert reader.message(TextMessage).text == "True"
+
+
+def test_nor_through_a_modbus_unit(box):
+    with connect(box, "primary") as sock:
+        add = f'modbus_add_signal("127.0.0.1:{box.control_port}", 255, 1, 2, "s")'
+        wait = ("while True:", '  modbus_get_signal_status("s", False)', "  sync()", "end")
+        sock.sendall(program(add, *wait))
+        assert "control API" in MessageReader(sock).message(RuntimeExceptionMessage).text
