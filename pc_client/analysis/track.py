@@ -89,6 +89,8 @@ def track_of(recording: Recording) -> TcpTrack:
     for name, most in _MOST.items():
         if not np.all(np.abs(recording.column(name)) <= most):  # NaN is not
             raise RecordingError(f"{recording.path} has {name} with values beyond {most:g}, or not a number")
+    if not np.all(np.diff(t[rows]) > 0.0):
+        raise RecordingError(f"{recording.path} has time stamps that go back; those of a robot do not")
     cycle = float(np.median(np.diff(t[rows])))
     if not SHORTEST_CYCLE <= cycle <= LONGEST_CYCLE:
         raise RecordingError(

@@ -77,7 +77,6 @@ def parse_law(
     Raises:
         MovementError: naming the field.
     """
-    law: MovementLaw
     if kind == "lognormal":
         strokes = tuple(_parse_stroke(stroke) for stroke in table.tables("strokes"))
         lognormal = SigmaLognormal(points, strokes, duration)
@@ -92,11 +91,11 @@ def parse_law(
         raise table.error("kind", f'"{kind}"; give one of {kinds} (samples are .csv files)')
     if stroke_durations is None:
         raise table.error("stroke_durations", "missing; give a list of numbers")
+    total = sum(stroke_durations.tolist())
+    if abs(total - duration) > 1e-6:
+        raise table.error("duration", f"{duration} s; the stroke durations add up to {total:.6f} s")
     parse = _parse_robotic if kind == "uniform" else _parse_minimum_jerk
-    law = parse(table.table("profile"), points, stroke_durations)
-    if abs(law.duration - duration) > 1e-6:
-        raise table.error("duration", f"{duration} s; the stroke durations add up to {law.duration:.6f} s")
-    return law, stroke_durations
+    return parse(table.table("profile"), points, stroke_durations), stroke_durations
 
 
 def _stroke_lines(stroke: Stroke) -> list[str]:

@@ -43,6 +43,10 @@ class Inflections(NamedTuple):
     after: float
 
 
+# Ages below are taken for 0: a bell divides by its age [s].
+_YOUNGEST = 1e-100
+
+
 def evaluate_bells(t: ArrayLike, t0: ArrayLike, mu: ArrayLike, sigma: ArrayLike) -> BellValues:
     """F, Lambda and dLambda/dt of unit bells; all arguments broadcast against each other.
 
@@ -54,7 +58,7 @@ def evaluate_bells(t: ArrayLike, t0: ArrayLike, mu: ArrayLike, sigma: ArrayLike)
     """
     t, t0, mu, sigma = (np.asarray(value, dtype=np.float64) for value in (t, t0, mu, sigma))
     age = t - t0
-    begun = age > 0.0
+    begun = age > _YOUNGEST
     age = np.where(begun, age, 1.0)
     z = (np.log(age) - mu) / sigma
     done = np.where(begun, ndtr(z), 0.0)

@@ -26,6 +26,8 @@ __all__ = ["Corners", "RoboticLaw", "SmoothedSquareWave", "WayValues"]
 #: What happens at the inner target points: come to rest there, or pass a blended corner with the speed
 #: between two levels.
 Corners = Literal["stop", "blend"]
+#: Of a boxcar [s]; the speed divides by products of two.
+SHORTEST_RAMP = 1e-6
 
 
 class WayValues(NamedTuple):
@@ -142,10 +144,11 @@ class RoboticLaw:
 
 
 def check_ramps(ramps: tuple[float, ...]) -> None:
-    """Refuse ramps that are not one or two boxcar widths above 0 s."""
-    if len(ramps) not in (1, 2) or not all(math.isfinite(ramp) and ramp > 0.0 for ramp in ramps):
+    """Refuse ramps that are not one or two boxcar widths of `SHORTEST_RAMP` at least."""
+    if len(ramps) not in (1, 2) or not all(math.isfinite(ramp) and ramp >= SHORTEST_RAMP for ramp in ramps):
         raise MovementError(
-            f"ramps {list(ramps)} s: give one boxcar width (trapezoids) or two (S-curves), each above 0 s"
+            f"ramps {list(ramps)} s: give one boxcar width (trapezoids) or two (S-curves), "
+            f"{SHORTEST_RAMP:g} s at least"
         )
 
 

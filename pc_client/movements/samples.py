@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -61,7 +62,15 @@ class SampledLaw:
         t = read_only(t - t[0])
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "points", points)
-        object.__setattr__(self, "_spline", CubicSpline(t, points, bc_type="natural"))
+        spline = None
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"), suppress(ValueError):
+            spline = CubicSpline(t, points, bc_type="natural")
+        if spline is None or not np.isfinite(spline.c).all():
+            raise MovementError(
+                f"samples up to {np.abs(points).max():g} away with times from {np.diff(t).min():g} s apart: "
+                "the speed between them is no number; give metres and seconds"
+            )
+        object.__setattr__(self, "_spline", spline)
 
     @property
     def duration(self) -> float:

@@ -170,7 +170,7 @@ class _Scan:
                         damage = "damaged: the checksum over all records is wrong"
                 elif in_rows:
                     self._take(opcode, data[start:end])
-            except (McapError, RecordingError, ValueError, struct.error) as error:
+            except (McapError, RecordingError, ValueError, OverflowError, struct.error) as error:
                 return f"damaged: record at byte {position} cannot be read ({error})"
             position = end
             if opcode == Opcode.FOOTER:

@@ -11,7 +11,8 @@ from functools import lru_cache
 from types import SimpleNamespace
 
 from box_support import FakeNetwork
-from fuzz_corpus import MESSAGES, mutate
+from fuzz_corpus import MESSAGES
+from fuzz_mutations import mutate_bytes
 from fuzz_replies import READERS
 from fuzz_wire import FakeLoop, Wire
 from states_support import check_wires
@@ -209,7 +210,7 @@ class FuzzBox:
             data = MESSAGES[name](rng, self.lively)
             if rng.random() < 0.55:
                 others = rng.choice(tuple(MESSAGES))
-                data = mutate(rng, data, lambda: MESSAGES[others](rng, self.lively))
+                data = mutate_bytes(rng, data, lambda: MESSAGES[others](rng, self.lively))
             self.send(name, wire, data)
         elif kind < 0.93:
             wire.sock.room = rng.choice((0, 1, 100, 5000))

@@ -1,4 +1,4 @@
-"""Valid messages of every port, from the project's own encoders, and what is done to them on the way."""
+"""Valid messages of every port, from the project's own encoders."""
 
 import json
 import struct
@@ -179,39 +179,3 @@ MESSAGES = {
     "modbus": modbus_message,
     "control": control_message,
 }
-_LENGTHS = (0, 1, 2, 3, 5, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
-
-
-def mutate(rng, data, others):
-    """Return data with something wrong with it; `others` makes a message of any port."""
-    data = bytearray(data)
-    for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
-        if not data:
-            break
-        at = rng.randrange(len(data))
-        match rng.randrange(11):
-            case 0:
-                data[at] ^= 1 << rng.randrange(8)
-            case 1:
-                del data[at:]
-            case 2:
-                data[at:at] = data[at : at + rng.randrange(1, 40)]
-            case 3:
-                data[at:at] = rng.randbytes(rng.randrange(1, 20))
-            case 4:
-                del data[at : at + rng.randrange(1, 10)]
-            case 5:
-                size = rng.choice((2, 4))
-                place = rng.choice((0, 2, 4, at))
-                data[place : place + size] = (rng.choice(_LENGTHS) & (256**size - 1)).to_bytes(size, "big")
-            case 6:
-                data[min(rng.choice((2, 7, at)), len(data) - 1)] = rng.randrange(256)
-            case 7:
-                data = data[at:] + data[:at]
-            case 8:
-                data += data * rng.choice((1, 1, 2, 30)) if len(data) < 2000 else b""
-            case 9:
-                data[at:at] = others()
-            case 10:
-                data = data.replace(b"\n", rng.choice((b"\r", b"", b"\n\n", b"\0")))
-    return bytes(data)

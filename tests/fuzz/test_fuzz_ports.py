@@ -11,7 +11,8 @@ import pytest
 from box_support import FrameReader, connect
 from dashboard_support import Dashboard, write_programs
 from fuzz_box import FuzzBox, run
-from fuzz_corpus import MESSAGES, mutate
+from fuzz_corpus import MESSAGES
+from fuzz_mutations import mutate_bytes
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
@@ -147,7 +148,7 @@ def test_the_same_over_sockets(folder, port):
             with socket.create_connection((box.host, number)) as sock:
                 sock.setblocking(False)
                 for _ in range(5):
-                    data = mutate(rng, MESSAGES[port](rng, False), lambda: MESSAGES[port](rng, False))
+                    data = mutate_bytes(rng, MESSAGES[port](rng, False), lambda: MESSAGES[port](rng, False))
                     data = data.replace(b"shutdown", b"shut")  # that would be obeyed
                     try:
                         sock.send(data)

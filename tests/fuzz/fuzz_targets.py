@@ -1,0 +1,5 @@
+"""All readers that are fuzzed, by name."""
+
+from fuzz_client_files import CLIENT_FILES
+
+TARGETS = {**CLIENT_FILES}
