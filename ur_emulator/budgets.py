@@ -89,6 +89,34 @@ class Budgets:
     )
     modbus_requests: int = _budget(64, "requests that wait", "a Modbus unit", "the newest is lost")
 
+    # --- files and reports ---
+
+    # The largest programs in the field have some megabytes.
+    program_bytes: int = _budget(16 * MIB, "bytes", "all files of a program, unpacked", "it is not loaded")
+    program_marks: int = _budget(500_000, "tags and attributes", "all files of a program", "it is not loaded")
+    # Each level of nodes is two levels of XML.
+    program_depth: int = _budget(200, "levels", "the elements of a file", "the program is not loaded")
+    # Real programs nest a few levels.
+    node_depth: int = _budget(50, "levels", "the nodes of a program", "it is not loaded")
+    subprograms: int = _budget(200, "sub-programs", "a program", "it is not loaded")
+    external_control_nodes: int = _budget(20, "nodes of External Control", "a program", "it is not loaded")
+    # A program of 10,000 references among 500 nodes has half of it.
+    reference_steps: int = _budget(
+        10_000_000, "elements led past", "the references of a program", "it is not loaded"
+    )
+    report_files: int = _budget(
+        50,
+        "flight reports and support files",
+        "the programs folder",
+        "no more are written until some are removed",
+    )
+    report_bytes: int = _budget(
+        64 * MIB, "bytes", "all reports in the programs folder", "no more are written until some are removed"
+    )
+    folder_files: int = _budget(
+        100_000, "files and folders", "a programs folder", "no reports are written into it"
+    )
+
 
 BUDGETS: Final = Budgets()
 

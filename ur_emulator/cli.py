@@ -189,8 +189,11 @@ def _write_ready_file(path: Path, rack: Sequence[Box]) -> None:
     ]
     facts = {**boxes[0], "boxes": boxes}
     partial = path.with_name(path.name + ".part")
-    partial.write_text(json.dumps(facts) + "\n")
-    partial.replace(path)
+    try:
+        partial.write_text(json.dumps(facts) + "\n")
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def main() -> None:

@@ -21,6 +21,8 @@ not here: they belong to the program (`urscript.errors`), not to the box.
 
 from __future__ import annotations
 
+_LONGEST_TEXT = 500
+
 
 class EmulatorError(Exception):
     """Root of all errors that a user of the emulator may meet."""
@@ -47,7 +49,10 @@ class PlantError(EmulatorError):
 
 
 class ProgramFileError(EmulatorError):
-    """A program or installation file cannot be used."""
+    """A program or installation file cannot be used; its text, which may quote the file, stays short."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.splitlines())[:_LONGEST_TEXT])
 
 
 class FileMissingError(ProgramFileError):

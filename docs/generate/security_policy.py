@@ -35,7 +35,7 @@ def render() -> str:
 
 def _budgets() -> Iterator[tuple[str, ...]]:
     for row in rows():
-        yield f"{row.limit:,g} {row.unit}", row.scope, row.beyond, f"`{row.name}`"
+        yield f"{row.limit:,} {row.unit}", row.scope, row.beyond, f"`{row.name}`"
 
 
 def _files() -> Iterator[tuple[str, ...]]:

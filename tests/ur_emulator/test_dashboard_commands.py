@@ -49,7 +49,7 @@ def booting(box, dashboard, folder):
 
 
 def no_place_for_the_log(box, dashboard, folder):
-    (folder / "log_history.txt.part").mkdir()
+    (folder / "ur-emulator.part").mkdir()
 
 
 FIVE_SECONDS = "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"

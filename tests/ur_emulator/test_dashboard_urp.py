@@ -317,7 +317,7 @@ def test_what_nobody_knows_is_an_error_that_names_it(tmp_path, nodes, problem):
         (gzip.compress(b"<URProgram>"), "is not XML"),
         (gzip.compress(b"<Installation/>"), "is not a program: it is a <Installation>, not a <URProgram>"),
         (gzip.compress(b"<URProgram/>"), "there is no <MainProgram> in it"),
-        (gzip.compress(bytes(40 << 20)), "has more than 33554432 bytes unpacked"),
+        (gzip.compress(bytes(40 << 20)), "has more than 16777216 bytes unpacked"),
         (
             gzip.compress(b'<!DOCTYPE x [<!ENTITY a "aaaa">]><URProgram>&a;</URProgram>'),
             "a document type is declared",

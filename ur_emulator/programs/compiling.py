@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc
 from ur_emulator.programs.loading import LoadedProgram, load_program
@@ -43,7 +44,11 @@ def compile_loaded(
     loaded: LoadedProgram, received: Mapping[ExternalControlPc, str], catalogue: Catalogue
 ) -> Outcome:
     """Compile a program from a file, with the parts that PCs have sent."""
-    return compile_text(loaded.script(received.__getitem__), catalogue, loaded.file_name)
+    try:
+        text = loaded.script(received.__getitem__)
+    except ProgramFileError as error:
+        return ScriptFailed(1, 1, f"{loaded.file_name} cannot be compiled: {error}")
+    return compile_text(text, catalogue, loaded.file_name)
 
 
 def load_and_compile(

@@ -2,15 +2,18 @@
 
 A box keeps its programs in `/programs`, the maker's simulator in `/ursim/programs`; here both
 mean the one folder, and so does a name without a folder. No name leads out of it: neither by `..`, nor by
-another absolute path, nor through a link.
+another absolute path, nor through a link. Everything below the folder is read and written here.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from ur_emulator.errors import FileMissingError
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.programs import inner_files
 
 # Names of the folder on the wire; the box itself uses the first.
 # Source: replies of real boxes and of the maker's simulator.
@@ -22,12 +25,20 @@ class FoundFile:
     """A file of the folder.
 
     Attributes:
-        path: where it is.
-        wire_path: its name on the wire, `/programs/sub/x.urp`.
+        inside: its path from the folder on, without links.
     """
 
-    path: Path
-    wire_path: str
+    inside: PurePosixPath
+
+    @property
+    def name(self) -> str:
+        """Its name without folder."""
+        return self.inside.name
+
+    @property
+    def wire_path(self) -> str:
+        """Its name on the wire, `/programs/sub/x.urp`."""
+        return str(WIRE_ROOTS[0] / self.inside)
 
 
 class ProgramFolder:
@@ -35,7 +46,12 @@ class ProgramFolder:
 
     def __init__(self, root: Path | None) -> None:
         """Take a folder; `None` is a box without programs."""
-        self.root = None if root is None else root.resolve()
+        self._root = None if root is None else root.resolve()
+
+    @property
+    def exists(self) -> bool:
+        """Whether the box has a folder."""
+        return self._root is not None
 
     def find(self, name: str) -> FoundFile:
         """Return the file of that name.
@@ -46,10 +62,10 @@ class ProgramFolder:
         Raises:
             FileMissingError: there is none, or the name leads out of the folder.
         """
-        path = self.locate(name)
-        if not _is_file(path):
-            raise FileMissingError(f"there is no file {name!r} in {self.root}")
-        return self._found(path)
+        inside = self.locate(name)
+        if not _is(Path.is_file, self._known_root() / inside):
+            raise FileMissingError(f"there is no file {name!r} in the programs folder")
+        return FoundFile(inside)
 
     def has(self, name: str) -> bool:
         """Return whether there is a file of that name."""
@@ -59,13 +75,13 @@ class ProgramFolder:
             return False
         return True
 
-    def locate(self, name: str) -> Path:
-        """Return the path that a name stands for; nothing need exist there.
+    def locate(self, name: str) -> PurePosixPath:
+        """Return the path that a name stands for, from the folder on; nothing need exist there.
 
         Raises:
             FileMissingError: the name leads out of the folder, or there is no folder.
         """
-        if self.root is None:
+        if self._root is None:
             raise FileMissingError(
                 f"{name!r} cannot be found: the box has no programs, give it --programs DIR"
             )
@@ -75,15 +91,23 @@ class ProgramFolder:
                 bare = bare.relative_to(wire_root)
                 break
         try:
-            path = (self.root / bare).resolve()
-            inside = not bare.is_absolute() and ".." not in bare.parts and path.is_relative_to(self.root)
+            path = (self._root / bare).resolve()
+            if not bare.is_absolute() and ".." not in bare.parts and path.is_relative_to(self._root):
+                return PurePosixPath(path.relative_to(self._root))
         except (OSError, ValueError, RuntimeError):  # a null character, a name too long, links in a circle
-            inside = False
-        if not inside:
-            raise FileMissingError(
-                f"{name!r} lies outside of the programs folder: name a file in {self.root}"
-            )
-        return path
+            pass
+        raise FileMissingError(f"{name!r} lies outside of the programs folder: name a file in it")
+
+    def locate_folder(self, name: str) -> PurePosixPath:
+        """Return the path of a folder in this folder, from there on.
+
+        Raises:
+            FileMissingError: there is none of that name.
+        """
+        inside = self.locate(name)
+        if not _is(Path.is_dir, self._known_root() / inside):
+            raise FileMissingError(f"there is no folder {name!r} in the programs folder")
+        return inside
 
     def beside(self, file: FoundFile, name: str) -> FoundFile:
         """Return the file that `file` refers to: by a path of the box, or by a name in the same folder.
@@ -91,25 +115,64 @@ class ProgramFolder:
         Raises:
             FileMissingError: there is none.
         """
-        try:
+        if self.has(name):
             return self.find(name)
-        except FileMissingError:
-            path = file.path.parent / PurePosixPath(name.replace("\\", "/")).name
-            if not _is_file(path):
-                raise
-            return self._found(self.locate(str(path.relative_to(self._known_root()))))
+        return self.find(str(file.inside.parent / PurePosixPath(name.replace("\\", "/")).name))
+
+    def read(self, file: FoundFile, most: int) -> bytes:
+        """Return what is in a file.
+
+        Raises:
+            ProgramFileError: it cannot be read, or has more than `most` bytes.
+        """
+        try:
+            data = inner_files.read(self._known_root(), file.inside, most + 1)
+        except OSError as error:
+            raise ProgramFileError(f"{file.name} cannot be read: {error.strerror or error}") from None
+        if len(data) > most:
+            raise ProgramFileError(f"{file.name} has more than {most} bytes")
+        return data
+
+    def write(self, inside: PurePosixPath, data: bytes) -> FoundFile:
+        """Write a file in one step: a reader never sees half of it.
+
+        Raises:
+            ProgramFileError: it cannot be written; nothing of it stays.
+        """
+        try:
+            inner_files.write(self._known_root(), inside, data)
+        except OSError as error:
+            raise ProgramFileError(f"{inside.name} cannot be written: {error.strerror or error}") from None
+        return FoundFile(inside)
+
+    def make_folder(self, name: str) -> PurePosixPath:
+        """Make a folder directly in this folder, if there is none of that name; return its path.
+
+        Raises:
+            ProgramFileError: it cannot be made, or a link of that name leads out of this folder.
+        """
+        try:
+            inner_files.make_folder(self._known_root(), name)
+        except OSError as error:
+            raise ProgramFileError(f"{name} cannot be made: {error.strerror or error}") from None
+        return self.locate_folder(name)
+
+    def sizes(self) -> Iterator[tuple[PurePosixPath, int]]:
+        """Yield path and size [bytes] of each file, those in inner folders too; links are left out.
+
+        Raises:
+            ProgramFileError: the folder has too many files.
+        """
+        return inner_files.sizes(self._known_root(), BUDGETS.folder_files)
 
     def _known_root(self) -> Path:
-        assert self.root is not None  # there was a file in it
-        return self.root
-
-    def _found(self, path: Path) -> FoundFile:
-        inside = PurePosixPath(path.relative_to(self._known_root()).as_posix())
-        return FoundFile(path, str(WIRE_ROOTS[0] / inside))
+        if self._root is None:
+            raise FileMissingError("the box has no programs, give it --programs DIR")
+        return self._root
 
 
-def _is_file(path: Path) -> bool:
+def _is(kind: Callable[[Path], bool], path: Path) -> bool:
     try:
-        return path.is_file()
+        return kind(path)
     except OSError:  # a name that is too long, a folder that may not be looked into
         return False

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
+from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import (
@@ -13,12 +14,11 @@ from ur_emulator.programs.installation import (
     Installation,
     installation_of,
 )
-from ur_emulator.programs.script_text import as_one_program, read_script
+from ur_emulator.programs.reading import ProgramReader
+from ur_emulator.programs.script_text import as_one_program
 from ur_emulator.programs.script_writer import Gap
 from ur_emulator.programs.urp_program import ROOT, make_script, uses_external_control
 from ur_emulator.programs.urp_values import identifier
-from ur_emulator.programs.xml_tree import read_xml
-from urscript.values import to_script_text
 
 SCRIPT_SUFFIX = ".script"
 PROGRAM_SUFFIX = ".urp"
@@ -56,19 +56,26 @@ class LoadedProgram:
 
         Args:
             received: gives what a PC has sent.
+
+        Raises:
+            ProgramFileError: what PCs have sent is longer than a box takes.
         """
-        lines: list[str] = []
+        texts: list[str] = []
+        size = 0
         headed: set[ExternalControlPc] = set()
         for part in self.parts:
             if isinstance(part, str):
-                lines.append(part)
+                texts.append(part)
                 continue
-            header, body = split_header(received(part.pc))
+            header, lines = split_header(received(part.pc))
             if part.pc not in headed:
                 headed.add(part.pc)
-                lines.extend(part.indent + line for line in header)
-            lines.extend(part.indent + line for line in body)
-        return "\n".join(lines) + "\n"
+                lines = header + lines
+            size += sum(map(len, lines)) + len(lines) * (len(part.indent) + 1)
+            if size > MAX_PROGRAM:
+                raise ProgramFileError(f"the parts of PCs together have more than {MAX_PROGRAM} bytes")
+            texts.append(part.indent + f"\n{part.indent}".join(lines))
+        return "\n".join(texts) + "\n"
 
 
 def split_header(text: str) -> tuple[list[str], list[str]]:
@@ -95,27 +102,21 @@ def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
         ProgramFileError: it cannot be used; the text says why.
     """
     file = folder.find(name)
-    program_name = identifier(file.path.stem)
-    if file.path.suffix == SCRIPT_SUFFIX:
-        script = as_one_program(read_script(file.path), program_name)
+    reader = ProgramReader(folder)
+    program_name = identifier(file.inside.stem)
+    if file.inside.suffix == SCRIPT_SUFFIX:
+        script = as_one_program(reader.script(file), program_name)
         return LoadedProgram(file.wire_path, None, (script,))
-    if file.path.suffix != PROGRAM_SUFFIX:
+    if file.inside.suffix != PROGRAM_SUFFIX:
         raise ProgramFileError(
-            f"{file.path.name} is not a program: its name must end in {PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
+            f"{file.name} is not a program: its name must end in {PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
         )
-    tree = read_xml(file.path)
+    tree = reader.xml(file)
     if tree.root.tag != ROOT:
-        raise ProgramFileError(
-            f"{file.path.name} is not a program: it is a <{tree.root.tag}>, not a <{ROOT}>"
-        )
-    installation = installation_of(folder, tree, file)
-    saved = file.path.with_suffix(SCRIPT_SUFFIX)
-    if saved.is_file() and not uses_external_control(tree):
-        parts: tuple[str | Gap, ...] = (as_one_program(read_script(saved), program_name),)
-    else:
-        parts = _in_bytes(make_script(file, tree, program_name, folder))
-    return LoadedProgram(file.wire_path, installation, parts)
-
-
-def _in_bytes(parts: tuple[str | Gap, ...]) -> tuple[str | Gap, ...]:
-    return tuple(to_script_text(part) if isinstance(part, str) else part for part in parts)
+        raise ProgramFileError(f"{file.name} is not a program: it is a <{tree.root.tag}>, not a <{ROOT}>")
+    installation = installation_of(reader, tree, file)
+    saved = str(file.inside.with_suffix(SCRIPT_SUFFIX))
+    if folder.has(saved) and not uses_external_control(tree):
+        script = as_one_program(reader.script(folder.find(saved)), program_name)
+        return LoadedProgram(file.wire_path, installation, (script,))
+    return LoadedProgram(file.wire_path, installation, make_script(file, tree, program_name, reader))

@@ -2,30 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from protocol.script_channel import MAX_PROGRAM, ProgramText, ScriptChannel
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs.xml_tree import read_bytes
 from urscript.values import to_script_text
-
-_BYTE_ORDER_MARK = "\ufeff"
-
-
-def read_script(path: Path) -> str:
-    """Read a text file, UTF-8 or else Latin-1.
-
-    Raises:
-        ProgramFileError: it cannot be read, is too large, or is not text.
-    """
-    data = read_bytes(path)
-    if b"\0" in data:
-        raise ProgramFileError(f"{path.name} is not text: it has zero bytes")
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    return text.removeprefix(_BYTE_ORDER_MARK).replace("\r\n", "\n")
 
 
 def as_one_program(text: str, name: str) -> str:
@@ -38,9 +17,9 @@ def as_one_program(text: str, name: str) -> str:
     Raises:
         ProgramFileError: the script is longer than a box takes.
     """
-    if len(text) > MAX_PROGRAM:
-        raise ProgramFileError(f"the script has more than {MAX_PROGRAM} bytes")
     plain = to_script_text(text).rstrip() + "\n"
+    if len(plain) > MAX_PROGRAM:
+        raise ProgramFileError(f"the script has more than {MAX_PROGRAM} bytes")
     items = ScriptChannel().feed(plain.encode("latin-1"))
     if len(items) == 1 and isinstance(items[0], ProgramText) and items[0].kind == "def":
         return items[0].text.rstrip("\n")

@@ -7,8 +7,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from protocol.script_channel import MAX_PROGRAM
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.installation import ExternalControlPc
+from urscript.values import to_script_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +30,7 @@ class ScriptWriter:
     """The script so far.
 
     Attributes:
-        parts: lines and gaps, in order.
+        parts: texts of whole lines and gaps, in order.
     """
 
     def __init__(self) -> None:
@@ -36,6 +38,7 @@ class ScriptWriter:
         self._depth = 0
         self._labels = 0
         self._size = 0
+        self._gaps = 0
 
     @property
     def depth(self) -> int:
@@ -43,16 +46,17 @@ class ScriptWriter:
         return self._depth
 
     def add(self, text: str) -> None:
-        """Write a line; a text of several lines is written as it is, each one indented.
+        """Write a line, one character a byte; a text of several lines is written as it is, each one indented.
 
         Raises:
             ProgramFileError: the script becomes longer than a box takes.
         """
-        self._size += len(text)
+        indent = "  " * self._depth
+        plain = to_script_text(text).replace("\r\n", "\n").rstrip("\n")
+        self._size += len(plain) + (1 + plain.count("\n")) * (len(indent) + 1)
         if self._size > MAX_PROGRAM:
             raise ProgramFileError(f"a script of more than {MAX_PROGRAM} bytes comes of the program")
-        indent = "  " * self._depth
-        self.parts.extend(indent + line for line in text.replace("\r\n", "\n").rstrip("\n").split("\n"))
+        self.parts.append(indent + plain.replace("\n", "\n" + indent))
 
     def label(self, text: str) -> None:
         """Write the label of a node, with the number and name that PolyScope shows."""
@@ -60,7 +64,16 @@ class ScriptWriter:
         self.add(f'$ {self._labels} "{one_line(text)}"')
 
     def gap(self, pc: ExternalControlPc) -> None:
-        """Add a gap for a program that comes later."""
+        """Add a gap for a program that comes later.
+
+        Raises:
+            ProgramFileError: there are too many.
+        """
+        self._gaps += 1
+        if self._gaps > BUDGETS.external_control_nodes:
+            raise ProgramFileError(
+                f"the program has more than {BUDGETS.external_control_nodes} nodes of External Control"
+            )
         self.parts.append(Gap(pc, "  " * self._depth))
 
     @contextmanager

@@ -6,18 +6,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs.folder import FoundFile, ProgramFolder
+from ur_emulator.programs.folder import FoundFile
+from ur_emulator.programs.reading import ProgramReader
 from ur_emulator.programs.script_writer import ScriptWriter
 from ur_emulator.programs.urp_values import identifier
-from ur_emulator.programs.xml_tree import XmlTree, read_xml
+from ur_emulator.programs.xml_tree import XmlTree
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
-
-# Greatest depth of nodes; real programs nest a few levels.
-_MAX_DEPTH = 50
-_MAX_SUBPROGRAMS = 200
 
 # Elements that give a variable its name.
 _VARIABLES = ("variable", "ProgramVariable")
@@ -46,26 +44,25 @@ class Shared:
 
     Attributes:
         nodes: what writes each kind of node.
-        folder: of all programs.
+        reader: reads the files of the program.
         writer: takes the script.
         subprograms: by the element that defines each, in the order of the first calls.
-        names: of variables, functions and threads, so that each is unique.
+        names: of variables, functions and threads, so that each is unique; with the number tried last.
     """
 
     nodes: Mapping[str, NodeWriter]
-    folder: ProgramFolder
+    reader: ProgramReader
     writer: ScriptWriter = field(default_factory=ScriptWriter)
     subprograms: dict[Element, SubProgram] = field(default_factory=dict)
-    names: set[str] = field(default_factory=set)
+    names: dict[str, int] = field(default_factory=dict)
 
     def new_name(self, wanted: str) -> str:
         """Return a name like the wanted one that no function or thread has yet."""
-        plain = identifier(wanted)
-        name, count = plain, 1
+        plain = name = identifier(wanted)
         while name in self.names:
-            count += 1
-            name = f"{plain}_{count}"
-        self.names.add(name)
+            self.names[plain] += 1
+            name = f"{plain}_{self.names[plain]}"
+        self.names[name] = 1
         return name
 
 
@@ -84,11 +81,9 @@ class UrpMaker:
         self.file = file
         self.tree = tree
         self.shared = shared
-        shared.names.update(
-            name
-            for element in tree.root.iter()
-            if element.tag in _VARIABLES and (name := element.get("name"))
-        )
+        for element in tree.root.iter():
+            if element.tag in _VARIABLES and (name := element.get("name")):
+                shared.names.setdefault(name, 1)
         self.move: Element | None = None
         self.previous: Element | None = None
         self._depth = 0
@@ -119,8 +114,8 @@ class UrpMaker:
     def write_children(self, element: Element) -> None:
         """Write the nodes inside a node."""
         self._depth += 1
-        if self._depth > _MAX_DEPTH:
-            raise self.error(f"nodes are nested more than {_MAX_DEPTH} deep")
+        if self._depth > BUDGETS.node_depth:
+            raise self.error(f"nodes are nested more than {BUDGETS.node_depth} deep")
         outer, self.previous = self.previous, None
         for child in element.findall("children/*"):
             self.write(child)
@@ -138,15 +133,15 @@ class UrpMaker:
         known = self.shared.subprograms.get(definition)
         if known is not None:
             return known.name
-        if len(self.shared.subprograms) >= _MAX_SUBPROGRAMS:
-            raise self.error(f"there are more than {_MAX_SUBPROGRAMS} sub-programs")
+        if len(self.shared.subprograms) >= BUDGETS.subprograms:
+            raise self.error(f"there are more than {BUDGETS.subprograms} sub-programs")
         name = self.shared.new_name(definition.get("name") or "SubProgram")
         maker, body = self, definition
         file_name = (definition.findtext("programFile") or "").strip()
         if file_name and definition.find("children/*") is None:
-            maker = UrpMaker(
-                beside := self.shared.folder.beside(self.file, file_name), read_xml(beside.path), self.shared
-            )
+            reader = self.shared.reader
+            file = reader.folder.beside(self.file, file_name)
+            maker = UrpMaker(file, reader.xml(file), self.shared)
             main = maker.tree.root.find("children/MainProgram")
             if main is None:
                 raise maker.error("there is no <MainProgram> in it")

@@ -8,12 +8,14 @@ published description of all of them. A node that is not known is an error.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import groupby
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ur_emulator.programs import urp_flow, urp_moves, urp_statements
-from ur_emulator.programs.folder import FoundFile, ProgramFolder
+from ur_emulator.programs.folder import FoundFile
+from ur_emulator.programs.reading import ProgramReader
 from ur_emulator.programs.script_writer import Gap
 from ur_emulator.programs.urp_maker import NodeWriter, Shared, UrpMaker
 from ur_emulator.programs.urp_values import expression_text, variable_name
@@ -58,19 +60,19 @@ def uses_external_control(tree: XmlTree) -> bool:
     )
 
 
-def make_script(file: FoundFile, tree: XmlTree, name: str, folder: ProgramFolder) -> tuple[str | Gap, ...]:
-    """Return the lines of a program and the gaps that are filled when it is played.
+def make_script(file: FoundFile, tree: XmlTree, name: str, reader: ProgramReader) -> tuple[str | Gap, ...]:
+    """Return the script of a program and the gaps in it that are filled when it is played.
 
     Args:
         file: of the program.
         tree: its content.
         name: of the program in the script.
-        folder: where files that it refers to lie.
+        reader: reads files that it refers to.
 
     Raises:
         ProgramFileError: a part of it is not known.
     """
-    maker = UrpMaker(file, tree, Shared(NODES, folder))
+    maker = UrpMaker(file, tree, Shared(NODES, reader))
     writer = maker.writer
     main = tree.root.find("children/MainProgram")
     if main is None:
@@ -93,7 +95,16 @@ def make_script(file: FoundFile, tree: XmlTree, name: str, folder: ProgramFolder
                 writer.label("Robot Program")
                 maker.write_children(main)
         _write_subprograms(maker, begin)
-    return tuple(writer.parts)
+    return tuple(_joined(writer.parts))
+
+
+def _joined(parts: list[str | Gap]) -> Iterator[str | Gap]:
+    """Yield the texts between gaps whole."""
+    for is_text, group in groupby(parts, lambda part: isinstance(part, str)):
+        if is_text:
+            yield "\n".join(map(str, group))
+        else:
+            yield from group
 
 
 _TOP_LEVEL = {"InitVariablesNode", "MainProgram", "SpecialSequence", "SubProgram", "Thread"}

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from ur_emulator.errors import FileMissingError
 from ur_emulator.programs.installation import pc_from
-from ur_emulator.programs.script_text import read_script
 from ur_emulator.programs.script_writer import one_line
 from ur_emulator.programs.urp_maker import UrpMaker
 from ur_emulator.programs.urp_values import (
@@ -56,7 +55,8 @@ def write_script(maker: UrpMaker, element: Element) -> None:
     name = (element.findtext("file") or "").strip()
     if name:
         try:
-            content = read_script(maker.shared.folder.beside(maker.file, name).path)
+            reader = maker.shared.reader
+            content = reader.script(reader.folder.beside(maker.file, name))
         except FileMissingError:
             if content is None:
                 raise

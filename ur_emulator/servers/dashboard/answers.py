@@ -18,7 +18,7 @@ from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
-from ur_emulator.errors import EmulatorError, RefusedError
+from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.dashboard.reports import (
     BoxFacts,
@@ -117,10 +117,12 @@ class DashboardAnswers:
         loading = self._player.load(name)
         if row.replies_when_done(self._access.identity.software.version):
             return self._loaded(row, loading, name, lambda: _path_of(self._player.loaded))
-        if not self._player.folder.has(name):
+        try:
+            path = self._player.folder.find(name).wire_path
+        except FileMissingError:
             return row.reply("not_found", name=name)
         self._access.start_alone(loading)
-        return row.reply(path=self._player.folder.find(name).wire_path)
+        return row.reply(path=path)
 
     def _load_installation(self, row: DashboardCommand, name: str, _: str) -> Answer:
         loading = self._player.load_installation(name)
@@ -189,24 +191,24 @@ class DashboardAnswers:
     def _flight_report(self, row: DashboardCommand, kind: str, _: str) -> Steps[str]:
         facts = self._facts()
         try:
-            number = yield from self._access.in_worker(flight_report, self._reports.root, kind, facts)
-        except (EmulatorError, OSError) as error:
+            number = yield from self._access.in_worker(flight_report, self._reports.folder, kind, facts)
+        except EmulatorError as error:
             return row.reply("failed", reason=error)
         return row.reply(id=number)
 
     def _support_file(self, row: DashboardCommand, directory: str, _: str) -> Steps[str]:
         facts = self._facts()
         try:
-            name = yield from self._access.in_worker(support_file, self._reports.root, directory, facts)
-        except (EmulatorError, OSError) as error:
+            name = yield from self._access.in_worker(support_file, self._reports.folder, directory, facts)
+        except EmulatorError as error:
             return row.reply("failed", reason=error)
         return row.reply(file=name)
 
     def _save_log(self, row: DashboardCommand, *_: str) -> Steps[str]:
         facts = self._facts()
         try:
-            path = yield from self._access.in_worker(save_log, self._reports.root, facts)
-        except (EmulatorError, OSError) as error:
+            path = yield from self._access.in_worker(save_log, self._reports.folder, facts)
+        except EmulatorError as error:
             self._access.note(f"saveLog failed: {error}")
             return row.reply("failed")
         self._access.note(f"Log saved to {path}")

@@ -9,14 +9,16 @@ own; the rest is ours.
 from __future__ import annotations
 
 import json
+import re
 import tempfile
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.programs.folder import FoundFile, ProgramFolder
 
 REPORT_KINDS = ("controller", "software", "system")
 LOG_NAME = "log_history.txt"
@@ -24,6 +26,9 @@ REPORT_FOLDER = "flightreports"
 # Date at which the controller's clock is 0: chosen, the box knows no date.
 CLOCK_EPOCH = datetime(2021, 11, 30, tzinfo=UTC)
 _MAX_SAME_SECOND = 1000
+_FLIGHT_REPORT = re.compile(r"flightreport_([0-9]{1,9})\.zip")
+# Flight reports, and support files of any box.
+_REPORT = re.compile(r"flightreport_[0-9]{1,9}\.zip|ur_[0-9]+_[0-9_-]+\.zip")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,16 +63,25 @@ class ReportFolder:
     """Where reports go."""
 
     def __init__(self, programs: ProgramFolder) -> None:
-        self._root = programs.root
+        self._folder = programs
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
 
     @property
-    def root(self) -> Path:
-        """The folder of programs; a box without one gets a temporary folder now."""
-        if self._root is None:
-            self._temporary = tempfile.TemporaryDirectory(prefix="ur-emulator-", ignore_cleanup_errors=True)
-            self._root = Path(self._temporary.name)
-        return self._root
+    def folder(self) -> ProgramFolder:
+        """The folder of programs; a box without one gets a temporary folder now.
+
+        Raises:
+            ProgramFileError: that cannot be made.
+        """
+        if not self._folder.exists:
+            try:
+                self._temporary = tempfile.TemporaryDirectory(
+                    prefix="ur-emulator-", ignore_cleanup_errors=True
+                )
+            except OSError as error:
+                raise ProgramFileError(f"no temporary folder: {error.strerror or error}") from None
+            self._folder = ProgramFolder(Path(self._temporary.name))
+        return self._folder
 
     def close(self) -> None:
         """Remove the temporary folder, if there is one, with what was written into it."""
@@ -75,65 +89,88 @@ class ReportFolder:
             self._temporary.cleanup()
 
 
-def save_log(root: Path, facts: BoxFacts) -> Path:
-    """Write the log, in place of what was written before; return the file."""
-    return _write(root / LOG_NAME, facts.log.encode("utf-8"))
+def save_log(folder: ProgramFolder, facts: BoxFacts) -> str:
+    """Write the log, in place of what was written before; return the name of the file on the wire.
+
+    Raises:
+        ProgramFileError: it cannot be written.
+    """
+    return folder.write(PurePosixPath(LOG_NAME), facts.log.encode("utf-8")).wire_path
 
 
-def flight_report(root: Path, kind: str, facts: BoxFacts) -> str:
+def flight_report(folder: ProgramFolder, kind: str, facts: BoxFacts) -> str:
     """Write a flight report; return its number.
 
     Args:
-        root: of the reports.
+        folder: of the reports.
         kind: one of `REPORT_KINDS`, or "" for the last of them.
         facts: its contents.
 
     Raises:
-        ProgramFileError: there is no such kind.
+        ProgramFileError: there is no such kind, the report is one too many, or it cannot be written.
     """
     if kind not in ("", *REPORT_KINDS):
         raise ProgramFileError(f"Unknown report type: {kind}")
-    folder = root / REPORT_FOLDER
-    folder.mkdir(exist_ok=True)
-    number = 1 + max((int(p.stem.rpartition("_")[2]) for p in _reports(folder)), default=0)
+    place = folder.make_folder(REPORT_FOLDER)
+    number = 1 + max(_flight_reports(folder, place), default=0)
     contents = {
         "report.json": _json({"kind": kind or REPORT_KINDS[-1], "id": number}),
         **_contents(facts),
     }
-    _write(folder / f"flightreport_{number}.zip", _zip(contents, facts.time))
+    _write_report(folder, place / f"flightreport_{number}.zip", _zip(contents, facts.time))
     return str(number)
 
 
-def support_file(root: Path, directory: str, facts: BoxFacts) -> str:
+def support_file(folder: ProgramFolder, directory: str, facts: BoxFacts) -> str:
     """Write a support file, which holds all flight reports and a new one; return its name.
 
     Args:
-        root: of the reports.
-        directory: of the folder of programs, as a client names it.
+        folder: of the reports.
+        directory: in the folder of programs, as a client names it.
         facts: contents of the new report.
 
     Raises:
-        ProgramFileError: there is no such directory.
+        ProgramFileError: there is no such directory, the file is one too many, or it cannot be written.
     """
     try:
-        place = ProgramFolder(root).locate(directory or "?")
+        place = folder.locate_folder(directory or "?")
     except FileMissingError:
-        place = root / "?"  # a client must not see paths of this machine
-    if not place.is_dir():
-        raise ProgramFileError(f"Directory not found: {directory}")
-    flight_report(root, "", facts)
-    contents = {f"{REPORT_FOLDER}/{p.name}": p.read_bytes() for p in _reports(root / REPORT_FOLDER)}
+        raise ProgramFileError(f"Directory not found: {directory}") from None
+    flight_report(folder, "", facts)
+    reports = _flight_reports(folder, folder.make_folder(REPORT_FOLDER)).values()
+    contents = {f"{REPORT_FOLDER}/{file.name}": folder.read(file, BUDGETS.report_bytes) for file in reports}
     contents |= _contents(facts)
     for later in range(_MAX_SAME_SECOND):  # no file takes the place of another
         stamp = f"{facts.time + timedelta(seconds=later):%Y-%m-%d_%H-%M-%S}"
-        path = place / f"ur_{facts.serial_number}_{stamp}.zip"
-        if not path.exists():
+        inside = place / f"ur_{facts.serial_number}_{stamp}.zip"
+        if not folder.has(str(inside)):
             break
-    return _write(path, _zip(contents, facts.time)).name
+    _write_report(folder, inside, _zip(contents, facts.time))
+    return inside.name
 
 
-def _reports(folder: Path) -> list[Path]:
-    return sorted(p for p in folder.glob("flightreport_*.zip") if p.stem.rpartition("_")[2].isdecimal())
+def _flight_reports(folder: ProgramFolder, place: PurePosixPath) -> dict[int, FoundFile]:
+    """Return the flight reports in a folder by their numbers."""
+    return {
+        int(match[1]): FoundFile(inside)
+        for inside, _ in folder.sizes()
+        if inside.parent == place and (match := _FLIGHT_REPORT.fullmatch(inside.name))
+    }
+
+
+def _write_report(folder: ProgramFolder, inside: PurePosixPath, data: bytes) -> None:
+    """Write a report unless it is one too many: clients must not fill the disk.
+
+    Raises:
+        ProgramFileError: it is one too many, or cannot be written.
+    """
+    reports = [size for other, size in folder.sizes() if _REPORT.fullmatch(other.name)]
+    if len(reports) >= BUDGETS.report_files or sum(reports) + len(data) > BUDGETS.report_bytes:
+        raise ProgramFileError(
+            f"the folder holds {len(reports)} reports with {sum(reports)} bytes, and may hold "
+            f"{BUDGETS.report_files} with {BUDGETS.report_bytes}: remove some"
+        )
+    folder.write(inside, data)
 
 
 def _contents(facts: BoxFacts) -> dict[str, bytes]:
@@ -164,11 +201,3 @@ def _zip(files: dict[str, bytes], time: datetime) -> bytes:
             info.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(info, content)
     return buffer.getvalue()
-
-
-def _write(path: Path, data: bytes) -> Path:
-    """Write a file in one step: a reader never sees half of it."""
-    partial = path.with_name(path.name + ".part")
-    partial.write_bytes(data)
-    partial.replace(path)
-    return path

@@ -1,0 +1,174 @@
+"""Small files that want to become large: each is refused within the budgets of a program, in one short line."""
+
+import gzip
+import pickle
+from dataclasses import replace
+
+import pytest
+from dashboard_support import external_control, script_line, urp
+
+from protocol.script_channel import MAX_PROGRAM
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.errors import ProgramFileError
+from ur_emulator.programs import reading, xml_tree
+from ur_emulator.programs.compiling import compile_loaded
+from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.programs.loading import load_program
+from urscript.catalogue import catalogue_for
+
+BLANKS = '<ExpressionChar character=" "/>' * 50_000
+LAUGHS = "".join(f'<!ENTITY {chr(98 + n)} "{("&" + chr(97 + n) + ";") * 10}">' for n in range(7))
+DOCTYPES = {
+    "laughs": f'<!DOCTYPE URProgram [<!ENTITY a "<c/><c/><c/>">{LAUGHS}]><URProgram>&h;</URProgram>',
+    "defaults": f'<!DOCTYPE c [<!ATTLIST c x CDATA "{"y" * 100_000}">]><URProgram>{"<c/>" * 20_000}</URProgram>',
+}
+
+
+def load(folder, data, name="p.urp"):
+    (folder / name).write_bytes(data)
+    return load_program(ProgramFolder(folder), name)
+
+
+def refused(folder, data):
+    with pytest.raises(ProgramFileError) as told:
+        load(folder, data)
+    text = str(told.value)
+    assert "\n" not in text
+    assert len(text) <= 500
+    return text
+
+
+def nested(depth, inside):
+    return '<Loop type="Forever"><children>' * depth + inside + "</children></Loop>" * depth
+
+
+# --- files
+
+
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp037", "utf-7"]
+)
+@pytest.mark.parametrize("kind", DOCTYPES)
+@pytest.mark.parametrize("packed", [False, True])
+def test_document_types_are_refused_in_every_encoding(tmp_path, kind, encoding, packed):
+    declared = encoding.removesuffix("-sig").removesuffix("-le").removesuffix("-be")
+    data = f'<?xml version="1.0" encoding="{declared}"?>{DOCTYPES[kind]}'.encode(encoding)
+    text = refused(tmp_path, gzip.compress(data) if packed else data)
+    assert any(word in text for word in ("document type", "not text in UTF-8", "not XML"))
+
+
+@pytest.mark.parametrize(
+    ("plain", "problem"),
+    [
+        (b"<URProgram>" + b"<a/>" * 8_000_000 + b"</URProgram>", "more than 16777216 bytes unpacked"),
+        (b"<URProgram>" + b"<a/>" * 500_000 + b"</URProgram>", "more than 500000 tags and attributes"),
+        (b"<URProgram " + b" ".join(b'a%d=""' % n for n in range(500_000)) + b"/>", "more than 500000 tags"),
+        (
+            b"<URProgram>" + b"<a>" * 200_000 + b"</a>" * 200_000 + b"</URProgram>",
+            "nested more than 200 deep",
+        ),
+        (b"<URProgram>\0</URProgram>", "not text in UTF-8"),
+        (b"<URProgram>\xff</URProgram>", "not text in UTF-8"),
+        (b"<" + b"x" * 1_000_000 + b"/>", "is not a program"),
+        (b"<URProgram/><URProgram/>", "is not XML"),
+    ],
+    ids=["bytes", "elements", "attributes", "depth", "zeros", "encoding", "long name", "two roots"],
+)
+def test_a_file_is_bounded_before_and_after_it_is_unpacked(tmp_path, plain, problem):
+    assert problem in refused(tmp_path, gzip.compress(plain))
+
+
+def test_a_packed_file_ends_at_its_end(tmp_path):
+    data = urp(script_line("x = 1"))
+    assert "something stands behind its end" in refused(tmp_path, data + data)
+    assert "something stands behind its end" in refused(tmp_path, data + b"more")
+    assert load(tmp_path, data + bytes(100)).script(str) == load(tmp_path, data).script(str)
+
+
+def test_installations_are_bounded_as_well(tmp_path):
+    inner = '<Contributed ownerId="com.fzi.externalcontrol">' * 10_000 + "</Contributed>" * 10_000
+    (tmp_path / "default.installation").write_bytes(gzip.compress(f"<I>{inner}</I>".encode()))
+    assert "nested more than 200 deep" in refused(tmp_path, urp(script_line("x = 1")))
+
+
+def test_the_budgets_hold_for_all_files_of_a_program_together(tmp_path):
+    (tmp_path / "s.urp").write_bytes(urp("<Comment/>" * 20_000))
+    call = "<CallSubProgram><subprogram><programFile>s.urp</programFile></subprogram></CallSubProgram>"
+    load(tmp_path, urp(call * 2))
+    assert "more than 500000 tags and attributes" in refused(tmp_path, urp(call * 100))
+    (tmp_path / "s.script").write_text("#" * 3_000_000 + "\n")
+    node = '<Script type="File"><file>s.script</file></Script>'
+    assert f"more than {MAX_PROGRAM} bytes" in refused(tmp_path, urp(node * 3))
+
+
+# --- trees
+
+
+def test_references_lead_past_a_bounded_number_of_elements(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading, "BUDGETS", replace(BUDGETS, reference_steps=100_000))
+    first = f'<If type="If"><expression>{BLANKS}<ExpressionChar character="1"/></expression><children/></If>'
+    again = '<If type="If"><expression reference="../../If/expression"/><children/></If>'
+    assert "references lead past more than 100000" in refused(tmp_path, urp(first + again * 5))
+    many = (
+        "<Comment/>" * 1000 + '<Assignment><variable reference="../../Assignment[1]/x"/></Assignment>' * 100
+    )
+    assert "leads nowhere" in refused(tmp_path, urp(many))
+    named = '<Assignment><variable name="a"/><expression><ExpressionChar character="1"/></expression></Assignment>'
+    other = named.replace('name="a"', 'reference="../../Assignment[1]/variable"')
+    assert "references lead past more than 100000" in refused(
+        tmp_path, urp("<Comment/>" * 1000 + named + other * 100)
+    )
+    far = f'<variable reference="{"../" * 20_000}variable"/>'
+    assert "lead" in refused(tmp_path, urp(f"<Assignment>{far}</Assignment>" * 10))
+
+
+def test_levels_of_a_file_are_counted_exactly(tmp_path, monkeypatch):
+    monkeypatch.setattr(xml_tree, "BUDGETS", replace(BUDGETS, program_depth=9))
+    load(tmp_path, urp(nested(2, "<Halt/>")))
+    assert "nested more than 9 deep" in refused(tmp_path, urp(nested(3, "<Halt/>")))
+
+
+def test_many_equal_names_are_numbered_without_a_search_each(tmp_path):
+    threads = '<Thread name="t"><children/></Thread>' * 20_000
+    script = load(tmp_path, urp("", around=threads)).script(str)
+    assert "thread t_20000():" in script
+
+
+# --- scripts
+
+
+def test_indentation_counts(tmp_path):
+    lines = '<Script type="File"><cachedContents>' + "\n" * 200_000 + "x = 1</cachedContents></Script>"
+    load(tmp_path, urp(lines))
+    assert f"a script of more than {MAX_PROGRAM} bytes" in refused(tmp_path, urp(nested(45, lines)))
+
+
+def test_characters_of_several_bytes_count_as_such(tmp_path):
+    line = f'<Comment comment="{"€" * 1_000_000}"/>'
+    load(tmp_path, urp(line))
+    assert f"a script of more than {MAX_PROGRAM} bytes" in refused(tmp_path, urp(line * 2))
+    (tmp_path / "e.script").write_text("#" + "€" * 1_390_000)
+    with pytest.raises(ProgramFileError, match=f"more than {MAX_PROGRAM} bytes"):
+        load(tmp_path, ("#" + "€" * 1_400_000).encode(), "e.script")
+
+
+def test_what_comes_back_to_the_box_is_small(tmp_path):
+    loaded = load(tmp_path, urp(script_line("x = 1") * 5000))
+    assert len(loaded.parts) == 1
+    assert len(pickle.dumps(loaded)) < len(loaded.parts[0]) + 1000
+    assert "more than 20 nodes of External Control" in refused(tmp_path, urp(external_control() * 21))
+    assert "host of External Control has more than 253" in refused(
+        tmp_path, urp(external_control(host="h" * 254))
+    )
+
+
+def test_parts_of_pcs_are_bounded_together(tmp_path):
+    loaded = load(tmp_path, urp(nested(40, external_control(host="h") * 20)))
+    sent = dict.fromkeys(loaded.pcs, "x = 1\n" + "\n" * 100000 + "y = 2\n")
+    outcome = compile_loaded(loaded, sent, catalogue_for("3.15"))
+    assert isinstance(outcome, ScriptFailed)
+    assert (
+        outcome.text
+        == f"p.urp cannot be compiled: the parts of PCs together have more than {MAX_PROGRAM} bytes"
+    )

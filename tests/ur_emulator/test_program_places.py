@@ -1,0 +1,275 @@
+"""Nothing is read or written out of the programs folder, reports stay within their budgets, and no path is told."""
+
+import json
+import os
+import resource
+import zipfile
+from dataclasses import replace
+from pathlib import PurePosixPath
+
+import pytest
+from dashboard_support import Dashboard, script_line, urp, write_programs
+
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.emulator import ControlBox
+from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.programs.folder import FoundFile, ProgramFolder
+from ur_emulator.programs.inner_files import PART_NAME
+from ur_emulator.programs.loading import load_program
+from ur_emulator.servers.dashboard import reports
+from ur_emulator.servers.dashboard.reports import BoxFacts, flight_report, save_log, support_file
+
+SECRET = 'def secret():\n  textmsg("secret of another user")\nend\n'
+FACTS = BoxFacts("20193000007", {"software": "3.15"}, 12.0, {"actual_q": [0.0]}, "the log\n")
+
+
+@pytest.fixture
+def outside(tmp_path):
+    """A folder of somebody else."""
+    (tmp_path / "outside").mkdir()
+    (tmp_path / "outside" / "secret.script").write_text(SECRET)
+    return tmp_path / "outside"
+
+
+@pytest.fixture
+def folder(tmp_path, outside):
+    (tmp_path / "programs").mkdir()
+    return write_programs(tmp_path / "programs")
+
+
+def session(folder, *lines):
+    """Let a box answer lines; return the replies and the log."""
+    with (
+        ControlBox(pace="lockstep", port_base=None, seed=7, programs=folder) as box,
+        Dashboard(box) as dashboard,
+    ):
+        return dashboard.ask_all(*lines), [str(entry) for entry in box.log]
+
+
+def parts_left(folder):
+    return list(folder.rglob("*.part"))
+
+
+# --- links
+
+
+def test_a_saved_script_that_is_a_link_does_not_leak_into_a_support_file(folder, outside):
+    (folder / "hello.script").symlink_to(outside / "secret.script")
+    replies, _ = session(folder, "load hello.urp", "generate support file .")
+    assert replies[0] == "Loading program: /programs/hello.urp"
+    with zipfile.ZipFile(folder / replies[1].removeprefix("Completed successfully:")) as archive:
+        assert not any(b"secret of" in archive.read(name) for name in archive.namelist())
+
+
+def test_a_flight_report_that_is_a_link_does_not_leak_into_a_support_file(folder, outside):
+    (folder / "flightreports").mkdir()
+    (folder / "flightreports" / "flightreport_1.zip").symlink_to(outside / "secret.script")
+    os.mkfifo(folder / "flightreports" / "flightreport_2.zip")
+    (folder / "flightreports" / "flightreport_3.zip").mkdir()
+    name = support_file(ProgramFolder(folder), ".", FACTS)
+    with zipfile.ZipFile(folder / name) as archive:
+        assert [n for n in archive.namelist() if "flight" in n] == ["flightreports/flightreport_1.zip"]
+        assert b"secret of" not in archive.read("flightreports/flightreport_1.zip")
+
+
+@pytest.mark.parametrize("line", ["generate flight report", "generate support file ."])
+def test_a_linked_report_folder_is_not_written_through(folder, outside, line):
+    (folder / "flightreports").symlink_to(outside)
+    replies, _ = session(folder, line)
+    assert "lies outside of the programs folder" in replies[0]
+    assert [path.name for path in outside.iterdir()] == ["secret.script"]
+
+
+def test_a_log_that_is_a_link_is_replaced_and_not_written_through(folder, outside):
+    for name in ("log_history.txt", PART_NAME):
+        (folder / name).symlink_to(outside / "secret.script")
+    assert session(folder, "saveLog")[0] == ["Log saved to disk"]
+    assert (outside / "secret.script").read_text() == SECRET
+    assert not (folder / "log_history.txt").is_symlink()
+    assert not parts_left(folder)
+
+
+def test_links_that_stay_in_the_folder_work(folder):
+    (folder / "real").mkdir()
+    (folder / "flightreports").symlink_to("real")
+    (folder / "again.urp").symlink_to(folder / "hello.urp")
+    (folder / "cell" / "hello.script").symlink_to("../new.script")
+    (folder / "new.script").write_text("def new():\n  textmsg(1)\nend\n")
+    replies, _ = session(folder, "load again.urp", "load cell/hello.script", "generate flight report")
+    assert replies == [
+        "Loading program: /programs/hello.urp", "Loading program: /programs/new.script", "Flight Report generated with id:1",
+    ]  # fmt: skip
+    assert (folder / "real" / "flightreport_1.zip").is_file()
+
+
+def test_a_folder_that_is_itself_a_link_works(folder, tmp_path):
+    (tmp_path / "link").symlink_to(folder)
+    replies, _ = session(tmp_path / "link", "load hello.urp", "saveLog")
+    assert replies == ["Loading program: /programs/hello.urp", "Log saved to disk"]
+
+
+@pytest.mark.parametrize("swapped", ["file", "folder"])
+def test_a_link_that_is_put_there_after_the_check_leads_nowhere(folder, outside, swapped):
+    place = ProgramFolder(folder)
+    (folder / "cell" / "secret.script").write_text("x = 1\n")
+    found = place.find("cell/secret.script")
+    if swapped == "file":
+        (folder / "cell" / "secret.script").unlink()
+        (folder / "cell" / "secret.script").symlink_to(outside / "secret.script")
+    else:
+        (folder / "cell").rename(folder / "moved")
+        (folder / "cell").symlink_to(outside)
+        with pytest.raises(ProgramFileError, match="cannot be written"):
+            place.write(PurePosixPath("cell/evil.txt"), b"x")
+        assert not (outside / "evil.txt").exists()
+    with pytest.raises(ProgramFileError, match="cannot be read"):
+        place.read(found, 1000)
+
+
+# --- what is no file
+
+
+def test_pipes_devices_and_folders_are_no_programs(folder):
+    os.mkfifo(folder / "pipe.script")
+    os.mkfifo(folder / "wait.script")  # beside a program
+    (folder / "folder.script").mkdir()
+    (folder / "null.script").symlink_to("/dev/null")
+    replies, _ = session(
+        folder, *(f"load {name}.script" for name in ("pipe", "folder", "null")), "load wait.urp"
+    )
+    assert replies == [
+        "File not found: pipe.script", "File not found: folder.script", "File not found: null.script",
+        "Loading program: /programs/wait.urp",
+    ]  # fmt: skip
+
+
+def test_a_pipe_that_is_put_there_after_the_check_does_not_block(folder):
+    os.mkfifo(folder / "pipe.script")
+    with pytest.raises(ProgramFileError, match=r"pipe\.script cannot be read: it is not a file"):
+        ProgramFolder(folder).read(FoundFile(PurePosixPath("pipe.script")), 1000)
+
+
+# --- budgets and disks
+
+
+def test_reports_are_counted_and_the_next_is_refused(folder, monkeypatch):
+    monkeypatch.setattr(reports, "BUDGETS", replace(BUDGETS, report_files=4))
+    place = ProgramFolder(folder)
+    assert [flight_report(place, "", FACTS) for _ in range(2)] == ["1", "2"]
+    support_file(place, "cell", FACTS)  # with a third report
+    for write in (lambda: flight_report(place, "", FACTS), lambda: support_file(place, ".", FACTS)):
+        with pytest.raises(ProgramFileError, match="the folder holds 4 reports"):
+            write()
+    (folder / "flightreports" / "flightreport_1.zip").unlink()
+    assert flight_report(place, "", FACTS) == "4"
+    assert save_log(place, FACTS) == "/programs/log_history.txt"
+
+
+def test_the_bytes_of_reports_are_bounded(folder, monkeypatch):
+    monkeypatch.setattr(reports, "BUDGETS", replace(BUDGETS, report_bytes=20_000))
+    noise = replace(FACTS, log=os.urandom(2000).hex())
+
+    def write_many():
+        for _ in range(20):
+            support_file(ProgramFolder(folder), ".", noise)
+
+    with pytest.raises(ProgramFileError, match="may hold 50 with 20000: remove some"):
+        write_many()
+    assert sum(path.stat().st_size for path in folder.rglob("*.zip")) <= 20_000
+
+
+def test_the_dashboard_tells_that_no_report_is_written_any_more(folder):
+    (folder / "flightreports").mkdir()
+    for number in range(BUDGETS.report_files):
+        (folder / "flightreports" / f"flightreport_{number}.zip").touch()
+    replies, _ = session(folder, "generate flight report", "generate support file .", "running")
+    assert all("remove some" in reply for reply in replies[:2])
+    assert replies[2] == "Program running: false"
+    assert not list(folder.glob("*.zip"))
+
+
+def test_a_folder_of_too_many_files_gets_no_reports(folder, monkeypatch):
+    monkeypatch.setattr("ur_emulator.programs.folder.BUDGETS", replace(BUDGETS, folder_files=5))
+    with pytest.raises(ProgramFileError, match="too many files"):
+        flight_report(ProgramFolder(folder), "", FACTS)
+
+
+@pytest.fixture
+def small_disk():
+    """Files may have 1,000 bytes, as if the disk were full then."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_full_disk_is_one_line_and_leaves_nothing(folder, small_disk):
+    place = ProgramFolder(folder)
+    noise = replace(FACTS, log=os.urandom(5000).hex())
+    writers = (
+        lambda: save_log(place, noise), lambda: flight_report(place, "", noise), lambda: support_file(place, ".", noise)
+    )  # fmt: skip
+    for write in writers:
+        with pytest.raises(ProgramFileError, match=r"^\S+ cannot be written: [^/\n]+$"):
+            write()
+    assert not parts_left(folder)
+    assert not list(folder.rglob("*.zip"))
+
+
+def test_what_a_killed_box_has_left_goes_with_the_next_write(folder):
+    (folder / PART_NAME).write_bytes(b"half a report")
+    support_file(ProgramFolder(folder), ".", FACTS)
+    assert not parts_left(folder)
+
+
+@pytest.mark.parametrize("line", ["saveLog", "generate flight report", "generate support file cell"])
+def test_without_rights_it_is_one_line(folder, line):
+    (folder / "flightreports").mkdir()
+    for place in ("", "flightreports", "cell"):
+        (folder / place / PART_NAME).mkdir()  # as good as no rights, and holds for root as well
+    replies, log = session(folder, line)
+    assert replies[0] != "Log saved to disk"
+    assert "Completed" not in replies[0]
+    assert "generated" not in replies[0]
+    assert str(folder) not in "\n".join(replies + log)
+
+
+def test_without_a_temporary_folder_it_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "gone"))
+    with ControlBox(pace="lockstep", port_base=None) as box, Dashboard(box) as dashboard:
+        assert "no temporary folder" in dashboard.ask("generate flight report")
+        assert dashboard.ask("running") == "Program running: false"
+        assert str(tmp_path) not in "".join(map(str, box.log))
+
+
+# --- what is told
+
+
+def test_no_answer_and_no_log_entry_tells_where_the_folder_is(folder, outside):
+    (folder / "link.script").symlink_to(outside / "secret.script")
+    (folder / "lost.urp").write_bytes(urp(script_line("x = 1"), installation="gone"))
+    (folder / "file.urp").write_bytes(urp('<Script type="File"><file>gone.script</file></Script>'))
+    (folder / "cut.urp").write_bytes(urp(script_line("x = 1"))[:-20])
+    names = [
+        "gone.urp",
+        "link.script",
+        "../secret.script",
+        "lost.urp",
+        "file.urp",
+        "cut.urp",
+        "strange.urp",
+        "cell",
+        "x" * 900,
+    ]
+    replies, log = session(
+        folder, *(f"load {name}" for name in names), "load installation gone", "load installation odd.installation", "saveLog",
+        "generate flight report", "generate support file ..", "generate support file cell",
+    )  # fmt: skip
+    told = json.dumps([replies, log])
+    assert str(folder.parent) not in told
+    assert "lies outside of the programs folder" in told
+
+
+def test_names_stay_those_of_the_wire(folder):
+    with pytest.raises(FileMissingError, match=r"^there is no file 'gone\.urp' in the programs folder$"):
+        load_program(ProgramFolder(folder), "gone.urp")

@@ -1,0 +1,64 @@
+"""Reads the files of one program. Its budgets hold for all of them together: a program may name many."""
+
+from __future__ import annotations
+
+from protocol.script_channel import MAX_PROGRAM
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.errors import ProgramFileError
+from ur_emulator.programs.folder import FoundFile, ProgramFolder
+from ur_emulator.programs.xml_tree import XmlTree, count_marks, parse_xml, unpack
+
+_BYTE_ORDER_MARK = "\ufeff"
+
+
+class ProgramReader:
+    """Reads the files of one program.
+
+    Attributes:
+        folder: where they lie.
+    """
+
+    def __init__(self, folder: ProgramFolder) -> None:
+        self.folder = folder
+        self._bytes_left = BUDGETS.program_bytes
+        self._marks_left = BUDGETS.program_marks
+        self._steps_left = BUDGETS.reference_steps
+
+    def xml(self, file: FoundFile) -> XmlTree:
+        """Read an XML file, packed or not.
+
+        Raises:
+            ProgramFileError: it cannot be read, is not XML, or the program becomes too large with it.
+        """
+        data = unpack(file.name, self.folder.read(file, self._bytes_left), self._bytes_left)
+        self._bytes_left -= len(data)
+        self._marks_left -= count_marks(data)
+        if self._marks_left < 0:
+            raise ProgramFileError(
+                f"{file.name}: the program has more than {BUDGETS.program_marks} tags and attributes"
+            )
+        return parse_xml(file.name, data, self._take_steps)
+
+    def script(self, file: FoundFile) -> str:
+        """Read a text file, UTF-8 or else Latin-1.
+
+        Raises:
+            ProgramFileError: it cannot be read, is not text, or the program becomes too large with it.
+        """
+        data = self.folder.read(file, min(MAX_PROGRAM, self._bytes_left))
+        self._bytes_left -= len(data)
+        if b"\0" in data:
+            raise ProgramFileError(f"{file.name} is not text: it has zero bytes")
+        try:
+            text = data.decode("utf-8")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+        return text.removeprefix(_BYTE_ORDER_MARK).replace("\r\n", "\n")
+
+    def _take_steps(self, name: str, count: int) -> None:
+        """Count elements that references have led past."""
+        self._steps_left -= count
+        if self._steps_left < 0:
+            raise ProgramFileError(
+                f"{name}: references lead past more than {BUDGETS.reference_steps} elements in all"
+            )
