@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -89,8 +90,10 @@ def withstands(attack: Attack, box: BoxUnderAttack, seconds: float) -> list[str]
 def watched(attack: Attack, seconds: float) -> Outcome:
     """Attack a box of its own, with bystanders."""
     with served(attack) as box:
+        began = time.monotonic()
         with watching(box) as seen:
             remark, problems = _attacked(attack, box, seconds)
+            time.sleep(max(0.0, began + seconds - time.monotonic()))  # what it has left behind is seen too
         problems += box.problems()
         return Outcome(seen, tuple(problems), remark, box.stop())
 

@@ -27,7 +27,7 @@ def flood(
     clients: int = 8,
     reads: bool = True,
     most: int = 64 << 20,
-) -> int:
+) -> None:
     """Send the same bytes again and again over some connections; one that the box closes is replaced.
 
     Args:
@@ -38,9 +38,6 @@ def flood(
         clients: how many connections.
         reads: they read what comes.
         most: bytes in total.
-
-    Returns:
-        Bytes that the box's machine has taken.
     """
     sent, end = 0, time.monotonic() + seconds
     events = selectors.EVENT_WRITE | (selectors.EVENT_READ if reads else 0)
@@ -74,7 +71,6 @@ def flood(
                     selector.unregister(sock)
                     sock.close()
                     del at[sock]
-    return sent
 
 
 @contextmanager
@@ -99,11 +95,11 @@ def reset(sock: socket.socket) -> None:
     sock.close()
 
 
-def until(condition: Callable[[], bool], what: str) -> float:
-    """Wait until a condition holds; return how long that took [s]."""
+def until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> float:
+    """Wait until a condition holds, for at most `patience` [s]; return how long that took [s]."""
     began = time.monotonic()
     while not condition():
-        assert time.monotonic() < began + PATIENCE, f"not within {PATIENCE:g} s: {what}"
+        assert time.monotonic() < began + patience, f"not within {patience:g} s: {what}"
         time.sleep(0.02)
     return time.monotonic() - began
 
@@ -111,6 +107,20 @@ def until(condition: Callable[[], bool], what: str) -> float:
 def plays(box: BoxUnderAttack) -> bool:
     """Return whether a program runs."""
     return box.ask("running")[0] == "Program running: true"
+
+
+def run_to_end(box: BoxUnderAttack, *lines: str) -> None:
+    """Run a program of these lines, and wait for its end."""
+    after = request(box, "GET", "log")[1]["next"]
+    box.run(*lines)
+
+    def has_ended() -> bool:
+        entries = request(box, "GET", f"log?after={after}")[1]["entries"]
+        return any(
+            entry["level"] == "FAULT" or entry["text"].startswith("Program stopped") for entry in entries
+        )
+
+    until(has_ended, "the program ends")
 
 
 @contextmanager

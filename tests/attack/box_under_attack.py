@@ -48,6 +48,7 @@ class BoxUnderAttack:
         programs: its folder of programs.
         errors: the file that stderr goes to, unless an attack took it.
         at_rest: descriptors and threads before the attack.
+        is_stopped: it was told to end.
     """
 
     process: subprocess.Popen
@@ -56,6 +57,7 @@ class BoxUnderAttack:
     programs: Path
     errors: Path
     at_rest: tuple[int, int] = (0, 0)
+    is_stopped: bool = False
     _turns: Iterator[int] = field(default_factory=count)
 
     def connect(self, port: str, timeout: float = PATIENCE) -> socket.socket:
@@ -94,6 +96,8 @@ class BoxUnderAttack:
 
     def problems(self) -> list[str]:
         """Return what is wrong with the box, a line each: none if it lives, answers, moves and has let go of all."""
+        if self.is_stopped:
+            return []
         if self.process.poll() is not None:
             told = self.errors.read_text().strip().splitlines()
             return [f"the box has ended with code {self.process.returncode}: {(told or ['no word'])[-1]}"]
@@ -150,6 +154,7 @@ class BoxUnderAttack:
     def stop(self) -> float:
         """Tell the box to end; return how long that takes [s], infinity if it must be killed."""
         began = time.monotonic()
+        self.is_stopped = True
         self.process.send_signal(signal.SIGTERM)
         try:
             self.process.wait(PATIENCE)

@@ -63,7 +63,7 @@ def timer(pid):
         gap_ms: longest time between two wakes; box_mb, worker_mb: most memory that the process held, and most that
         its children held together.
     """
-    box, children, worker_peak, k = psutil.Process(pid), [], 0, 0
+    box, children, box_peak, worker_peak, k = psutil.Process(pid), [], 0, 0, 0
     began = last = time.monotonic()
     gap = 0.0
     _begin()
@@ -74,11 +74,16 @@ def timer(pid):
             if k % _CHILDREN_EVERY == 0:
                 children = box.children()
             if k % _LOOK_EVERY == 0:
+                box_peak = max(box_peak, peak_memory(pid))
                 worker_peak = max(worker_peak, sum(peak_memory(child.pid) for child in children))
         # What the looks cost is no gap of the host.
         last += time.monotonic() - now
         k = max(k + 1, round((last - began) / PERIOD))
-    return {"gap_ms": 1e3 * gap, "box_mb": peak_memory(pid) / _MB, "worker_mb": worker_peak / _MB}
+    return {
+        "gap_ms": 1e3 * gap,
+        "box_mb": max(box_peak, peak_memory(pid)) / _MB,
+        "worker_mb": worker_peak / _MB,
+    }
 
 
 def peak_memory(pid):
