@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -16,6 +15,7 @@ from pc_client.commands.experiment import execute
 from pc_client.commands.options import OutOption, RepeatOption, RobotOption, TimeUnitOption, console, say
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import ClientError, MovementError
+from pc_client.file_names import as_file_name
 
 if TYPE_CHECKING:
     from pc_client.drawing.drawing import Drawing
@@ -195,7 +195,7 @@ def _names(recordings: Sequence[PenRecording]) -> list[str]:
     """Names of movements, each its own and fit for file names."""
     names: list[str] = []
     for recording in recordings:
-        stem = re.sub(r"[^A-Za-z0-9_-]+", "_", PurePath(recording.name).stem).strip("_") or "drawing"
+        stem = as_file_name(recording.name, "drawing")
         name, number = stem, 2
         while name in names:
             name, number = f"{stem}_{number}", number + 1

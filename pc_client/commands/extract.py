@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import sys
 from collections.abc import Sequence
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -18,7 +18,8 @@ from pc_client.commands.options import (
     console,
     say,
 )
-from pc_client.errors import ClientError, RecordingError, one_line
+from pc_client.errors import ClientError, RecordingError, one_line, printable
+from pc_client.file_names import as_file_name
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -149,7 +150,7 @@ def _pictures(outcomes: Sequence[Outcome]) -> dict[str, bytes]:
     """Pictures by file name: the place in the batch makes names differ that are equal in their last part."""
     digits = len(str(len(outcomes)))
     return {
-        f"figures/{number:0{digits}}_{PurePath(outcome.name).stem}.png": outcome.picture
+        f"figures/{number:0{digits}}_{as_file_name(outcome.name, 'recording')}.png": outcome.picture
         for number, outcome in enumerate(outcomes, start=1)
         if outcome.picture is not None
     }
@@ -193,7 +194,7 @@ def _table(rows: Sequence[Row]) -> Table:
     table = Table(*map(escape, headings))  # rich would take a unit in brackets for a style
     for row in rows:
         table.add_row(
-            escape(row.file),
+            escape(printable(row.file)),
             _decibels(row.snr_v_db),
             _decibels(row.snr_t_db),
             str(row.n_strokes),

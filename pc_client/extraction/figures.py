@@ -16,6 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pc_client.errors import printable
 from pc_client.extraction.extract import Extraction, PartExtraction
 from pc_client.extraction.results import Row
 from pc_client.movements.stroke import Motion
@@ -36,7 +37,7 @@ def draw_extraction(extraction: Extraction) -> bytes:
     """
     spatial = extraction.parts[0].p.shape[1] == 3
     figure = Figure(figsize=(12.0, 4.6), layout="constrained")
-    figure.suptitle(_title(extraction), fontsize=10)
+    figure.suptitle(printable(_title(extraction)), fontsize=10, parse_math=False)
     grid = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.7))
     path = figure.add_subplot(grid[0], projection="3d" if spatial else None)
     speed = figure.add_subplot(grid[1])

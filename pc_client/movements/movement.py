@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import MovementError
+from pc_client.file_names import ALLOWED, MOST_BYTES, is_file_name
 from pc_client.movements.geometry import Similarity, read_only
 from pc_client.movements.minimum_jerk import MinimumJerk
 from pc_client.movements.power_law import PowerLaw
@@ -49,9 +50,6 @@ _KINDS: Mapping[type, Kind] = MappingProxyType(
 LONGEST_DURATION = 1200.0
 """No movement lasts longer [s]: its recording could not be read back (`pc_client.input_files`)."""
 
-_NOT_IN_NAMES = frozenset('/\\:*?"<>|')
-_LONGEST_NAME = 100
-
 
 def check_name(name: str) -> None:
     """Refuse a name of which no file name of the same folder can be made, on any system.
@@ -59,16 +57,9 @@ def check_name(name: str) -> None:
     Raises:
         MovementError: saying what is allowed.
     """
-    if (
-        not 0 < len(name) <= _LONGEST_NAME
-        or name.startswith((".", "-"))
-        or not name.isprintable()
-        or not _NOT_IN_NAMES.isdisjoint(name)
-    ):
+    if not is_file_name(name):
         raise MovementError(
-            f"a movement is called {name[:_LONGEST_NAME]!r}: files are named after it, so give 1 to "
-            f"{_LONGEST_NAME} printed characters without {' '.join(sorted(_NOT_IN_NAMES))}, "
-            "and no dot or minus at the beginning"
+            f"a movement is called {name[:MOST_BYTES]!r}: files are named after it, so give {ALLOWED}"
         )
 
 

@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +21,9 @@ from pc_client.errors import SweepError
 from pc_client.input_files import read_bytes
 from pc_client.sweep.case import Case
 from pc_client.sweep.outcome import Outcome
+
+# A part of a file that is older [s] belongs to a sweep that was killed.
+_LONGEST_WRITE = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +37,18 @@ class SweepFolder:
     path: Path
 
     def prepare(self) -> None:
-        """Make the folder, and find out now whether it can be written.
+        """Make the folder, find out now whether it can be written, and remove what a killed sweep has left.
 
         Raises:
             SweepError: it cannot.
         """
         self.write("cases/.writable", b"")
         (self.path / "cases/.writable").unlink(missing_ok=True)
+        for folder in ("cases", "recordings"):
+            for partial in (self.path / folder).rglob("*.part"):
+                with suppress(OSError):  # another sweep into this folder has removed it
+                    if time.time() - partial.stat().st_mtime > _LONGEST_WRITE:
+                        partial.unlink()
 
     def load(self, case: Case, keep_recordings: bool) -> Outcome | None:
         """What came of a case in an earlier call; None when it has to run (again).

@@ -10,7 +10,7 @@ import sys
 import tracemalloc
 import zipfile
 from collections.abc import Callable
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from zlib import crc32
 
 import pytest
@@ -30,6 +30,7 @@ from pc_client.errors import ClientError, MovementError, RecordingError, one_lin
 from pc_client.experiment.prepare import _refuse_to_lose
 from pc_client.extraction.files import MOST_SAMPLES, parse_pen
 from pc_client.extraction.sources import contents, pen_sources
+from pc_client.file_names import MOST_BYTES, as_file_name, is_file_name
 from pc_client.input_files import FILE_KINDS, MIB, read_bytes
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.movements.files import LIBRARY_FOLDER, load_movement
@@ -325,14 +326,56 @@ ODD = [
 ]
 
 
-@pytest.mark.parametrize(
-    "name", ["../../evil", "/etc/evil", "a/b", "a\\\\b", "..", ".x", "-rf", "", "x" * 300, "a\\u0000"]
-)
+NO_NAMES = [
+    *(
+        "../../evil",
+        "/etc/evil",
+        "a/b",
+        "a\\\\b",
+        "..",
+        ".",
+        ".x",
+        "-rf",
+        "",
+        " ",
+        "a ",
+        " a",
+        "a.",
+        "x" * 300,
+        "é" * 51,
+    ),
+    *(
+        "a\\u0000",
+        "a\\u001b[2J",
+        "a\\nb",
+        "C:evil",
+        "a*",
+        "CON",
+        "nul",
+        "Com1",
+        "LPT9.txt",
+        "aux.tar.gz",
+        "a\\u202eb",
+    ),
+]
+
+
+@pytest.mark.parametrize("name", NO_NAMES)
 def test_a_name_never_leaves_the_folder_of_the_recordings(tmp_path: Path, name: str) -> None:
     path = tmp_path / "m.toml"
     path.write_text(LIBRARY.replace('"lognorm_4_1"', f'"{name}"'))
     with pytest.raises(MovementError, match="name"):
         load_movement(path)
+
+
+@QUIET
+@given(name=st.text(max_size=120) | st.sampled_from(NO_NAMES))
+def test_a_name_that_is_taken_is_a_file_of_the_folder(name: str) -> None:
+    if is_file_name(name):
+        assert PurePosixPath(name).parts == PureWindowsPath(name).parts == (name,)
+        assert not PureWindowsPath(name).is_reserved()
+        assert len(name.encode()) <= MOST_BYTES
+    assert is_file_name(as_file_name(name, "drawing"))
 
 
 def test_a_movement_of_years_is_refused_before_it_is_planned(tmp_path: Path) -> None:

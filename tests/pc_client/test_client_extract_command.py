@@ -100,6 +100,29 @@ def test_archives_and_folders(here):
     assert sorted(path.name for path in (here / "out/figures").iterdir()) == ["1_one.png", "2_two.png"]
 
 
+def test_pictures_lie_in_the_folder_whatever_names_an_archive_has(here, capsys):
+    names = [
+        "../../evil.csv",
+        "a/../../evil.csv",
+        "x" * 400 + ".csv",
+        "..\\evil.csv",
+        "CON.csv",
+        "-a\x1b[2J.csv",
+        "$x^$.csv",
+    ]
+    with zipfile.ZipFile(here / "all.zip", "w") as archive:
+        for name in names:
+            archive.write(here / "one.csv", name)
+    before = set(here.rglob("*"))
+    assert cli.run(["extract", "all.zip", "--out", "deep/out", "--figures", "all"]) == 0
+    new = [path.relative_to(here).as_posix() for path in set(here.rglob("*")) - before if path.is_file()]
+    assert {name.rpartition("/")[0] for name in new} == {"deep/out", "deep/out/figures"}
+    assert sorted(name.rpartition("/")[2] for name in new if "figures" in name) == [
+        "1_x.png", "2_a_2J.png", "3_evil.png", "4_evil.png", "5_evil.png", "6_recording.png", f"7_{'x' * 80}.png",
+    ]  # fmt: skip
+    assert "\x1b[2J" not in capsys.readouterr().out
+
+
 def test_the_unit_of_time_can_be_given(here):
     assert cli.run(["extract", "one.csv", "--out", "out", "--time-unit", "ms", "--figures", "none"]) == 0
     assert rows(here / "out")[0]["n_strokes"] <= 1

@@ -6,6 +6,7 @@ import csv
 import errno
 import io
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -106,6 +107,17 @@ def test_a_full_disk_leaves_no_half_file(tmp_path, monkeypatch):
     assert folder.load(case(), False) is None
     assert folder.load(case(seed=8), False) == DONE
     assert [p.name for p in (tmp_path / "cases").iterdir()] == [f"{case(seed=8).identity}.json"]
+
+
+def test_what_a_killed_sweep_has_left_goes_but_not_what_is_being_written(tmp_path):
+    SweepFolder(tmp_path).prepare()
+    for folder in ("cases", "recordings/abc"):
+        (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+        (tmp_path / folder / "old.1.part").write_bytes(b"half")
+        (tmp_path / folder / "new.2.part").write_bytes(b"half")
+        os.utime(tmp_path / folder / "old.1.part", (0, 0))
+    SweepFolder(tmp_path).prepare()
+    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {"new.2.part"}
 
 
 def test_a_folder_that_cannot_be_written_is_found_at_once(tmp_path):
