@@ -9,10 +9,18 @@ from pathlib import Path
 CORPUS = Path(__file__).parent / "corpus"
 FINDINGS = {
     "archive/bomb.zip": "3.1 GB, and a name outside of the folder",
+    "installation/entities.installation": "entities that double are what XML bombs are made of",
+    "installation/long_port.installation": "the log had all of the port's 5,000 digits",
     "movement/name_leaves_the_folder.toml": "recordings were written beside the folder",
     "movement/shortest_lead.toml": "0 / 0: positions that are no numbers, a warning of numpy",
     "movement/shortest_ramp.toml": "0 / 0: positions that are no numbers, a warning of numpy",
     "movement/stroke_of_ages.toml": "a division by 0: what was added to the time of a stroke vanished",
+    "program/deep.urp": "trees of 200,000 levels are handled by functions that call themselves",
+    "program/line_break_in_the_installation.urp": "the refusal had two lines",
+    "program/long_type.urp": "the log had all of its 5,000,000 characters",
+    "program/many_elements.urp": "32 kB became 1.3 GB",
+    "program/packed_twice_the_limit.urp": "memory of all that was packed",
+    "program/references_in_a_circle.urp": "references that lead to each other",
     "recording/endless_row.mcap": "memory for a row that no file has",
     "recording/length_beyond_all.mcap": "OverflowError of the reader of records",
     "recording/lz4_bomb.mcap": "1.9 GB",

@@ -277,15 +277,15 @@ def mutate_zip(rng, data):
             content = source.read(info)
             if rng.random() < 0.4:
                 content = mutate_table(rng, content)
-            if rng.random() < 0.1:
-                content = bytes(rng.choice((0, 1 << 16, 9 << 20)))
             name = info.filename
             if rng.random() < 0.2:
                 name = f"{rng.choice(_MEMBERS)}{number}.csv"
             method = rng.choice(
                 (zipfile.ZIP_STORED, *[zipfile.ZIP_DEFLATED] * 5, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
             )
-            made.writestr(zipfile.ZipInfo(name), content, method)
+            if rng.random() < 0.05:
+                content, method = bytes(rng.choice((0, 1 << 16, 9 << 20))), zipfile.ZIP_DEFLATED
+            made.writestr(zipfile.ZipInfo(name), content, method, compresslevel=1)
     changed = bytearray(packed.getvalue())
     if rng.random() < 0.5:
         for _ in range(rng.randrange(1, 5)):  # in the directory, where a byte means most
