@@ -34,7 +34,7 @@ class LogEntry:
         time: seconds since controller start.
         level: how serious it is.
         source: part of the box: Program, Controller, Safety, Client, Dashboard.
-        text: without line breaks at its end.
+        text: without line breaks at its end; as a client or a program has sent it.
         code: `C<code>A<argument>` of an error code, "" for everything else.
     """
 
@@ -47,7 +47,12 @@ class LogEntry:
 
     def __str__(self) -> str:
         code = f"{self.code} " if self.code else ""
-        return f"{self.time:.3f} {self.level.name} {self.source}: {code}{self.text}"
+        return printable(f"{self.time:.3f} {self.level.name} {self.source}: {code}{self.text}")
+
+
+def printable(text: str) -> str:
+    """Return a text with all characters escaped that a terminal obeys instead of printing them."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 class BoxLog:

@@ -117,6 +117,13 @@ class Budgets:
         100_000, "files and folders", "a programs folder", "no reports are written into it"
     )
 
+    # --- log ---
+
+    # 300 kB of lines as they usually are.
+    log_lines: int = _budget(
+        3_000, "lines", "what --log shows and nobody reads", "the newest are lost, a line says how many"
+    )
+
 
 BUDGETS: Final = Budgets()
 

@@ -7,8 +7,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -21,6 +20,9 @@ from ur_emulator.control.token import TOKEN_VARIABLE
 if TYPE_CHECKING:
     from ur_emulator.box import Box
     from ur_emulator.box_log import LogEntry
+    from ur_emulator.realtime.line_writer import LineWriter
+
+_END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None
@@ -93,10 +95,10 @@ def serve(
     raise_descriptor_limit()
     prestart_process()  # it loads the compiler while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
-    from ur_emulator.box_options import is_loopback
     from ur_emulator.emulator import ControlBox
     from ur_emulator.errors import EmulatorError
     from ur_emulator.realtime.interpreter import freeze_existing_objects
+    from ur_emulator.realtime.line_writer import LineWriter
 
     try:
         rack = ControlBox.many(
@@ -113,43 +115,40 @@ def serve(
             control_port=control_port,
             control_token=token,
         )
-        for name in (signal.SIGINT, signal.SIGTERM):
+        for name in _END_SIGNALS:
             signal.signal(name, lambda number, frame: rack.stop())
-        if log:
-            for box in rack:
-                box.follow_log(partial(_print_entry, f"{box.host} " if boxes > 1 else ""))
         rack.listen()
         if ready_file is not None:
             _write_ready_file(ready_file, rack)
     except (EmulatorError, ProtocolError, OSError) as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(1) from None
-    notices = [notice for box in rack for notice in box.notices]
-    if notices:
-        others = f" ({len(notices) - 1} more boxes say the like)" if len(notices) > 1 else ""
-        sys.stderr.write(f"ur-emulator: {notices[0]}{others}\n")
-    if not is_loopback(host):
-        sys.stderr.write(
-            f"ur-emulator: other machines can reach {host}: whoever reaches port {rack[0].ports.secondary} "
-            "(30002) runs programs here, which may connect to anything; let a firewall decide who\n"
-        )
+    out, err = LineWriter(sys.stdout, "this output"), LineWriter(sys.stderr, "the log")
+    for notice in _notices(rack):
+        err.write(f"ur-emulator: {notice}")
     for k, box in enumerate(rack):
-        print(
+        out.write(
             f"{robot.upper()} {box.generation.name} {version or box.generation.default_version} "
             f"ready at {box.host}, {pace}, {fidelity}, "
             f"seed {seed + k}, serial {box.serial_number}: "
             f"dashboard {box.ports.dashboard}, primary {box.ports.primary}, "
             f"secondary {box.ports.secondary}, realtime {box.ports.realtime}, rtde {box.ports.rtde}"
             + (f", modbus {box.ports.modbus}" if box.ports.modbus else "")
-            + (f", control {box.control_port}" if box.control_port else ""),
-            flush=True,
+            + (f", control {box.control_port}" if box.control_port else "")
         )
+        if log:
+            box.follow_log(partial(_show_entry, err, f"{box.host} " if boxes > 1 else ""))
     freeze_existing_objects()
     try:
         rack.serve_forever()
     except EmulatorError as error:
-        sys.stderr.write(f"ur-emulator: {error}\n")
+        err.write(f"ur-emulator: {error}")
         raise typer.Exit(1) from None
+    finally:
+        for name in _END_SIGNALS:
+            signal.signal(name, signal.SIG_DFL)
+        out.close()
+        err.close()
 
 
 @app.command(
@@ -167,10 +166,24 @@ def ctl(context: typer.Context) -> None:
     raise typer.Exit(control(context.args))
 
 
-def _print_entry(prefix: str, entry: LogEntry) -> None:
-    with suppress(OSError):  # stderr was closed
-        sys.stderr.write(f"{prefix}{entry}\n")
-        sys.stderr.flush()
+def _notices(rack: Sequence[Box]) -> Iterator[str]:
+    """Yield what the user should know before the boxes run."""
+    from ur_emulator.box_options import is_loopback
+
+    notices = [notice for box in rack for notice in box.notices]
+    if notices:
+        others = f" ({len(notices) - 1} more boxes say the like)" if len(notices) > 1 else ""
+        yield f"{notices[0]}{others}"
+    box = rack[0]
+    if not is_loopback(box.host):
+        yield (
+            f"other machines can reach {box.host}: whoever reaches port {box.ports.secondary} "
+            "(30002) runs programs here, which may connect to anything; let a firewall decide who"
+        )
+
+
+def _show_entry(err: LineWriter, prefix: str, entry: LogEntry) -> None:
+    err.write(f"{prefix}{entry}")
 
 
 def _write_ready_file(path: Path, rack: Sequence[Box]) -> None:

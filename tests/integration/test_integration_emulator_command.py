@@ -11,12 +11,14 @@ from contextlib import suppress
 import pytest
 from integration_support import (
     SPIN,
+    TIMEOUT,
     Frames,
     Messages,
     command,
     connect,
     finish,
     free_port_base,
+    in_background,
     send,
     serving,
 )
@@ -171,3 +173,37 @@ def test_the_log_goes_to_stderr_if_asked_for(tmp_path):
         "INFO Program: Program stopped: f",
         "FAULT Program: Compile error: name 'nowhere' is not defined",
     ]
+
+
+@pytest.mark.parametrize("pace", ["realtime", "lockstep"])
+def test_a_log_that_nobody_reads_costs_no_cycle_and_no_answer_and_the_end_does_not_wait_for_it(
+    tmp_path, pace
+):
+    line = b"addToLog " + b"x" * 500 + b"\n"
+    with (
+        serving(tmp_path, "--log", "--pace", pace) as box,
+        Frames(box) as frames,
+        connect(box, "dashboard") as sock,
+        sock.makefile("rb") as dashboard,
+    ):
+        frames.next()
+        assert dashboard.readline()
+        with in_background(frames.raw):
+            for _ in range(50):  # several times what a pipe and the box take
+                sock.sendall(100 * line)
+                for _ in range(100):
+                    assert dashboard.readline() == b"Added log message\n"
+        assert frames.lost() == 0
+        box.process.terminate()
+        assert box.process.wait(TIMEOUT) == 0
+
+
+def test_a_log_shows_what_clients_send_without_obeying_it(tmp_path):
+    with serving(tmp_path, "--log", "--pace", "lockstep") as box, connect(box, "dashboard") as sock:
+        sock.sendall(b"addToLog a\x1b[2J\x9b\a\rb\n")
+        while b"Added" not in sock.recv(100):
+            pass
+        box.process.terminate()
+        log = finish(box.process).err
+    assert r"Dashboard: a\x1b[2J\x9b\x07\rb" in log
+    assert log.replace("\n", "").isprintable()

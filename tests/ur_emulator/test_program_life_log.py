@@ -180,7 +180,7 @@ EVENTS = [
     (events.PopupShown("T", "x", False, False, False), "INFO Program: Popup: T: x"),
     (events.ScriptFailed(1, 2, "wire"), "FAULT Program: wire"),
     (events.ScriptFailed(1, 2, "wire", True, "log"), "FAULT Program: Secondary program: log"),
-    (events.TextPrinted("a\nb\n"), "INFO Program: a\nb"),
+    (events.TextPrinted("a\nb\n"), r"INFO Program: a\nb"),
 ]
 
 

@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from ur_emulator.box_log import printable
 from ur_emulator.commands.parameters import Kind, Parameter
 from ur_emulator.control.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
 from ur_emulator.control.operations import OPERATIONS, make
@@ -138,7 +139,7 @@ def _follow(client: ControlClient, arguments: dict[str, Any], as_json: bool) -> 
 
 def _log_line(entry: Mapping[str, Any]) -> str:
     code = f"{entry['code']} " if entry["code"] else ""
-    return f"{entry['time']:.3f} {entry['level']} {entry['source']}: {code}{entry['text']}"
+    return printable(f"{entry['time']:.3f} {entry['level']} {entry['source']}: {code}{entry['text']}")
 
 
 def _lines(prefix: str, values: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -163,9 +164,9 @@ def _text(value: Any) -> str:
             return " ".join(str(int(item)) for item in value)
         is_numeric = all(isinstance(item, int | float) for item in value)
         return (" " if is_numeric else "; ").join(map(_text, value))
-    return str(value)
+    return printable(str(value))
 
 
 def _complain(error: Exception, code: int) -> int:
-    sys.stderr.write(f"{PROGRAM}: {' '.join(str(error).split())}\n")
+    sys.stderr.write(f"{PROGRAM}: {printable(' '.join(str(error).split()))}\n")
     return code

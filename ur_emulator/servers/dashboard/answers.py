@@ -56,6 +56,13 @@ class DashboardAnswers:
         self._shut_down = shut_down
         self._reports = reports
         self._user_role = "NONE"
+        # Looked up now: a process without descriptors cannot do it later.
+        self._versions = {
+            "software": str(access.identity.software.version),
+            "robot": access.identity.model,
+            "emulator": package_version("ur-hil"),
+            "python": platform.python_version(),
+        }
         self._methods: dict[str, Callable[[DashboardCommand, str, str], Answer]] = {
             "load": self._load,
             "play": lambda row, _, client: self._done(row, player.play(client)),
@@ -218,12 +225,7 @@ class DashboardAnswers:
         access, player = self._access, self._player
         return BoxFacts(
             serial_number=access.identity.serial_number,
-            versions={
-                "software": str(access.identity.software.version),
-                "robot": access.identity.model,
-                "emulator": package_version("ur-hil"),
-                "python": platform.python_version(),
-            },
+            versions=self._versions,
             timestamp=access.snapshot.timestamp,
             state=access.snapshot.as_dict(),
             log="".join(f"{entry}\n" for entry in access.log.entries),
