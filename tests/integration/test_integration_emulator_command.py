@@ -72,6 +72,12 @@ def test_a_ready_file_that_cannot_be_written_is_one_line_and_exit_1():
     check_complaint(serve("--ready-file", "/nowhere/ready.json"), "/nowhere/ready.json")
 
 
+def test_a_ready_file_that_cannot_take_its_place_leaves_no_part(tmp_path):
+    (tmp_path / "ready.json").mkdir()
+    check_complaint(serve("--ready-file", tmp_path / "ready.json"), "ready.json")
+    assert [path.name for path in tmp_path.iterdir()] == ["ready.json"]
+
+
 def test_an_empty_host_does_not_open_the_box_to_other_machines():
     with pytest.raises(EmulatorError, match="no host given"):
         ControlBox(host="", port_base=None)

@@ -183,6 +183,11 @@ def test_a_body_must_say_that_it_is_json(http):
         "",
         "[",
         "[::1]",
+        "evil.example@127.0.0.1",
+        "localhost:80@evil.example",
+        "localhost:80:80",
+        "localhost/evil.example",
+        "localhost evil.example",
     ],
 )
 def test_a_foreign_name_that_resolves_to_this_machine_is_refused(http, host):

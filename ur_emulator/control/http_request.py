@@ -8,11 +8,12 @@ token, a request must show it.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from ipaddress import ip_address
 from typing import Any
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl
 
 import h11
 
@@ -24,6 +25,8 @@ MAX_HEADER = 16 * 1024
 PREFIX = "/v1/"
 LIST = "operations"
 JSON = "application/json"
+# A name or an address, and a port; nothing else that a URL may have there.
+_HOST = re.compile(r"(\[[0-9A-Za-z:.%]+\]|[A-Za-z0-9.-]+)(?::[0-9]{1,5})?")
 # What a browser says of where a request comes from: from the user, or from a page of this box.
 _OWN_SITES = ("none", "same-origin")
 
@@ -124,8 +127,11 @@ def parse_request(request: h11.Request, body: bytes, gate: Gate) -> tuple[str, M
 
 def _is_own(host: str, own_host: str) -> bool:
     """Return whether a Host header names the address that the port is bound to, or this machine."""
+    match = _HOST.fullmatch(host)
+    if match is None:
+        return False
+    name = match[1].strip("[]").lower()
     try:
-        name = urlsplit(f"//{host}").hostname or ""
         if name in ("localhost", own_host):
             return True
         # Bound to all addresses: any address will do, but no name: it could resolve to any of them.
