@@ -38,12 +38,37 @@ def _budget(limit: float, unit: str, scope: str, beyond: str) -> Any:
     return field(default=limit, metadata={"unit": unit, "scope": scope, "beyond": beyond})
 
 
+_REFUSED: Final = "it is closed at once"
+
+
 @dataclass(frozen=True, slots=True)
 class Budgets:
     """All budgets; a comment says where a figure comes from."""
 
+    # --- clients and ports
+    # A frame for a client costs 7 us, twice that on a slow host: 256 clients leave half of a cycle.
+    clients: int = _budget(256, "clients", "a box", _REFUSED)
+    clients_of_address: int = _budget(128, "clients", "an address", _REFUSED)
+    clients_of_port: int = _budget(64, "clients", "an address at one port", _REFUSED)
+    # A client costs up to 0.3 ms.
+    accepted_at_once: int = _budget(2, "clients", "a turn of a port", "the next are accepted a turn later")
+    # Two for each client that comes and goes; the log keeps an hour of programs beside a storm of clients.
+    client_lines: int = _budget(200, "log lines a minute", "a box", "further ones are counted in one line")
     # A client that stops reading for half a second finds all it missed.
     outbox_bytes: int = _budget(64 * KIB, "bytes", "a client", "further packages to it are dropped")
+    # 512 bytes of statements take 0.4 ms to be cut into programs.
+    read_bytes: int = _budget(512, "bytes", "a turn of a client", "the rest is read in its next turn")
+    # A unit is about 4 us: a turn takes a quarter of a millisecond, and never less than a whole request.
+    client_work: int = _budget(64, "units of work", "a turn of a client", "the rest waits for its next turn")
+    commands: int = _budget(256, "commands", "a cycle of a box", "RTDE clients wait for the next cycle")
+    script_bytes: int = _budget(
+        16 * MIB, "bytes of programs that have no end yet", "a port", "the client that sends more is closed"
+    )
+    # --- control API
+    control_clients: int = _budget(32, "clients", "a control port", "the most silent one is closed")
+    # 64 KiB of JSON take up to 1 ms to be read; the longest program in the field has 50 kB.
+    body_bytes: int = _budget(64 * KIB, "bytes", "a body", "it is refused with status 413")
+    log_entries: int = _budget(100, "entries", "an answer of `log`", "they come with the next call")
 
     # --- variables and labels of running programs, as port 30001 reports them ---
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ur_emulator.budgets import BUDGETS, KIB
 from ur_emulator.commands.operation import Operation
 from ur_emulator.commands.parameters import Kind, Parameter
 from ur_emulator.control.http_client import DEFAULT_PORT
@@ -48,8 +49,8 @@ whoever reaches the port controls the box then. On any other address a control p
 - `POST` takes a JSON object (content type `application/json`); without a body all defaults are taken.
 - The answer is a JSON object; an error is `{{"error": "one line"}}` with status 400 (does not fit), 401 (no token),
   403 (see below), 404 (no such operation), 405 (GET and POST confused), 409 (the box is not in a state for it), 413 (too long:
-  1 MiB of body) or 431 (16 KiB of header).
-- Connections are kept alive; one request of a client is answered after the other. The box keeps 64 connections and
+  {BUDGETS.body_bytes // KIB} KiB of body; longer programs go to port 30002) or 431 (16 KiB of header).
+- Connections are kept alive; one request of a client is answered after the other. The box keeps {BUDGETS.control_clients} connections and
   closes the one that has been silent longest for a new one.
 - Pages in a browser cannot reach the box: `Host` must be the address that it listens on, or `localhost` (403
   otherwise, against DNS rebinding), and requests of foreign origins are refused (`Origin`, `Sec-Fetch-Site`).

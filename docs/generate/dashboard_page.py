@@ -9,7 +9,7 @@ from protocol.dashboard.commands import (
     DashboardCommand,
     unknown_command_reply,
 )
-from protocol.dashboard.connection import MAX_LINE, MAX_WAITING
+from protocol.dashboard.connection import MAX_LINE
 from protocol.ur_types import SoftwareVersion
 
 _FIRST_CB3 = SoftwareVersion(3, 0)
@@ -30,10 +30,9 @@ A reply comes after the control cycle in which the command has acted, so that th
 Where a version stands in the last column, it comes when the command is carried out (the program is loaded,
 has started, the arm rests), from that software on; before, at once.
 
-While a line waits for its reply, so do the lines behind it: {MAX_WAITING} bytes of them,
-{MAX_LINE} bytes a line. A client that sends more is cut off, and so is one that does
-not read its replies. Who closes his end still gets all replies. What was asked is done even if the client is
-gone.
+While a line waits for its reply, so do the lines behind it. A client whose line has more than
+{MAX_LINE} bytes is cut off, and so is one that does not read its replies. Who closes his end still gets all
+replies. What was asked is done even if the client is gone.
 """
 
 

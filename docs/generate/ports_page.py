@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from docs.generate.page_parts import table
 from protocol.ur_types import Ports
+from ur_emulator.budgets import BUDGETS
 
 __all__ = ["ROWS", "MapRow", "render"]
 
@@ -36,16 +37,21 @@ ROWS: tuple[MapRow, ...] = (
 )
 """One row a port of `Ports`."""
 
-_INTRODUCTION = """\
+_OF_ADDRESS = BUDGETS.clients_of_address
+_INTRODUCTION = f"""\
 # The ports of the box
 
 Made from `docs/generate/ports_page.py` and `protocol/ur_types.py` by `make docs`.
 
 `ur-emulator serve` opens these ports, with the numbers of a real control box, which most clients have
 built in; `--port-base N` adds N to all of them, and several boxes live side by side on loopback addresses
-of their own. All ports take several clients at once. No client holds up another: what it does not read is
-dropped in whole packages (where every reply counts, the client is cut off instead). `--version` decides
-what software the box pretends to run, and with it the layouts.
+of their own. `--version` decides what software the box pretends to run, and with it the layouts.
+
+All ports take several clients at once: {BUDGETS.clients_of_port} of an address at a port,
+{_OF_ADDRESS} of an address, {BUDGETS.clients} of a box. Further ones are accepted and closed
+at once, and the log says so. No client holds up another: what it does not read is dropped in whole packages
+(where every reply counts, the client is cut off instead). What clients send is taken a piece of each in turn,
+and never when a cycle is due: a client that sends faster than it is served waits.
 """
 
 _CHOICE = """\

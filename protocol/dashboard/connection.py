@@ -21,7 +21,6 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 
 __all__ = [
     "MAX_LINE",
-    "MAX_WAITING",
     "CommandReceived",
     "DashboardConnection",
     "DashboardEvent",
@@ -30,9 +29,6 @@ __all__ = [
 
 MAX_LINE = 1 << 16
 """Longest line in bytes. No document gives a limit; clients send much shorter lines."""
-
-MAX_WAITING = 1 << 20
-"""Most bytes of lines that wait for their answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +61,6 @@ class DashboardConnection:
         self._commands = commands
         self._buffer = bytearray()
         self._lines: deque[str] = deque()
-        self._waiting = 0
         self._unanswered: deque[str] = deque()
         self._closed = False
 
@@ -78,7 +73,7 @@ class DashboardConnection:
         """Take what the socket gave.
 
         Raises:
-            RemoteProtocolError: a line beyond `MAX_LINE`, lines beyond `MAX_WAITING`; close the connection.
+            RemoteProtocolError: a line beyond `MAX_LINE`; close the connection.
         """
         if self._closed:
             return
@@ -86,9 +81,6 @@ class DashboardConnection:
         *lines, self._buffer = self._buffer.split(b"\n")
         if any(len(line) > MAX_LINE for line in (*lines, self._buffer)):
             raise RemoteProtocolError(f"a dashboard line has more than {MAX_LINE} bytes")
-        self._waiting += sum(map(len, lines)) + len(lines)
-        if self._waiting > MAX_WAITING:
-            raise RemoteProtocolError(f"more than {MAX_WAITING} bytes of dashboard lines wait for an answer")
         self._lines.extend(line.decode("latin-1").strip() for line in lines)
 
     def next_event(self) -> DashboardEvent | None:
@@ -96,7 +88,6 @@ class DashboardConnection:
         if self._closed or not self._lines:
             return None
         line = self._lines.popleft()
-        self._waiting = max(0, self._waiting - len(line) - 1) if self._lines else 0
         self._unanswered.append(line)
         matched = match_command(line, self._commands)
         return CommandReceived(*matched) if matched else UnknownCommand(line, unknown_command_reply(line))

@@ -9,7 +9,6 @@ import pytest
 from protocol.dashboard.commands import COMMANDS, commands_of, match_command, unknown_command_reply
 from protocol.dashboard.connection import (
     MAX_LINE,
-    MAX_WAITING,
     CommandReceived,
     DashboardConnection,
     UnknownCommand,
@@ -177,19 +176,6 @@ def test_endless_lines_are_refused(data):
     robot.next_event()
     with pytest.raises(LocalProtocolError, match="longer than"):
         robot.reply("x" * MAX_LINE)
-
-
-def test_lines_that_wait_are_bounded_and_count_no_more_when_they_are_answered():
-    robot = DashboardConnection(KNOWN)
-    lines = b"robotmode\n" * (MAX_WAITING // 10)
-    for _ in range(3):
-        for start in range(0, len(lines), 65_536):
-            robot.receive_data(lines[start : start + 65_536])
-        while robot.next_event() is not None:
-            robot.reply("Robotmode: RUNNING")
-    robot.receive_data(lines[: MAX_WAITING - 10])
-    with pytest.raises(RemoteProtocolError, match="wait for an answer"):
-        robot.receive_data(b"robotmode\n" * 2)
 
 
 def test_which_software_answers_when_it_is_done():

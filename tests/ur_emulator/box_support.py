@@ -152,7 +152,13 @@ def bare_access(software, controller, commands):
     def report(what, error):
         raise error
 
-    box = SimpleNamespace(controller=controller, submit=submit, announce=lambda event: None, report=report)
+    box = SimpleNamespace(
+        controller=controller,
+        submit=submit,
+        takes_commands=True,
+        announce=lambda event: None,
+        report=report,
+    )
     return BoxAccess(BoxIdentity(software, "UR3", "20993000007"), box, None, None)
 
 

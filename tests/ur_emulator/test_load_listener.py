@@ -8,10 +8,12 @@ import socket
 import pytest
 from box_support import TIMEOUT
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp import listener
-from ur_emulator.servers.tcp.listener import MAX_AT_ONCE, PAUSE, Listener
+from ur_emulator.servers.tcp.listener import PAUSE, Listener
+from ur_emulator.servers.tcp.places import Places
 from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
 
@@ -52,9 +54,22 @@ def loop():
     made.close()
 
 
+class ForAll(Places):
+    """Places without limits."""
+
+    def take(self, host, port):
+        return ""
+
+    def release(self, host, port):
+        pass
+
+
 def listen(loop, clients, notices=None, **options):
     notices = [] if notices is None else notices
-    return Listener(loop, "127.0.0.1", 0, clients, set(), notices.append, pytest.fail, "dashboard", **options)
+    places = options.pop("places", None) or Places()
+    return Listener(
+        loop, "127.0.0.1", 0, clients, set(), notices.append, pytest.fail, "dashboard", places, **options
+    )
 
 
 def close_all(port, clients, *socks):
@@ -66,26 +81,26 @@ def close_all(port, clients, *socks):
 
 
 def test_a_crowd_is_let_in_a_few_at_a_time(loop):
-    clients, n = Clients(), 2 * MAX_AT_ONCE + 2
+    clients, n = Clients(), 2 * BUDGETS.accepted_at_once + 2
     port = listen(loop, clients)
     socks = [socket.create_connection(("127.0.0.1", port.number), timeout=TIMEOUT) for _ in range(n)]
     turns = Turns(loop, clients, 4)
     loop.add(turns)
     loop.run()
-    assert turns.counts == [0, MAX_AT_ONCE, 2 * MAX_AT_ONCE, n, n]
+    assert turns.counts == [0, BUDGETS.accepted_at_once, 2 * BUDGETS.accepted_at_once, n, n]
     close_all(port, clients, *socks)
 
 
 def test_two_hundred_clients_may_wait_to_be_let_in(loop):
     """Those beyond the backlog would wait for a second and more before they try again."""
     clients = Clients()
-    port = listen(loop, clients)
+    port = listen(loop, clients, places=ForAll())
     n = min(200, socket.SOMAXCONN)
     socks = [socket.socket() for _ in range(n)]
     for sock in socks:
         sock.setblocking(False)
         assert sock.connect_ex(("127.0.0.1", port.number)) in (0, errno.EINPROGRESS)
-    turns = Turns(loop, clients, n // MAX_AT_ONCE)
+    turns = Turns(loop, clients, n // BUDGETS.accepted_at_once)
     loop.add(turns)
     loop.run()
     assert turns.counts[-1] == n
@@ -149,7 +164,7 @@ def is_watched(loop, port):
 
 def test_a_client_that_has_gone_while_it_waited_harms_nobody(loop, monkeypatch):
     class Gone(socket.socket):
-        left = 2
+        left = 1
 
         def accept(self):
             if Gone.left:
@@ -180,4 +195,4 @@ def test_silent_clients_are_asked_whether_they_are_still_there(loop):
 
 def test_an_address_of_another_machine_is_told_from_a_taken_port(loop):
     with pytest.raises(PortError, match=r"192\.0\.2\.1 is not an address of this machine"):
-        Listener(loop, "192.0.2.1", 0, Clients(), set(), print, pytest.fail, "dashboard")
+        Listener(loop, "192.0.2.1", 0, Clients(), set(), print, pytest.fail, "dashboard", Places())

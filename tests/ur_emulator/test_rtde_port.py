@@ -22,6 +22,7 @@ class FakeConnection:
         self.has_ended = False
         self.full = full
         self.sent = []
+        self.calls, self.reads = [], True
         self.pc = RtdeClientConnection()
         port.opened(self)
 
@@ -41,8 +42,16 @@ class FakeConnection:
     def failed(self, error):
         raise error
 
+    def call_soon(self, call):
+        self.calls.append(call)
+
+    def set_reading(self, wanted):
+        self.reads = wanted
+
     def say(self, data):
         self.port.received(self, data)
+        while self.calls:
+            self.calls.pop(0)()
 
     def ask(self, request):
         self.say(self.pc.send(request))

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ur_emulator.box_log import printable
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.parameters import Kind, Parameter
 from ur_emulator.control.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
 from ur_emulator.control.operations import OPERATIONS, make
@@ -48,7 +49,7 @@ def main(words: Sequence[str]) -> int:
     try:
         if follow:
             _follow(client, arguments, as_json)
-        result = client.perform(name, arguments)
+        result = _whole_log(client, arguments) if name == "log" else client.perform(name, arguments)
     except KeyboardInterrupt:
         return 0
     except ControlError as error:
@@ -134,7 +135,19 @@ def _follow(client: ControlClient, arguments: dict[str, Any], as_json: bool) -> 
         for entry in result["entries"]:
             print(json.dumps(entry) if as_json else _log_line(entry), flush=True)
         arguments["after"] = result["next"]
-        time.sleep(_FOLLOW_PERIOD)
+        if len(result["entries"]) < BUDGETS.log_entries:
+            time.sleep(_FOLLOW_PERIOD)
+
+
+def _whole_log(client: ControlClient, arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return all entries of the log as one result; the box gives some at a time."""
+    entries: list[Any] = []
+    while True:
+        result = client.perform("log", arguments)
+        entries += result["entries"]
+        if len(result["entries"]) < BUDGETS.log_entries:
+            return {**result, "entries": entries}
+        arguments["after"] = result["next"]
 
 
 def _log_line(entry: Mapping[str, Any]) -> str:

@@ -1,19 +1,21 @@
 """The control API over HTTP: `GET /v1/state`, `POST /v1/push` with a JSON object, and so on.
 
 h11 knows HTTP/1.1, `http_request` what a request asks for, `runner` does it. The requests of a client are
-answered in order, one after the other. Everything is bounded: header, body, what a client sends ahead, and
-the number of clients: the one that has been silent longest is closed for a new one.
+answered in order, one after the other. Everything is bounded: header, body, an answer, and the number of
+clients: the one that has been silent longest is closed for a new one.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, is_dataclass
+from collections.abc import Callable
+from dataclasses import asdict, fields, is_dataclass
 from typing import Any
 
 import h11
 
 from ur_emulator.box_log import LogEntry
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.control.http_request import (
     JSON,
     LIST,
@@ -31,10 +33,8 @@ from ur_emulator.servers.session import Session
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
 
-MAX_BODY = 1024 * 1024
-# Bytes that a client may send ahead while its last request is being answered.
-MAX_AHEAD = MAX_BODY + MAX_HEADER
-MAX_CLIENTS = 64
+# Units of work for a piece of a request; its answer takes the rest of the turn.
+_PIECE_COST = 4
 
 
 class HttpPort:
@@ -55,19 +55,17 @@ class HttpPort:
 
     def opened(self, connection: Connection) -> None:
         """Take in a client; if there are too many, the one that has been silent longest is closed."""
-        if len(self._sessions) >= MAX_CLIENTS:
+        if len(self._sessions) >= BUDGETS.control_clients:
             idle = [other for other, session in self._sessions.items() if not session.is_busy]
             (idle or list(self._sessions))[0].close()
-        self._sessions[connection] = _HttpSession(connection, self._access, self._runner, self._gate)
+        self._sessions[connection] = _HttpSession(
+            connection, self._access, self._runner, self._gate, self._is_not_silent
+        )
         connection.allow_half_close(self.ended)
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Take bytes and answer what can be answered now."""
-        session = self._sessions[connection]
-        n_requests = session.n_requests
-        session.receive(data)
-        if session.n_requests != n_requests and connection in self._sessions:
-            self._sessions[connection] = self._sessions.pop(connection)
+        self._sessions[connection].receive(data)
 
     def ended(self, connection: Connection) -> None:
         """A client sends nothing more; its requests are still answered."""
@@ -77,77 +75,76 @@ class HttpPort:
         """Forget the client; what it has begun takes its course."""
         self._sessions.pop(connection, None)
 
+    def _is_not_silent(self, connection: Connection) -> None:
+        """A client has sent a whole request."""
+        self._sessions[connection] = self._sessions.pop(connection)
+
 
 class _HttpSession(Session):
     """A client: its HTTP state, and the request that is read or answered.
 
     Attributes:
         http: reads requests, writes answers.
-        n_requests: how many have been read.
     """
 
     def __init__(
-        self, connection: Connection, access: BoxAccess, runner: OperationRunner, gate: Gate
+        self,
+        connection: Connection,
+        access: BoxAccess,
+        runner: OperationRunner,
+        gate: Gate,
+        on_request: Callable[[Connection], None],
     ) -> None:
-        super().__init__(connection, access.steps)
-        self._access = access
+        super().__init__(connection, access)
         self._runner = runner
         self._gate = gate
+        self._on_request = on_request
         self.http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEADER)
-        self.n_requests = 0
         self._request: h11.Request | None = None
         self._body = bytearray()
-        # Bytes that have come while the last request is being answered.
-        self._n_ahead = 0
 
-    def receive(self, data: bytes) -> None:
-        """Take bytes and answer what can be answered now."""
+    def _take(self, data: bytes) -> None:
         self.http.receive_data(data)
-        if self.is_busy:
-            self._n_ahead += len(data)
-            if self._n_ahead > MAX_AHEAD:
-                self.connection.close()
-        self.answer_requests()
 
-    def _finished(self, _: None, error: Exception | None) -> None:
+    def _finished(self, goes_on: bool | None, error: Exception | None) -> None:
         if isinstance(error, NotRunningError):
             self.is_busy = False
             self._reject(503, str(error))
         else:
-            super()._finished(None, error)
+            super()._finished(goes_on, error)
 
-    def _serve(self) -> Steps[None]:
-        """Answer the requests that have come, in order."""
+    def _answer_next(self) -> Steps[int]:
+        """Read the next piece of a request; after the last one, answer it."""
         try:
-            while self.connection.is_open and (body := self._next_request()) is not None:
-                self.n_requests += 1
-                self._n_ahead = 0
+            event = self.http.next_event()
+            if isinstance(event, h11.EndOfMessage):
+                self._on_request(self.connection)
+                body, self._body = bytes(self._body), bytearray()
                 yield from self._answer(body)
+                return BUDGETS.client_work
+            return self._read(event)
         except h11.RemoteProtocolError as error:
             self._reject(error.error_status_hint, f"not understood: {error}")
         except HttpError as error:
             self._reject(error.status, str(error))
+        return 0
 
-    def _next_request(self) -> bytes | None:
-        """Read the next request; return its body, None if more bytes are needed or no request will come."""
-        while True:
-            event = self.http.next_event()
-            if isinstance(event, h11.Request):
-                self._request = event
-                check_head(event)
-                if self.http.they_are_waiting_for_100_continue:
-                    self._send(h11.InformationalResponse(status_code=100, headers=[]))
-            elif isinstance(event, h11.Data):
-                self._body += event.data
-                if len(self._body) > MAX_BODY:
-                    raise HttpError(413, f"the body is longer than {MAX_BODY} bytes")
-            elif isinstance(event, h11.EndOfMessage):
-                body, self._body = bytes(self._body), bytearray()
-                return body
-            else:
-                if event is not h11.NEED_DATA:
-                    self.connection.close_when_sent()
-                return None
+    def _read(self, event: h11.Event | type[h11.NEED_DATA] | type[h11.PAUSED]) -> int:
+        """Take a piece of a request; return what it costs, 0 if more bytes are needed or none will come."""
+        if isinstance(event, h11.Request):
+            self._request = event
+            check_head(event)
+            if self.http.they_are_waiting_for_100_continue:
+                self._send(h11.InformationalResponse(status_code=100, headers=[]))
+        elif isinstance(event, h11.Data):
+            self._body += event.data
+            if len(self._body) > BUDGETS.body_bytes:
+                raise HttpError(413, f"the body is longer than {BUDGETS.body_bytes} bytes")
+        else:
+            if event is not h11.NEED_DATA:
+                self.connection.close_when_sent()
+            return 0
+        return _PIECE_COST
 
     def _answer(self, body: bytes) -> Steps[None]:
         """Do what a request asks for, and answer it."""
@@ -214,6 +211,9 @@ class _HttpSession(Session):
             self.connection.close()
 
 
+_LOG_FIELDS = tuple(field.name for field in fields(LogEntry))
+
+
 def _status_of(error: EmulatorError) -> int:
     if isinstance(error, ArgumentError):
         return 400
@@ -224,7 +224,8 @@ def _status_of(error: EmulatorError) -> int:
 
 def _as_json(value: Any) -> Any:
     if isinstance(value, LogEntry):
-        return {**asdict(value), "level": value.level.name}
+        values = {name: getattr(value, name) for name in _LOG_FIELDS}
+        return values | {"level": value.level.name}
     if is_dataclass(value) and not isinstance(value, type):
         return asdict(value)
     return list(value)

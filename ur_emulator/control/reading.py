@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import LogEntry
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.control.box_state import BoxState, take_state
 from ur_emulator.control.step_operation import Context, StepOperation
@@ -36,15 +37,25 @@ class ReadLog(StepOperation[tuple[LogEntry, ...]]):
     level: str = parameter(
         "leave out what weighs less", choices=tuple(ReportLevel.__members__), default="DEBUG"
     )
-    result: ClassVar[str] = "`entries`, the oldest first, and `next`, to be given as `after` in the next call"
+    result: ClassVar[str] = (
+        f"`entries`, the oldest first, at most {BUDGETS.log_entries} of them, and `next`, to be given as "
+        "`after` in the next call"
+    )
     only_reads: ClassVar[bool] = True
 
     def steps(self, context: Context) -> Steps[Any]:
         """Pick the entries."""
         yield from ()
         log, least = context.access.log, ReportLevel[self.level]
-        entries = [entry for entry in log.since(self.after) if entry.level >= least]
-        return {"entries": entries, "next": max(self.after, log.count)}
+        new = log.since(self.after)
+        entries, seen = list[LogEntry](), log.count - len(new)
+        for entry in new:
+            if len(entries) == BUDGETS.log_entries:
+                break
+            seen += 1
+            if entry.level >= least:
+                entries.append(entry)
+        return {"entries": entries, "next": max(self.after, seen)}
 
 
 class ReadIdentity(StepOperation[dict[str, Any]]):

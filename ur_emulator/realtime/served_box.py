@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import BoxLog
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.command import Command, Done, Submitted
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
@@ -74,6 +75,11 @@ class ServedBox:
             listeners: with every event, before the cycle that it belongs to is published.
         """
         self._publishers, self._listeners = tuple(publishers), tuple(listeners)
+
+    @property
+    def takes_commands(self) -> bool:
+        """Whether the next cycle takes further commands; for clients that can wait."""
+        return len(self._commands) < BUDGETS.commands
 
     def submit(self, command: Command, done: Done | None = None) -> None:
         """Take a command for the next cycle; `done` is called then with the result."""

@@ -68,6 +68,11 @@ class BoxAccess:
         """What the box has done."""
         return self._box.log
 
+    @property
+    def takes_commands(self) -> bool:
+        """False when so many wait for the next cycle that a client shall wait for the one after it."""
+        return self._box.takes_commands
+
     def submit(self, command: Command) -> None:
         """Ask for something in the next cycle."""
         self._box.submit(command)

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from ur_emulator.errors import PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import ServedBox
-from ur_emulator.servers.tcp.connection import Connection
+from ur_emulator.servers.tcp.client_lines import ClientLines
 from ur_emulator.servers.tcp.listener import Listener, Port
+from ur_emulator.servers.tcp.places import Places
 from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
 CONTROL, MODBUS = "control", "modbus"
@@ -34,6 +35,8 @@ class PortSet:
         self._ports = dict(ports)
         self._listeners: dict[str, Listener] = {}
         self._spare = SpareDescriptor()
+        self._places = Places()
+        self._lines = ClientLines(box.notice)
         self.notices: list[str] = []
 
     @property
@@ -72,8 +75,17 @@ class PortSet:
             listener.close()
 
     def _listener(self, name: str, port: Port, number: int) -> Listener:
-        """Listen; lockstep does not wait for clients of the control API, and they do not fill the log."""
-        box = self._box
-        backlog = set[Connection]() if name == CONTROL else box.backlog
-        notice = (lambda text: None) if name == CONTROL else box.notice
-        return Listener(self._loop, self._host, number, port, backlog, notice, box.report, name, self._spare)
+        """Listen; lockstep does not wait for clients of the control API, and they do not fill the log.
+
+        They have places of their own: a box whose other ports are full can still be controlled.
+        """
+        box, places, backlog, notice = self._box, self._places, self._box.backlog, self._lines.write
+        if name == CONTROL:
+            places, backlog, notice = Places(), set(), _no_line
+        return Listener(
+            self._loop, self._host, number, port, backlog, notice, box.report, name, places, self._spare
+        )
+
+
+def _no_line(text: str) -> None:
+    """Leave out a line."""

@@ -24,13 +24,8 @@ from ur_emulator.servers.tcp.connection import Connection
 SOURCE = "RTDE"
 # The one variable that costs something to find: only looked up while a client asks for it.
 _SCRIPT_LINE = "script_control_line"
-# What one client may cost in a turn, about 1 ms; more would delay the control cycle. A unit is what a
-# data package costs; bytes that make no sense cost as they are taken apart, in portions.
-_BUDGET = 256
-_REQUEST_COST = 8
-_PORTION, _PORTION_COST = 4 * 1024, 64
-# Bytes of a client that may wait for that; a client that sends more is disconnected.
-MAX_WAITING = 256 * 1024
+# Units of work for input data, for a request, and for one that sets up a recipe: 0.2 ms and more.
+_INPUT_COST, _REQUEST_COST, _RECIPE_COST = 2, 8, 64
 
 
 class RtdePort:
@@ -52,14 +47,7 @@ class RtdePort:
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Answer requests in order, pass inputs on; bytes that are not RTDE end the connection."""
-        session = self._sessions[connection]
-        if session.is_lost:
-            return
-        session.inbox += data
-        if len(session.inbox) > MAX_WAITING:
-            connection.close()
-        else:
-            session.answer_requests()
+        self._sessions[connection].receive(data)
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; its input variables are free at once."""
@@ -107,7 +95,6 @@ class _RtdeSession(Session):
         protocol: what it has asked for.
         encode: makes its data packages; None while it gets none. Sessions with the same recipe have the same.
         wants_line: its recipe has the line that the program executes.
-        inbox: bytes that were not read yet.
         is_lost: it has sent bytes that are not RTDE; it gets a text message, then the connection is closed.
     """
 
@@ -121,14 +108,12 @@ class _RtdeSession(Session):
             access: to the box.
             answer: replies to a request for recipes, start, pause and the like.
         """
-        super().__init__(connection, access.steps)
+        super().__init__(connection, access)
         software = access.identity.software
         self.protocol = RtdeServerConnection(software.version, software.rtde_outputs, software.rtde_inputs)
         self.encode: Callable[[Snapshot], bytes] | None = None
         self.wants_line = False
-        self.inbox = bytearray()
         self.is_lost = False
-        self._access = access
         self._answer = answer
         self._cycle_rate = access.controller.generation.cycle_rate
         self._divisor = 1
@@ -136,38 +121,34 @@ class _RtdeSession(Session):
         self._last_tick = -1
         self._repeats = 0
 
-    def _serve(self) -> Steps[None]:
-        protocol, inbox = self.protocol, self.inbox
-        budget = _BUDGET
+    def _take(self, data: bytes) -> None:
+        if not self.is_lost:
+            self.protocol.receive_data(data)
+
+    def _answer_next(self) -> Steps[int]:
+        if self.is_lost:
+            return 0
         try:
-            while self.connection.is_open:
-                if budget <= 0:
-                    yield
-                    budget = _BUDGET
-                event = protocol.next_event()
-                if event is None:
-                    if not inbox:
-                        return
-                    protocol.receive_data(bytes(inbox[:_PORTION]))
-                    del inbox[:_PORTION]
-                    budget -= _PORTION_COST
-                    continue
-                budget -= 1
-                match event:
-                    case InputReceived(names, values):
-                        self._access.submit(WriteInputs(tuple(zip(names, values, strict=True))))
-                    case RtdeTextMessage(text, source):
-                        entry = LogAdded(" ".join(source.split()) or SOURCE, " ".join(text.split()))
-                        self._access.announce(entry)
-                        budget -= _REQUEST_COST
-                    case _:
-                        self._answer(self, event)
-                        budget -= _REQUEST_COST
+            event = self.protocol.next_event()
         except RemoteProtocolError as problem:
             self.is_lost = True
-            inbox.clear()
-            self.connection.send(protocol.text(RtdeTextMessage(str(problem), SOURCE, TextLevel.ERROR)))
+            self.connection.send(self.protocol.text(RtdeTextMessage(str(problem), SOURCE, TextLevel.ERROR)))
             self.connection.close_when_sent()
+            return 0
+        match event:
+            case None:
+                return 0
+            case InputReceived(names, values):
+                while not self._access.takes_commands:
+                    yield
+                self._access.submit(WriteInputs(tuple(zip(names, values, strict=True))))
+                return _INPUT_COST
+            case RtdeTextMessage(text, source):
+                entry = LogAdded(" ".join(source.split()) or SOURCE, " ".join(text.split()))
+                self._access.announce(entry)
+                return _REQUEST_COST
+        self._answer(self, event)
+        return _RECIPE_COST if isinstance(event, SetupInputs | SetupOutputs) else _REQUEST_COST
 
     def restart(self) -> None:
         """Take over what the last request has changed; a new stream begins in the next cycle."""

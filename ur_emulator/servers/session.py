@@ -5,43 +5,80 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from functools import partial
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import NotRunningError
 from ur_emulator.realtime.barrier import guarded
-from ur_emulator.servers.steps import StepRunner, Steps
+from ur_emulator.servers.box_access import BoxAccess
+from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
 
 
 class Session(ABC):
     """One client of a port.
 
+    It answers for one turn (`client_work` of the budgets), then all other clients have theirs. A client that
+    sends ahead is not read meanwhile: what it sends waits in the buffers of the system, not in the box.
+
     Attributes:
         connection: to the client.
         is_busy: its requests are being answered.
     """
 
-    def __init__(self, connection: Connection, steps: StepRunner) -> None:
+    def __init__(self, connection: Connection, access: BoxAccess) -> None:
         """Prepare; nothing has arrived yet.
 
         Args:
             connection: to the client.
-            steps: of the box.
+            access: to the box.
         """
         self.connection = connection
         self.is_busy = False
-        self._steps = steps
+        self._access = access
+
+    def receive(self, data: bytes) -> None:
+        """Take what has arrived, and answer what can be answered now."""
+        if self.is_busy:
+            self.connection.set_reading(False)
+        self._take(data)
+        self.answer_requests()
 
     def answer_requests(self) -> None:
         """Begin to answer what has arrived; harmless if that is under way."""
         if not self.is_busy:
             self.is_busy = True
-            self._steps.start(self._serve(), partial(guarded, self.connection.failed, self._finished))
+            self._answer_for_a_turn()
 
     @abstractmethod
-    def _serve(self) -> Steps[None]:
-        """Answer all requests that have arrived."""
+    def _take(self, data: bytes) -> None:
+        """Keep what has arrived."""
 
-    def _finished(self, _: None, error: Exception | None) -> None:
-        """All are answered, or the box has ended, or an error of ours has ended the answering."""
+    @abstractmethod
+    def _answer_next(self) -> Steps[int]:
+        """Answer the next request; return what it has cost in units of work, 0 if none is there."""
+
+    def _answer_for_a_turn(self) -> None:
+        self._access.steps.start(self._serve(), partial(guarded, self.connection.failed, self._finished))
+
+    def _serve(self) -> Steps[bool]:
+        """Answer requests; return True when the turn is over, False when none is left.
+
+        A request that has waited for a cycle is the last of a turn: it is answered within the next cycle.
+        """
+        snapshot, work = self._access.snapshot, BUDGETS.client_work
+        while self.connection.is_open:
+            if work <= 0 or self._access.snapshot is not snapshot:
+                return True
+            cost = yield from self._answer_next()
+            if not cost:
+                break
+            work -= cost
+        return False
+
+    def _finished(self, goes_on: bool | None, error: Exception | None) -> None:
+        """The turn is over, all are answered, the box has ended, or an error of ours the answering."""
+        if goes_on:
+            self.connection.call_soon(self._answer_for_a_turn)
+            return
         self.is_busy = False
         if isinstance(error, NotRunningError):
             self.connection.close()
@@ -49,3 +86,5 @@ class Session(ABC):
             self.connection.failed(error)
         elif self.connection.has_ended:
             self.connection.close_when_sent()
+        else:
+            self.connection.set_reading(True)

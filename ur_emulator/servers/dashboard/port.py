@@ -10,8 +10,8 @@ from ur_emulator.servers.session import Session
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
 
-# Lines of one client that are answered in a turn; more would keep the control cycle waiting.
-LINES_PER_TURN = 200
+# Units of work for a line, and for so many bytes of it.
+_LINE_COST, _BYTES_PER_UNIT = 2, 1024
 
 
 class DashboardPort:
@@ -36,14 +36,8 @@ class DashboardPort:
         connection.send(session.lines.greet())
 
     def received(self, connection: Connection, data: bytes) -> None:
-        """Take lines and answer what can be answered now; a client that sends too much is disconnected."""
-        session = self._sessions[connection]
-        try:
-            session.lines.receive_data(data)
-        except ProtocolError:
-            connection.close()
-        else:
-            session.answer_requests()
+        """Take lines and answer what can be answered now; a client whose line has no end is disconnected."""
+        self._sessions[connection].receive(data)
 
     def ended(self, connection: Connection) -> None:
         """A client sends nothing more: close it when all its lines are answered."""
@@ -62,22 +56,27 @@ class _DashboardSession(Session):
     """
 
     def __init__(self, connection: Connection, access: BoxAccess, answers: DashboardAnswers) -> None:
-        super().__init__(connection, access.steps)
+        super().__init__(connection, access)
         self.lines = DashboardConnection(access.identity.software.dashboard)
         self._answers = answers
 
-    def _serve(self) -> Steps[None]:
-        n_answered = 0
-        while self.connection.is_open and (event := self.lines.next_event()) is not None:
-            if n_answered and n_answered % LINES_PER_TURN == 0:
-                yield
-            n_answered += 1
-            if not isinstance(event, CommandReceived):
-                text = event.answer
-            else:
-                answer = self._answers.answer(event, self.connection.host)
-                text = answer if isinstance(answer, str) else (yield from answer)
-            self._reply(text)
+    def _take(self, data: bytes) -> None:
+        try:
+            self.lines.receive_data(data)
+        except ProtocolError:
+            self.connection.close()
+
+    def _answer_next(self) -> Steps[int]:
+        event = self.lines.next_event()
+        if event is None:
+            return 0
+        if not isinstance(event, CommandReceived):
+            text = event.answer
+        else:
+            answer = self._answers.answer(event, self.connection.host)
+            text = answer if isinstance(answer, str) else (yield from answer)
+        self._reply(text)
+        return _LINE_COST + len(text) // _BYTES_PER_UNIT
 
     def _reply(self, text: str) -> None:
         # A reply may repeat what the client sent, and must stay one line of allowed length.

@@ -27,10 +27,8 @@ from ur_emulator.servers.session import Session
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
 
-# Requests of one client that are answered in one go; the rest waits for the next cycle.
-MAX_AT_ONCE = 32
-# Bytes of requests that may wait; a client that sends more without reading answers is disconnected.
-MAX_INBOX = 16 * 1024
+# Units of work for a request, and how many values cost another one.
+_REQUEST_COST, _VALUES_PER_UNIT = 4, 4
 
 
 class ModbusPort:
@@ -50,12 +48,7 @@ class ModbusPort:
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Answer requests in order."""
-        session = self._sessions[connection]
-        session.inbox += data
-        if len(session.inbox) > MAX_INBOX:
-            connection.close()
-        else:
-            session.answer_requests()
+        self._sessions[connection].receive(data)
 
     def closed(self, connection: Connection) -> None:
         """Forget the client."""
@@ -63,29 +56,27 @@ class ModbusPort:
 
 
 class _ModbusSession(Session):
-    """A client.
-
-    Attributes:
-        inbox: requests that wait for their answer.
-    """
+    """A client."""
 
     def __init__(self, connection: Connection, access: BoxAccess) -> None:
-        super().__init__(connection, access.steps)
-        self.inbox = bytearray()
-        self._access = access
+        super().__init__(connection, access)
+        self._inbox = bytearray()
 
-    def _serve(self) -> Steps[None]:
-        n_answered = 0
+    def _take(self, data: bytes) -> None:
+        self._inbox += data
+
+    def _answer_next(self) -> Steps[int]:
         try:
-            while self.connection.is_open and (frame := take_frame(self.inbox)) is not None:
-                if n_answered and n_answered % MAX_AT_ONCE == 0:
-                    yield
-                n_answered += 1
-                pdu = yield from self._answer(frame.pdu)
-                if not self.connection.send(encode_frame(frame.transaction, frame.unit, pdu)):
-                    self.connection.close()  # without its answer, a client takes the next one for it
+            frame = take_frame(self._inbox)
         except RemoteProtocolError:
             self.connection.close()
+            return 0
+        if frame is None:
+            return 0
+        pdu = yield from self._answer(frame.pdu)
+        if not self.connection.send(encode_frame(frame.transaction, frame.unit, pdu)):
+            self.connection.close()  # without its answer, a client takes the next one for it
+        return _REQUEST_COST + len(pdu) // (2 * _VALUES_PER_UNIT)
 
     def _answer(self, pdu: bytes) -> Steps[bytes]:
         """Return the answer to a request; that to a write after the cycle in which it acts."""

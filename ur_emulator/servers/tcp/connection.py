@@ -13,8 +13,6 @@ from ur_emulator.servers.tcp.buffered_socket import BufferedSocket
 # Kernel buffer for sending: small, so that a slow reader gets fresh data and a silent one costs little
 # memory.
 SEND_BUFFER = 64 * 1024
-# Bytes taken from a client in a turn of the loop: 64 KiB of script lines would hold up a cycle for 100 ms.
-_READ_SIZE = 8 * 1024
 # A peer that is silent is asked whether it is still there, first after a minute; one that lost its power or
 # its cable is forgotten after two. Where the system has no such options, after two hours.
 _KEEP_ALIVE = [
@@ -52,7 +50,7 @@ class Connection(BufferedSocket):
             backlog: the connection is in this set while something waits in its outbox.
             report: called with an error of ours in what the client has caused; it ends the connection.
         """
-        super().__init__(loop, BUDGETS.outbox_bytes, _READ_SIZE)
+        super().__init__(loop, BUDGETS.outbox_bytes, BUDGETS.read_bytes)
         self._on_data = on_data
         self._on_close = on_close
         self._backlog = backlog
@@ -76,6 +74,16 @@ class Connection(BufferedSocket):
     def host(self) -> str:
         """Address of the client without its port."""
         return self.peer.rpartition(":")[0]
+
+    def call_soon(self, call: Callable[[], None]) -> None:
+        """Run `call` when this client has its next turn."""
+        self._loop.call_soon(call, self.failed)
+
+    def set_reading(self, wanted: bool) -> None:
+        """Read on, or leave what comes with the system; no effect once either side has closed."""
+        if self.is_open and not self.has_ended and wanted != self._wants_data:
+            self._wants_data = wanted
+            self._watch()
 
     def allow_half_close(self, on_end: Callable[[Connection], None]) -> None:
         """Stay open when the client closes its sending side: it may still read. The owner closes then.

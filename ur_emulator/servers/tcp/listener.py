@@ -1,8 +1,8 @@
 """A listening port: accepts clients and hands each to the port that it belongs to.
 
-There is no limit on clients: none of a real controller is known. They are limited by the number of
-descriptors that the operating system gives this process. Without a free one, further clients are accepted and
-closed at once, so that they notice it; connected clients are not disturbed.
+Clients beyond the limits of a box (`places`), and those for whom the process has no descriptor left, are
+accepted and closed at once, so that they notice it; connected clients are not disturbed. The limits of a real
+controller are not known.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ import errno
 import selectors
 import socket
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.realtime.barrier import Report, guarded
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp.connection import Connection
+from ur_emulator.servers.tcp.places import Places
 from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
-# Clients accepted in one go; the rest waits for the next turn of the loop, so that a crowd at one port does
-# not hold up a cycle: a client costs up to 0.3 ms.
-MAX_AT_ONCE = 4
 # How long not to listen when a client can be neither accepted nor refused [s].
 PAUSE = 0.1
 # Errors of accept() that mean that this process or system has nothing left, not that the client has gone.
@@ -62,6 +62,7 @@ class Listener:
         notice: Callable[[str], None],
         report: Report,
         name: str,
+        places: Places,
         spare: SpareDescriptor | None = None,
     ) -> None:
         """Listen.
@@ -75,6 +76,7 @@ class Listener:
             notice: called with a text when a client connects or disconnects.
             report: called with an error of ours and what it has ended.
             name: of the port, for notices.
+            places: of the box, for its clients.
             spare: refuses clients when no descriptor is left; without one they wait.
 
         Raises:
@@ -87,6 +89,7 @@ class Listener:
         self._notice = notice
         self._report = report
         self._name = name
+        self._places = places
         self._spare = spare
         self._refuses = False
         self._paused_until: float | None = None
@@ -120,29 +123,40 @@ class Listener:
         self._pause()
 
     def _accept(self, events: int) -> None:
-        for _ in range(MAX_AT_ONCE):
+        for _ in range(BUDGETS.accepted_at_once):
             try:
-                client, _ = self._sock.accept()
+                client, address = self._sock.accept()
             except BlockingIOError:
                 return
             except OSError as error:
                 if error.errno not in _EXHAUSTED:
                     continue  # this client has closed its end already
-                self._refuse(error)
+                self._refuse_next(error)
                 return
+            why_not = self._places.take(address[0], self.number)
+            if why_not:
+                client.close()
+                self._refused(why_not)
+                continue
             self._refuses = False
             try:
                 connection = Connection(
-                    self._loop, client, self._port.received, self._closed, self._backlog, self._report
+                    self._loop,
+                    client,
+                    self._port.received,
+                    partial(self._closed, address[0]),
+                    self._backlog,
+                    self._report,
                 )
             except OSError:
                 client.close()  # closed by the client; some systems report it only now
+                self._places.release(address[0], self.number)
                 continue
             self.connections[connection] = None
             self._notice(f"{connection.peer} connected to {self._name} port {self.number}")
             guarded(connection.failed, self._port.opened, connection)
 
-    def _refuse(self, error: OSError) -> None:
+    def _refuse_next(self, error: OSError) -> None:
         """Close the next client, or pause: the port stays readable, the loop would spin."""
         try:
             if self._spare is None:
@@ -151,16 +165,22 @@ class Listener:
         except OSError:
             self._pause()
             is_refused = True
-        if is_refused and not self._refuses:
+        if is_refused:
+            self._refused(str(error.strerror))
+
+    def _refused(self, why: str) -> None:
+        """Write one line for all clients that are refused one after the other."""
+        if not self._refuses:
             self._refuses = True
-            self._notice(f"clients are turned away from {self._name} port {self.number}: {error.strerror}")
+            self._notice(f"clients are turned away from {self._name} port {self.number}: {why}")
 
     def _pause(self) -> None:
         self._loop.unwatch(self._sock)
         self._loop.add(self)
 
-    def _closed(self, connection: Connection) -> None:
+    def _closed(self, host: str, connection: Connection) -> None:
         del self.connections[connection]
+        self._places.release(host, self.number)
         self._port.closed(connection)
         self._notice(f"{connection.peer} disconnected from {self._name} port {self.number}")
 
