@@ -13,7 +13,7 @@ from ur_emulator.box_log import LogEntry, printable
 from ur_emulator.realtime import line_writer
 from ur_emulator.realtime.line_writer import LineWriter
 
-_LOST = "lines of the log were lost: they were not read in time".split()
+_LOST = ["lines", "of", "the", "log", "were", "lost:", "they", "were", "not", "read", "in", "time"]
 
 
 @pytest.fixture
