@@ -1,0 +1,105 @@
+"""SIGTERM ends a served box whatever it is doing, with exit code 0 and without a word."""
+
+from __future__ import annotations
+
+import gzip
+import math
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+import psutil
+import pytest
+from attackers import crowd, until
+from box_under_attack import PATIENCE, BoxUnderAttack, serving
+
+_LONG_PROGRAM = b"def long():\n" + b"  x = [1, 2, 3]\n" * 250_000 + b"end\n"  # 4 MB
+_WAIT = "<Wait type='Sleep'><waitTime>0.01</waitTime></Wait>"
+_URP = (
+    "<URProgram name='x'><children><MainProgram><children>{}</children></MainProgram></children></URProgram>"
+)
+_NO_NAMES = "import socket, threading\nsocket.getaddrinfo = lambda *names: threading.Event().wait()"
+
+
+def wait_for_work(box: BoxUnderAttack) -> None:
+    """Wait until the worker process is at work."""
+    (worker,) = psutil.Process(box.process.pid).children()
+    before = worker.cpu_times().user
+    until(lambda: worker.cpu_times().user > before + 0.1, "the worker process works")
+
+
+@contextmanager
+def compiling(box: BoxUnderAttack) -> Iterator[None]:
+    with box.connect("secondary") as sock:
+        sock.sendall(_LONG_PROGRAM)
+        wait_for_work(box)
+        yield
+
+
+@contextmanager
+def loading(box: BoxUnderAttack) -> Iterator[None]:
+    program = box.programs / "long.urp"
+    program.write_bytes(gzip.compress(_URP.format(_WAIT * 40_000).encode()))
+    with box.connect("dashboard") as sock:
+        sock.sendall(b"load long.urp\n")
+        wait_for_work(box)
+        yield
+
+
+@contextmanager
+def reporting(box: BoxUnderAttack) -> Iterator[None]:
+    with box.connect("dashboard") as sock:
+        (worker,) = psutil.Process(box.process.pid).children()
+        worker.suspend()
+        sock.sendall(b"generate support file .\n")
+        box.ask("robotmode")  # the box has begun with the report by then
+        yield
+
+
+@contextmanager
+def unread(box: BoxUnderAttack) -> Iterator[None]:
+    with ExitStack() as stack:
+        for port in ("primary", "realtime"):
+            stack.enter_context(crowd(box, port, 200))
+        yield
+
+
+@contextmanager
+def calling(box: BoxUnderAttack) -> Iterator[None]:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(PATIENCE)
+        box.run(f'rpc_factory("xmlrpc", "http://127.0.0.1:{server.getsockname()[1]}").wait()')
+        with server.accept()[0] as sock:
+            assert sock.recv(4)
+            yield
+
+
+@contextmanager
+def looking_up(box: BoxUnderAttack) -> Iterator[None]:
+    box.run('socket_open("robot.invalid", 9)')
+    until(
+        lambda: psutil.Process(box.process.pid).num_threads() > box.at_rest[1], "a thread looks up the name"
+    )
+    yield
+
+
+@pytest.mark.parametrize("busy", [compiling, loading, reporting, unread, calling, looking_up])
+def test_a_busy_box_ends(busy):
+    with serving(prelude=_NO_NAMES if busy is looking_up else "") as box:
+        with busy(box):
+            assert box.stop() < math.inf
+        assert box.process.returncode == 0
+        assert box.errors.read_text() == ""
+
+
+def test_a_box_ends_whose_log_nobody_reads():
+    with serving("--log", unread_log=True) as box:
+        lines = 500 * (b"addToLog " + b"x" * 500 + b"\n")
+        with box.connect("dashboard") as sock, sock.makefile("rb") as replies:
+            assert replies.readline()
+            sock.sendall(lines)
+            for _ in range(500):
+                assert replies.readline() == b"Added log message\n"
+            assert box.stop() < math.inf
+        assert box.process.returncode == 0
+        box.process.stderr.close()
