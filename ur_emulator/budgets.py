@@ -45,7 +45,8 @@ _REFUSED: Final = "it is closed at once"
 class Budgets:
     """All budgets; a comment says where a figure comes from."""
 
-    # --- clients and ports
+    # --- clients and ports ---
+
     # A frame for a client costs 7 us, twice that on a slow host: 256 clients leave half of a cycle.
     clients: int = _budget(256, "clients", "a box", _REFUSED)
     clients_of_address: int = _budget(128, "clients", "an address", _REFUSED)
@@ -61,10 +62,9 @@ class Budgets:
     # A unit is about 4 us: a turn takes a quarter of a millisecond, and never less than a whole request.
     client_work: int = _budget(64, "units of work", "a turn of a client", "the rest waits for its next turn")
     commands: int = _budget(256, "commands", "a cycle of a box", "RTDE clients wait for the next cycle")
-    script_bytes: int = _budget(
-        16 * MIB, "bytes of programs that have no end yet", "a port", "the client that sends more is closed"
-    )
-    # --- control API
+
+    # --- control API ---
+
     control_clients: int = _budget(32, "clients", "a control port", "the most silent one is closed")
     # 64 KiB of JSON take up to 1 ms to be read; the longest program in the field has 50 kB.
     body_bytes: int = _budget(64 * KIB, "bytes", "a body", "it is refused with status 413")
