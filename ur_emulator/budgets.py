@@ -118,7 +118,8 @@ class Budgets:
 
     # The largest programs in the field have some megabytes.
     program_bytes: int = _budget(16 * MIB, "bytes", "all files of a program, unpacked", "it is not loaded")
-    program_marks: int = _budget(500_000, "tags and attributes", "all files of a program", "it is not loaded")
+    # An element with an attribute takes 0.6 kB, and two of them.
+    program_marks: int = _budget(300_000, "tags and attributes", "all files of a program", "it is not loaded")
     # Each level of nodes is two levels of XML.
     program_depth: int = _budget(200, "levels", "the elements of a file", "the program is not loaded")
     # Real programs nest a few levels.
@@ -136,7 +137,7 @@ class Budgets:
         "no more are written until some are removed",
     )
     report_bytes: int = _budget(
-        64 * MIB, "bytes", "all reports in the programs folder", "no more are written until some are removed"
+        32 * MIB, "bytes", "all reports in the programs folder", "no more are written until some are removed"
     )
     folder_files: int = _budget(
         100_000, "files and folders", "a programs folder", "no reports are written into it"

@@ -3,13 +3,15 @@
 import gzip
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
-from dashboard_support import external_control, script_line, urp
+from dashboard_support import Dashboard, external_control, script_line, urp
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs import reading, xml_tree
 from ur_emulator.programs.compiling import compile_loaded
@@ -62,10 +64,10 @@ def test_document_types_are_refused_in_every_encoding(tmp_path, kind, encoding, 
     ("plain", "problem"),
     [
         (b"<URProgram>" + b"<a/>" * 8_000_000 + b"</URProgram>", "more than 16777216 bytes unpacked"),
-        (b"<URProgram>" + b"<a/>" * 500_000 + b"</URProgram>", "more than 500000 tags and attributes"),
-        (b"<URProgram " + b" ".join(b'a%d=""' % n for n in range(500_000)) + b"/>", "more than 500000 tags"),
+        (b"<URProgram>" + b"<a/>" * 300_000 + b"</URProgram>", "more than 300000 tags and attributes"),
+        (b"<URProgram " + b" ".join(b'a%d=""' % n for n in range(300_000)) + b"/>", "more than 300000 tags"),
         (
-            b"<URProgram>" + b"<a>" * 200_000 + b"</a>" * 200_000 + b"</URProgram>",
+            b"<URProgram>" + b"<a>" * 140_000 + b"</a>" * 140_000 + b"</URProgram>",
             "nested more than 200 deep",
         ),
         (b"<URProgram>\0</URProgram>", "not text in UTF-8"),
@@ -96,7 +98,7 @@ def test_the_budgets_hold_for_all_files_of_a_program_together(tmp_path):
     (tmp_path / "s.urp").write_bytes(urp("<Comment/>" * 20_000))
     call = "<CallSubProgram><subprogram><programFile>s.urp</programFile></subprogram></CallSubProgram>"
     load(tmp_path, urp(call * 2))
-    assert "more than 500000 tags and attributes" in refused(tmp_path, urp(call * 100))
+    assert "more than 300000 tags and attributes" in refused(tmp_path, urp(call * 100))
     (tmp_path / "s.script").write_text("#" * 3_000_000 + "\n")
     node = '<Script type="File"><file>s.script</file></Script>'
     assert f"more than {MAX_PROGRAM} bytes" in refused(tmp_path, urp(node * 3))
@@ -172,3 +174,42 @@ def test_parts_of_pcs_are_bounded_together(tmp_path):
         outcome.text
         == f"p.urp cannot be compiled: the parts of PCs together have more than {MAX_PROGRAM} bytes"
     )
+
+
+# --- a box
+
+
+def test_a_box_refuses_them_in_one_line_each_and_loads_the_next(tmp_path):
+    bombs = {
+        "elements.urp": gzip.compress(b"<URProgram>" + b"<a/>" * 4_000_000 + b"</URProgram>"),
+        "utf16.urp": gzip.compress(DOCTYPES["defaults"].encode("utf-16")),
+        "names.urp": urp(f"<{'x' * 100_000}/>"),
+        "lines.script": b"x = 1\n" * 1_000_000,
+    }
+    for name, data in {**bombs, "good.urp": urp(script_line("x = 1"))}.items():
+        (tmp_path / name).write_bytes(data)
+    with ControlBox(pace="lockstep", port_base=None, programs=tmp_path) as box, Dashboard(box) as dashboard:
+        replies = dashboard.ask_all(*(f"load {name}" for name in bombs), "load good.urp")
+        told = [entry.text for entry in box.log if "failed" in entry.text]
+    assert replies == [f"Error while loading program: {name}" for name in bombs] + [
+        "Loading program: /programs/good.urp"
+    ]
+    assert len(told) == len(bombs)
+    assert all(text.startswith(f"load {name} failed: ") for name, text in zip(bombs, told, strict=True))
+    assert max(map(len, told)) < 600
+
+
+def test_the_page_names_the_limits():
+    page = (Path(__file__).parents[2] / "docs" / "programs.md").read_text()
+    mib = 1 << 20
+    for words in (
+        f"{BUDGETS.program_bytes // mib} MiB unpacked",
+        f"{BUDGETS.program_marks:,} tags and attributes",
+        f"{BUDGETS.program_depth} levels of XML",
+        f"{BUDGETS.node_depth} levels of nodes",
+        f"{BUDGETS.subprograms} sub-programs",
+        f"{BUDGETS.external_control_nodes} nodes of External Control",
+        f"{MAX_PROGRAM // mib} MiB of script",
+        f"{BUDGETS.report_files} flight reports and support files, or {BUDGETS.report_bytes // mib} MiB",
+    ):
+        assert words in page
