@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist lo
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: ablation pictures help setup demo draw explore test check check-static bench format docs clean
+.PHONY: ablation pictures help setup demo draw explore soak test check check-static bench format docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -48,6 +48,9 @@ check: check-static ## lint, types, fast tests
 
 bench: $(STAMP) ## measure speed, lateness, memory; writes bench/results.json
 	$(BIN)/python -m bench
+
+soak: $(STAMP) ## an hour (or SOAK_MINUTES) under load, with an attack every minute, into out/soak
+	$(BIN)/python tests/attack/soak.py
 
 format: $(STAMP) ## put the code into its canonical layout
 	$(BIN)/ruff format .

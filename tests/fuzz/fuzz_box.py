@@ -8,13 +8,15 @@ seed is the same story. A step is something that one hostile client does, a cycl
 import math
 import os
 import re
+import socket
 import threading
 import time
 from collections import Counter, deque
+from functools import lru_cache
 from types import SimpleNamespace
 
 import psutil
-from fuzz_corpus import MESSAGES
+from fuzz_corpus import DIALLING_PROGRAMS, MESSAGES, peer_message
 from fuzz_mutations import mutate_bytes
 from fuzz_replies import READERS
 from fuzz_wire import Wire
@@ -136,13 +138,16 @@ class FuzzBox:
         self.readers["rtde"] = RtdeWitness(self.witnesses["rtde"], self.turn)
         self.asked_at = {}
         self.rest = self.controller.snapshot.target_q
+        self.server = socket.create_server(("127.0.0.1", 0), backlog=64)
+        self.server.setblocking(False)
+        self.peers = []
         self.process = psutil.Process()
         self.memory = self.process.memory_info().rss
         self.in_use = self._in_use()
 
     def _connect(self, name):
         number = self.box.control_port if name == "control" else getattr(self.box.ports, name)
-        wire = Wire((self.box.host, number))
+        wire = Wire.to((self.box.host, number))
         self.turn()
         return wire
 
@@ -156,7 +161,20 @@ class FuzzBox:
         for wires in (*self.hostile.values(), self.witnesses):
             for wire in wires.values() if wires is self.witnesses else wires:
                 wire.close()
+        self._end_peers()
+        self.server.close()
         self.box.close()
+
+    def _end_peers(self):
+        """Nobody answers those that scripts dial any more, and those that were answered are gone."""
+        try:
+            while True:
+                self.server.accept()[0].close()
+        except BlockingIOError:
+            pass
+        for wire in self.peers:
+            wire.close()
+        self.peers.clear()
 
     def _in_use(self):
         """Descriptors and threads of this process."""
@@ -179,8 +197,10 @@ class FuzzBox:
                 self.repair()
         elif kind < 1.1 * self.cycle_share:
             self.heartbeat()
-        else:
+        elif kind < 0.95:
             self.attack(self.rng.choice(tuple(MESSAGES)))
+        else:
+            self.attack_as_peer()
 
     def attack(self, name):
         """Let a client of a port do something."""
@@ -209,8 +229,39 @@ class FuzzBox:
             wire.reset()
             self._did(name, "reset", wire)
 
+    def attack_as_peer(self):
+        """Let one that a script has dialled do something."""
+        try:
+            while True:
+                self.peers.append(Wire(self.server.accept()[0]))
+        except BlockingIOError:
+            pass
+        for wire in self.peers[:-MAX_HOSTILE]:
+            wire.close()
+        self.peers = [wire for wire in self.peers if wire.is_open]
+        if not self.peers:
+            if not self.controller.programs.is_running:
+                program = self.rng.choice(DIALLING_PROGRAMS)
+                self._order(
+                    2, StartProgram(_compiled(program.replace("PEER", str(self.server.getsockname()[1]))))
+                )
+            return
+        wire, kind = self.rng.choice(self.peers), self.rng.random()
+        if kind < 0.8:
+            data = peer_message(self.rng)
+            wire.send(data)
+            self._did("peer", data, wire)
+        elif kind < 0.9:
+            wire.end()
+            self._did("peer", "end", wire)
+        else:
+            wire.reset()
+            self._did("peer", "reset", wire)
+        wire.take()
+
     def send(self, name, wire, data):
         """Send in one piece, at one cut, or byte by byte."""
+        data = data.replace(b"PEER", b"%d" % self.server.getsockname()[1])
         how = self.rng.random()
         if how < 0.6 or len(data) < 2:
             pieces = [data]
@@ -409,6 +460,7 @@ class FuzzBox:
             self._look()
         # One that ended before it was reset is heard of again when all that it asked for is answered.
         for _ in range(_LONGEST_QUEUE):
+            self._end_peers()
             if self._in_use() <= self.in_use:
                 break
             self._advance(ticks=True)
@@ -438,6 +490,11 @@ def run(rng, folder, n_cases, **options):
 
 def _is_idle(tasks):
     return not (tasks._waiting or getattr(tasks, "_current", None) or getattr(tasks, "_under_way", None))
+
+
+@lru_cache
+def _compiled(text):
+    return compile_program(text)
 
 
 def _nothing():

@@ -43,6 +43,22 @@ STILL_PROGRAMS = (
     "def labels():\n  $ 1 \"one\"\n  sleep(0.01)\n  $ 2 \"two\"\n  sleep(0.01)\nend\n",
     "def halts():\n  halt\nend\n",
 )  # fmt: skip
+# They dial a peer of the test; PEER stands for its port.
+DIALLING_PROGRAMS = (
+    'def floats():\n  socket_open("127.0.0.1", PEER)\n  while True:\n    textmsg(socket_read_ascii_float(3))\n'
+    "    sync()\n  end\nend\n",
+    'def integers():\n  socket_open("127.0.0.1", PEER, "a")\n  while True:\n'
+    '    x = socket_read_binary_integer(2, "a")\n    write_output_integer_register(1, x[0])\n  end\nend\n',
+    'def strings():\n  socket_open("127.0.0.1", PEER)\n  while True:\n'
+    '    textmsg(socket_read_string(prefix=">", suffix="<", timeout=0.1))\n    sync()\n  end\nend\n',
+    'def lines():\n  socket_open("127.0.0.1", PEER)\n  i = 0\n  while i < 50:\n'
+    '    socket_send_line("x")\n    textmsg(socket_read_line(timeout=0.05))\n    i = i + 1\n  end\n'
+    "  socket_close()\nend\n",
+    'def variables():\n  socket_open("127.0.0.1", PEER)\n  textmsg(socket_get_var("a"))\n'
+    '  socket_set_var("b", 3)\n  socket_send_int(7)\n  textmsg(socket_read_byte_list(5, timeout=0.1))\nend\n',
+    'def many():\n  i = 0\n  while i < 30:\n    socket_open("127.0.0.1", PEER, to_str(i))\n    i = i + 1\n'
+    "  end\n  sleep(0.1)\nend\n",
+)
 MOVING_PROGRAMS = (
     "movej([0, -1.57, 1.57, 0, 0, 0], a=1.4, v=1.05)\n",
     "speedj([0.1, 0, 0, 0, 0, 0.1], 1, 0.1)\n",
@@ -64,7 +80,7 @@ def script_message(rng, lively):
         word = rng.choice([w for w in CONTROLLER_WORDS if lively or w.text not in MOVING_WORDS])
         numbers = ("0.5", "1", "0", "-1", "nan", "1e999", "0.01")
         return (word.text + (f" {rng.choice(numbers)}" if word.takes_number else "") + "\n").encode()
-    programs = STILL_PROGRAMS + (MOVING_PROGRAMS if lively else ())
+    programs = STILL_PROGRAMS + DIALLING_PROGRAMS + (MOVING_PROGRAMS if lively else ())
     return rng.choice(programs).encode()
 
 
@@ -165,6 +181,22 @@ def control_message(rng, lively):
         return head.encode() + b"%x\r\n%s\r\n0\r\n\r\n" % (len(body), body)
     head = f"POST /v1/{name} HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\n{extra}Content-Length: {len(body)}\r\n\r\n"
     return head.encode() + body
+
+
+def peer_message(rng):
+    """What a peer of a script sends."""
+    kind = rng.randrange(5)
+    if kind == 0:
+        numbers = [
+            rng.choice(("1", "2.5", "-1e9", "nan", "1e999", "x", ""))
+            for _ in range(rng.choice((3, 3, 0, 31)))
+        ]
+        return f"({', '.join(numbers)})\n".encode()
+    if kind == 1:
+        return bytes([rng.choice((2, 2, 0, 31, 255))]) + rng.randbytes(8)
+    if kind == 2:
+        return rng.choice((b">text<", b"a 7\n", b"line\r\n", b"\xff\0\n", b"<" * 300, b"GET b\n", b""))
+    return rng.randbytes(rng.choice((1, 40, 4000, 60_000)))
 
 
 MESSAGES = {

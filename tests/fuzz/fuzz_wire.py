@@ -16,8 +16,13 @@ class Wire:
         reads: what comes is taken; False lets the buffers of the box fill.
     """
 
-    def __init__(self, address):
-        self.sock = socket.create_connection(address, timeout=_TIMEOUT)
+    @classmethod
+    def to(cls, address):
+        """Connect to a port."""
+        return cls(socket.create_connection(address, timeout=_TIMEOUT))
+
+    def __init__(self, sock):
+        self.sock = sock
         self.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.sock.setblocking(False)
         self.number = self.sock.getsockname()[1]

@@ -33,7 +33,7 @@ def repeat(do, n_times):
 @pytest.mark.parametrize("seed", range(2))
 def test_no_bytes_move_the_arm_or_harm_others(folder, seed):
     cases = run(random.Random(seed), folder, 1500, lively=False)
-    assert set(cases) == set(PORTS)
+    assert set(cases) >= set(PORTS)
 
 
 @pytest.mark.parametrize("seed", range(2))
