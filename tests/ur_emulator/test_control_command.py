@@ -8,6 +8,7 @@ import sys
 import pytest
 from control_support import control_box
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.control.command_line import main, make_parser, plain
 from ur_emulator.control.http_client import ControlClient
 from ur_emulator.control.operations import OPERATIONS
@@ -130,6 +131,24 @@ def test_a_program_of_this_machine_runs_and_its_question_is_answered(box, ctl, t
     assert "INFO Program: said 42" in out
     assert "said 42" not in ctl("log", "--after", str(10**6))[1]
     assert ctl("log", "--level", "FAULT")[1] == "\n"
+
+
+def test_the_whole_log_comes_although_the_box_gives_some_entries_at_a_time(box, ctl):
+    texts = [f"entry {k} of many" for k in range(2 * BUDGETS.log_entries + 1)]
+    for text in texts:
+        box.add_to_log(text)
+    code, out, _ = ctl("log")
+    assert code == 0
+    assert [line.partition("Control: ")[2] for line in out.splitlines() if "of many" in line] == texts
+    assert len(json.loads(ctl("log", "--json")[1])["entries"]) == len(out.splitlines())
+
+
+def test_a_program_that_is_too_long_is_not_sent_and_the_message_says_where_to(ctl, tmp_path):
+    path = tmp_path / "long.script"
+    path.write_text("def f():\n" + "# x\n" * BUDGETS.body_bytes + "end\n")
+    code, _, err = ctl("run_program", "--script-file", str(path))
+    assert code == 1
+    assert "the control API takes 65536; send a longer program to port 30002" in err
 
 
 @pytest.mark.parametrize(

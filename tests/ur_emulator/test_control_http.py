@@ -8,6 +8,7 @@ import struct
 import pytest
 from control_support import Http, control_box
 
+from protocol.primary.messages import ReportLevel
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.control.http_request import MAX_HEADER
 from ur_emulator.control.operations import OPERATIONS
@@ -78,6 +79,23 @@ def test_the_log_is_read_on_where_it_was_left_off(http):
     assert more["next"] == log["next"] + 1
     assert http.ask("GET", f"/v1/log?after={more['next']}")[1] == {"entries": [], "next": more["next"]}
     assert http.ask("GET", "/v1/log?level=FAULT&after=999999")[1] == {"entries": [], "next": 999_999}
+
+
+def test_an_answer_has_some_entries_of_a_long_log_and_the_next_one_the_others(box, http):
+    start = box._box.log.count
+    for k in range(2 * BUDGETS.log_entries + 10):
+        box._box.log.write(0, "Test", f"{k}", ReportLevel.FAULT if k % 2 else ReportLevel.INFO)
+    texts, sizes, after = [], [], start
+    while not sizes or sizes[-1]:
+        page = http.ask("GET", f"/v1/log?after={after}")[1]
+        sizes.append(len(page["entries"]))
+        texts += [entry["text"] for entry in page["entries"]]
+        after = page["next"]
+    assert sizes == [BUDGETS.log_entries, BUDGETS.log_entries, 10, 0]
+    assert texts == [f"{k}" for k in range(2 * BUDGETS.log_entries + 10)]
+    page = http.ask("GET", f"/v1/log?after={start}&level=FAULT")[1]
+    assert [entry["text"] for entry in page["entries"]] == texts[1 : 2 * BUDGETS.log_entries : 2]
+    assert page["next"] == start + 2 * BUDGETS.log_entries
 
 
 def test_a_wait_is_answered_when_it_is_over_and_others_are_served_meanwhile(box, http):

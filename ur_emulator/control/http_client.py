@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlencode
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.control.operations import OPERATIONS, make
 from ur_emulator.errors import ArgumentError, ControlError, RefusedError
 
@@ -42,6 +43,12 @@ class ControlClient:
         """
         make(name, arguments)
         given = {key: value for key, value in arguments.items() if value is not None}
+        body = json.dumps(given)
+        if len(body) > BUDGETS.body_bytes:
+            raise ArgumentError(
+                f"{name} with {len(body)} bytes: the control API takes {BUDGETS.body_bytes}; "
+                "send a longer program to port 30002, or put its file into the folder of programs"
+            )
         patience = PATIENCE + float(given.get("timeout", 0.0))
         connection = http.client.HTTPConnection(self.host, self.port, timeout=patience)
         try:
@@ -50,7 +57,7 @@ class ControlClient:
                 connection.request("GET", f"/v1/{name}{query}", headers=self._headers)
             else:
                 headers = {"Content-Type": "application/json", **self._headers}
-                connection.request("POST", f"/v1/{name}", json.dumps(given), headers)
+                connection.request("POST", f"/v1/{name}", body, headers)
             response = connection.getresponse()
             result = json.loads(response.read())
         except (OSError, http.client.HTTPException, ValueError) as error:
