@@ -216,7 +216,7 @@ class Box(BoxOperations):
         Args:
             command: one of `ur_emulator.commands`, such as `operator.ClosePopup()` or `power.PowerOff()`.
             done: called in that cycle, in the thread of the box: with its result and None, or with
-                None and the `RefusedError`.
+                None and the error, a `RefusedError` if it was refused.
         """
         self._loop.call_soon_threadsafe(lambda: self._box.submit(command, done), self._fail)
 

@@ -10,6 +10,7 @@ from control_support import Http, control_box
 from dashboard_support import Dashboard
 
 from protocol.primary.messages import ReportLevel
+from ur_emulator.commands.power import PowerOff
 from ur_emulator.control.reading import ReadState
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.scripts.sockets import ScriptConnection
@@ -180,6 +181,17 @@ def test_an_error_after_the_last_answer_ends_the_connection(box, monkeypatch):
             assert other.ask("robotmode") == "Robotmode: RUNNING"
     (line,) = faults(box)
     assert DEFECT in line
+
+
+def test_an_error_in_a_command_ends_who_has_sent_it(box, monkeypatch):
+    monkeypatch.setattr(PowerOff, "apply", fail)
+    with Dashboard(box) as dashboard:
+        dashboard.send("power off")
+        assert dashboard.is_closed()
+    box.submit(PowerOff())
+    until(box, lambda: len(faults(box)) == 2)
+    assert DEFECT in faults(box)[0]
+    assert faults(box)[1].startswith(f"a command is lost: {DEFECT}")
 
 
 def test_an_error_of_an_operation_is_told_to_who_asked(box, monkeypatch):

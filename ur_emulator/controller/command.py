@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported
-from ur_emulator.errors import RefusedError
 
 if TYPE_CHECKING:
     from ur_emulator.controller.compliance.flange_push import FlangePush
@@ -23,8 +22,8 @@ if TYPE_CHECKING:
 
 # Values that a command returns; most return none.
 Result = Mapping[str, Any] | None
-# Called in the cycle in which a command was applied, with its result or its refusal.
-Done = Callable[[Result, RefusedError | None], None]
+# Called in the cycle in which a command was applied, with its result, or with its refusal or another error.
+Done = Callable[[Result, Exception | None], None]
 
 
 class Box(Protocol):
@@ -66,11 +65,11 @@ class Submitted:
     done: Done
 
     def apply(self, box: Box) -> Result:
-        """Apply the command and call `done` with its result or its refusal."""
+        """Apply the command and call `done` with its result or its error, which ends only the command."""
         try:
             result = self.command.apply(box)
-        except RefusedError as refusal:
-            self.done(None, refusal)
+        except Exception as error:
+            self.done(None, error)
             return None
         self.done(result, None)
         return result

@@ -9,10 +9,11 @@ from typing import Any, Protocol
 from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import BoxLog
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.command import Command, Done, Submitted
+from ur_emulator.controller.command import Command, Done, Result, Submitted
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.errors import RefusedError
 from ur_emulator.realtime.barrier import Failed, place_of
 from ur_emulator.realtime.pacing import Pacer, RealtimePacer
 
@@ -82,8 +83,8 @@ class ServedBox:
         return len(self._commands) < BUDGETS.commands
 
     def submit(self, command: Command, done: Done | None = None) -> None:
-        """Take a command for the next cycle; `done` is called then with the result."""
-        self._commands.append(command if done is None else Submitted(command, done))
+        """Take a command for the next cycle; `done` is called then with the result or the error."""
+        self._commands.append(Submitted(command, done or self._report_error))
 
     def announce(self, event: Event) -> None:
         """Publish an event at once, outside of a cycle."""
@@ -99,6 +100,11 @@ class ServedBox:
         """Write into the log what an error of ours has ended."""
         text = f"{what}: {place_of(error)}"
         self.log.write(self.controller.snapshot.tick, "Controller", text, ReportLevel.FAULT)
+
+    def _report_error(self, result: Result, error: Exception | None) -> None:
+        """Report an error of ours in a command; a refusal is none."""
+        if error is not None and not isinstance(error, RefusedError):
+            self.report("a command is lost", error)
 
     # --- what the pacer asks
 
