@@ -25,6 +25,7 @@ from protocol.wire_codec import codec_for
 from protocol.wire_record import ALWAYS, OLDEST, Since, since, wire
 
 __all__ = [
+    "LONGEST_TITLE",
     "MESSAGES",
     "ErrorCodeMessage",
     "KeyMessage",
@@ -122,6 +123,10 @@ class ProgramLabelMessage(RobotMessage):
 
     label_id: int = wire("i", "number after the $")
     text: str = wire("s", default="")
+
+
+# Characters of a title: its length is one byte on the wire.
+LONGEST_TITLE = 255
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,11 +5,11 @@ import socket
 from types import SimpleNamespace
 
 import pytest
-from box_support import FrameReader, connect, listening_socket
+from box_support import FrameReader, MessageReader, connect, listening_socket
 from control_support import Http, control_box
 from dashboard_support import Dashboard
 
-from protocol.primary.messages import ReportLevel
+from protocol.primary.messages import LONGEST_TITLE, PopupMessage, ReportLevel
 from ur_emulator.commands.power import PowerOff
 from ur_emulator.control.reading import ReadState
 from ur_emulator.realtime.event_loop import EventLoop
@@ -192,6 +192,27 @@ def test_an_error_in_a_command_ends_who_has_sent_it(box, monkeypatch):
     until(box, lambda: len(faults(box)) == 2)
     assert DEFECT in faults(box)[0]
     assert faults(box)[1].startswith(f"a command is lost: {DEFECT}")
+
+
+@pytest.mark.parametrize("method", ["publish", "_package"], ids=["states", "messages"])
+def test_a_port_that_cannot_publish_is_told_once_and_the_others_publish(box, method, monkeypatch):
+    with connect(box, "primary") as reader, connect(box, "secondary") as sock:
+        assert reader.recv(1)
+        monkeypatch.setattr(box._port_set._ports["primary"], method, fail)
+        for k in range(3):
+            sock.sendall(f"def p():\n  textmsg({k})\nend\n".encode())
+            until(box, lambda k=k: any(entry.text == str(k) for entry in box._log_entries()))
+    (line,) = faults(box)
+    assert line.startswith(f"a port cannot publish: {DEFECT}")
+
+
+def test_a_popup_with_a_long_title_is_shown(box):
+    """A title of 256 letters once ended the box."""
+    with connect(box, "primary") as reader, connect(box, "secondary") as sock:
+        sock.sendall(f'def p():\n  popup("x", "{"t" * 300}")\nend\n'.encode())
+        popup = MessageReader(reader).message(PopupMessage)
+    assert popup.title == "t" * LONGEST_TITLE
+    assert not faults(box)
 
 
 def test_an_error_of_an_operation_is_told_to_who_asked(box, monkeypatch):

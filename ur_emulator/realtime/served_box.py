@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, Protocol
 
 from protocol.primary.messages import ReportLevel
@@ -14,7 +15,7 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import RefusedError
-from ur_emulator.realtime.barrier import Failed, place_of
+from ur_emulator.realtime.barrier import Failed, guarded, place_of
 from ur_emulator.realtime.pacing import Pacer, RealtimePacer
 
 
@@ -62,6 +63,7 @@ class ServedBox:
         self.backlog: set[Any] = set()
         self._on_failure = on_failure
         self._given_up: set[Any] = set()
+        self._failing: set[object] = set()
         self._last_frame = -math.inf
         # A cycle is computed and waits for its deadline.
         self._is_held = False
@@ -90,7 +92,7 @@ class ServedBox:
         """Publish an event at once, outside of a cycle."""
         self.log.note(event, self.controller.snapshot.tick)
         for listener in self._listeners:
-            listener(event)
+            guarded(partial(self._fail_to_publish, listener), listener, event)
 
     def notice(self, text: str) -> None:
         """Write a line about a client into the log."""
@@ -185,4 +187,13 @@ class ServedBox:
             for event in self.controller.state.events.take():
                 self.announce(event)
         for publisher in self._publishers:
-            publisher.publish(snapshot)
+            try:
+                publisher.publish(snapshot)
+            except Exception as error:
+                self._fail_to_publish(publisher, error)
+
+    def _fail_to_publish(self, part: object, error: Exception) -> None:
+        """Do without what a port could not publish; reported once, for it may be so in every cycle."""
+        if part not in self._failing:
+            self._failing.add(part)
+            self.report("a port cannot publish", error)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from protocol.primary.framing import NO_TIME
 from protocol.primary.messages import (
+    LONGEST_TITLE,
     ErrorCodeMessage,
     KeyMessage,
     MessageSource,
@@ -71,6 +72,6 @@ def message_for(event: events.Event, timestamp: int) -> RobotMessage | None:
                 is_warning=warning,
                 is_error=error,
                 is_blocking=blocking,
-                title=title,
+                title=title[:LONGEST_TITLE],
                 text=text,
             )
