@@ -143,6 +143,11 @@ def test_the_whole_log_comes_although_the_box_gives_some_entries_at_a_time(box, 
     assert len(json.loads(ctl("log", "--json")[1])["entries"]) == len(out.splitlines())
 
 
+def test_what_others_have_said_is_shown_and_not_obeyed(box, ctl):
+    box.add_to_log("\x1b[2J\r\x9b\u202e")
+    assert r"Control: \x1b[2J\r\x9b\u202e" in ctl("log")[1]
+
+
 def test_a_program_that_is_too_long_is_not_sent_and_the_message_says_where_to(ctl, tmp_path):
     path = tmp_path / "long.script"
     path.write_text("def f():\n" + "# x\n" * BUDGETS.body_bytes + "end\n")

@@ -160,6 +160,17 @@ def test_an_error_of_a_port_ends_the_connection_that_has_caused_it(box, name, me
         assert [c.peer for c in connections] == ["{}:{}".format(*other.getsockname())]
 
 
+def test_an_error_of_a_port_that_forgets_a_client_harms_nobody(box, monkeypatch):
+    connections = box._port_set._listeners["rtde"].connections
+    monkeypatch.setattr(box._port_set._ports["rtde"], "closed", fail)
+    with connect(box, "rtde") as sock:
+        until(box, lambda: connections)
+        address = "{}:{}".format(*sock.getsockname())
+    until(box, lambda: not connections and faults(box))
+    (line,) = faults(box)
+    assert line.startswith(f"{address} is not forgotten: {DEFECT}")
+
+
 def test_an_error_while_requests_are_answered_ends_their_connection(box, monkeypatch):
     with Dashboard(box) as other, Dashboard(box) as dashboard:
         with monkeypatch.context() as patch:

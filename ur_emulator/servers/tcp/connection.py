@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable
+from functools import partial
 
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.realtime.barrier import Report
+from ur_emulator.realtime.barrier import Report, guarded
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp.buffered_socket import BufferedSocket
 
@@ -116,7 +117,7 @@ class Connection(BufferedSocket):
         if self.is_open:
             super().close()
             self._backlog.discard(self)
-            self._on_close(self)
+            guarded(partial(self._report, f"{self.peer} is not forgotten"), self._on_close, self)
 
     def failed(self, error: Exception) -> None:
         """Close after an error of ours in what the client has caused, and report it."""
