@@ -96,6 +96,7 @@ def test_without_a_folder_the_files_go_to_a_temporary_one_that_goes_with_the_box
         assert sorted(path.suffix for path in written.iterdir()) == ["", ".txt", ".zip", ".zip"]
         assert not any(str(tmp_path) in str(entry) for entry in box.log)
     assert not list(tmp_path.iterdir())
+    box.close()  # harmless
 
 
 @pytest.mark.parametrize("directory", ["", "..", "/etc", "/programs/..", "no/such", "wait.urp", "a\0b"])

@@ -3,6 +3,8 @@
 import json
 import os
 import resource
+import subprocess
+import sys
 import zipfile
 from dataclasses import replace
 from pathlib import PurePosixPath
@@ -18,6 +20,7 @@ from ur_emulator.programs.inner_files import PART_NAME
 from ur_emulator.programs.loading import load_program
 from ur_emulator.servers.dashboard import reports
 from ur_emulator.servers.dashboard.reports import BoxFacts, flight_report, save_log, support_file
+from ur_emulator.servers.dashboard.temporary_folder import TemporaryFolder
 
 SECRET = 'def secret():\n  textmsg("secret of another user")\nend\n'
 FACTS = BoxFacts("20193000007", {"software": "3.15"}, 12.0, {"actual_q": [0.0]}, "the log\n")
@@ -240,6 +243,24 @@ def test_without_a_temporary_folder_it_is_one_line(tmp_path, monkeypatch):
         assert "no temporary folder" in dashboard.ask("generate flight report")
         assert dashboard.ask("running") == "Program running: false"
         assert str(tmp_path) not in "".join(map(str, box.log))
+
+
+def test_the_temporary_folder_of_a_killed_box_goes_with_the_next_one(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    code = f"import tempfile; tempfile.tempdir = {str(tmp_path)!r}\n" + (
+        "import os, signal\nfrom ur_emulator.servers.dashboard.temporary_folder import TemporaryFolder\n"
+        "folder = TemporaryFolder()\n(folder.path / 'log_history.txt').touch()\nos.kill(os.getpid(), signal.SIGKILL)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=False)
+    (left,) = tmp_path.iterdir()
+    others = [tmp_path / name for name in (f"{left.name}.txt", "ur-emulator-box-reports-mine", "somebody")]
+    for path in others:
+        path.mkdir()
+    living = TemporaryFolder()
+    with ControlBox(pace="lockstep", port_base=None):
+        assert set(tmp_path.iterdir()) == {living.path, *others}
+    living.close()
+    assert set(tmp_path.iterdir()) == set(others)
 
 
 # --- what is told

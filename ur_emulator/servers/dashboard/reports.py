@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import FoundFile, ProgramFolder
+from ur_emulator.servers.dashboard.temporary_folder import TemporaryFolder, remove_left_folders
 
 REPORT_KINDS = ("controller", "software", "system")
 LOG_NAME = "log_history.txt"
@@ -64,7 +64,9 @@ class ReportFolder:
 
     def __init__(self, programs: ProgramFolder) -> None:
         self._folder = programs
-        self._temporary: tempfile.TemporaryDirectory[str] | None = None
+        self._temporary: TemporaryFolder | None = None
+        if not programs.exists:
+            remove_left_folders()
 
     @property
     def folder(self) -> ProgramFolder:
@@ -75,18 +77,17 @@ class ReportFolder:
         """
         if not self._folder.exists:
             try:
-                self._temporary = tempfile.TemporaryDirectory(
-                    prefix="ur-emulator-", ignore_cleanup_errors=True
-                )
+                self._temporary = TemporaryFolder()
             except OSError as error:
                 raise ProgramFileError(f"no temporary folder: {error.strerror or error}") from None
-            self._folder = ProgramFolder(Path(self._temporary.name))
+            self._folder = ProgramFolder(self._temporary.path)
         return self._folder
 
     def close(self) -> None:
         """Remove the temporary folder, if there is one, with what was written into it."""
-        if self._temporary is not None:
-            self._temporary.cleanup()
+        temporary, self._temporary = self._temporary, None
+        if temporary is not None:
+            temporary.close()
 
 
 def save_log(folder: ProgramFolder, facts: BoxFacts) -> str:
