@@ -106,6 +106,22 @@ class Budgets:
         "a cycle of a program",
         "the read goes on in the next cycle",
     )
+    remote_connections: int = _budget(
+        16, "connections", "the remote procedure handles of a box", "the one that was idle longest is closed"
+    )
+    remote_answer_bytes: int = _budget(
+        256 * KIB, "bytes", "an answer of a remote procedure", "the call fails"
+    )
+    remote_answer_time: float = _budget(
+        30.0, "s from its first byte", "an answer of a remote procedure", "the call fails"
+    )
+    # 5,000 numbers take 10 ms, in pieces.
+    remote_values: int = _budget(
+        5_000,
+        "values",
+        "a call or an answer of a remote procedure, all calls of a cycle",
+        "it fails or waits",
+    )
     external_control_time: float = _budget(
         30.0, "s", "a PC that sends a program", "a program is played that shows what is wrong"
     )

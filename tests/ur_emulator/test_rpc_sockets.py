@@ -1,14 +1,21 @@
 """XML-RPC over real sockets: a box, a server of the standard library, and servers that misbehave."""
 
+import gzip
+import socket
 import threading
-from contextlib import contextmanager
+import xmlrpc.client
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from socketserver import ThreadingMixIn
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 from box_support import TIMEOUT, MessageReader, connect, listening_socket
 
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
+from ur_emulator.servers.scripts import xmlrpc_client, xmlrpc_exchange
 
 
 class Handler(SimpleXMLRPCRequestHandler):
@@ -22,7 +29,7 @@ class Handler(SimpleXMLRPCRequestHandler):
         self.connections.append(self.client_address)
 
 
-class Server(SimpleXMLRPCServer):
+class Server(ThreadingMixIn, SimpleXMLRPCServer):
     """Serves in a thread until it is closed."""
 
     daemon_threads = True
@@ -98,27 +105,195 @@ def test_a_server_that_does_not_run(box):
     assert "does not answer" in fail(box, port).text
 
 
-@pytest.mark.parametrize(
-    "answer", [b"HTTP/1.1 200 OK\r\nContent-Length: 3\r\n\r\nabc", b"hello\r\n\r\n", b""]
-)
-def test_a_server_that_speaks_nonsense(box, answer):
+def http(body=b"", *headers, status="200 OK", length=None):
+    """An HTTP answer."""
+    lines = [f"HTTP/1.1 {status}", *headers, f"Content-Length: {len(body) if length is None else length}"]
+    return "\r\n".join((*lines, "", "")).encode() + body
+
+
+def value(inside):
+    return (
+        f"<methodResponse><params><param><value>{inside}</value></param></params></methodResponse>".encode()
+    )
+
+
+FAULT = xmlrpc.client.dumps(xmlrpc.client.Fault(1, "no \u20ac\n1")).encode()
+POSE = "".join(f"<member><name>{key}</name><value><int>1</int></value></member>" for key in "abcdef")
+
+
+@contextmanager
+def answering(answer, then=b"", closes=True):
+    """A server that answers every call with the same bytes, and may go on with others until the box has enough."""
+    served = []
     with listening_socket() as server:
-        port = server.getsockname()[1]
 
         def serve():
-            for _ in range(2):  # a connection that breaks is tried once more
+            while True:
                 try:
                     peer, _ = server.accept()
                 except OSError:
                     return
-                with peer:
-                    peer.recv(65536)
+                served.append(peer)
+                with peer, suppress(OSError):
+                    while not peer.recv(65536).endswith(b"</methodCall>\n"):
+                        pass
                     peer.sendall(answer)
+                    while then:
+                        peer.sendall(then)
+                    while not closes and peer.recv(65536):
+                        pass
 
         thread = threading.Thread(target=serve, daemon=True)
         thread.start()
+        yield server.getsockname()[1], served
+        server.shutdown(socket.SHUT_RDWR)
+    thread.join(TIMEOUT)
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (http(b"abc"), "not XML"),
+        (b"hello\r\n\r\n", "makes no sense"),
+        (b"", "closed the connection"),
+        (http(b"<methodResponse><fault/></methodResponse>"), "<fault> that is not valid"),
+        (http(value("<int>1</int>")[:-9]), "not XML"),
+        (http(value("<array><data><value/>")), "not XML"),
+        (http(b"<methodResponse><params><param>" + b"<value><array><data>" * 10_000), "inside each other"),
+        (http(value("<array><data>" + "<value/>" * 6000 + "</data></array>")), "too many values"),
+        (http(b"<?xml version='1.0' encoding='no-such'?>" + value("")), "unknown encoding"),
+        (http(gzip.compress(bytes(1 << 20)), "Content-Encoding: gzip"), "packed with gzip"),
+        (http(b"\x1f\x8b\x08broken", "Content-Encoding: gzip"), "packed with gzip"),
+        (http(gzip.compress(value(""))), "not XML"),
+        (http(length=1 << 30), "longer than 262144 bytes"),
+        (http(length="-1"), "makes no sense"),
+        (http(length="9" * 5000), "makes no sense"),
+        (http(value(""), length=5000), "makes no sense"),
+        (http(status="301 Moved"), "answered 301 Moved"),
+        (http(status="500 \x1b[2J"), "remote procedure call failed"),
+        (http(value("<i8>9223372036854775807</i8>")), "no counterpart"),
+        (http(value(f"<int>{'9' * 6000}</int>")), "<int> that is not valid"),
+        (http(value("<dateTime.iso8601>20260101T00:00:00</dateTime.iso8601>")), "<dateTime.iso8601>"),
+        (http(value("<base64>AAAA</base64>")), "<base64>"),
+        (http(value(f"<struct>{POSE}</struct>")), "no counterpart"),
+        (http(value("x" * 70_000)), "no counterpart"),
+        (http(value("<array><data><value><nil/></value></data></array>")), "no list of a script"),
+        (http(FAULT), "\xe2\x82\xac 1"),
+        (b"HTTP/1.1 100 Continue\r\n\r\n" * 20_000, "longer than"),
+        (b"HTTP/1.1 200 OK\r\nX: " + b"x" * 100_000, "makes no sense"),
+        (b"HTTP/1.1 101 Switching Protocols\r\n\r\n", "remote procedure call failed"),
+    ],
+    ids=lambda given: given if isinstance(given, str) else "",
+)
+def test_an_answer_that_is_none_is_a_run_time_error(box, answer, words):
+    with answering(answer) as (port, _):
+        message = fail(box, port)
+    assert message.line == 3
+    assert message.text.startswith("work: remote procedure call failed: ")
+    assert words in message.text
+    assert "\n" not in message.text
+
+
+@pytest.mark.parametrize(
+    ("answer", "then"),
+    [
+        (b"HTTP/1.1 200 OK\r\n\r\n" + b"<methodResponse>", b" " * 65536),
+        (b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n", b"1\r\n \r\n" * 1000),
+        (b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n", b"X: x\r\n" * 1000),
+        (b"", b"HTTP/1.1 100 Continue\r\n\r\n" * 1000),
+        (b"HTTP/1.1 200 OK\r\n", b"X: x\r\n" * 1000),
+    ],
+    ids=["body", "chunks", "trailer", "continue", "header"],
+)
+def test_an_answer_without_end_is_a_run_time_error(box, answer, then):
+    with answering(answer, then) as (port, _):
         text = fail(box, port).text
-    assert "work: remote procedure call failed" in text
+    assert "longer than" in text or "makes no sense" in text
+
+
+def test_an_answer_that_comes_too_slowly_is_a_run_time_error(box, monkeypatch):
+    monkeypatch.setattr(xmlrpc_exchange, "BUDGETS", replace(BUDGETS, remote_answer_time=0.05))
+    with answering(http(value(""))[:-4], closes=False) as (port, _):
+        assert "takes longer than 0.05 s" in fail(box, port).text
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "http://h:99999999", "http://[::1", "http://h:abc", "http://user:word@127.0.0.1:8080/", "ftp://127.0.0.1/",
+        "https://127.0.0.1/", "http://", "://", "http://127.0.0.1:80 80/", "http://b\xfccher.example/", "http://a..b/",
+        "http://127.0.0.1/a b", "http://127.0.0.1:0/", "http://-1/", "http://[v1.x]/", "http://" + "a" * 300 + "/",
+    ],
+)  # fmt: skip
+def test_an_address_that_is_none_is_a_run_time_error(box, url):
+    with connect(box, "primary") as sock:
+        sock.sendall(f'def p():\n  h = rpc_factory("xmlrpc", "{url}")\n  h.work()\nend\n'.encode("latin-1"))
+        message = MessageReader(sock).message(RuntimeExceptionMessage)
+    assert message.line == 3
+    assert "is not an address" in message.text or "does not answer" in message.text
+
+
+def test_the_control_port_is_closed_to_remote_procedures():
+    with ControlBox(pace="lockstep", port_base=None, control_port=0) as box:
+        assert "control API" in fail(box, box.control_port).text
+
+
+def test_a_text_with_a_control_character_is_not_sent(box):
+    with answering(http(value(""))) as (port, served):
+        assert "XML does not have it" in fail(box, port, ('h.work("\x1b")',)).text
+        assert not served
+
+
+def test_an_answer_that_nobody_asked_for_is_not_taken_for_that_of_the_next_call(box):
+    with answering(http(value("first")) + http(value("forged")), closes=False) as (port, served):
+        with connect(box, "primary") as sock:
+            reader = MessageReader(sock)
+            send(sock, port, ("textmsg(h.a())", "sleep(0.1)", "textmsg(h.b())"))
+            assert [reader.message(TextMessage).text for _ in range(2)] == ["first", "first"]
+            sock.sendall(b"stop program\n")
+        assert len(served) == 2
+
+
+def test_handles_in_a_loop_share_a_few_connections(box, monkeypatch):
+    monkeypatch.setattr(xmlrpc_client, "BUDGETS", replace(BUDGETS, remote_connections=3))
+    with procedures(one=lambda: 1) as port, connect(box, "primary") as sock:
+        most = 0
+        loop = (
+            "i = 0",
+            "while i < 30:",
+            f'  k = rpc_factory("xmlrpc", "http://127.0.0.1:{port}/RPC2")',
+            "  k.one()",
+        )
+        send(sock, port, (*loop, "  i = i + 1", "end", 'textmsg("done")'))
+        while not [entry for entry in box.log if entry.text == "done"]:
+            most = max(most, len(box._network._remotes._connected))
+        MessageReader(sock).message(TextMessage)
+        assert len(Handler.connections) == 30
+    assert 1 <= most <= 3
+
+
+def test_more_calls_at_the_same_time_than_connections_fail(box, monkeypatch):
+    monkeypatch.setattr(xmlrpc_client, "BUDGETS", replace(BUDGETS, remote_connections=2))
+    with listening_socket() as server, connect(box, "primary") as sock:
+        url = f"http://127.0.0.1:{server.getsockname()[1]}/RPC2"
+        threads = [
+            f'thread t{i}():\n    k = rpc_factory("xmlrpc", "{url}")\n    k.work()\n  end' for i in range(3)
+        ]
+        send(sock, server.getsockname()[1], (*threads, *[f"run t{i}()" for i in range(3)], "sleep(9)"))
+        text = MessageReader(sock).message(RuntimeExceptionMessage).text
+    assert "2 remote procedures of other handles are being called" in text
+
+
+def test_calls_leave_no_thread_and_no_connection(box):
+    threads = threading.active_count()
+    with procedures(one=lambda: 1) as port, connect(box, "primary") as sock:
+        send(sock, port, ("textmsg(h.one())",))
+        reader = MessageReader(sock)
+        reader.message(TextMessage)
+        while not reader.message(KeyMessage).title.endswith("STOPPED"):
+            pass
+    assert threading.active_count() <= threads
+    assert not any(one.is_open for one in tuple(box._network._buffers.connections))
 
 
 def test_stopping_the_program_breaks_off_a_call_that_nobody_answers(box):

@@ -9,14 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Final
+from weakref import WeakSet
 
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.clock import Clock
 from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, RemoteServer
+from urscript.dialect import LONGEST_STRING
 from urscript.errors import ScriptRuntimeError
 from urscript.run.threads import ScriptThread
-from urscript.run.waits import Blocked
+from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
 from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type, to_script_text
 
+_IN_LISTS: Final = frozenset({bool, int, float, str, Pose})
 _POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
+# Of a text that a server gives as its error, so many characters are shown.
+LONGEST_MESSAGE = 500
 # The method that does not call the server.
 _CLOSE = "closeXMLRPCClientConnection"
 
@@ -24,9 +31,13 @@ _CLOSE = "closeXMLRPCClientConnection"
 class ProgramRemotes:
     """The remote-procedure handles of one program."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, network: Network, clock: Clock) -> None:
         self._network = network
-        self._servers: list[RemoteServer] = []
+        self._clock = clock
+        # Those whose handle the program still has, or that are connected.
+        self._servers: WeakSet[RemoteServer] = WeakSet()
+        self._sent = 0
+        self._sent_in = -1
 
     def functions(self) -> Mapping[str, Callable[..., Any]]:
         """Return the builtins by URScript name."""
@@ -34,14 +45,23 @@ class ProgramRemotes:
 
     def close_all(self) -> None:
         """Close every connection; the program has ended."""
-        for server in self._servers:
+        for server in tuple(self._servers):
             server.close()
         self._servers.clear()
 
+    def may_send(self, n_values: int) -> bool:
+        """Count values that a call is about to send; False if the program has sent enough in this cycle."""
+        if self._sent_in != self._clock.tick:
+            self._sent_in, self._sent = self._clock.tick, 0
+        if self._sent + n_values > BUDGETS.remote_values:
+            return False
+        self._sent += n_values
+        return True
+
     def _rpc_factory(self, thread: object, kind: str, url: str) -> RemoteHandle:
         server = self._network.remote_server(url if "://" in url else f"http://{url}")
-        self._servers.append(server)
-        return RemoteHandle(server)
+        self._servers.add(server)
+        return RemoteHandle(self, server)
 
 
 class RemoteHandle:
@@ -49,24 +69,41 @@ class RemoteHandle:
 
     script_type: Final = "remote procedure handle"
 
-    def __init__(self, server: RemoteServer) -> None:
+    def __init__(self, program: ProgramRemotes, server: RemoteServer) -> None:
+        self._program = program
         self._server = server
 
     def call_method(
         self, thread: ScriptThread, method: str, arguments: Sequence[Any], named: Mapping[str, Any]
-    ) -> Generator[Blocked, None, Any]:
+    ) -> Generator[Wait, None, Any]:
         """Call a procedure and wait for its result."""
         if method == _CLOSE:
             self._server.close()
             return None
         if named:
             raise ScriptRuntimeError(f"{method}: arguments of a remote procedure have no names")
+        n_values = sum(map(_n_values, arguments))
+        if n_values > BUDGETS.remote_values:
+            raise ScriptRuntimeError(
+                f"{method}: {n_values} values given, a remote procedure takes up to {BUDGETS.remote_values}"
+            )
+        while not self._program.may_send(n_values):
+            yield NEXT_CYCLE
         call: RemoteCall = self._server.call(method, [_to_wire(value) for value in arguments])
         yield Blocked(lambda: call.is_done, outside=True)
         try:
             return _from_wire(call.result())
         except RemoteCallError as error:
-            raise ScriptRuntimeError(f"{method}: remote procedure call failed: {error}") from None
+            text = to_script_text(" ".join(str(error).split())[:LONGEST_MESSAGE])
+            raise ScriptRuntimeError(f"{method}: remote procedure call failed: {text}") from None
+
+
+def _n_values(argument: Any) -> int:
+    """Return how many values travel for an argument."""
+    if isinstance(argument, Matrix):
+        rows, columns = argument.shape
+        return 1 + rows * (1 + columns)
+    return 1 + len(argument) if isinstance(argument, list) else 1
 
 
 def _to_wire(value: Any) -> Any:
@@ -91,8 +128,8 @@ def _from_wire(value: Any) -> Any:
             return value
         case int() if INT_MIN <= value <= INT_MAX:
             return value
-        case str():
-            return to_script_text(value)
+        case str() if len(text := to_script_text(value)) <= LONGEST_STRING:
+            return text
         case dict() if set(value) == set(_POSE_KEYS):
             numbers = [value[key] for key in _POSE_KEYS]
             if all(type(number) in (int, float) for number in numbers):
@@ -105,8 +142,12 @@ def _from_wire(value: Any) -> Any:
 def _one_type(items: list[Any]) -> list[Any] | Matrix:
     """Return a list of one type, as the language has them: integers among floats become floats."""
     if items and all(type(item) is list for item in items):
+        if not items[0]:
+            raise RemoteCallError("the result is a matrix without columns")
         return Matrix(items)
     types = {type(item) for item in items}
+    if not types <= _IN_LISTS:
+        raise RemoteCallError("the result is a list of what no list of a script has")
     if types == {int, float}:
         return [float(item) for item in items]
     if len(types) > 1:

@@ -44,7 +44,7 @@ class RobotHost:
         arm = ScriptArm(state.robot, state.arm, state.motion, state.tool)
         self._state = state
         self._sockets = ProgramSockets(state.clock, state.events, network)
-        self._remotes = ProgramRemotes(network)
+        self._remotes = ProgramRemotes(network, state.clock)
         self._conveyor = ProgramConveyor(arm, state.encoders, state.clock)
         settings = settings_functions(state.robot, state.tool, state.requests)
         self._builtins: Mapping[str, Callable[..., Any]] = {

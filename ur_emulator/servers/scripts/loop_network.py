@@ -10,7 +10,7 @@ from ur_emulator.servers.modbus.client import ModbusClient
 from ur_emulator.servers.modbus.link import ModbusLink
 from ur_emulator.servers.scripts.buffers import Buffers
 from ur_emulator.servers.scripts.sockets import ScriptConnection
-from ur_emulator.servers.scripts.xmlrpc_client import XmlRpcServer
+from ur_emulator.servers.scripts.xmlrpc_client import XmlRpcClient, XmlRpcServer
 
 
 class LoopNetwork:
@@ -31,6 +31,7 @@ class LoopNetwork:
         self._own_address = own_address
         self._buffers = Buffers(loop, report)
         self._modbus = ModbusClient(loop, self.open, period_s, report)
+        self._remotes = XmlRpcClient(loop, self.open, report)
 
     def open(self, host: str, port: int) -> ScriptConnection:
         """Begin to connect to `host`:`port`."""
@@ -43,7 +44,7 @@ class LoopNetwork:
 
     def remote_server(self, url: str) -> XmlRpcServer:
         """Return an XML-RPC server; nothing is connected before its first call."""
-        return XmlRpcServer(self._loop, url)
+        return XmlRpcServer(self._remotes, url)
 
     def modbus_unit(self, address: UnitAddress) -> ModbusLink:
         """Return the connection to a Modbus unit."""
@@ -52,6 +53,7 @@ class LoopNetwork:
     def close(self) -> None:
         """Close everything, whatever the programs are doing."""
         self._modbus.close()
+        self._remotes.close()
         self._buffers.close()
         for connection in tuple(self._buffers.connections):
             connection.close()
