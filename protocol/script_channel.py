@@ -73,7 +73,7 @@ class Overflow(NamedTuple):
 
 ScriptItem: TypeAlias = ProgramText | ControlLine | Overflow
 
-MAX_LINE = 1 << 20
+MAX_LINE = 64 << 10
 """Longest line in bytes; the longest in the field (a matrix literal) has some kilobytes."""
 
 MAX_PROGRAM = 4 << 20
@@ -110,8 +110,7 @@ class ScriptChannel:
         self._partial = bytearray()  # the incomplete line
         self._skipping_line = False
         self._state = _State.OUTSIDE
-        self._lines: list[str] = []
-        self._size = 0
+        self._text = bytearray()  # the incomplete program
         self._depth = 0
         self._kind: ProgramKind = "def"
         self._name = ""
@@ -119,7 +118,7 @@ class ScriptChannel:
     @property
     def pending(self) -> int:
         """Bytes of an incomplete line or program; they are lost if the connection ends."""
-        return self._size + len(self._partial)
+        return len(self._text) + len(self._partial)
 
     def feed(self, data: bytes) -> list[ScriptItem]:
         """Add received bytes and return what is complete. Never raises."""
@@ -144,16 +143,25 @@ class ScriptChannel:
         self._check_partial(items)
         return items
 
+    def drop(self) -> None:
+        """Drop the incomplete line and program, and the rest of them that is still to come."""
+        self._skipping_line = self._skipping_line or bool(self._partial)
+        self._partial.clear()
+        self._drop_program()
+
     def _check_partial(self, items: list[ScriptItem]) -> None:
         if len(self._partial) > self._max_line:
             self._partial.clear()
             self._skipping_line = True
             self._overflow("line", items)
 
-    def _overflow(self, what: Literal["line", "program"], items: list[ScriptItem]) -> None:
+    def _drop_program(self) -> None:
         if self._state is _State.IN_PROGRAM:
             self._state = _State.DROPPING
-            self._forget()
+            self._text.clear()
+
+    def _overflow(self, what: Literal["line", "program"], items: list[ScriptItem]) -> None:
+        self._drop_program()
         items.append(Overflow(what, self._max_line if what == "line" else self._max_program))
 
     def _take_line(self, line: str, items: list[ScriptItem]) -> None:
@@ -191,9 +199,8 @@ class ScriptChannel:
         items.append(ProgramText(line + "\n", called[1] if called else "", "statement"))
 
     def _take_body(self, line: str, items: list[ScriptItem]) -> None:
-        self._lines.append(line)
-        self._size += len(line) + 1
-        if self._size > self._max_program:
+        self._text += line.encode("latin-1") + b"\n"
+        if len(self._text) > self._max_program:
             self._overflow("program", items)
         elif self._closes(line):
             self._state = _State.OUTSIDE
@@ -220,10 +227,6 @@ class ScriptChannel:
         return _HEADER.match(line) is not None or match_controller_word(line) is not None
 
     def _finish(self) -> ProgramText:
-        program = ProgramText("\n".join(self._lines) + "\n", self._name, self._kind)
-        self._forget()
+        program = ProgramText(self._text.decode("latin-1"), self._name, self._kind)
+        self._text.clear()
         return program
-
-    def _forget(self) -> None:
-        self._lines = []
-        self._size = 0

@@ -135,9 +135,7 @@ class Box(BoxOperations):
             self._loop.expect_soon,
             self._fail,
         )
-        self._intake = ProgramIntake(
-            self._loop.tasks, software.catalogue, self._box.submit, self._box.announce
-        )
+        self._intake = ProgramIntake(self._loop.tasks, software.catalogue, self._box)
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         player = ProgramPlayer(self._access, ProgramFolder(None if programs is None else Path(programs)))
@@ -156,7 +154,7 @@ class Box(BoxOperations):
         )
         read_only = (realtime_ro, primary_ro, secondary_ro)
         self._box.attach(  # first those whose clients act on a cycle
-            (realtime, rtde, primary, secondary, *read_only, self._access.steps),
+            (realtime, rtde, primary, secondary, *read_only, self._intake, self._access.steps),
             [port.send_message for port in messengers],
         )
         ports: dict[str, Port] = {

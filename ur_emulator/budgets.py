@@ -70,6 +70,24 @@ class Budgets:
     body_bytes: int = _budget(64 * KIB, "bytes", "a body", "it is refused with status 413")
     log_entries: int = _budget(100, "entries", "an answer of `log`", "they come with the next call")
 
+    # --- scripts sent: text of unfinished programs and of those that wait for the compiler ---
+
+    # The longest program, and 1 MiB behind it. A waiting program costs 2 KiB beside its text.
+    script_bytes_client: int = _budget(5 * MIB, "bytes", "script of a client", "the newest is dropped")
+    script_bytes: int = _budget(
+        12 * MIB, "bytes", "script of a box", "the newest of a client that has more than 64 KiB is dropped"
+    )
+    script_bytes_gone: int = _budget(
+        1 * MIB, "bytes", "script of clients that have gone", "the newest is dropped"
+    )
+    # More than any client sends; each costs the cycle up to 0.5 ms.
+    programs_per_cycle: int = _budget(4, "programs", "started or refused in a cycle", "the others wait")
+    script_warnings_per_cycle: int = _budget(4, "warnings", "about scripts in a cycle", "no further ones")
+    # A program with this much starts within 10 ms; 10,000 waypoints have room.
+    program_functions: int = _budget(3_000, "functions", "a program", "it is refused")
+    program_values: int = _budget(10_000, "global variables and poses", "a program", "it is refused")
+    program_code: int = _budget(4 * MIB, "bytes", "a compiled program", "it is refused")
+
     # --- variables and labels of running programs, as port 30001 reports them ---
 
     # A client that connects gets all names and values; so many take 1 ms.
@@ -158,6 +176,16 @@ class Budgets:
     folder_files: int = _budget(
         100_000, "files and folders", "a programs folder", "no reports are written into it"
     )
+
+    # --- programs and files: compiling, loading and reports in the worker process ---
+
+    # 3,000 lines take 0.3 s, 20,000 moves 4.5 s.
+    task_seconds: float = _budget(10, "s of processor time", "a program, file or report", "it is refused")
+    # 3,000 lines take 35 MiB.
+    task_memory: int = _budget(64 * MIB, "bytes", "compiling, loading, reporting", "it is refused")
+    task_result_bytes: int = _budget(16 * MIB, "bytes", "what was compiled or loaded", "it is refused")
+    # Beyond it one that takes more than 1 s ends, and others take turns.
+    long_tasks: int = _budget(1, "programs, files or reports", "that take more than 1 s", "they are refused")
 
     # --- log ---
 

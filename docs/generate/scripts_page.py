@@ -1,15 +1,17 @@
-"""The page docs/protocol/scripts.md, made from the controller words and the limits of the channel."""
+"""The page docs/protocol/scripts.md, made from the words, the limits of the channel and the budgets."""
 
 from __future__ import annotations
 
 from docs.generate.page_parts import table
 from protocol.controller_words import CONTROLLER_WORDS
 from protocol.script_channel import MAX_LINE, MAX_PROGRAM
+from ur_emulator.budgets import BUDGETS
 
 _INTRODUCTION = f"""\
 # Scripts over ports 30001, 30002 and 30003
 
-Made from `protocol/controller_words.py` and `protocol/script_channel.py` by `make docs`.
+Made from `protocol/controller_words.py`, `protocol/script_channel.py` and `ur_emulator/budgets.py` by `make
+docs`.
 
 Whoever connects to one of the three ports can make the robot run [URScript](../urscript-coverage.md): drivers
 upload their control programs this way, urx and small tools send a line for every move. It is plain text
@@ -33,6 +35,11 @@ with socket.create_connection(("127.0.0.1", 30002)) as robot:
 * The program goes on when its sender disconnects. One that is not complete then is dropped.
 * Lines up to {MAX_LINE} bytes, programs up to {MAX_PROGRAM} bytes; longer ones are dropped, and a warning
   says so.
+* Programs begin in the order of arrival. Who sends many at once lets others go first; nobody waits longer
+  than a second for a long program of somebody else, which does not begin any more when a newer one has. At
+  most {BUDGETS.programs_per_cycle} programs begin in a control cycle, the others wait; what waits, and how
+  long a program may take to compile, is limited ([SECURITY.md](../../SECURITY.md)). What comes on top is
+  refused, and a warning says so.
 * A program that comes while the robot is not RUNNING, or stopped for safety, is not run; a runtime
   exception says why.
 
@@ -44,7 +51,11 @@ when it does not compile or dies, and before the stop. `python -m protocol decod
 
 ## Words that are not URScript
 
-Lines of their own, in lower case, outside of a program.
+Lines of their own, in lower case, outside of a program. They act in the next control cycle and never wait
+for a program; one that comes twice in a cycle acts once. `stop program` and `power off`, like `stop` and
+`power off` of the dashboard and an emergency stop, also end all programs that have come before and have not
+begun, whoever has sent them; only those of kind `sec` go on. A program that somebody has paused before it
+began begins with a pause.
 """
 
 

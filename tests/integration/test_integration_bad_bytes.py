@@ -9,6 +9,7 @@ from integration_support import HELLO_PROGRAM, STARTED, Frames, Messages, connec
 from protocol.primary.layout import RobotModeData
 from protocol.primary.messages import ErrorCodeMessage, KeyMessage, RuntimeExceptionMessage, TextMessage
 from protocol.primary.state import RobotState
+from protocol.script_channel import MAX_LINE
 from protocol.ur_types import ProgramState
 
 RTDE_GARBAGE = {
@@ -125,10 +126,10 @@ def test_two_half_programs_on_two_connections_do_not_mix(lockstep_box, port):
 
 
 @pytest.mark.parametrize("port", SCRIPT_PORTS)
-def test_a_megabyte_without_a_line_end_is_dropped_and_said(lockstep_box, port):
+def test_a_line_without_an_end_is_dropped_and_said(lockstep_box, port):
     with Messages(lockstep_box) as primary, connect(lockstep_box, port) as sock:
-        sock.sendall(b"x" * (1 << 20) + b"x" * 1000)
-        assert "line of more than 1048576 bytes was dropped" in primary.message(ErrorCodeMessage).text
+        sock.sendall(b"x" * (MAX_LINE + 1000))
+        assert f"line of more than {MAX_LINE} bytes was dropped" in primary.message(ErrorCodeMessage).text
         sock.sendall(b"rest of it\n" + HELLO_PROGRAM.encode())
         primary.message(TextMessage, text="hello")
         assert not [m for m in primary.all if isinstance(m, RuntimeExceptionMessage)]

@@ -99,7 +99,7 @@ def quiet_box():
 
 def everybody_has_gone(box):
     n_clients = sum(len(listener.connections) for listener in box._port_set._listeners.values())
-    return n_clients == 1 and not box._intake._waiting and not box._box.controller.is_active
+    return n_clients == 1 and not box._intake._senders and not box._box.controller.is_active
 
 
 def between_cycles(box, ask):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.controller_words import CONTROLLER_WORDS
-from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptChannel
+from protocol.script_channel import MAX_LINE, ControlLine, Overflow, ProgramText, ScriptChannel
 
 NESTED = """\
 def outer():
@@ -218,9 +218,17 @@ def test_megabytes_without_a_newline_are_bounded_and_cheap(unit):
     channel = ScriptChannel()
     data = unit * (3_000_000 // len(unit))
     items = split(channel, data, 4096)
-    assert items == [Overflow("line", 1 << 20)]
+    assert items == [Overflow("line", MAX_LINE)]
     assert channel.pending == 0
-    line = unit * ((1 << 20) // len(unit) - 1)
+    line = unit * (MAX_LINE // len(unit) - 1)
     (item,) = ScriptChannel().feed(b"x=" + line[:-2] + b"\n")
     assert isinstance(item, ProgramText)
     assert channel.feed(b"\nsync()\n") == [ProgramText("sync()\n", "sync", "statement")]
+
+
+def test_what_is_dropped_from_outside_does_not_run_line_by_line():
+    channel = ScriptChannel()
+    assert not channel.feed(b"def p():\n  a()\n  b(")
+    channel.drop()
+    assert channel.pending == 0
+    assert channel.feed(b"1)\nend\nsync()\n") == [ProgramText("sync()\n", "sync", "statement")]

@@ -1,32 +1,63 @@
-"""Script items become commands in the order in which they came, whatever takes how long."""
+"""Script text becomes commands: words at once, programs in the turns of their senders, and never too much of it."""
+
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
-from protocol.script_channel import ControlLine, Overflow, ProgramText
-from ur_emulator.commands.programs import SetSpeedSlider, StartProgram, StopProgram
+from protocol.script_channel import MAX_PROGRAM
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.commands.power import PowerOff
+from ur_emulator.commands.programs import PauseProgram, SetSpeedSlider, StartProgram, StopProgram
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.errors import WorkerError
-from ur_emulator.servers.programs.intake import MAX_WAITING, ProgramIntake
-
-STOP = ControlLine("stop program", "stop program", "")
+from ur_emulator.servers.programs import intake as module
+from ur_emulator.servers.programs.intake import ProgramIntake
+from ur_emulator.servers.programs.sender import Sender
 
 
 class Tasks:
-    """Tasks that end when the test says so."""
+    """Tasks that end when the test says so, in the order of their places."""
 
     def __init__(self):
-        self.begun, self.dropped = [], []
+        self.begun = []
 
-    def submit(self, done, failed, function, *arguments):
-        self.begun.append((done, arguments[0]))
-        return done
+    def submit(self, done, failed, place, function, text, *arguments):
+        task = SimpleNamespace(done=done, place=place, text=text)
+        self.begun.append(task)
+        return task
 
     def drop(self, task):
-        self.dropped.append(task)
+        if task in self.begun:
+            self.begun.remove(task)
 
-    def finish(self, result=None, error=None):
-        done, text = self.begun.pop(0)
-        done(result or text, error)
+    def finish(self, n_tasks=1, error=None):
+        for _ in range(n_tasks):
+            task = min(self.begun, key=lambda task: (task.place.turn, task.place.arrived))
+            self.begun.remove(task)
+            name = task.text.split("(")[0].split()[-1]
+            task.done(SimpleNamespace(name=name), error)
+
+
+class Box:
+    """Notes what it takes: names of programs that start, commands, texts."""
+
+    def __init__(self):
+        self.stops = 0
+        self.done = []
+
+    def submit(self, command, *, in_place_of=""):
+        self.stops += isinstance(command, StopProgram | PowerOff)
+        if isinstance(command, StartProgram):
+            command = command.program.name + " paused" * command.pauses
+        self.done.append(command)
+
+    def announce(self, event):
+        self.done.append(event.text if isinstance(event, ErrorReported) else event)
+
+    def take(self):
+        done, self.done = self.done, []
+        return done
 
 
 @pytest.fixture
@@ -35,56 +66,185 @@ def tasks():
 
 
 @pytest.fixture
-def done():
-    return []
+def box():
+    return Box()
 
 
 @pytest.fixture
-def intake(tasks, done):
-    return ProgramIntake(tasks, None, done.append, done.append)
+def intake(tasks, box):
+    return ProgramIntake(tasks, None, box)
 
 
-def program(text, kind="def"):
-    return ProgramText(text, 1, kind)
+@pytest.fixture
+def one():
+    return Sender()
 
 
-def test_what_needs_no_compiling_waits_for_the_programs_before_it(intake, tasks, done):
-    intake.take("one", [STOP, program("a")])
-    intake.take("two", [STOP, program("b")])
-    intake.take("one", [ControlLine("set speed 0.5", "set speed", "0.5")])
-    assert done == [StopProgram()]
-    assert [text for _, text in tasks.begun] == ["a"]
-    tasks.finish()
-    assert done == [StopProgram(), StartProgram("a"), StopProgram()]
-    tasks.finish()
-    assert done[3:] == [StartProgram("b"), SetSpeedSlider(0.5)]
-    assert not intake._waiting
+@pytest.fixture
+def two():
+    return Sender()
 
 
-def test_a_program_that_is_not_compiled_is_refused_and_the_next_one_goes_on(intake, tasks, done):
-    intake.take("one", [program("a"), program("b")])
-    tasks.finish(error=WorkerError("it has ended: try again"))
-    tasks.finish(ScriptFailed(2, 3, "wrong"))
-    assert done == [
-        ScriptFailed(1, 1, "the program cannot be compiled: it has ended: try again"),
-        ScriptFailed(2, 3, "wrong"),
+@pytest.fixture
+def budgets(monkeypatch):
+    def lower(**limits):
+        monkeypatch.setattr(module, "BUDGETS", replace(BUDGETS, **limits))
+
+    return lower
+
+
+def program(name, kind="def", size=0):
+    return (f"{kind} {name}():\n" + ("#" * 63 + "\n") * (size // 64) + "end\n").encode()
+
+
+TOO_MUCH = "programs come faster than they compile, some were dropped"
+
+
+def test_words_wait_for_no_program(intake, tasks, box, one, two):
+    intake.received(one, program("a") + b"set speed 0.5\npower off\n")
+    intake.received(two, b"stop program\nset speed 7\n")
+    *commands, warning = box.take()
+    assert commands == [SetSpeedSlider(0.5), PowerOff(), StopProgram()]
+    assert warning == "'set speed 7' was ignored: the speed slider takes 0 to 1"
+
+
+def test_programs_begin_in_the_order_of_arrival(intake, tasks, box, one, two):
+    intake.received(one, program("a") + program("b"))
+    intake.received(two, program("c"))
+    intake.received(one, program("d"))
+    tasks.finish(4)
+    assert box.take() == ["a", "b", "c", "d"]
+
+
+def test_who_sends_many_lets_others_go_first(intake, tasks, box, one, two):
+    intake.received(one, b"a()\n" * 20)
+    intake.received(two, program("b"))
+    for _ in range(5):
+        tasks.finish(4)
+        intake.publish(None)
+    assert box.take()[14:18] == [
+        "a",
+        "b",
+        *["program a does not begin: a newer one was compiled before it"] * 2,
     ]
 
 
-def test_who_floods_the_port_loses_programs_and_nobody_else_does(intake, tasks, done):
-    half = "x" * (MAX_WAITING // 2)
-    intake.take("one", [program(half)] * 4)
-    intake.take("two", [program("b")])
-    assert [type(event) for event in done] == [ErrorReported]
+def test_a_program_that_takes_long_holds_up_nobody_and_does_not_replace_a_newer_one(
+    intake, tasks, box, one, two
+):
+    intake.received(one, program("long"))
+    intake.received(two, program("b") + b"pause program\n")
+    long = tasks.begun.pop(0)
     tasks.finish()
-    tasks.finish()
-    assert done[1:] == [StartProgram(half), StartProgram("b")]
-    intake.take("one", [Overflow("program", 5)])
-    assert "more than 5 bytes" in done[3].text
+    long.done(SimpleNamespace(name="long"), None)
+    assert box.take() == [
+        PauseProgram(),
+        "b paused",
+        "program long does not begin: a newer one was compiled before it",
+    ]
 
 
-def test_a_box_that_closes_forgets_what_waits(intake, tasks, done):
-    intake.take("one", [program("a"), program("b"), STOP])
+def test_a_stop_ends_all_that_came_before_it_and_nothing_else(intake, tasks, box, one, two):
+    intake.received(one, program("a") + program("s", "sec"))
+    intake.received(two, program("b") + b"stop program\n" + program("c"))
+    assert box.take() == [StopProgram()]
+    tasks.finish()
+    assert box.take() == ["program a was stopped before it began"]
+    intake.publish(None)
+    assert box.take() == ["programs that were stopped before they began: 1"]
+    assert [task.text for task in tasks.begun] == [program("s", "sec").decode(), program("c").decode()]
+    tasks.finish(2)
+    assert box.take() == ["s", "c"]
+    assert one.held == two.held == intake._held == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "is_paused"), [("pause program", True), ("pause program\nresume program", False)]
+)
+def test_a_program_that_somebody_has_paused_before_it_began_begins_with_a_pause(
+    intake, tasks, box, one, two, words, is_paused
+):
+    intake.received(one, program("a"))
+    intake.received(two, words.encode() + b"\n" + program("b"))
+    assert PauseProgram() in box.take()
+    tasks.finish(2)
+    assert box.take() == ["a" + " paused" * is_paused, "b"]
+
+
+def test_a_program_that_is_not_compiled_is_refused_and_the_next_one_goes_on(intake, tasks, box, one):
+    intake.received(one, program("a") + program("b"))
+    tasks.finish(error=WorkerError("it has ended: try again"))
+    tasks.finish()
+    assert box.take() == [ScriptFailed(1, 1, "the program cannot be compiled: it has ended: try again"), "b"]
+
+
+def test_a_client_may_let_so_much_wait_and_is_told_once(intake, tasks, box, one, two):
+    intake.received(one, program("a", size=MAX_PROGRAM - 64) + program("b", size=MAX_PROGRAM // 6) * 3)
+    intake.received(two, program("c"))
+    assert box.take() == [TOO_MUCH]
+    tasks.finish(3)
+    assert box.take() == ["a", "b", "c"]
+    assert not tasks.begun
+    assert intake._held == 0
+    assert not one.is_told
+
+
+def test_text_that_is_not_complete_counts_too_and_the_rest_of_it_is_dropped(
+    intake, tasks, box, budgets, one, two
+):
+    budgets(script_bytes=100_000)
+    for sender in (one, two):
+        intake.received(sender, b"def a():\n" + b"#\n" * 40_000)
+    assert box.take() == [TOO_MUCH]
+    assert (one.held, two.held) == (80_009, 0)
+    intake.received(two, b"b()\nend\nc()\n")
+    assert [task.text for task in tasks.begun] == ["c()\n"]
+
+
+def test_what_others_send_leaves_room_for_a_small_program(intake, tasks, box, budgets, one, two):
+    budgets(script_bytes=100_000)
+    intake.received(one, b"def a():\n" + b"#\n" * 49_000)
+    intake.received(two, program("b", size=50_000))
+    assert len(tasks.begun) == 1
+    assert not box.take()
+
+
+def test_only_so_many_programs_start_in_a_cycle_and_the_others_wait(intake, tasks, box, budgets, one, two):
+    budgets(programs_per_cycle=2)
+    intake.received(one, b"a()\n" * 5)
+    intake.received(two, b"b()\n")
+    for left in ([2, 1, 0, 0], [2, 0], [0]):
+        for n in left:
+            tasks.finish(min(len(tasks.begun), 1 + n))
+        assert len(box.take()) <= 2
+        intake.publish(None)
+    assert intake._held == len(box.take()) == 0
+
+
+def test_a_million_mistakes_are_few_warnings(intake, box, one):
+    intake.received(one, b"set speed 7\n" * 1000)
+    assert len(box.take()) == BUDGETS.script_warnings_per_cycle
+    intake.publish(None)
+    intake.received(one, b"set speed 7\n")
+    assert len(box.take()) == 1
+
+
+def test_of_a_client_that_has_gone_so_much_is_still_compiled(intake, tasks, box, budgets, one, two):
+    budgets(script_bytes_gone=22_000)
+    for sender in (one, two):
+        intake.received(sender, program("a", size=5000) * 3 + b"def b():\n")
+        intake.closed(sender)
+    assert box.take() == [TOO_MUCH]
+    assert [task.place.sender for task in tasks.begun] == [one, two]
+    tasks.finish(2)
+    assert [task.place.sender for task in tasks.begun] == [two, intake]
+    tasks.finish(2)
+    assert not tasks.begun
+    assert intake._held == intake._held_gone == 0
+
+
+def test_a_box_that_closes_forgets_what_waits(intake, tasks, box, one):
+    intake.received(one, program("a") + program("b"))
     intake.close()
-    assert tasks.dropped == [tasks.begun[0][0]]
-    assert not done
+    assert not tasks.begun
+    assert not box.done

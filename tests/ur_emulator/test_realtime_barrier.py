@@ -258,7 +258,7 @@ def test_an_error_in_accepting_costs_a_pause_of_that_port(box, monkeypatch):
 def test_an_error_after_a_task_is_told_to_who_has_asked_for_it(box, monkeypatch):
     with connect(box, "secondary") as sock:
         with monkeypatch.context() as patch:
-            patch.setattr(box._intake, "_finish", fail)
+            patch.setattr(box._intake, "_start", fail)
             sock.sendall(b"def lost():\nend\n")
             until(box, lambda: any("a program is lost" in entry.text for entry in box._log_entries()))
         sock.sendall(b"def next():\n  textmsg(1)\nend\n")

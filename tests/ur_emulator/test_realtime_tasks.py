@@ -6,14 +6,16 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import WorkerError
 from ur_emulator.programs.compiling import compile_text
 from ur_emulator.realtime import tasks as module
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.realtime.worker_process import TASK_LIMIT
+from ur_emulator.realtime.tasks import Place
 from urscript.catalogue import catalogue_for
 from urscript.program import ProgramStatus, compile_program
 from urscript.recording_host import RecordingHost
@@ -25,17 +27,22 @@ class Bench:
     def __init__(self):
         self.loop = EventLoop()
         self.results = []
+        self.n_wanted = None
 
     def submit(self, function, *arguments):
-        return self.loop.tasks.submit(lambda *it: self._note(*it), pytest.fail, function, *arguments)
+        return self.submit_at(Place(object()), function, *arguments)
+
+    def submit_at(self, place, function, *arguments):
+        return self.loop.tasks.submit(lambda *it: self._note(*it), pytest.fail, place, function, *arguments)
 
     def _note(self, result, error):
         self.results.append(result if error is None else error)
-        if not self.loop.tasks._waiting and self.loop.tasks._current is None:
+        if self.loop.tasks.is_idle or len(self.results) == self.n_wanted:
             self.loop.stop()
 
-    def run(self):
-        """Run until all is done; return what has come of it."""
+    def run(self, n_wanted=None):
+        """Run until all, or so much, is done; return what has come of it."""
+        self.n_wanted = n_wanted
         self.loop.run()
         self.loop._stopping = False
         results, self.results = self.results, []
@@ -112,10 +119,42 @@ def test_a_process_that_dies_costs_one_task(bench):
 
 
 def test_a_task_may_take_so_much_processor_time_and_no_more(bench):
-    assert 0.0 < bench.ask(signal.getitimer, signal.ITIMER_PROF)[0] < 1.1 * TASK_LIMIT
+    assert 0.0 < bench.ask(signal.getitimer, signal.ITIMER_PROF)[0] < 1.1 * BUDGETS.task_seconds
     error = bench.ask(signal.raise_signal, signal.SIGPROF)
     assert isinstance(error, WorkerError)
-    assert str(error) == "it takes more than 60 s of processor time: make it shorter"
+    assert str(error) == "it takes more than 10 s of processor time: make it shorter"
+
+
+def test_a_task_may_need_so_much_memory_and_no_more(bench):
+    pid = bench.ask(os.getpid)
+    error = bench.ask(bytes, BUDGETS.task_memory)
+    assert isinstance(error, WorkerError)
+    assert str(error) == "it needs more than 64 MiB of memory: make it shorter"
+    assert (
+        str(bench.ask(bytes, BUDGETS.task_result_bytes)) == "its result has more than 16 MiB: make it shorter"
+    )
+    assert bench.ask(os.getpid) == pid
+
+
+def test_tasks_are_done_by_their_turns_then_in_the_order_of_arrival(bench):
+    for name, turn, arrived in (("a", 0, 9), ("b", 1, 3), ("c", 0, 5), ("d", 1, 2), ("e", 0, 4)):
+        bench.submit_at(Place(name, turn, arrived), str.lower, name)
+    assert bench.run() == ["a", "e", "c", "d", "b"]
+
+
+def test_a_task_that_takes_long_does_not_hold_up_the_next_of_others(bench):
+    pid = bench.ask(os.getpid)
+    long = bench.submit_at(Place("a"), time.sleep, 1e6)
+    bench.submit_at(Place("a"), operator.add, 1, 2)
+    for function, *arguments in ((os.getpid,), (os.getpid,), (time.sleep, 1e6)):
+        bench.submit(function, *arguments)
+    first, second, too_many = bench.run(3)
+    assert first == second != pid
+    assert str(too_many).startswith("it takes long, and so does what another client has sent: ")
+    bench.loop.tasks.drop(long)
+    assert bench.run() == [3]
+    bench.loop.close()
+    assert has_ended(pid)
 
 
 def test_a_task_that_is_dropped_does_not_hold_up_the_next(bench):

@@ -33,7 +33,7 @@ from ur_emulator.models.robots import robot_by_name
 from ur_emulator.servers.primary.event_messages import message_for
 from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder, dexterity, setup_records
-from ur_emulator.servers.programs.intake import SPEED_WORD, WORDS
+from ur_emulator.servers.programs.words import SPEED_WORD, WORDS
 
 V3_15 = SoftwareVersion(3, 15, 8)
 VERSIONS = [SoftwareVersion(3, minor) for minor in range(16)]
@@ -75,8 +75,8 @@ class PortBench(Bench):
             for every in (True, False)
         ]
 
-    def take(self, sender, items):
-        self.taken += items
+    def received(self, sender, data):
+        self.taken.append(data)
 
     def tick(self, n=1, *commands):
         for _ in range(n):
@@ -178,7 +178,7 @@ def test_read_only_ports_take_no_script():
     for port in bench.ports:
         client = Client(port)
         port.received(client, b"stop program\ntextmsg(1)\n")
-    assert len(bench.taken) == 4  # two lines on 30001, two on 30002
+    assert len(bench.taken) == 2  # on 30001 and 30002
 
 
 @pytest.mark.parametrize(

@@ -20,9 +20,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class StartProgram:
-    """Run a compiled program; a primary program replaces the one that runs, a `sec` runs beside it."""
+    """Run a compiled program; a primary program replaces the one that runs, a `sec` runs beside it.
+
+    Attributes:
+        program: compiled.
+        pauses: it begins with a pause.
+    """
 
     program: CompiledProgram
+    pauses: bool = False
 
     def apply(self, box: Box) -> None:
         obstacle = _why_not_running(box.state)
@@ -31,6 +37,8 @@ class StartProgram:
             box.state.events.append(ScriptFailed(1, 1, text))
             raise RefusedError(text)
         box.programs.start(self.program)
+        if self.pauses:
+            box.programs.pause()
 
 
 class StopProgram(CommandOperation):

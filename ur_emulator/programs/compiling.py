@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
@@ -33,11 +34,24 @@ def compile_text(
         is_secondary: it is a `sec` program.
     """
     try:
-        return compile_program(text, catalogue=catalogue, name=name)
+        program = compile_program(text, catalogue=catalogue, name=name)
     except ScriptError as error:
         # Arguments are counted when the call runs, so that of a `sec` is one of its exceptions.
         secondary = is_secondary and isinstance(error, ScriptTypeError)
         return ScriptFailed(error.line, error.column, error.wire_text, secondary, error.log_text)
+    compiled = program.compiled
+    for count, limit, what in (
+        (len(compiled.code), BUDGETS.program_code, "bytes when compiled"),
+        (len(compiled.function_names), BUDGETS.program_functions, "functions"),
+        (
+            len(program.globals) + len(compiled.constants),
+            BUDGETS.program_values,
+            "global variables and poses",
+        ),
+    ):
+        if count > limit:
+            return ScriptFailed(1, 1, f"the program has {count} {what}: at most {limit} are allowed")
+    return program
 
 
 def compile_loaded(

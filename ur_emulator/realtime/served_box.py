@@ -10,6 +10,9 @@ from typing import Any, Protocol
 from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import BoxLog
 from ur_emulator.budgets import BUDGETS
+from ur_emulator.commands.power import PowerOff
+from ur_emulator.commands.programs import StopProgram
+from ur_emulator.commands.safety import PressEmergencyStop
 from ur_emulator.controller.command import Command, Done, Result, Submitted
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
@@ -17,6 +20,9 @@ from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import RefusedError
 from ur_emulator.realtime.barrier import Failed, guarded, place_of
 from ur_emulator.realtime.pacing import Pacer, RealtimePacer
+
+# What was sent before one of these does not begin after it.
+_STOPS = (StopProgram, PowerOff, PressEmergencyStop)
 
 
 class Publisher(Protocol):
@@ -34,6 +40,7 @@ class ServedBox:
         controller: the box without its ports.
         log: programs, errors, modes, text messages, clients.
         backlog: the connections with bytes in their outbox; they enter and leave it themselves.
+        stops: how many commands so far stop the program and all that waits to be compiled.
     """
 
     def __init__(
@@ -59,7 +66,9 @@ class ServedBox:
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._publishers: tuple[Publisher, ...] = ()
         self._listeners: tuple[Callable[[Event], None], ...] = ()
-        self._commands: list[Command] = []
+        # By the name that replaces them, or by something that nothing else has.
+        self._commands: dict[object, Command] = {}
+        self.stops = 0
         self.backlog: set[Any] = set()
         self._on_failure = on_failure
         self._given_up: set[Any] = set()
@@ -84,9 +93,19 @@ class ServedBox:
         """Whether the next cycle takes further commands; for clients that can wait."""
         return len(self._commands) < BUDGETS.commands
 
-    def submit(self, command: Command, done: Done | None = None) -> None:
-        """Take a command for the next cycle; `done` is called then with the result or the error."""
-        self._commands.append(Submitted(command, done or self._report_error))
+    def submit(self, command: Command, done: Done | None = None, *, in_place_of: str = "") -> None:
+        """Take a command for the next cycle.
+
+        Args:
+            command: acts as the cycle begins.
+            done: called then with the result or the error.
+            in_place_of: a name; one of the same name that waits for the cycle does not act any more.
+        """
+        if isinstance(command, _STOPS):
+            self.stops += 1
+        name = in_place_of or object()
+        self._commands.pop(name, None)
+        self._commands[name] = Submitted(command, done or self._report_error)
 
     def announce(self, event: Event) -> None:
         """Publish an event at once, outside of a cycle."""
@@ -158,8 +177,8 @@ class ServedBox:
             self._is_held = False
             self._publish(self.controller.snapshot, now)
         elif self._pacer.may_tick(now, self):
-            commands, self._commands = self._commands, []
-            snapshot = self.controller.tick(commands)
+            commands, self._commands = self._commands, {}
+            snapshot = self.controller.tick(commands.values())
             if now < self._pacer.publish_at:
                 self._is_held = True
                 return self._pacer.publish_at

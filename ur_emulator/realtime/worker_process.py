@@ -2,7 +2,8 @@
 
 A task is a function that can be imported and its arguments, pickled; the answer is what it returns or raises.
 The process lives as long as this one: it ends when the pipe is closed. It is in a session of its own, where
-Ctrl-C does not reach it. One that a loop leaves idle stays for the next loop of this process.
+Ctrl-C does not reach it. One that a loop leaves idle stays for the next loop of this process. While a task
+takes long, the process says so and lowers its priority; when it takes too long, it ends.
 """
 
 from __future__ import annotations
@@ -11,17 +12,26 @@ import atexit
 import gc
 import os
 import pickle
+import resource
 import signal
 import socket
 import subprocess
 import sys
 from contextlib import suppress
+from pathlib import Path
+from types import FrameType
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import EmulatorError, WorkerError
 from ur_emulator.realtime.barrier import place_of
 
-# Processor time that a task may take [s]; the process ends itself beyond it.
-TASK_LIMIT = 60.0
+# What comes before the answer to a task that takes long.
+TAKES_LONG = b""
+# After so much real time a task takes long [s], and after so much it ends: it may wait for a disk for ever.
+_LONG = 1.0
+_FOR_EVER = 60.0
+# By so much the priority of a long task is lower: the loop comes first.
+_NICENESS = 10
 # Bytes of the length in front of a task and of an answer, big-endian.
 _HEAD = 8
 _READ_SIZE = 1 << 18
@@ -79,12 +89,12 @@ class WorkerProcess:
         try:
             self._outbox = self._outbox[self.sock.send(self._outbox) :]
         except BlockingIOError:
-            gc.collect()
+            return
         except OSError:
             self._outbox = memoryview(b"")
 
-    def receive(self) -> bytes | None:
-        """Return the answer once all of it has come, None before.
+    def receive(self) -> list[bytes]:
+        """Return the answers of which all has come.
 
         Raises:
             EOFError: the process has ended.
@@ -92,17 +102,17 @@ class WorkerProcess:
         try:
             data = self.sock.recv(_READ_SIZE)
         except BlockingIOError:
-            return None
+            return []
         except OSError:
             data = b""
         if not data:
             raise EOFError
         self._inbox += data
-        if len(self._inbox) < _HEAD or len(self._inbox) < _HEAD + int.from_bytes(self._inbox[:_HEAD], "big"):
-            return None
-        answer = bytes(memoryview(self._inbox)[_HEAD:])
-        self._inbox.clear()
-        return answer
+        answers = []
+        while len(self._inbox) >= (end := _HEAD + int.from_bytes(self._inbox[:_HEAD], "big")):
+            answers.append(bytes(memoryview(self._inbox)[_HEAD:end]))
+            del self._inbox[:end]
+        return answers
 
     def kill(self) -> None:
         """Let the process end, soon."""
@@ -167,21 +177,40 @@ if hasattr(os, "register_at_fork"):
 
 def work() -> None:
     """Do tasks until the other end is closed; the main function of the process."""
+    from ur_emulator.programs import compiling  # noqa: F401
     from urscript.syntax.parser import prepare
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     prepare()  # now, so that the first program does not wait for it
     gc.freeze()
     gc.set_threshold(_MANY_OBJECTS)
-    with socket.socket(fileno=sys.stdin.fileno()) as sock, sock.makefile("rwb") as stream, suppress(OSError):
+    _limit_memory()
+    with socket.socket(fileno=sys.stdin.fileno()) as sock, sock.makefile("rb") as stream, suppress(OSError):
+
+        def takes_long(number: int, frame: FrameType | None) -> None:
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
+            signal.setitimer(signal.ITIMER_REAL, _FOR_EVER)
+            os.nice(_NICENESS)
+            sock.sendall(_framed(TAKES_LONG))
+
         while head := stream.read(_HEAD):
             task = stream.read(int.from_bytes(head, "big"))
-            signal.setitimer(signal.ITIMER_PROF, TASK_LIMIT)  # its signal ends the process
+            signal.signal(signal.SIGALRM, takes_long)
+            signal.setitimer(signal.ITIMER_REAL, _LONG)
+            signal.setitimer(signal.ITIMER_PROF, BUDGETS.task_seconds)  # its signal ends the process
             answer = _answer(task)
-            signal.setitimer(signal.ITIMER_PROF, 0.0)
-            stream.write(_framed(answer))
-            stream.flush()
+            for timer in (signal.ITIMER_REAL, signal.ITIMER_PROF):
+                signal.setitimer(timer, 0.0)
+            sock.sendall(_framed(answer))
     os._exit(0)
+
+
+def _limit_memory() -> None:
+    """Limit what this process has beside what it needs for itself; some systems cannot tell what that is."""
+    with suppress(OSError):
+        n_pages = int(Path("/proc/self/statm").read_text().split()[5])
+        limit = n_pages * resource.getpagesize() + BUDGETS.task_memory
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 
 
 def _answer(task: bytes) -> bytes:
@@ -191,11 +220,19 @@ def _answer(task: bytes) -> bytes:
     """
     try:
         function, arguments = pickle.loads(task)
-        return pickle.dumps((function(*arguments), None))
-    except (EmulatorError, OSError) as error:
-        return pickle.dumps((None, error))
-    except Exception as error:
-        return pickle.dumps((None, WorkerError(place_of(error))))
+        answer = pickle.dumps((function(*arguments), None))
+        if len(answer) <= BUDGETS.task_result_bytes:
+            return answer
+        limit = BUDGETS.task_result_bytes >> 20
+        error: Exception = WorkerError(f"its result has more than {limit} MiB: make it shorter")
+    except (EmulatorError, OSError) as problem:
+        error = problem
+    except MemoryError:
+        limit = BUDGETS.task_memory >> 20
+        error = WorkerError(f"it needs more than {limit} MiB of memory: make it shorter")
+    except Exception as problem:
+        error = WorkerError(place_of(problem))
+    return pickle.dumps((None, error))
 
 
 def _framed(data: bytes) -> bytes:

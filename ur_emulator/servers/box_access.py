@@ -16,6 +16,7 @@ from ur_emulator.errors import ControlError
 from ur_emulator.models.software import Software
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import ServedBox
+from ur_emulator.realtime.tasks import Place
 from ur_emulator.scripting.network import Network
 from ur_emulator.servers.steps import StepRunner, Steps, settle
 
@@ -124,7 +125,7 @@ class BoxAccess:
             settled(result, error)
             self.steps.advance()
 
-        task = self._loop.tasks.submit(done, self._failed, function, *arguments)
+        task = self._loop.tasks.submit(done, self._failed, Place(outcome), function, *arguments)
         try:
             while not outcome.done():
                 yield

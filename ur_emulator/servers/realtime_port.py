@@ -23,5 +23,5 @@ class RealtimePort(ScriptPort):
 
     def publish(self, snapshot: Snapshot) -> None:
         """Send the frame of this cycle."""
-        if self._channels:
+        if self._clients:
             self._send(self._encode(snapshot))

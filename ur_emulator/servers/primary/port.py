@@ -70,7 +70,7 @@ class PrimaryPort(ScriptPort):
         connection.send(self._states.encode_first(self._controller.snapshot))
         if self._all_messages:
             programs = self._controller.programs
-            if not self._channels:  # the first client: what was sent before does not count
+            if not self._clients:  # the first client: what was sent before does not count
                 self._begin_report(programs.latest if programs.is_running else None)
                 self._variables.changes(self._now, at_once=True)
             for package in (*self._variables.names(self._now), *self._variables.values(self._now)):
@@ -79,7 +79,7 @@ class PrimaryPort(ScriptPort):
 
     def publish(self, snapshot: Snapshot) -> None:
         """Send a state and what has changed of the variables if they are due in this cycle."""
-        if self._channels and self._labels.is_watching:
+        if self._clients and self._labels.is_watching:
             message = self._labels.message(self._now)
             if message is not None:
                 self._send(self._package(message))
@@ -90,13 +90,13 @@ class PrimaryPort(ScriptPort):
         self._phase -= cycle_rate
         running = snapshot.robot_mode == RobotMode.RUNNING
         has_started, self._was_running = running and not self._was_running, running
-        if self._channels:
+        if self._clients:
             encode = self._states.encode_first if has_started else self._states.encode
             self._send(encode(snapshot), *self._variables.changes(self._now))
 
     def send_message(self, event: Event) -> None:
         """Send the message for an event, on the primary port."""
-        if not (self._all_messages and self._channels):
+        if not (self._all_messages and self._clients):
             return
         if isinstance(event, ProgramStopped):
             self._send(*self._variables.changes(self._now, at_once=True))

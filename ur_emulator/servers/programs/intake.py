@@ -1,158 +1,253 @@
 """From bytes on a script port to commands: split, compile in the worker process, hand over.
 
-The order of arrival stays. What needs no compiling waits for the programs before it: a `stop program` sent
-after a program must stop it. A program is compiled also when its sender has closed the connection meanwhile,
-as many do.
+Words act at once: they never wait for a program. What waits when a client stops the program or switches the
+power off is stopped with it, whoever has sent it: on a real controller it would run already. Programs begin
+in the order of arrival, but who sends many at once lets others go first, and nobody waits for a program that
+takes long to compile: it does not begin any more when a newer one of another client has begun meanwhile. A
+program is compiled also when its sender has closed the connection meanwhile, as many do.
 """
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from collections.abc import Callable, Iterable
+import time
+from collections import deque
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 from protocol.primary.messages import ReportLevel
-from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptItem
-from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes, StartFreedrive
-from ur_emulator.commands.programs import (
-    PauseProgram,
-    ResumeProgram,
-    SetSpeedSlider,
-    StartProgram,
-    StopProgram,
-)
-from ur_emulator.commands.safety import ConfirmSafety, UnlockProtectiveStop
+from protocol.script_channel import ControlLine, Overflow, ProgramText
+from ur_emulator.budgets import BUDGETS, KIB
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
-from ur_emulator.errors import ArgumentError
+from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.programs.compiling import compile_text
 from ur_emulator.realtime.barrier import place_of
-from ur_emulator.realtime.tasks import Task, TaskQueue
+from ur_emulator.realtime.tasks import Place, TaskQueue
+from ur_emulator.servers.programs.sender import Program, Sender
+from ur_emulator.servers.programs.words import word_command
 from urscript.catalogue import Catalogue
 
-# The controller's own words and the command each stands for; words that change nothing here map to None.
-# Source: what PolyScope and public clients send on the script ports (protocol.controller_words).
-WORDS: dict[str, Command | None] = {
-    "power on": PowerOn(),
-    "power off": PowerOff(),
-    "set robotmode run": ReleaseBrakes(),
-    "set robotmode freedrive": StartFreedrive(),
-    "set unlock protective stop": UnlockProtectiveStop(),
-    "stop program": StopProgram(),
-    "pause program": PauseProgram(),
-    "resume program": ResumeProgram(),
-    "set real": None,
-    "set sim": None,
-    "confirm user safety parameters": ConfirmSafety(),
-}
-SPEED_WORD = "set speed"
-# Script of one sender that may wait for the compiler, each program counted with its cost beside its text
-# [bytes]; what comes on top is dropped: who floods the port must neither fill the memory nor delay others.
-MAX_WAITING = 4 << 20
-_PROGRAM_COST = 1 << 10
+# So much of a client's script is taken whatever others send [bytes].
+_ALWAYS_TAKEN = 64 * KIB
+# So many programs that a client sends at once come in one turn.
+_PROGRAMS_A_TURN = 16
+
+
+class Box(Protocol):
+    """The part of a box that takes what comes.
+
+    Attributes:
+        stops: how often clients have stopped the program so far, in whatever way.
+    """
+
+    stops: int
+
+    def submit(self, command: Command, *, in_place_of: str = "") -> None:
+        """Take a command for the next cycle, in place of one of the same name that waits for it."""
+        ...
+
+    def announce(self, event: Event) -> None:
+        """Take an event that needs no cycle, such as a syntax error."""
+        ...
 
 
 class ProgramIntake:
-    """Turns script items into commands for one box."""
+    """Turns script text into commands for one box."""
 
-    def __init__(
-        self,
-        tasks: TaskQueue,
-        catalogue: Catalogue,
-        submit: Callable[[Command], None],
-        announce: Callable[[Event], None],
-    ) -> None:
+    def __init__(self, tasks: TaskQueue, catalogue: Catalogue, box: Box) -> None:
         """Prepare.
 
         Args:
             tasks: where programs are compiled.
             catalogue: the builtins of the software.
-            submit: takes a command for the next cycle.
-            announce: takes an event that needs no cycle, such as a syntax error.
+            box: takes what comes of them.
         """
         self._tasks = tasks
         self._catalogue = catalogue
-        self._submit = submit
-        self._announce = announce
-        self._queue: deque[tuple[ScriptItem, object, int]] = deque()
-        self._compiling: Task | None = None
-        self._waiting: Counter[object] = Counter()
-        self._flooding: set[object] = set()
+        self._box = box
+        # Those with programs that have not begun.
+        self._senders: dict[Sender, None] = {}
+        self._ready: deque[Program] = deque()
+        self._held = self._held_gone = 0
+        # When the newest program that has begun arrived, and when it was paused last, 0 if it goes on.
+        self._newest = self._paused = 0.0
+        self._stops = 0
+        self._n_programs = self._n_warnings = 0
 
-    def take(self, sender: object, items: Iterable[ScriptItem]) -> None:
-        """Queue what one connection has sent: words always, programs as long as not too much waits."""
+    # --- clients
+
+    def received(self, sender: Sender, data: bytes) -> None:
+        """Take script text of a client."""
+        before = sender.channel.pending
+        items = sender.channel.feed(data)
+        self._hold(sender, sender.channel.pending - before)
         for item in items:
-            cost = _PROGRAM_COST + len(item.text) if isinstance(item, ProgramText) else 0
-            waiting = self._waiting[sender]
-            if cost and waiting and waiting + cost > MAX_WAITING:
-                if sender not in self._flooding:
-                    self._announce(_warning("programs come faster than they compile, some were dropped"))
-                self._flooding.add(sender)
-                continue
-            self._waiting[sender] += cost
-            self._queue.append((item, sender, cost))
-        self._go_on()
+            match item:
+                case ProgramText():
+                    self._take_program(sender, item)
+                case ControlLine():
+                    self._take_word(item)
+                case Overflow(what, limit):
+                    self._warn(f"a script {what} of more than {limit} bytes was dropped")
+        if self._holds_too_much(sender):
+            self._hold(sender, -sender.channel.pending)
+            sender.channel.drop()
+            self._tell(sender)
+        self._begin(sender)
+
+    def closed(self, sender: Sender) -> None:
+        """Keep some programs of a client that has gone, and drop what is not complete."""
+        self._hold(sender, -sender.channel.pending)
+        sender.is_open = False
+        self._held_gone += sender.held
+        while self._held_gone > BUDGETS.script_bytes_gone and sender.waiting:
+            self._tell(sender)
+            self._drop(sender.waiting[-1])
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Go on after a cycle."""
+        self._n_programs = self._n_warnings = 0
+        if self._stops != self._box.stops:
+            self._stops = self._box.stops
+            self._drop_stopped()
+        if self._ready or self._senders:
+            self._hand_over()
 
     def close(self) -> None:
-        """Forget what is queued and what is being compiled."""
-        self._queue.clear()
-        if self._compiling is not None:
-            self._tasks.drop(self._compiling)
+        """Forget what waits and what is being compiled."""
+        for program in [program for sender in self._senders for program in sender.programs]:
+            self._drop(program)
 
-    def _go_on(self) -> None:
-        """Hand on all that stands before the next program, and have that compiled."""
-        while self._queue and self._compiling is None:
-            item, sender, cost = self._queue.popleft()
-            if isinstance(item, ProgramText):
-                done = partial(self._compiled, sender, cost)
-                is_secondary = item.kind == "sec"
-                self._compiling = self._tasks.submit(
-                    done, self._failed, compile_text, item.text, self._catalogue, "<program>", is_secondary
-                )
-            else:
-                self._finish(_translate(item), sender, cost)
+    # --- what it sends
 
-    def _compiled(self, sender: object, cost: int, outcome: Any, error: Exception | None) -> None:
-        self._compiling = None
+    def _take_program(self, sender: Sender, item: ProgramText) -> None:
+        sender.n_sent += 1
+        place = Place(sender, sender.n_sent // _PROGRAMS_A_TURN)
+        program = Program(sender, item.text, place, self._box.stops, item.kind == "sec")
+        self._hold(sender, program.cost)
+        if self._holds_too_much(sender):
+            self._hold(sender, -program.cost)
+            self._tell(sender)
+        else:
+            sender.waiting.append(program)
+            self._senders[sender] = None
+
+    def _take_word(self, item: ControlLine) -> None:
+        command = word_command(item)
+        if isinstance(command, str):
+            self._warn(command)
+            return
+        if command is not None:
+            self._box.submit(command, in_place_of=item.word)
+        if isinstance(command, PauseProgram):
+            self._paused = time.monotonic()
+        elif isinstance(command, ResumeProgram):
+            self._paused = 0.0
+
+    def _holds_too_much(self, sender: Sender) -> bool:
+        is_crowded = self._held > BUDGETS.script_bytes and sender.held > _ALWAYS_TAKEN
+        return is_crowded or sender.held > BUDGETS.script_bytes_client
+
+    def _hold(self, sender: Sender, n_bytes: int) -> None:
+        self._held += n_bytes
+        sender.held += n_bytes
+        if not sender.is_open:
+            self._held_gone += n_bytes
+        if not sender.held:
+            sender.n_sent, sender.is_told = 0, False
+
+    def _tell(self, sender: Sender) -> None:
+        if not sender.is_told:
+            sender.is_told = True
+            self._warn("programs come faster than they compile, some were dropped")
+
+    def _warn(self, text: str) -> None:
+        self._n_warnings += 1
+        if self._n_warnings <= BUDGETS.script_warnings_per_cycle:
+            self._box.announce(ErrorReported(0, 0, ReportLevel.WARNING, text))
+
+    # --- programs
+
+    def _begin(self, sender: Sender) -> None:
+        """Have the next program of a client compiled, unless there are enough for this cycle."""
+        if sender.compiling is None and sender.waiting and len(self._ready) < BUDGETS.programs_per_cycle:
+            program = sender.compiling = sender.waiting.popleft()
+            program.task = self._tasks.submit(
+                partial(self._compiled, program),
+                partial(self._failed, program),
+                program.place if sender.is_open else replace(program.place, sender=self),
+                compile_text,
+                program.text,
+                self._catalogue,
+                "<program>",
+                program.is_secondary,
+            )
+
+    def _compiled(self, program: Program, outcome: Any, error: Exception | None) -> None:
         if error is not None:
             outcome = ScriptFailed(1, 1, f"the program cannot be compiled: {error}")
-        self._finish(outcome if isinstance(outcome, ScriptFailed) else StartProgram(outcome), sender, cost)
-        self._go_on()
+        program.task, program.outcome = None, outcome
+        self._ready.append(program)
+        self._hand_over()
 
-    def _failed(self, error: Exception) -> None:
-        self._announce(_warning(f"a program is lost: {place_of(error)}"))
+    def _failed(self, program: Program, error: Exception) -> None:
+        self._drop(program)
+        self._warn(f"a program is lost: {place_of(error)}")
 
-    def _finish(self, result: Command | Event | None, sender: object, cost: int) -> None:
-        """Hand on a result."""
-        self._waiting[sender] -= cost
-        if not self._waiting[sender]:
-            del self._waiting[sender]
-            self._flooding.discard(sender)
-        if isinstance(result, Command):
-            self._submit(result)
-        elif result is not None:
-            self._announce(result)
+    def _hand_over(self) -> None:
+        """Hand over what is compiled, as much as a cycle takes, and go on with compiling."""
+        while self._ready and self._n_programs < BUDGETS.programs_per_cycle:
+            self._n_programs += 1
+            program = self._ready.popleft()
+            self._start(program)
+            self._drop(program)
+        idle = [sender for sender in self._senders if sender.waiting and sender.compiling is None]
+        for sender in sorted(idle, key=lambda sender: sender.waiting[0].place.arrived):
+            self._begin(sender)
 
+    def _start(self, program: Program) -> None:
+        outcome = program.outcome
+        assert outcome is not None
+        if isinstance(outcome, ScriptFailed):
+            self._box.announce(outcome)
+        elif program.is_secondary:
+            self._box.submit(StartProgram(outcome))
+        elif program.stops != self._box.stops:
+            self._warn(f"program {outcome.name} was stopped before it began")
+        elif program.place.arrived < self._newest:
+            self._warn(f"program {outcome.name} does not begin: a newer one was compiled before it")
+        else:
+            self._newest = program.place.arrived
+            self._box.submit(StartProgram(outcome, program.place.arrived < self._paused))
 
-def _translate(item: ControlLine | Overflow) -> Command | Event | None:
-    match item:
-        case ControlLine(text, word, argument):
-            if word == SPEED_WORD:
-                return _speed_command(text, argument)
-            if word in WORDS:
-                return WORDS[word]
-            return _warning(f"'{text}' is declared only: this box does not model it yet")
-        case Overflow(what, limit):
-            return _warning(f"a script {what} of more than {limit} bytes was dropped")
+    def _drop_stopped(self) -> None:
+        """Drop the programs that arrived before the last stop."""
+        stopped = [
+            program
+            for sender in self._senders
+            for program in sender.programs
+            if program.stops != self._stops and not program.is_secondary
+        ]
+        for program in stopped:
+            self._drop(program)
+        if stopped:
+            self._warn(f"programs that were stopped before they began: {len(stopped)}")
 
-
-def _speed_command(text: str, argument: str) -> Command | Event:
-    try:
-        return SetSpeedSlider(float(argument))
-    except (ValueError, ArgumentError):
-        return _warning(f"'{text}' was ignored: the speed slider takes 0 to 1")
-
-
-def _warning(text: str) -> Event:
-    return ErrorReported(0, 0, ReportLevel.WARNING, text)
+    def _drop(self, program: Program) -> None:
+        """Let go of a program that was handed over, or that nobody wants any more."""
+        sender = program.sender
+        if sender.compiling is program:
+            sender.compiling = None
+        if program.task is not None:
+            self._tasks.drop(program.task)
+            program.task = None
+        with suppress(ValueError):
+            sender.waiting.remove(program)
+        with suppress(ValueError):
+            self._ready.remove(program)
+        self._hold(sender, -program.cost)
+        if not (sender.waiting or sender.compiling):
+            self._senders.pop(sender, None)

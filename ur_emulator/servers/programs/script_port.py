@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from protocol.script_channel import ScriptChannel
 from ur_emulator.servers.programs.intake import ProgramIntake
+from ur_emulator.servers.programs.sender import Sender
 from ur_emulator.servers.tcp.connection import Connection
 
 
@@ -13,22 +13,24 @@ class ScriptPort:
     def __init__(self, intake: ProgramIntake | None) -> None:
         """Prepare; `intake` takes script text, None makes the port read-only."""
         self._intake = intake
-        self._channels: dict[Connection, ScriptChannel] = {}
+        self._clients: dict[Connection, Sender] = {}
 
     def opened(self, connection: Connection) -> None:
         """The client gets the next package."""
-        self._channels[connection] = ScriptChannel()
+        self._clients[connection] = Sender()
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Take script text."""
         if self._intake is not None:
-            self._intake.take(connection, self._channels[connection].feed(data))
+            self._intake.received(self._clients[connection], data)
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; a program it sent goes on."""
-        self._channels.pop(connection, None)
+        sender = self._clients.pop(connection, None)
+        if self._intake is not None and sender is not None:
+            self._intake.closed(sender)
 
     def _send(self, *packages: bytes) -> None:
-        for connection in tuple(self._channels):
+        for connection in tuple(self._clients):
             for package in packages:
                 connection.send(package)
