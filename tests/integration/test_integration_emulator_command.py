@@ -6,7 +6,9 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from contextlib import suppress
+from types import SimpleNamespace
 
 import pytest
 from integration_support import (
@@ -21,6 +23,7 @@ from integration_support import (
     in_background,
     send,
     serving,
+    start,
 )
 
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage
@@ -202,6 +205,34 @@ def test_a_log_that_nobody_reads_costs_no_cycle_and_no_answer_and_the_end_does_n
         assert frames.lost() == 0
         box.process.terminate()
         assert box.process.wait(TIMEOUT) == 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes cannot be filled there without waiting")
+def test_a_full_pipe_for_output_and_messages_keeps_nothing_from_starting_and_ending(tmp_path):
+    near, far = os.pipe()
+    os.set_blocking(far, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(far, bytes(1 << 16))
+    os.set_blocking(far, True)
+    ready, base = tmp_path / "ready.json", free_port_base()
+    options = ("--log", "--port-base", base, "--ready-file", ready)
+    process = start("ur_emulator", "serve", *options, stdout=far, stderr=far)
+    try:
+        while not ready.exists():
+            assert process.poll() is None
+            time.sleep(0.01)
+        box = SimpleNamespace(host="127.0.0.1", ports=Ports.standard(base))
+        with Frames(box) as frames:
+            frames.new()
+            frames.new()
+        process.terminate()
+        assert process.wait(TIMEOUT) == 0
+    finally:
+        process.kill()
+        process.wait()
+        os.close(near)
+        os.close(far)
 
 
 def test_a_log_shows_what_clients_send_without_obeying_it(tmp_path):
