@@ -3,17 +3,96 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from docs.generate.page_parts import table
 from pc_client.input_files import FILE_KINDS, MIB
+from protocol.ur_types import Ports
 from ur_emulator.budgets import rows
+from ur_emulator.control.http_client import DEFAULT_PORT
+
+
+class _PortRow(NamedTuple):
+    """What one port allows: its names in `Ports`, what whoever reaches it may do, what it asks for."""
+
+    names: tuple[str, ...]
+    may: str
+    asks: str
+
+
+_NOTHING = "nothing"
+_CONTROL = ()
+_PORTS = (
+    _PortRow(
+        ("primary", "secondary", "realtime"),
+        "run any URScript program: move the arm, set outputs and registers, **open connections from this "
+        "machine to any address and port that it reaches** (sockets, XML-RPC, Modbus units), also to "
+        "services on loopback addresses that trust this machine, and pass on what comes back. A script reads "
+        "and writes no files, and does not reach the control port of its box",
+        _NOTHING,
+    ),
+    _PortRow(
+        ("dashboard",),
+        "power the arm and release its brakes, reset safety stops, play, stop and load programs of the "
+        "folder `--programs`, learn which names exist there, write the log, flight reports and support files "
+        "into it, and `shutdown` the box",
+        _NOTHING,
+    ),
+    _PortRow(("rtde",), "read all variables, set outputs, registers and the speed slider", _NOTHING),
+    _PortRow(("modbus",), "read and set outputs and registers", _NOTHING),
+    _PortRow(("primary_ro", "secondary_ro", "realtime_ro"), "read states, frames and messages", _NOTHING),
+    _PortRow(
+        _CONTROL,
+        "change the physics and the surroundings: push the arm, add obstacles and payloads, press emergency "
+        "stops, set inputs, trigger faults; run programs as text and of the folder; read the log",
+        "a token, if one was set; pages of other sites and scripts of the box are refused",
+    ),
+)
 
 _INTRODUCTION = """\
 # Security
 
 Made from `docs/generate/security_policy.py`, `ur_emulator/budgets.py` and `pc_client/input_files.py` by
-`make docs`.
+`make docs`. [docs/security.md](docs/security.md) says what was tried against the box, with figures.
+
+## Who may do what
+
+The box trusts whoever reaches its ports, as a real CB3 does: its protocols know no password. So the address
+decides. `ur-emulator serve` listens on 127.0.0.1 unless `--host` says otherwise; then **every program and
+every user of this machine** may do what the table says. With another address, so may the network: do that
+only in a network of your own. The control port demands a token there.
 """
+
+_PROMISES = """\
+## What is promised
+
+| promise | held by |
+|---|---|
+| No bytes that arrive at a port, and no program, end the process of a box or stop its other clients. An error ends the connection or the program that has caused it, with a line in the log | `tests/attack`, `tests/fuzz` |
+| What clients and programs use is bounded, also in total (below); beyond it the newest is refused. The box and its worker process stay below 300 MB together | `tests/attack` |
+| A client that has nothing to do with an attack keeps its stream, on an idle machine with the rate and the gaps of docs/security.md; that page also says which attacks do more than that | `make attack` |
+| Nothing is read or written outside of the folder `--programs`, by no name and through no link; without that option the box writes into a temporary folder, which it removes. No answer shows a path of this machine | `tests/attack` |
+| A web page cannot use the control port: `Host`, `Origin` and `Sec-Fetch-Site` are checked | `tests/attack` |
+| The client ends a session with a hostile or broken robot in one line, with the arm at rest, and refuses files that are too large or damaged | `tests/attack` |
+
+## What is not promised
+
+- Nothing protects the users of one machine from each other. The protocols have no passwords and no encryption.
+- A web page in a browser of this machine may be able to send text to ports 30001 to 30003 and 29999, which cannot
+  know where it comes from: a port that asks for nothing trusts what arrives.
+- The box is an ordinary process with the rights of its user. It compiles scripts to Python code of its own making;
+  a defect in the compiler, in MuJoCo, numpy or Python is a defect of the box. Run it as a user who may do little,
+  in a container where strangers reach it.
+- A machine that is too slow, or busy with other things, delays the box.
+- The client (`ur-client`) moves real arms. Its checks do not replace the safety functions of the arm, and the box
+  does not prove that an arm is safe: [docs/real-arm.md](docs/real-arm.md).
+
+## How to report a weakness
+
+Tell the maintainers in private, by the private report of the repository that you have this from, before you tell
+others. Say the version (`pip show ur-hil`), the options of `ur-emulator serve`, and what was sent, best as a function for
+`tests/attack`. Only the last version gets corrections.
+"""  # noqa: E501 - rows of tables
 
 
 def render() -> str:
@@ -21,6 +100,9 @@ def render() -> str:
     return "\n".join(
         (
             _INTRODUCTION,
+            *table(("port", "whoever reaches it may", "it asks for"), _ports()),
+            "",
+            _PROMISES,
             "## Limits of a box",
             "",
             *table(("limit", "of", "beyond it", "name"), _budgets()),
@@ -31,6 +113,13 @@ def render() -> str:
             "",
         )
     )
+
+
+def _ports() -> Iterator[tuple[str, ...]]:
+    numbers = Ports()
+    for row in _PORTS:
+        given = ", ".join(str(getattr(numbers, name)) for name in row.names)
+        yield given or f"control port, e.g. {DEFAULT_PORT}; closed unless asked for", row.may, row.asks
 
 
 def _budgets() -> Iterator[tuple[str, ...]]:

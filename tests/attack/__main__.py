@@ -43,6 +43,7 @@ def main(names):
     result = {
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "machine": machine,
+        "seconds": SECONDS,
         "attacks": [rows[name] for name in attacks if name in rows],
     }
     RESULTS.write_text(json.dumps(result, indent=1) + "\n")

@@ -24,7 +24,7 @@ class Attack:
         options: of `ur-emulator serve`.
         prelude: Python code that the process of the box runs first.
         unread_log: stderr is a pipe that nobody reads.
-        is_short: it also makes sense within a second, and belongs to `make test`.
+        is_short: it makes sense within half a second, too, and belongs to `make test`.
     """
 
     name: str
@@ -35,6 +35,14 @@ class Attack:
     prelude: str = ""
     unread_log: bool = False
     is_short: bool = True
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def is_special(self) -> bool:
+        """Whether it needs a box that is started for it."""
+        return bool(self.options or self.prelude or self.unread_log)
 
 
 @dataclass(slots=True)
@@ -58,6 +66,10 @@ class Section:
             return run
 
         return add
+
+    def short(self) -> list[Attack]:
+        """Return those that belong to `make test`."""
+        return [attack for attack in self.attacks if attack.is_short]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +105,8 @@ def watched(attack: Attack, seconds: float) -> Outcome:
         began = time.monotonic()
         with watching(box) as seen:
             remark, problems = _attacked(attack, box, seconds)
-            time.sleep(max(0.0, began + seconds - time.monotonic()))  # what it has left behind is seen too
+            while not box.is_stopped and time.monotonic() < began + seconds:
+                time.sleep(0.02)  # what it has left behind is seen too
         problems += box.problems()
         return Outcome(seen, tuple(problems), remark, box.stop())
 

@@ -79,7 +79,7 @@ def connect_storm(box: BoxUnderAttack, seconds: float) -> str:
     return f"{n / seconds:,.0f} connections a second"
 
 
-@CLIENTS.attack("1,500 readers of port 30003", "refused, or each of them gets its frames")
+@CLIENTS.attack("1,500 readers of port 30003", "refused, or each of them gets its frames", is_short=False)
 def crowd_of_readers(box: BoxUnderAttack, seconds: float) -> str:
     n = max(150, min(1500, round(190 * seconds)))
     with crowd(box, "realtime", n) as clients:

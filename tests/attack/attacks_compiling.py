@@ -32,7 +32,7 @@ def flood_of_statements(box: BoxUnderAttack, seconds: float) -> None:
     flood(box, "secondary", 4096 * b"a()\n", seconds)
 
 
-@COMPILING.attack("53 MB of scripts over 60 connections", "the newest programs are refused")
+@COMPILING.attack("53 MB of scripts over 60 connections", "the newest programs are refused", is_short=False)
 def flood_of_programs(box: BoxUnderAttack, seconds: float) -> None:
     flood(box, "secondary", _program(30_000), seconds, clients=60, most=53_000_000)
 
@@ -40,6 +40,7 @@ def flood_of_programs(box: BoxUnderAttack, seconds: float) -> None:
 @COMPILING.attack(
     "A program of nearly 4 MB; another client sends `stop program` while that is compiled",
     "words do not wait for the compiler",
+    is_short=False,
 )
 def long_program_and_stop(box: BoxUnderAttack, seconds: float) -> str:
     _spins(box)
@@ -49,14 +50,16 @@ def long_program_and_stop(box: BoxUnderAttack, seconds: float) -> str:
     return f"stopped after {until(lambda: not plays(box), 'the program stops'):.2f} s"
 
 
-@COMPILING.attack("The box is told to end while it compiles a program of nearly 4 MB")
+@COMPILING.attack("The box is told to end while it compiles a program of nearly 4 MB", is_short=False)
 def long_program_and_end(box: BoxUnderAttack, seconds: float) -> str:
     box.send("secondary", _program((4 << 20) - 100))
     time.sleep(0.5)
     return f"ended after {box.stop():.2f} s"
 
 
-@COMPILING.attack("40 clients send a program of 1 MB each and are reset", "what they wanted is dropped")
+@COMPILING.attack(
+    "40 clients send a program of 1 MB each and are reset", "what they wanted is dropped", is_short=False
+)
 def senders_that_go(box: BoxUnderAttack, seconds: float) -> None:
     program = _program(1_000_000)
     for _ in range(max(4, min(40, round(5 * seconds)))):
@@ -135,6 +138,7 @@ def program_file_bombs(box: BoxUnderAttack, seconds: float) -> str:
 @COMPILING.attack(
     "Script files of 30 MB, without an end, of zero bytes, and installations that are bombs",
     "they are not loaded",
+    is_short=False,
 )
 def script_file_bombs(box: BoxUnderAttack, seconds: float) -> str:
     (box.programs / "default.installation").write_bytes(gzip.compress(30_000_000 * b"<"))

@@ -75,7 +75,9 @@ def text_messages(box: BoxUnderAttack, seconds: float) -> str:
 
 
 @SCRIPTS.attack(
-    "Globals of 50,000 elements, changed every cycle, with a reader of 30001", "they are not reported whole"
+    "Globals of 50,000 elements, changed every cycle, with a reader of 30001",
+    "they are not reported whole",
+    is_short=False,
 )
 def long_globals(box: BoxUnderAttack, seconds: float) -> str:
     names = [f"g{n}" for n in range(4)]
@@ -84,7 +86,9 @@ def long_globals(box: BoxUnderAttack, seconds: float) -> str:
         return _spend(box, seconds, *(f"{name}[7] = {name}[7] + 1" for name in names), "sync()", setup=setup)
 
 
-@SCRIPTS.attack("RTDE clients ask for `script_control_line` while a function of 100,000 statements runs")
+@SCRIPTS.attack(
+    "RTDE clients ask for `script_control_line` while a function of 100,000 statements runs", is_short=False
+)
 def line_of_a_long_function(box: BoxUnderAttack, seconds: float) -> str:
     with crowd(box, "rtde", 4, _RTDE_LINE):
         n = min(100_000, round(12_500 * seconds))
@@ -206,13 +210,13 @@ def flood_of_sendings(box: BoxUnderAttack, seconds: float) -> None:
 
 
 @SCRIPTS.attack(
-    "Programs look up names that take 15 s each, in 20 threads, and are replaced 20 times",
+    "Programs look up names that take 15 s each, in 20 threads, and are replaced by others",
     "further look-ups fail at once",
     prelude=_SLOW_NAMES,
 )
 def flood_of_look_ups(box: BoxUnderAttack, seconds: float) -> str:
     most = 0
-    for n in range(20):
+    for n in range(max(4, min(20, round(3 * seconds)))):
         threads = [
             line
             for k in range(20)
@@ -291,7 +295,9 @@ def odd_answers_of_procedures(box: BoxUnderAttack, seconds: float) -> None:
         _call(box, port)
 
 
-@SCRIPTS.attack("An XML-RPC server answers with 0.6 MB of gzip that unpack to 600 MB", "the call fails")
+@SCRIPTS.attack(
+    "An XML-RPC server answers with 0.6 MB of gzip that unpack to 600 MB", "the call fails", is_short=False
+)
 def gzip_bomb_of_a_procedure(box: BoxUnderAttack, seconds: float) -> None:
     with peer(_answering(_http(_bomb(), "Content-Encoding: gzip"))) as port:
         _call(box, port)
@@ -304,7 +310,9 @@ def _bomb() -> bytes:
     return b"".join([*parts, packer.compress(end), packer.flush()])
 
 
-@SCRIPTS.attack("An XML-RPC server answers without end, in lines of header and in body", "the call fails")
+@SCRIPTS.attack(
+    "An XML-RPC server answers without end, in lines of header and in body", "the call fails", is_short=False
+)
 def endless_answer_of_a_procedure(box: BoxUnderAttack, seconds: float) -> None:
     def header(client: socket.socket) -> None:
         client.sendall(b"HTTP/1.1 200 OK\r\n")

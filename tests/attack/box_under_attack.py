@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -91,6 +91,16 @@ class BoxUnderAttack:
         """Return how many descriptors and threads the process has."""
         process = psutil.Process(self.process.pid)
         return process.num_fds(), process.num_threads()
+
+    def forget_peaks(self) -> None:
+        """Let the peaks of memory begin anew, for the next attack on the same box."""
+        for process in self._processes():
+            with suppress(OSError):
+                Path(f"/proc/{process.pid}/clear_refs").write_text("5")
+
+    def _processes(self) -> list[psutil.Process]:
+        box = psutil.Process(self.process.pid)
+        return [box, *box.children()]
 
     # --- afterwards
 
@@ -211,6 +221,8 @@ def serving(*options: str, prelude: str = "", unread_log: bool = False) -> Itera
         finally:
             process.kill()
             process.wait()
+            if process.stderr is not None:
+                process.stderr.close()
 
 
 @dataclass(slots=True)

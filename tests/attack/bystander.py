@@ -33,26 +33,33 @@ def stream(host, port):
         the box has ended the stream.
     """
     sock = socket.create_connection((host, port), timeout=10.0)
-    stamps, arrivals, buffer, closed = [], [], bytearray(), False
-    _begin()
-    while sys.stdin not in (ready := select.select([sys.stdin] + [sock] * (not closed), [], [])[0]):
-        data = _received(sock) if ready else b""
+    stamps, arrivals, buffer = [], [], bytearray()
+
+    def read():
+        data = _received(sock)
         now = time.monotonic()
-        closed = not data
-        buffer += data
+        buffer.extend(data)
         while len(buffer) >= _HEAD.size and len(buffer) >= (size := _HEAD.unpack_from(buffer)[0]):
             stamps.append(_HEAD.unpack_from(buffer)[1])
             arrivals.append(now)
             del buffer[:size]
-    arrivals.append(time.monotonic())  # a stream that stood still at the end has a gap there
-    gaps = [after - before for before, after in pairwise(arrivals)]
+        return bool(data)
+
+    while not stamps and read():
+        pass
+    _begin()
+    is_open = True
+    while sys.stdin not in select.select([sys.stdin] + [sock] * is_open, [], [])[0]:
+        is_open = is_open and read()
+    if is_open:  # a stream that stood still at the end has a gap there
+        stamps.append(stamps[-1])
+        arrivals.append(max(arrivals[-1], time.monotonic() - PERIOD))
     cycles = {round(stamp / PERIOD) for stamp in stamps}
-    passed = max(arrivals[-2] - arrivals[0], arrivals[-1] - arrivals[0] - 2 * PERIOD) if stamps else 0.0
     return {
-        "rate": (stamps[-1] - stamps[0]) / passed if passed else 0.0,
-        "gap_ms": 1e3 * max(gaps, default=0.0),
-        "lost": max(cycles) - min(cycles) + 1 - len(cycles) if cycles else 0,
-        "closed": closed,
+        "rate": (stamps[-1] - stamps[0]) / max(PERIOD, arrivals[-1] - arrivals[0]),
+        "gap_ms": 1e3 * max(after - before for before, after in pairwise(arrivals)),
+        "lost": max(cycles) - min(cycles) + 1 - len(cycles),
+        "closed": not is_open,
     }
 
 
