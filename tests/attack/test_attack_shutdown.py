@@ -37,6 +37,13 @@ def compiling(box: BoxUnderAttack) -> Iterator[None]:
 
 
 @contextmanager
+def flooded(box: BoxUnderAttack) -> Iterator[None]:
+    with crowd(box, "secondary", 8, 100_000 * b"a()\n"):
+        wait_for_work(box)
+        yield
+
+
+@contextmanager
 def loading(box: BoxUnderAttack) -> Iterator[None]:
     program = box.programs / "long.urp"
     program.write_bytes(gzip.compress(_URP.format(_WAIT * 40_000).encode()))
@@ -83,7 +90,7 @@ def looking_up(box: BoxUnderAttack) -> Iterator[None]:
     yield
 
 
-@pytest.mark.parametrize("busy", [compiling, loading, reporting, unread, calling, looking_up])
+@pytest.mark.parametrize("busy", [compiling, flooded, loading, reporting, unread, calling, looking_up])
 def test_a_busy_box_ends(busy):
     with serving(prelude=_NO_NAMES if busy is looking_up else "") as box:
         with busy(box):

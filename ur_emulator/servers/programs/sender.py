@@ -14,7 +14,8 @@ from ur_emulator.realtime.tasks import Place, Task
 _PROGRAM_COST = 2 * KIB
 
 
-@dataclass(eq=False, slots=True)
+# Without a text of their own: `deque.remove` makes one of what it does not find, and each holds all others.
+@dataclass(eq=False, repr=False, slots=True)
 class Sender:
     """A client that sends scripts.
 
@@ -42,7 +43,7 @@ class Sender:
         return (*self.waiting, *(() if self.compiling is None else (self.compiling,)))
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, repr=False, slots=True)
 class Program:
     """A program that waits.
 
