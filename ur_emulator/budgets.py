@@ -107,8 +107,12 @@ class Budgets:
     look_up_threads: int = _budget(8, "threads", "all boxes of a process", "names wait for their turn")
     look_ups_at_once: int = _budget(2, "names", "a box", "names wait for their turn")
     look_ups_waiting: int = _budget(64, "names", "a box", "`socket_open` returns False")
+    # So many bytes take 4 ms to search, if they are made for it.
     inbox_bytes: int = _budget(
-        MIB, "bytes", "a socket of a script", "nothing more is read; a read that finds no end drops them"
+        256 * KIB,
+        "bytes",
+        "a socket of a script",
+        "nothing more is read; a read that finds no end drops them",
     )
     all_inboxes_bytes: int = _budget(
         4 * MIB, "bytes", "all sockets of the scripts of a box", "no socket gets more than 4 KiB"
@@ -117,9 +121,13 @@ class Budgets:
     all_unsent_bytes: int = _budget(
         4 * MIB, "bytes", "all sockets of the scripts of a box", "a send returns False"
     )
+    # They take 2 ms of a cycle of 8.
+    received_bytes: int = _budget(
+        512 * KIB, "bytes in 8 ms", "all sockets of the scripts of a box", "the rest is read later"
+    )
     # A read of a line looks at each byte once; a script that asks for more ends waits for the next cycle.
     search_bytes: int = _budget(
-        256 * KIB,
+        128 * KIB,
         "bytes searched",
         "a cycle of a program",
         "the read goes on in the next cycle",

@@ -77,8 +77,12 @@ class Resolver:
         self.answer = threading.Event()
         self.asked = []
         self.threads = set()
-        self.first = threading.Event()
+        self._begun = threading.Semaphore(0)
         monkeypatch.setattr(look_ups, "socket", SimpleNamespace(**{**vars(socket), "getaddrinfo": self._ask}))
+
+    def wait_for(self, n):
+        """Wait until n more names are being looked up."""
+        assert all(self._begun.acquire(timeout=TIMEOUT) for _ in range(n))
 
     def end(self):
         self.answer.set()
@@ -88,7 +92,7 @@ class Resolver:
     def _ask(self, host, *_):
         self.asked.append(host)
         self.threads.add(threading.current_thread())
-        self.first.set()
+        self._begun.release()
         assert self.answer.wait(TIMEOUT)
         return [(0, 0, 0, "", ("127.0.0.1", 0))]
 
@@ -101,6 +105,7 @@ def test_a_box_has_a_share_of_the_look_ups_and_forgets_those_whose_script_is_gon
     assert all(names.start(one) for one in asked)
     other = LookUp("other box", "elsewhere", found.append)
     assert names.start(other)
+    resolver.wait_for(3)
     for one in asked[2:]:
         names.forget(one)
     resolver.end()
@@ -126,6 +131,7 @@ def test_beyond_the_queue_and_without_threads_a_look_up_is_refused(monkeypatch):
     names = LookUps()
     asked = [LookUp("box", "name", lambda address: None) for _ in range(BUDGETS.look_ups_waiting + 3)]
     assert not all(names.start(one) for one in asked)
+    resolver.wait_for(BUDGETS.look_ups_at_once)
     for one in asked:
         names.forget(one)
     resolver.end()
@@ -145,7 +151,7 @@ def test_two_hundred_scripts_that_wait_for_names_take_two_threads(monkeypatch):
     )
     with ControlBox(port_base=None) as box, connect(box, "secondary") as sock:
         sock.sendall((text + "  sleep(9)\nend\n").encode())
-        assert resolver.first.wait(TIMEOUT)
+        resolver.wait_for(2)
         with connect(box, "realtime") as stream:
             reader = FrameReader(stream)
             for _ in range(20):
