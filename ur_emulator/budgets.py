@@ -88,6 +88,23 @@ class Budgets:
     program_values: int = _budget(10_000, "global variables and poses", "a program", "it is refused")
     program_code: int = _budget(4 * MIB, "bytes", "a compiled program", "it is refused")
 
+    # --- running programs ---
+
+    # Units of `urscript.run.metering`, 50 ns: 2 ms of a cycle of 8 ms, 4 ms on a machine half as fast.
+    # What is saved is for the thousands of assignments with which programs begin.
+    program_units: int = _budget(
+        30_000, "units", "the program of a box, a cycle", "the program goes on in the next cycle"
+    )
+    program_units_saved: int = _budget(
+        120_000, "units", "a cycle after a rest", "the program goes on in the next cycle"
+    )
+    secondary_units: int = _budget(
+        10_000, "units", "all secondary programs of a box, a cycle", "they go on in the next cycle"
+    )
+    secondary_units_saved: int = _budget(
+        30_000, "units", "a cycle after a rest", "they go on in the next cycle"
+    )
+
     # --- variables and labels of running programs, as port 30001 reports them ---
 
     # A client that connects gets all names and values; so many take 1 ms.

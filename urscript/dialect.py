@@ -27,12 +27,9 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 STATEMENT_BUDGET: Final = 110_000
-"""Statements a thread may run in one cycle (U): a loop of 100,000 iterations and the code around it. Exported
-programs run thousands of assignments at their start without a sync, so real budgets are at least 10^4 to
-10^5 (O)."""
-
-PROGRAM_BUDGET: Final = 4
-"""All threads of a program together may run this many times STATEMENT_BUDGET in one cycle (U)."""
+"""Statements a thread may run in one time slice (U): a loop of 100,000 iterations and the code around it.
+Exported programs run thousands of assignments at their start without a sync, so real budgets are at least
+10^4 to 10^5 (O)."""
 
 LONGEST_STRING: Final = 65_536
 """Characters of a string that `+` makes (U; str_cat and to_str end at 1023, D). Without a limit, a string

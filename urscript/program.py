@@ -20,7 +20,7 @@ from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntax
 from urscript.names.resolver import resolve
 from urscript.names.scopes import ResolvedProgram
 from urscript.run import positions, runtime
-from urscript.run.metering import Meter
+from urscript.run.metering import Meter, WorkBudget
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread
 from urscript.run.variables import UNDEFINED
 from urscript.source import Source, as_bytes
@@ -142,9 +142,14 @@ class CompiledProgram:
     globals: frozenset[str]
     declared_globals: tuple[str, ...]
 
-    def start(self, host: Host) -> RunningProgram:
-        """A new run on `host`; it begins with its first `step`."""
-        return RunningProgram(self, host)
+    def start(self, host: Host, work: WorkBudget | None = None) -> RunningProgram:
+        """A new run on `host`; it begins with its first `step`.
+
+        Args:
+            host: The robot.
+            work: What it may do in a cycle; its owner renews it. Without one there is no such limit.
+        """
+        return RunningProgram(self, host, work)
 
 
 class ProgramStatus(Enum):
@@ -163,7 +168,7 @@ class RunningProgram:
         error: The error of a FAILED run, with line, column and call stack.
     """
 
-    def __init__(self, program: CompiledProgram, host: Host) -> None:
+    def __init__(self, program: CompiledProgram, host: Host, work: WorkBudget | None = None) -> None:
         self.program = program
         self.status = ProgramStatus.RUNNING
         self.error: ScriptRuntimeError | None = None
@@ -171,9 +176,10 @@ class RunningProgram:
         self._in_step = False
         self._kill_wanted = False
         self._namespace: dict[str, Any] = {}
-        meter = Meter(self._namespace)
+        meter = Meter(self._namespace, work or WorkBudget())
         self._namespace.update(runtime.base_namespace(program.dialect, meter))
-        self._scheduler = Scheduler(self._namespace, program.dialect.statement_budget, host.thread_ended)
+        budget = program.dialect.statement_budget
+        self._scheduler = Scheduler(self._namespace, meter, budget, host.thread_ended)
         self._namespace.update(runtime.flow_namespace(self._scheduler, self._namespace, meter))
         self._namespace.update(runtime.builtin_namespace(program.builtins, program.catalogue, host, meter))
         self._namespace.update(program.compiled.constants)
@@ -187,8 +193,15 @@ class RunningProgram:
         return [thread for thread in self._scheduler.threads if not thread.finished]
 
     @property
+    def is_between(self) -> bool:
+        """Whether it used up the units of this cycle: it goes on in the next one where it stopped."""
+        return self._scheduler.is_between
+
+    @property
     def waits_outside(self) -> bool:
-        """Whether a thread waits for something outside the box that has not come yet."""
+        """Whether all threads have had their turn, and one waits for something outside the box."""
+        if self._scheduler.is_between:
+            return False
         for thread in self._scheduler.threads:
             wait = thread.wait
             if wait is not None and wait.outside and not wait.ready():
@@ -209,7 +222,7 @@ class RunningProgram:
         else:
             if self._main.finished or self._kill_wanted:
                 self._finish(ProgramStatus.FINISHED)
-            elif self.program.kind == "sec":
+            elif self.program.kind == "sec" and not self.is_between:
                 self._fail_secondary()
         finally:
             self._in_step = False

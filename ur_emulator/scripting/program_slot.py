@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 from protocol.ur_types import ProgramState
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.events import (
     ProgramPaused,
     ProgramResumed,
@@ -14,6 +17,7 @@ from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.robot_host import RobotHost
 from urscript import CompiledProgram, ProgramStatus, RunningProgram
+from urscript.run.metering import WorkBudget
 
 # Looked up once: a cycle asks for them several times.
 _PLAYING, _PAUSED = ProgramState.PLAYING, ProgramState.PAUSED
@@ -38,7 +42,9 @@ class ProgramSlot:
         self._state = state
         self._network = network
         self._primary: RunningProgram | None = None
-        self._secondaries: list[RunningProgram] = []
+        self._secondaries: deque[RunningProgram] = deque()
+        self._work = WorkBudget(BUDGETS.program_units, BUDGETS.program_units_saved)
+        self._secondary_work = WorkBudget(BUDGETS.secondary_units, BUDGETS.secondary_units_saved)
         self._ran = False
         self._phase = ProgramState.PLAYING
         self._phase_since = 0
@@ -93,11 +99,12 @@ class ProgramSlot:
     def start(self, program: CompiledProgram) -> None:
         """Start a program; a primary one replaces the one that runs."""
         if program.kind == "sec":
-            self._secondaries.append(program.start(RobotHost(self._state, self._network)))
+            host = RobotHost(self._state, self._network)
+            self._secondaries.append(program.start(host, self._secondary_work))
             return
         self.stop()
         self.name = program.name
-        self.latest = self._primary = program.start(RobotHost(self._state, self._network))
+        self.latest = self._primary = program.start(RobotHost(self._state, self._network), self._work)
         self._phase = ProgramState.PLAYING
         self._state.io_configuration.program_started()
         self._state.events.append(ProgramStarted(program.name, self._primary))
@@ -143,13 +150,18 @@ class ProgramSlot:
     def step(self) -> None:
         """Run all programs for one cycle."""
         self._ran = self._primary is not None
-        if self._secondaries:
-            for program in self._secondaries:
-                if program.step() is ProgramStatus.FAILED:
-                    self._report(program, secondary=True)
-                else:
-                    program.kill()  # a secondary program has one cycle
-            self._secondaries.clear()
+        self._work.renew()
+        self._secondary_work.renew()
+        while self._secondaries and self._secondary_work.left > 0:
+            program = self._secondaries[0]
+            status = program.step()
+            if program.is_between:
+                break  # its cycle takes several of the box
+            self._secondaries.popleft()
+            if status is ProgramStatus.FAILED:
+                self._report(program, secondary=True)
+            else:
+                program.kill()  # a secondary program has one cycle
         if self._primary is not None and (self._phase is _PLAYING or self._may_run()):
             self._state.clock.advance_program()
             status = self._primary.step()

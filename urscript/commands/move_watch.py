@@ -14,6 +14,7 @@ from typing import Any, Final
 from urscript.catalogue import TimeClass
 from urscript.program import CompiledProgram, RunningProgram
 from urscript.run.host import Host, HostFunction
+from urscript.run.metering import WorkBudget
 from urscript.run.threads import ScriptThread
 from urscript.run.waits import Wait
 
@@ -125,8 +126,8 @@ class _WatchedProgram(CompiledProgram):
 
     watch: MoveWatch
 
-    def start(self, host: Host) -> RunningProgram:
-        return RunningProgram(self, _WatchedHost(host, self.watch))
+    def start(self, host: Host, work: WorkBudget | None = None) -> RunningProgram:
+        return RunningProgram(self, _WatchedHost(host, self.watch), work)
 
 
 class _WatchedHost:

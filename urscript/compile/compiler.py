@@ -1,11 +1,11 @@
 """Resolved program -> Python code object.
 
-Every function and thread becomes one Python function of a flat module; those that may block become
-generators, all others stay plain functions. Variables of the program body are module globals, so threads
-and nested functions share them. `runtime` provides the other names the code uses.
+Every function and thread becomes one Python function of a flat module. All are generators, so that a program
+can stand still anywhere: it waits, or has used up the units of a cycle. Variables of the program body are
+module globals, so threads and nested functions share them. `runtime` provides the other names the code uses.
 
-Statements are counted at loop iterations and function entries, not one by one: the count of a block is known
-before it runs (of an `if`, its longest branch).
+Statements and units are charged at loop iterations and function entries, not one by one (see `costs`). After
+a statement with operations whose cost depends on values, the code asks whether it may go on.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from urscript.catalogue import Catalogue
+from urscript.compile.costs import Cost, block_cost, expression_cost
 from urscript.compile.expressions import ExpressionCompiler
 from urscript.compile.inference import SCALARS, StaticTypes
 from urscript.compile.positions import PositionTable, position_tables
 from urscript.compile.python_tree import (
+    ask,
     call,
-    charge_statements,
+    charge,
     constant,
     expression_statement,
     function,
@@ -86,21 +88,6 @@ def compile_resolved(
     )
 
 
-def _cost(block: Block) -> int:
-    """Most statements that one execution of `block` runs; bodies of loops are counted at their iterations."""
-    cost = 0
-    for statement in block:
-        if isinstance(statement, nodes.If):
-            branches = [branch.body for branch in statement.branches]
-            cost += 1 + max(_cost(body) for body in [*branches, statement.else_body or ()])
-        elif not isinstance(statement, (nodes.Function, nodes.Label)):
-            cost += 1
-            value = getattr(statement, "value", None)
-            if isinstance(value, nodes.ListLiteral):
-                cost += len(value.items) // 16  # a long list takes as long as many statements
-    return cost
-
-
 class _FunctionCompiler:
     """Compiles one function, thread or program body."""
 
@@ -115,7 +102,7 @@ class _FunctionCompiler:
         self._types = types
         self._expressions = expressions
         self._scope = scope
-        self._globals_stored: set[str] = {"_b"}
+        self._globals_stored: set[str] = {"_b", "_x"}
 
     def compile(self) -> list[ast.FunctionDef]:
         """The Python function, after those that compute its defaults."""
@@ -134,7 +121,8 @@ class _FunctionCompiler:
                     default = self._default(name, parameter.default)
                     defaults.append(default)
                     prologue.append(self._fill_in(parameter, default))
-        prologue.insert(0, charge_statements(_cost(scope.body) + 1, span))
+        cost = block_cost(scope.body, types, scope)
+        prologue[:0] = charge(cost.statements + 1, cost.extra, span)
         for name in sorted(scope.locals - {name.removeprefix("v_") for name in parameters}):
             # Others are neither read before they are assigned nor compared with their old value.
             if name in scope.maybe_unassigned or types.variable(name, scope) not in SCALARS:
@@ -171,7 +159,12 @@ class _FunctionCompiler:
     # --- statements --------------------------------------------------------------------------------------
 
     def _block(self, block: Block) -> list[ast.stmt]:
-        result = [made for statement in block for made in self._statement(statement)]
+        result: list[ast.stmt] = []
+        for statement in block:
+            self._expressions.begin_statement()
+            result += self._statement(statement)
+            if self._expressions.asks and not isinstance(statement, nodes.Return):
+                result.append(ask(statement.span))
         return result or [ast.Pass(**place(_first_span(block)))]
 
     def _statement(self, statement: Statement) -> list[ast.stmt]:
@@ -186,8 +179,14 @@ class _FunctionCompiler:
                 return self._if(branches, else_body)
             case nodes.While(condition=condition, body=body):
                 test = self._expressions.condition(condition, scope)
-                turn = charge_statements(max(1, _cost(body)), condition.span)
-                return [ast.While(test, [turn, *self._block(body)], [], **at)]
+                asks = self._expressions.asks
+                cost = block_cost(body, self._types, scope)
+                tenths = cost.tenths + expression_cost((condition,), self._types, scope)
+                cost = Cost(max(1, cost.statements), tenths)
+                turn = charge(cost.statements, cost.extra, condition.span)
+                loop = ast.While(test, [*turn, *self._block(body)], [], **at)
+                self._expressions.asks = asks
+                return [loop]
             case nodes.Return(value=value):
                 result = None if value is None else self._expressions.compile(value, scope)
                 return [ast.Return(result, **at)]
@@ -219,9 +218,12 @@ class _FunctionCompiler:
     def _if(self, branches: tuple[nodes.Branch, ...], else_body: Block | None) -> list[ast.stmt]:
         """From the last branch to the first, without recursion for chains of any length."""
         rest = self._block(else_body) if else_body else []
-        for branch in reversed(branches):
-            test = self._expressions.condition(branch.condition, self._scope)
+        self._expressions.begin_statement()
+        tests = [self._expressions.condition(branch.condition, self._scope) for branch in branches]
+        asks = self._expressions.asks
+        for branch, test in zip(reversed(branches), reversed(tests), strict=True):
             rest = [ast.If(test, self._block(branch.body), rest, **place(branch.span))]
+        self._expressions.asks = asks
         return rest
 
     def _assign(self, statement: nodes.Assign) -> ast.stmt:
@@ -244,7 +246,7 @@ class _FunctionCompiler:
             else:
                 helper, indices = "_store_member", [constant(target.name, span)]
             old = self._expressions.compile(target.target, scope)
-            value = call(helper, [value, *indices, old], span)
+            value = self._expressions.asking(call(helper, [value, *indices, old], span))
             inner = target.target
             assert isinstance(inner, (nodes.Name, nodes.Subscript, nodes.Attribute))
             target = inner

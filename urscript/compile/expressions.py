@@ -12,8 +12,9 @@ from typing import Any, Final
 
 from urscript import dialect
 from urscript.catalogue import Catalogue
+from urscript.catalogue.costs import EXPENSIVE, UNITS
 from urscript.compile.inference import StaticTypes, Type, is_numeric
-from urscript.compile.python_tree import call, constant, load, place
+from urscript.compile.python_tree import ask_after, call, constant, load, place
 from urscript.dialect import Dialect
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Span
@@ -36,6 +37,8 @@ _COMPARISON: Final[dict[str, tuple[str, type[ast.cmpop]]]] = {
     ">": ("_greater", ast.Gt),
     ">=": ("_greater_equal", ast.GtE),
 }
+# Operations of an expression after which the code asks whether the program may go on.
+_ASK_EVERY: Final = 8
 _PLAIN = (bool, int, float, str, type(None))
 
 
@@ -44,6 +47,8 @@ class ExpressionCompiler:
 
     Attributes:
         constants: Values that cannot be literals in Python code, by their name.
+        asks: Operations of the present statement whose cost depends on values; after it, or after every few
+            of them, the code asks whether the program may go on.
     """
 
     def __init__(
@@ -54,6 +59,16 @@ class ExpressionCompiler:
         self._catalogue = catalogue
         self._dialect = dialect
         self.constants: dict[str, Any] = {}
+        self.asks = 0
+
+    def begin_statement(self) -> None:
+        """The expressions that follow belong to another statement."""
+        self.asks = 0
+
+    def asking(self, made: ast.expr, weight: int = 1) -> ast.expr:
+        """An operation whose cost depends on values; a long expression asks in between."""
+        before, self.asks = self.asks, self.asks + weight
+        return made if before // _ASK_EVERY == self.asks // _ASK_EVERY else ask_after(made)
 
     def compile(self, expression: Expression, scope: FunctionScope) -> ast.expr:
         """The Python expression with the value of `expression`."""
@@ -81,13 +96,16 @@ class ExpressionCompiler:
                 return self._prefix(expression, scope)
             case nodes.ListLiteral(items=items):
                 values = ast.List(self._all(items, scope), ast.Load(), **place(span))
-                return values if self._are_numbers(items, scope) else call("_list", [values], span)
+                return (
+                    values if self._are_numbers(items, scope) else self.asking(call("_list", [values], span))
+                )
             case nodes.PoseLiteral(items=items):
                 return self._pose(items, span, scope)
             case nodes.RunThread(thread=thread):
                 callee = scope.find_function(thread)
                 assert callee is not None
-                return call("_run", [load(callee.python_name, span), constant(thread, span)], span)
+                made = call("_run", [load(callee.python_name, span), constant(thread, span)], span)
+                return self.asking(made)
             case nodes.MethodCall():
                 return self._method(expression, scope)
             case nodes.Attribute(target=target, name=name):
@@ -151,12 +169,10 @@ class ExpressionCompiler:
         )
         if operator in _COMPARISON:
             helper, comparison = _COMPARISON[operator]
-            same_scalar = left_type is right_type and left_type in (Type.BOOL, Type.STRING)
-            if (is_numeric(left_type) and is_numeric(right_type)) or (
-                same_scalar and operator in ("==", "!=")
-            ):
+            booleans = left_type is right_type is Type.BOOL and operator in ("==", "!=")
+            if booleans or (is_numeric(left_type) and is_numeric(right_type)):
                 return ast.Compare(left, [comparison()], [right], **place(span))
-            return call(helper, [left, right], span)
+            return self.asking(call(helper, [left, right], span))
         helper, python_operator = _ARITHMETIC[operator]
         if is_numeric(left_type) and is_numeric(right_type) and operator != "%":
             raw = ast.BinOp(left, python_operator(), right, **place(span))
@@ -167,7 +183,7 @@ class ExpressionCompiler:
                 return raw
             elif left_type is right_type is Type.INT:
                 return self._wrapped(raw, span)
-        return call(helper, [left, right], span)
+        return self.asking(call(helper, [left, right], span))
 
     def _wrapped(self, raw: ast.expr, span: Span) -> ast.expr:
         """`_i if INT_MIN <= (_i := raw) <= INT_MAX else _wrap(_i)`: a result of 32 bits."""
@@ -205,12 +221,12 @@ class ExpressionCompiler:
         kind = self._types.of(operand, scope)
         value = self.compile(operand, scope)
         if expression.operator == "+":
-            return value if is_numeric(kind) else call("_pos", [value], span)
+            return value if is_numeric(kind) else self.asking(call("_pos", [value], span))
         if isinstance(operand, (nodes.IntLiteral, nodes.FloatLiteral)):
             return constant(-operand.value, span)
         if kind is Type.FLOAT:
             return ast.UnaryOp(ast.USub(), value, **place(span))
-        return call("_neg", [value], span)
+        return self.asking(call("_neg", [value], span))
 
     def _index(self, expression: nodes.Subscript, scope: FunctionScope) -> ast.expr:
         target, indices, span = expression.target, expression.indices, expression.span
@@ -252,10 +268,11 @@ class ExpressionCompiler:
                 arguments.append(self.compile(named[slot[1]].value, scope))
             else:
                 arguments.append(self.shared(slot[1], span))
-        made = call(f"b_{expression.function}", arguments, span)
-        if self._catalogue[expression.function].may_wait:
-            return ast.YieldFrom(made, **place(span))
-        return made
+        name = expression.function
+        made: ast.expr = call(f"b_{name}", arguments, span)
+        if self._catalogue[name].may_wait:
+            made = ast.YieldFrom(made, **place(span))
+        return self.asking(made, _ASK_EVERY if UNITS.get(name, 0) >= EXPENSIVE else 1)
 
     def _user_call(self, expression: nodes.Call, callee: FunctionScope, scope: FunctionScope) -> ast.expr:
         assert callee.node is not None
@@ -275,7 +292,7 @@ class ExpressionCompiler:
             if parameter.name not in given:
                 omitted = load("_MISSING", span)
                 made.keywords.append(ast.keyword(f"v_{parameter.name}", omitted, **place(span)))
-        return ast.YieldFrom(made, **place(span)) if callee.blocks else made
+        return self.asking(ast.YieldFrom(made, **place(span)))
 
     def _method(self, expression: nodes.MethodCall, scope: FunctionScope) -> ast.expr:
         span = expression.span
@@ -290,4 +307,4 @@ class ExpressionCompiler:
             ast.List(positional, ast.Load(), **at),
             ast.Dict(list(names), values, **at),
         ]
-        return ast.YieldFrom(call("_method", arguments, span), **at)
+        return self.asking(ast.YieldFrom(call("_method", arguments, span), **at))

@@ -49,16 +49,50 @@ def expression_statement(value: ast.expr, span: Span) -> ast.Expr:
     return ast.Expr(value, **place(span))
 
 
-def charge_statements(cost: int, span: Span) -> ast.If:
-    """`if (_b := _b - cost) < 0: _over()`: charges statements to the budget of this cycle."""
+def charge(statements: int, extra: int, span: Span) -> list[ast.stmt]:
+    """`_x += extra`, `if (_b := _b - cost) < 0: yield _OUT_OF_UNITS`: charges a block before it runs."""
     at = place(span)
     rest = ast.NamedExpr(
         ast.Name("_b", ast.Store(), **at),
-        ast.BinOp(load("_b", span), ast.Sub(), constant(cost, span), **at),
+        ast.BinOp(load("_b", span), ast.Sub(), constant(statements + extra, span), **at),
         **at,
     )
-    test = ast.Compare(rest, [ast.Lt()], [constant(0, span)], **at)
-    return ast.If(test, [expression_statement(call("_over", [], span), span)], [], **at)
+    pay = _ask(rest, span)
+    if not extra:
+        return [pay]
+    beyond = ast.AugAssign(ast.Name("_x", ast.Store(), **at), ast.Add(), constant(extra, span), **at)
+    return [beyond, pay]
+
+
+def ask(span: Span) -> ast.If:
+    """`if _b < 0: yield _OUT_OF_UNITS`: asks whether the program may go on in this cycle."""
+    return _ask(load("_b", span), span)
+
+
+def ask_after(value: ast.expr) -> ast.expr:
+    """`(value, _b < 0 and (yield _OUT_OF_UNITS))[0]`: `value`, then the question of `ask`."""
+    span = _span_of(value)
+    at = place(span)
+    wait = ast.BoolOp(ast.And(), [_is_used_up(load("_b", span), span), _wait(span)], **at)
+    both = ast.Tuple([value, wait], ast.Load(), **at)
+    return ast.Subscript(both, constant(0, span), ast.Load(), **at)
+
+
+def _span_of(node: ast.expr) -> Span:
+    end_line, end_column = node.end_lineno or node.lineno, node.end_col_offset or node.col_offset
+    return Span(node.lineno, node.col_offset + 1, end_line, end_column + 1)
+
+
+def _ask(left: ast.expr, span: Span) -> ast.If:
+    return ast.If(_is_used_up(left, span), [expression_statement(_wait(span), span)], [], **place(span))
+
+
+def _is_used_up(left: ast.expr, span: Span) -> ast.Compare:
+    return ast.Compare(left, [ast.Lt()], [constant(0, span)], **place(span))
+
+
+def _wait(span: Span) -> ast.Yield:
+    return ast.Yield(load("_OUT_OF_UNITS", span), **place(span))
 
 
 def function(name: str, parameters: list[str], body: list[ast.stmt], span: Span) -> ast.FunctionDef:

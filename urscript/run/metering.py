@@ -1,96 +1,157 @@
-"""Charges the budget of a cycle for operations that take longer than a statement: arrays, strings, builtins.
+"""What a program may do in a control cycle: statements have a limit, units of work spread it over cycles.
 
-The compiler counts statements. An operation on a matrix, or a call of inverse kinematics, takes as long as
-hundreds of them; without a charge, a loop of it would block the control cycle for minutes before the budget
-is exceeded. An operation that costs more than the rest of the budget is not started.
+Two things are counted. *Statements* are the language's: a thread that runs `Dialect.statement_budget` of them
+without a call that takes time ends with the controller's error. *Units* are time: one is what a simple
+statement takes. A `WorkBudget` gets so many in each cycle, and saves some for programs that compute a lot now
+and then. When they are used up, the program stands still with all its threads and goes on in the next cycle
+at the same place: what needs more gets slower itself and computes the same. An operation that takes more than
+was left makes a debt, which the next cycles pay. Nothing here reads a clock.
+
+Compiled code counts its own statements and units (`compile.costs`): `_b` is what is left of a grant, `_x` the
+units beyond one a statement. Here are the charges that depend on values: arrays, texts, builtins.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import inf
 from typing import Any, Final
 
+from urscript.catalogue.costs import OF_HOST, OF_PURE, TEXT, UNITS
 from urscript.errors import ScriptBudgetError
-from urscript.values import Matrix
+from urscript.values import Matrix, Pose
 
-COSTS: Final = {
-    "get_inverse_kin": 300,
-    "get_inverse_kin_has_solution": 300,
-    "is_within_safety_limits": 300,
-    "str_cat": 30,
-    "to_str": 30,
-    "textmsg": 30,
-    "popup": 30,
-    "socket_send_line": 30,
-    "socket_send_string": 30,
-}
-"""Builtin -> number of statements that a call counts for (C): the slowest ones, by measurement."""
+MOST_AT_ONCE: Final = 110_000
+"""Units of the longest operation that is started, 5 ms: one on arrays cannot be interrupted. A longer one is
+an error, as if it were a loop."""
 
-HOST_COST: Final = 10
-"""Of every other builtin of the host."""
+_CALL_SHARE: Final = 14
+"""A call of a builtin counts for one statement every so many units: the limit of statements is for loops, and
+a program that computes a lot in calls gets slower instead."""
 
-PURE_COST: Final = 3
-"""Of every other pure function."""
+_LEAST_OF_HOST: Final = 10
+_LEAST_OF_PURE: Final = 3
+"""Statements that a cheap call counts for."""
 
-START_COST: Final = 100
-"""Of starting a thread."""
+_ELEMENT: Final = 5
+"""Units that an operator takes for each element of an array (0.25 µs)."""
 
+_OF_ELEMENT: Final = {"_list": 2, "_store_item": 1, "_store_cell": 2, "_neg": _ELEMENT, "_pos": _ELEMENT}
 _OF_TWO: Final = ("_add", "_sub", "_mul", "_div", "_mod", "_equal", "_unequal")
-_OF_ONE_ARRAY: Final = ("_neg", "_pos", "_list", "_store_item", "_store_cell")
-"""Operations of compiled programs whose operands may be arrays (see `runtime`)."""
 
 _SCALARS: Final = frozenset({int, float, bool})
 
 Function = Callable[..., Any]
 
 
-class Meter:
-    """Subtracts costs from the budget of the running thread.
+class WorkBudget:
+    """Units of work of a control cycle, shared by programs.
 
     Args:
-        namespace: The globals of the compiled program; `_b` is what is left for this cycle.
+        per_cycle: Units that each cycle gives; without a limit for programs that nobody waits beside.
+        most: Units that one cycle may use when those before it used few.
+
+    Attributes:
+        left: Units that are left; below 0 it is a debt.
     """
 
-    def __init__(self, namespace: dict[str, Any]) -> None:
-        self._namespace = namespace
+    __slots__ = ("_most", "_per_cycle", "left")
 
-    def charge(self, statements: int) -> None:
-        """Charge the cost of `statements`; raises ScriptBudgetError when it exceeds the budget."""
-        left = self._namespace["_b"] - statements
-        self._namespace["_b"] = left
-        if left < 0:
+    def __init__(self, per_cycle: float = inf, most: float = inf) -> None:
+        self._per_cycle = per_cycle
+        self._most = self.left = most
+
+    def renew(self) -> None:
+        """A cycle begins."""
+        self.left = min(self._most, self.left + self._per_cycle)
+
+
+class Meter:
+    """Counts for the threads of one program.
+
+    Attributes:
+        work: What the program may do in a cycle.
+        statements: That the running thread may still run in its time slice.
+    """
+
+    def __init__(self, namespace: dict[str, Any], work: WorkBudget) -> None:
+        """Args: the globals of the compiled program, and what it may do."""
+        self._namespace = namespace
+        self._granted: float = 0
+        self.work = work
+        self.statements: float = 0
+
+    def grant(self, statements: float) -> None:
+        """Let a thread with so many statements left use what is left of the cycle."""
+        left = self.work.left
+        self.statements = statements
+        self._namespace["_b"] = self._granted = statements if statements < left else left
+        self._namespace["_x"] = 0
+
+    def settle(self) -> float:
+        """Book what was used of the grant; return the statements that are left, below 0 beyond the limit."""
+        namespace = self._namespace
+        used, self._granted = self._granted - namespace["_b"], namespace["_b"]
+        self.work.left -= used
+        self.statements -= used - namespace["_x"]
+        namespace["_x"] = 0
+        return self.statements
+
+    def charge(self, statements: int, units: int) -> None:
+        """Charge an operation before it is done.
+
+        Raises:
+            ScriptBudgetError: it exceeds the limit of statements, or is too long to be done at once.
+        """
+        namespace = self._namespace
+        left = namespace["_b"] - units
+        namespace["_b"] = left
+        namespace["_x"] += units - statements
+        if left < 0 and (units > MOST_AT_ONCE or self.settle() < 0):
             raise ScriptBudgetError
 
     def operations(self, names: Mapping[str, Any]) -> dict[str, Function]:
         """The operations of `names` that may get arrays, charged for each element."""
         pairs = {name: self._pair(names[name], name == "_mul") for name in _OF_TWO}
-        return pairs | {name: self._change(names[name]) for name in _OF_ONE_ARRAY}
+        return pairs | {name: self._change(names[name], units) for name, units in _OF_ELEMENT.items()}
 
-    def function(self, function: Function, cost: int, name: str) -> Function:
-        """A builtin, charged for the call and for arrays among its arguments."""
-        charge = self.charge
+    def function(self, function: Function, cost: tuple[int, int], name: str) -> Function:
+        """A builtin, charged its statements and units, and for arrays among its arguments."""
+        charge, (own, units) = self.charge, cost
         cubic = name == "inv"
+        of_element = 12 if name in TEXT else 3
 
         def call(*arguments: Any) -> Any:
-            work = cost
+            statements, work = own, units
             for argument in arguments:
                 kind = type(argument)
-                if kind is list or kind is str:
+                if kind is list:
+                    statements += len(argument) >> 3
+                    work += of_element * len(argument)
+                elif kind is str:
+                    statements += len(argument) >> 3
                     work += len(argument) >> 3
                 elif kind is Matrix:
-                    work += _product(argument, argument) if cubic else _cells(argument)
-            charge(work)
+                    cells = _product(argument, argument) if cubic else _cells(argument)
+                    statements += cells
+                    work += cells
+            charge(statements, work)
             return function(*arguments)
 
         return call
 
-    def checked(self, function: Function, cost: int, check: Callable[[Sequence[Any]], None]) -> Function:
-        """A builtin without long arguments, charged for the call; its arguments are checked."""
-        namespace = self._namespace
+    def checked(
+        self, function: Function, cost: tuple[int, int], check: Callable[[Sequence[Any]], None]
+    ) -> Function:
+        """A builtin without long arguments, charged its statements and units; its arguments are checked."""
+        namespace, settle = self._namespace, self.settle
+        statements, units = cost
+        extra = units - statements
 
         def call(thread: Any, *arguments: Any) -> Any:
-            namespace["_b"] = left = namespace["_b"] - cost
-            if left < 0:
+            namespace["_b"] = left = namespace["_b"] - units
+            namespace["_x"] += extra
+            if left < 0 and settle() < 0:
                 raise ScriptBudgetError
             check(arguments)
             return function(thread, *arguments)
@@ -104,31 +165,54 @@ class Meter:
             first, second = type(a), type(b)
             if first in _SCALARS and second in _SCALARS:
                 return operation(a, b)
-            if first is list or first is str:
-                charge(len(a) >> 3)
-            elif first is Matrix:
-                charge(_product(a, b) if product and second is Matrix else _cells(a))
-            elif second is list:
-                charge(len(b) >> 3)
-            elif second is Matrix:
-                charge(_cells(b))
+            if first is str or second is str:
+                length = len(a) + len(b) >> 3 if first is second else 0
+                charge(length, 2 + length)
+            elif first is list or second is list:
+                length = len(a if first is list else b)
+                if first is Matrix:
+                    cells = _cells(a)
+                    charge(cells, 3 * cells)
+                else:
+                    charge(length >> 3, _ELEMENT * length)
+            elif first is Matrix or second is Matrix:
+                if product and first is second:
+                    work = _product(a, b)
+                    charge(work, work)
+                else:
+                    cells = _cells(a if first is Matrix else b)
+                    charge(cells, 3 * cells)
+            elif first is Pose and second is Pose:
+                charge(0, 16)
             return operation(a, b)
 
         return operate
 
-    def _change(self, operation: Function) -> Function:
+    def _change(self, operation: Function, units: int) -> Function:
         """Charge an operation whose array is its last argument: a literal, a sign, a store."""
         charge = self.charge
 
         def operate(*arguments: Any) -> Any:
             array = arguments[-1]
             if type(array) is list:
-                charge(len(array) >> 3)
+                charge(len(array) >> 3, units * len(array))
             elif type(array) is Matrix:
-                charge(_cells(array))
+                charge(_cells(array), units * _cells(array))
             return operation(*arguments)
 
         return operate
+
+
+def host_cost(name: str) -> tuple[int, int]:
+    """Statements and units of a call of a builtin of the host."""
+    units = UNITS.get(name, OF_HOST)
+    return max(_LEAST_OF_HOST, units // _CALL_SHARE), units
+
+
+def pure_cost(name: str) -> tuple[int, int]:
+    """Statements and units of a call of a pure builtin."""
+    units = UNITS.get(name, OF_PURE)
+    return max(_LEAST_OF_PURE, units // _CALL_SHARE), units
 
 
 def _cells(matrix: Matrix) -> int:

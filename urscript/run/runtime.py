@@ -3,9 +3,9 @@
 | name | is |
 |---|---|
 | `_T` | the running thread, set by the scheduler |
-| `_b` | statements left in this cycle, set by the scheduler |
+| `_b`, `_x` | what is left of a grant of the meter, and the units in it beyond one a statement |
 | `_add` ... | the operators of `ops`, `elements` and `variables` |
-| `_run`, `_kill`, `_join`, `_halt`, `_over`, `_enter`, `_leave` | flow |
+| `_run`, `_kill`, `_join`, `_halt`, `_enter`, `_leave` | flow |
 | `b_name` | a builtin, called with the thread first |
 """
 
@@ -17,19 +17,16 @@ from typing import Any, Final
 
 from urscript.builtins import PURE
 from urscript.catalogue import Catalogue
+from urscript.catalogue.costs import OF_THREAD
 from urscript.catalogue.types import FIXED_SIZE
 from urscript.dialect import Dialect
-from urscript.errors import ScriptBudgetError, ScriptRuntimeError
+from urscript.errors import ScriptRuntimeError
 from urscript.run import elements, ops, variables
 from urscript.run.host import Handle, Host
-from urscript.run.metering import COSTS, HOST_COST, PURE_COST, START_COST, Meter
+from urscript.run.metering import Meter, host_cost, pure_cost
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread, join
-from urscript.run.waits import NEXT_CYCLE, Wait
+from urscript.run.waits import NEXT_CYCLE, OUT_OF_UNITS, Wait
 from urscript.values import Pose, a_type, log_form, type_name, wrap_int
-
-
-def _over() -> None:
-    raise ScriptBudgetError
 
 
 def _halt() -> None:
@@ -84,7 +81,7 @@ _COMMON: Final[dict[str, Any]] = {
     "_greater_equal": ops.greater_equal,
     "_join": join,
     "_halt": _halt,
-    "_over": _over,
+    "_OUT_OF_UNITS": OUT_OF_UNITS,
 }
 
 
@@ -122,7 +119,7 @@ def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any], meter: Me
     """The names with which a program calls its scheduler."""
 
     def run(function: Callable[[], Any], name: str) -> ScriptThread:
-        meter.charge(START_COST)
+        meter.charge(OF_THREAD, OF_THREAD)
         return scheduler.start(function, name, namespace["_T"])
 
     return {"_run": run, "_kill": scheduler.kill}
@@ -144,7 +141,7 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, me
             bound[f"b_{name}"] = _checked(name, function, catalogue, meter)
         elif name in PURE:
             pure = _without_thread(PURE[name])
-            bound[f"b_{name}"] = meter.function(pure, COSTS.get(name, PURE_COST), name)
+            bound[f"b_{name}"] = meter.function(pure, pure_cost(name), name)
         else:
             bound[f"b_{name}"] = _declared_only(name)
     return bound
@@ -168,7 +165,7 @@ def _checked(
     name: str, function: Callable[..., Any], catalogue: Catalogue, meter: Meter
 ) -> Callable[..., Any]:
     """A builtin of the host, charged for, with the check of its arguments in front."""
-    cost, builtin = COSTS.get(name, HOST_COST), catalogue.lookup(name)
+    cost, builtin = host_cost(name), catalogue.lookup(name)
     if builtin is None or not builtin.params:
         return meter.function(function, cost, name)
     check = catalogue.check_of(name)

@@ -11,11 +11,12 @@ thread scheduling; the fixed order: streaming programs stutter without it.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
-from typing import Any, Final, cast
+from typing import Any, Final
 
-from urscript.dialect import MAX_THREADS, PROGRAM_BUDGET
-from urscript.errors import ScriptRuntimeError
-from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
+from urscript.dialect import MAX_THREADS
+from urscript.errors import ScriptBudgetError, ScriptRuntimeError
+from urscript.run.metering import Meter
+from urscript.run.waits import NEXT_CYCLE, OUT_OF_UNITS, Blocked, Wait
 from urscript.values import a_type
 
 ThreadBody = Generator[Wait, None, Any]
@@ -39,7 +40,7 @@ class ScriptThread:
         finished: It ended or was killed.
         wait: What it waits for; None when it can run in the next cycle.
         label: Text of the last `$` line it passed.
-        budget: Statements it may still run in this cycle.
+        budget: Statements it may still run in its time slice.
         slice_used: Its time slice of this cycle is used up.
         depth: How deep it is in recursive functions.
         body: The generator that runs it.
@@ -70,7 +71,7 @@ class ScriptThread:
         self.finished = False
         self.wait: Blocked | None = None
         self.label = ""
-        self.budget = 0
+        self.budget: float = 0
         self.slice_used = False
         self.depth = 0
 
@@ -92,25 +93,44 @@ class ScriptThread:
 class Scheduler:
     """Runs the threads of one program.
 
+    A turn is a cycle of the program: every thread has had its time slice. It takes several cycles of the
+    robot when the units of a cycle do not suffice.
+
     Attributes:
+        is_between: A turn is under way: the threads go on in the next cycle where they stopped.
         threads: Unfinished threads, the main thread first, then by age.
         main: The thread whose end ends the program.
     """
 
     def __init__(
-        self, namespace: dict[str, Any], budget: int, thread_ended: Callable[[ScriptThread], None]
+        self,
+        namespace: dict[str, Any],
+        meter: Meter,
+        budget: int,
+        thread_ended: Callable[[ScriptThread], None],
     ) -> None:
-        """Args: the globals of the compiled program, statements per thread and cycle, a callback for ends."""
+        """Prepare.
+
+        Args:
+            namespace: The globals of the compiled program.
+            meter: Counts what its threads do.
+            budget: Statements of a time slice.
+            thread_ended: Told of every end.
+        """
         self._namespace = namespace
+        self._meter = meter
         self._budget = budget
-        self._left = 0
         self._thread_ended = thread_ended
+        self._turns = self._take_turns()
+        self.is_between = False
         self._count = 0
         self._some_finished = False
         self.threads: list[ScriptThread] = []
         self.main: ScriptThread | None = None
 
-    def start(self, function: Callable[[], Any], name: str, parent: ScriptThread | None) -> ScriptThread:
+    def start(
+        self, function: Callable[[], ThreadBody], name: str, parent: ScriptThread | None
+    ) -> ScriptThread:
         """Start `function` as a thread; it first runs when its turn in the cycle comes.
 
         Raises:
@@ -120,7 +140,7 @@ class Scheduler:
         if len(self.threads) >= MAX_THREADS <= sum(not thread.finished for thread in self.threads):
             raise ScriptRuntimeError(f"too many threads: a program may have {MAX_THREADS} at the same time")
         self._count += 1
-        thread = ScriptThread(self._count, name, parent, _as_body(function))
+        thread = ScriptThread(self._count, name, parent, function())
         thread.budget = self._budget
         if parent is None:
             self.main = thread
@@ -131,49 +151,61 @@ class Scheduler:
 
     def step(self) -> None:
         """Run one control cycle; exceptions of threads are not caught."""
-        threads = self.threads
-        budget = self._budget
-        self._left = budget * PROGRAM_BUDGET
-        for thread in threads:
-            thread.slice_used = False
-            thread.budget = budget
-        first_pass = True
-        while True:
-            progress = False
-            waits_inside = False
-            index = 0
-            # The list grows while it is walked: a new thread gets its slice in the cycle of its start.
-            while index < len(threads):
-                thread = threads[index]
-                index += 1
-                if thread.slice_used:
-                    continue
-                wait = thread.wait
-                if wait is not None:
-                    if wait.outside and not first_pass:
-                        continue
-                    if not wait.ready():
-                        waits_inside = waits_inside or not wait.outside
-                        continue
-                    thread.wait = None
-                self._resume(thread)
-                if thread.finished and thread is self.main:
-                    return
-                progress = True
-                wait = thread.wait
-                if wait is not None and not wait.outside:
-                    waits_inside = True
-            if not (progress and waits_inside):
-                break
-            first_pass = False
-        if self._some_finished:
-            self._some_finished = False
-            self.threads = [thread for thread in threads if not thread.finished]
+        self.is_between = next(self._turns)
 
-    def _resume(self, thread: ScriptThread) -> None:
-        namespace = self._namespace
-        namespace["_T"] = thread
-        namespace["_b"] = budget = min(thread.budget, self._left)
+    def _take_turns(self) -> Generator[bool, None, None]:
+        """Run the threads in turn; yield at the end of a cycle whether the turn goes on in the next one."""
+        while True:
+            threads = self.threads
+            budget = self._budget
+            for thread in threads:
+                thread.slice_used = False
+                thread.budget = budget
+            first_pass = True
+            while True:
+                progress = False
+                waits_inside = False
+                index = 0
+                # The list grows while it is walked: a new thread gets its slice in the turn of its start.
+                while index < len(threads):
+                    thread = threads[index]
+                    index += 1
+                    if thread.slice_used:
+                        continue
+                    wait = thread.wait
+                    if wait is not None:
+                        if wait.outside and not first_pass:
+                            continue
+                        if not wait.ready():
+                            waits_inside = waits_inside or not wait.outside
+                            continue
+                        thread.wait = None
+                    while not self._resume(thread):
+                        yield True
+                    if thread.finished and thread is self.main:
+                        yield False
+                        return
+                    progress = True
+                    wait = thread.wait
+                    if wait is not None and not wait.outside:
+                        waits_inside = True
+                if not (progress and waits_inside):
+                    break
+                first_pass = False
+            if self._some_finished:
+                self._some_finished = False
+                self.threads = [thread for thread in threads if not thread.finished]
+            yield False
+
+    def _resume(self, thread: ScriptThread) -> bool:
+        """Let a thread run; return False if it stopped because the units of the cycle are used up."""
+        meter = self._meter
+        work = meter.work
+        if work.left <= 0:
+            return False
+        self._namespace["_T"] = thread
+        budget = thread.budget
+        meter.grant(budget)
         proceed = thread.body.send
         try:
             while True:
@@ -181,18 +213,25 @@ class Scheduler:
                 if wait is NEXT_CYCLE:
                     thread.slice_used = True
                     break
-                if not wait.ready():
+                if wait is OUT_OF_UNITS:
+                    if meter.settle() < 0:
+                        thread.body.throw(ScriptBudgetError())
+                    if work.left <= 0:
+                        return False
+                    meter.grant(meter.statements)
+                elif not wait.ready():
                     thread.wait = wait
-                    thread.budget = cast(int, namespace["_b"])
                     break
-                if 2 * namespace["_b"] < budget:
+                elif 2 * meter.settle() < budget:
                     thread.slice_used = True
                     break
         except StopIteration:
             self._end(thread)
         except ThreadKilled:
             self._end(thread)
-        self._left -= budget - cast(int, namespace["_b"])
+        finally:
+            thread.budget = meter.settle()
+        return True
 
     def _end(self, thread: ScriptThread) -> None:
         thread.finished = True
@@ -240,6 +279,8 @@ class Scheduler:
                 fault = fault or error
             self._end(thread)
         self.threads = []
+        self._turns.close()
+        self.is_between = False
         return fault
 
 
@@ -262,20 +303,3 @@ def thread_of(handle: Any, word: str) -> ScriptThread | None:
     if type(handle) is int or handle is None:
         return None
     raise ScriptRuntimeError(f"{word} needs a thread handle, got {a_type(handle)}")
-
-
-def _as_body(function: Callable[[], Any]) -> ThreadBody:
-    """`function` as a thread body: one that cannot block is a plain function and runs at once."""
-    if function.__code__.co_flags & _IS_GENERATOR:
-        return cast(ThreadBody, function())
-    return _run_at_once(function)
-
-
-_IS_GENERATOR: Final = 0x20
-"""inspect.CO_GENERATOR, without importing inspect."""
-
-
-def _run_at_once(function: Callable[[], Any]) -> ThreadBody:
-    function()
-    return
-    yield NEXT_CYCLE

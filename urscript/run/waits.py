@@ -34,9 +34,16 @@ class Blocked:
         self.outside = outside
 
 
+class _OutOfUnits(Enum):
+    OUT_OF_UNITS = "out of units"
+
+
+OUT_OF_UNITS: Final = _OutOfUnits.OUT_OF_UNITS
+"""What the thread was granted is used up: compiled code asks whether it may go on (see `metering`)."""
+
 CHECKPOINT: Final = Blocked(lambda: True)
 """For a call that may wait but need not now: the thread continues at once, unless it has used half of its
 budget; then its time slice ends. So a program that reads a flood of data does not exceed its budget."""
 
-Wait = _NextCycle | Blocked
+Wait = _NextCycle | _OutOfUnits | Blocked
 """Everything a thread may yield."""
