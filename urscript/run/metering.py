@@ -63,7 +63,8 @@ class WorkBudget:
 
     def renew(self) -> None:
         """A cycle begins."""
-        self.left = min(self._most, self.left + self._per_cycle)
+        if self.left != self._most:
+            self.left = min(self._most, self.left + self._per_cycle)
 
 
 class Meter:
@@ -80,21 +81,24 @@ class Meter:
         self._granted: float = 0
         self.work = work
         self.statements: float = 0
+        namespace["_x"] = 0
 
     def grant(self, statements: float) -> None:
         """Let a thread with so many statements left use what is left of the cycle."""
         left = self.work.left
         self.statements = statements
         self._namespace["_b"] = self._granted = statements if statements < left else left
-        self._namespace["_x"] = 0
 
     def settle(self) -> float:
         """Book what was used of the grant; return the statements that are left, below 0 beyond the limit."""
         namespace = self._namespace
-        used, self._granted = self._granted - namespace["_b"], namespace["_b"]
-        self.work.left -= used
-        self.statements -= used - namespace["_x"]
-        namespace["_x"] = 0
+        left = namespace["_b"]
+        used = self._granted - left
+        if used:
+            self._granted = left
+            self.work.left -= used
+            self.statements -= used - namespace["_x"]
+            namespace["_x"] = 0
         return self.statements
 
     def charge(self, statements: int, units: int) -> None:
