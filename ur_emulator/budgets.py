@@ -98,6 +98,9 @@ class Budgets:
     program_units_saved: int = _budget(
         120_000, "units", "a cycle after a rest", "the program goes on in the next cycle"
     )
+    secondary_programs: int = _budget(
+        32, "secondary programs", "a box, not ended yet", "the newest is not started"
+    )
     secondary_units: int = _budget(
         10_000, "units", "all secondary programs of a box, a cycle", "they go on in the next cycle"
     )

@@ -6,7 +6,8 @@ import pytest
 from box_support import Bench
 
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.events import TextPrinted
+from ur_emulator.commands.programs import StartProgram
+from ur_emulator.controller.events import ScriptFailed, TextPrinted
 from urscript import ProgramStatus, RecordingHost, compile_program
 from urscript.dialect import STATEMENT_BUDGET
 from urscript.recording_host import FakeSocket
@@ -185,4 +186,17 @@ def test_a_secondary_program_that_fails_later_is_reported_and_gone(monkeypatch):
     bench.start(f"sec s():\n{LOOP.format(n=8_000, body='x = i')}    x = 1 / 0\nend\n")
     bench.tick(10)
     assert [e.text for e in bench.events if type(e).__name__ == "ScriptFailed"] == ["division by zero"]
+    assert not bench.controller.programs.has_work
+
+
+def test_secondary_programs_that_come_faster_than_they_end_are_refused():
+    bench = Bench(fidelity="ideal")
+    sec = StartProgram(compile_program(f"sec s():\n{LOOP.format(n=50_000, body='x = i')}end\n"))
+    bench.tick(1, *[sec] * (BUDGETS.secondary_programs + 2))
+    refused = [event.text for event in bench.events if isinstance(event, ScriptFailed)]
+    assert (
+        refused
+        == [f"{BUDGETS.secondary_programs} secondary programs wait already: this one is not started"] * 2
+    )
+    bench.tick(BUDGETS.secondary_programs * 12)
     assert not bench.controller.programs.has_work

@@ -99,6 +99,10 @@ class ProgramSlot:
     def start(self, program: CompiledProgram) -> None:
         """Start a program; a primary one replaces the one that runs."""
         if program.kind == "sec":
+            if len(self._secondaries) >= BUDGETS.secondary_programs:
+                text = f"{len(self._secondaries)} secondary programs wait already: this one is not started"
+                self._state.events.append(ScriptFailed(1, 1, text, True))
+                return
             host = RobotHost(self._state, self._network)
             self._secondaries.append(program.start(host, self._secondary_work))
             return
