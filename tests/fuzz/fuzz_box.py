@@ -285,7 +285,7 @@ class FuzzBox:
         """A turn of the loop; nothing is left for the worker process then."""
         self.loop.call_soon(_nothing, _raise)  # so that it does not wait
         self.loop._dispatch(time.monotonic() + _NEVER)
-        while not _is_idle(self.loop.tasks):
+        while not self.loop.tasks.is_idle:
             self.loop._dispatch(time.monotonic() + _NEVER)
         assert not self.defects, self.defects
 
@@ -486,10 +486,6 @@ def run(rng, folder, n_cases, **options):
     finally:
         fuzz.close()
     return fuzz.cases
-
-
-def _is_idle(tasks):
-    return not (tasks._waiting or getattr(tasks, "_current", None) or getattr(tasks, "_under_way", None))
 
 
 @lru_cache

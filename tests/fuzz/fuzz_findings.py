@@ -8,6 +8,16 @@ from pathlib import Path
 
 CORPUS = Path(__file__).parent / "corpus"
 FINDINGS = {
+    "answer/deep_array.http": "RecursionError in the worker thread: the program waited for ever",
+    "answer/empty_fault.http": "IndexError in the worker thread: the program waited for ever",
+    "answer/fault_of_text.http": "TypeError in the worker thread: the program waited for ever",
+    "answer/gzip_bomb.http": "0.5 MB became 618 MB",
+    "answer/gzip_that_is_cut.http": "EOFError in the worker thread: the program waited for ever",
+    "answer/length_beyond_all.http": "OverflowError in the worker thread: the program waited for ever",
+    "answer/lines_without_end.http": "a traceback instead of an error of the script",
+    "answer/status_with_line_break.http": "the error of the program had two lines, the second empty",
+    "answer/struct_without_value.http": "IndexError in the worker thread: the program waited for ever",
+    "answer/unknown_encoding.http": "LookupError in the worker thread: the program waited for ever",
     "archive/bomb.zip": "3.1 GB, and a name outside of the folder",
     "installation/entities.installation": "entities that double are what XML bombs are made of",
     "installation/long_port.installation": "the log had all of the port's 5,000 digits",
