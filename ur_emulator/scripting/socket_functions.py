@@ -81,7 +81,8 @@ class ProgramSockets:
             reason = (
                 "Connection timed out" if socket.is_connecting else socket.problem or "Connection refused"
             )
-            text = f"Not able to open socket [{name}] to host: {address} at port: {port}: {reason}"
+            where = f"[{name[:80]}] to host: {address[:80]} at port: {port}"
+            text = f"Not able to open socket {where}: {reason}"
             self._events.append(LogAdded("Program", text))
             socket.close()
             if self._sockets.get(name) is reader:
