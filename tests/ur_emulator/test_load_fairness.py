@@ -158,6 +158,32 @@ def test_a_client_that_sends_a_thousand_lines_does_not_keep_another_waiting(box,
     assert answered.index("PolyscopeVersion") <= BUDGETS.client_work
 
 
+def test_lines_of_a_client_that_is_gone_are_not_worked_off(box, monkeypatch):
+    answered = []
+    original = DashboardAnswers.answer
+
+    def answer(answers, event, host):
+        answered.append(event.command.name)
+        return original(answers, event, host)
+
+    monkeypatch.setattr(DashboardAnswers, "answer", answer)
+    with connect(box, "dashboard") as greedy:
+        read_lines(greedy, 1)
+        with standing_still(box):
+            greedy.sendall(b"robotmode\n" * 4000)
+            greedy.close()
+    with connect(box, "dashboard") as other:
+        read_lines(other, 1)
+        for _ in range(1000):
+            other.sendall(b"PolyscopeVersion\n")
+            read_lines(other, 1)
+            if len(box._port_set._listeners["dashboard"].connections) == 1:
+                break
+        else:
+            raise AssertionError("a client that is gone is still connected")
+    assert 0 < answered.count("robotmode") <= 2 * BUDGETS.read_bytes // len("robotmode\n") + 1
+
+
 def test_inputs_beyond_those_that_a_cycle_takes_wait_for_the_next_and_keep_their_order(box, monkeypatch):
     monkeypatch.setattr(served_box, "BUDGETS", replace(BUDGETS, commands=10))
     taken, values = [], []
@@ -167,7 +193,7 @@ def test_inputs_beyond_those_that_a_cycle_takes_wait_for_the_next_and_keep_their
     def counted(commands):
         commands = tuple(commands)
         taken.append(len(commands))
-        values.extend(value for command in commands for _, value in getattr(command, "values", ()))
+        values.extend(value for submitted in commands for _, value in submitted.command.values)
         return tick(commands)
 
     monkeypatch.setattr(controller, "tick", counted)

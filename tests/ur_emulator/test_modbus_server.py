@@ -346,6 +346,7 @@ class FakeConnection:
         self.full = full
         self.is_open = True
         self.has_ended = False
+        self.takes_answers = True
         self.answers = []
         self.calls = []
 

@@ -20,6 +20,7 @@ class FakeConnection:
         self.port = port
         self.is_open = True
         self.has_ended = False
+        self.takes_answers = True
         self.full = full
         self.sent = []
         self.calls, self.reads = [], True

@@ -84,6 +84,8 @@ class Session(ABC):
             self.connection.close()
         elif error is not None:
             self.connection.failed(error)
+        elif not self.connection.takes_answers:
+            self.connection.close()  # gone: what it has sent ahead is not done for nobody
         elif self.connection.has_ended:
             self.connection.close_when_sent()
         else:

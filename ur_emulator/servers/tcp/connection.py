@@ -76,6 +76,11 @@ class Connection(BufferedSocket):
         """Address of the client without its port."""
         return self.peer.rpartition(":")[0]
 
+    @property
+    def takes_answers(self) -> bool:
+        """False as soon as it is known that the client is gone; what it has sent may still be read."""
+        return self._can_send
+
     def call_soon(self, call: Callable[[], None]) -> None:
         """Run `call` when this client has its next turn."""
         self._loop.call_soon(call, self.failed)

@@ -22,6 +22,8 @@ from ur_emulator.servers.tcp.connection import Connection
 from ur_emulator.servers.tcp.places import Places
 from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
+# Buffer of the system for what a client sends and the box has not read yet.
+RECEIVE_BUFFER = 64 * 1024
 # How long not to listen when a client can be neither accepted nor refused [s].
 PAUSE = 0.1
 # Errors of accept() that mean that this process or system has nothing left, not that the client has gone.
@@ -190,6 +192,7 @@ def _listening_socket(host: str, number: int) -> socket.socket:
     sock = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
     try:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)  # its clients inherit it
         sock.bind((host, number))
         sock.listen(socket.SOMAXCONN)
     except OSError as error:
