@@ -78,7 +78,10 @@ class Budgets:
         12 * MIB, "bytes", "script of a box", "the newest of a client that has more than 64 KiB is dropped"
     )
     script_bytes_gone: int = _budget(
-        1 * MIB, "bytes", "script of clients that have gone", "the newest is dropped"
+        256 * KIB,
+        "bytes",
+        "script of clients that have gone",
+        "the newest is dropped unless it is the only one",
     )
     # More than any client sends; each costs the cycle up to 0.5 ms.
     programs_per_cycle: int = _budget(4, "programs", "started or refused in a cycle", "the others wait")

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any, Protocol
@@ -32,8 +31,10 @@ from urscript.catalogue import Catalogue
 
 # So much of a client's script is taken whatever others send [bytes].
 _ALWAYS_TAKEN = 64 * KIB
-# So many programs that a client sends at once come in one turn.
+# A program comes a turn later for so many that its sender has sent at once before it, and for so much text of
+# its own [bytes]: a short one goes before a long one that waits.
 _PROGRAMS_A_TURN = 16
+_BYTES_A_TURN = 8 * KIB
 
 
 class Box(Protocol):
@@ -103,9 +104,11 @@ class ProgramIntake:
         self._hold(sender, -sender.channel.pending)
         sender.is_open = False
         self._held_gone += sender.held
-        while self._held_gone > BUDGETS.script_bytes_gone and sender.waiting:
+        while self._held_gone > BUDGETS.script_bytes_gone and sender.programs:
+            if not sender.waiting and self._held_gone == sender.held:
+                return  # nobody else has gone: one program is always kept
             self._tell(sender)
-            self._drop(sender.waiting[-1])
+            self._drop(sender.waiting[-1] if sender.waiting else sender.programs[0])
 
     def publish(self, snapshot: Snapshot) -> None:
         """Go on after a cycle."""
@@ -125,7 +128,8 @@ class ProgramIntake:
 
     def _take_program(self, sender: Sender, item: ProgramText) -> None:
         sender.n_sent += 1
-        place = Place(sender, sender.n_sent // _PROGRAMS_A_TURN)
+        turn = sender.n_sent // _PROGRAMS_A_TURN + len(item.text) // _BYTES_A_TURN
+        place = Place(sender, turn)
         program = Program(sender, item.text, place, self._box.stops, item.kind == "sec")
         self._hold(sender, program.cost)
         if self._holds_too_much(sender):
@@ -241,12 +245,12 @@ class ProgramIntake:
         sender = program.sender
         if sender.compiling is program:
             sender.compiling = None
+        else:
+            sender.waiting.remove(program)
         if program.task is not None:
             self._tasks.drop(program.task)
             program.task = None
-        with suppress(ValueError):
-            sender.waiting.remove(program)
-        with suppress(ValueError):
+        elif program in self._ready:
             self._ready.remove(program)
         self._hold(sender, -program.cost)
         if not (sender.waiting or sender.compiling):

@@ -14,7 +14,7 @@ from ur_emulator.realtime.tasks import Place, Task
 _PROGRAM_COST = 2 * KIB
 
 
-# Without a text of their own: `deque.remove` makes one of what it does not find, and each holds all others.
+# Without a text of their own: each holds all others.
 @dataclass(eq=False, repr=False, slots=True)
 class Sender:
     """A client that sends scripts.
