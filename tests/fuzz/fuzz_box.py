@@ -2,7 +2,7 @@
 
 Loop, worker process and sockets are real, but everything waits for everything: the loop takes one turn at a time, a
 cycle passes when the test says so, and what the worker process has to do is done before the next step. So the same
-seed is the same story. A step is something that one hostile client does, a cycle, or a heartbeat without one.
+seed is the same story, up to the order in which answers of the worker process and bytes of clients come in one turn. A step is something that one hostile client does, a cycle, or a heartbeat without one.
 """
 
 import math
@@ -283,6 +283,8 @@ class FuzzBox:
 
     def turn(self):
         """A turn of the loop; nothing is left for the worker process then."""
+        for service in tuple(self.loop._services):
+            service.advance(time.monotonic())
         self.loop.call_soon(_nothing, _raise)  # so that it does not wait
         self.loop._dispatch(time.monotonic() + _NEVER)
         while not self.loop.tasks.is_idle:

@@ -56,6 +56,8 @@ DIALLING_PROGRAMS = (
     "  socket_close()\nend\n",
     'def variables():\n  socket_open("127.0.0.1", PEER)\n  textmsg(socket_get_var("a"))\n'
     '  socket_set_var("b", 3)\n  socket_send_int(7)\n  textmsg(socket_read_byte_list(5, timeout=0.1))\nend\n',
+    'def calls():\n  far = rpc_factory("xmlrpc", "http://127.0.0.1:PEER/")\n  while True:\n'
+    "    textmsg(far.value(1))\n  end\nend\n",
     'def many():\n  i = 0\n  while i < 30:\n    socket_open("127.0.0.1", PEER, to_str(i))\n    i = i + 1\n'
     "  end\n  sleep(0.1)\nend\n",
 )
@@ -185,7 +187,14 @@ def control_message(rng, lively):
 
 def peer_message(rng):
     """What a peer of a script sends."""
-    kind = rng.randrange(5)
+    kind = rng.randrange(6)
+    if kind == 5:
+        body = (
+            b"<methodResponse><params><param><value>%s</value></param></params></methodResponse>"
+            % rng.choice((b"<int>1</int>", b"text", b"<array><data/></array>", b"<nil/>", b""))
+        )
+        size = len(body) - rng.choice((0, 0, 0, 1))
+        return b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n%s" % (size, body)
     if kind == 0:
         numbers = [
             rng.choice(("1", "2.5", "-1e9", "nan", "1e999", "x", ""))
