@@ -154,7 +154,7 @@ def test_messages_of_a_flood_are_bounded(call):
     bench.tick(20)
     bench.events.clear()
     bench.tick(20)
-    assert 20 * 60 < len(bench.events) < 20 * 80
+    assert 20 * 25 < len(bench.events) < 20 * 35
 
 
 def test_secondary_programs_share_units_of_their_own_and_come_in_turn(monkeypatch):

@@ -24,8 +24,8 @@ UNITS: Final[Mapping[str, int]] = {
     "get_inverse_kin": 4_800,  # 215 to 240 µs
     "get_inverse_kin_has_solution": 4_800,
     "is_within_safety_limits": 4_800,
-    "textmsg": 420,
-    "popup": 420,
+    "textmsg": 1_000,  # with the log and the clients of port 30001
+    "popup": 1_000,
     "set_runstate_outputs": 200,  # 10 µs
     "set_runstate_standard_digital_outputs": 160,
     "track_conveyor_circular": 150,

@@ -25,7 +25,7 @@ MOST_AT_ONCE: Final = 110_000
 """Units of the longest operation that is started, 5 ms: one on arrays cannot be interrupted. A longer one is
 an error, as if it were a loop."""
 
-_CALL_SHARE: Final = 14
+_CALL_SHARE: Final = 30
 """A call of a builtin counts for one statement every so many units: the limit of statements is for loops, and
 a program that computes a lot in calls gets slower instead."""
 
