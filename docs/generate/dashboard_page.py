@@ -32,7 +32,7 @@ has started, the arm rests), from that software on; before, at once.
 
 While a line waits for its reply, so do the lines behind it. A client whose line has more than
 {MAX_LINE} bytes is cut off, and so is one that does not read its replies. Who closes his end still gets all
-replies. What has begun is done even if the client is gone; lines behind it that were not read yet are not.
+replies. What has begun is done even if the client is gone; the lines behind it are not.
 """
 
 

@@ -65,7 +65,7 @@ class Session(ABC):
         A request that has waited for a cycle is the last of a turn: it is answered within the next cycle.
         """
         snapshot, work = self._access.snapshot, BUDGETS.client_work
-        while self.connection.is_open:
+        while self.connection.is_open and self.connection.takes_answers:
             if work <= 0 or self._access.snapshot is not snapshot:
                 return True
             cost = yield from self._answer_next()
