@@ -2,7 +2,8 @@
 
 Loop, worker process and sockets are real, but everything waits for everything: the loop takes one turn at a time, a
 cycle passes when the test says so, and what the worker process has to do is done before the next step. So the same
-seed is the same story, up to the order in which answers of the worker process and bytes of clients come in one turn. A step is something that one hostile client does, a cycle, or a heartbeat without one.
+seed is the same story, up to the order of what one turn finds of the worker process and of clients. A step is
+something that one hostile client does, a cycle, or a heartbeat without one.
 """
 
 import math
