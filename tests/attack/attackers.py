@@ -46,7 +46,8 @@ def flood(
 
         def join() -> None:
             with suppress(OSError):
-                sock = stack.enter_context(box.connect(port, 2.0))
+                sock = box.connect(port, 2.0)
+                stack.callback(reset, sock)  # what was sent and not read by then is lost
                 sock.setblocking(False)
                 at[sock] = 0
                 selector.register(sock, events)
@@ -109,13 +110,22 @@ def plays(box: BoxUnderAttack) -> bool:
     return box.ask("running")[0] == "Program running: true"
 
 
+def log_since(box: BoxUnderAttack, after: int, level: str = "DEBUG") -> tuple[list[dict], int]:
+    """Return all entries of the log but the first so many, and how many there are; the API gives some at a time."""
+    entries = []
+    while (answer := request(box, "GET", f"log?after={after}&level={level}")[1])["next"] > after:
+        entries += answer["entries"]
+        after = answer["next"]
+    return entries, after
+
+
 def run_to_end(box: BoxUnderAttack, *lines: str) -> None:
     """Run a program of these lines, and wait for its end."""
-    after = request(box, "GET", "log")[1]["next"]
+    after = log_since(box, 0)[1]
     box.run(*lines)
 
     def has_ended() -> bool:
-        entries = request(box, "GET", f"log?after={after}")[1]["entries"]
+        entries, _ = log_since(box, after)
         return any(
             entry["level"] == "FAULT" or entry["text"].startswith("Program stopped") for entry in entries
         )

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from attack_record import Section
-from attackers import crowd, peer, plays, request, run_to_end, until
+from attackers import crowd, log_since, peer, plays, run_to_end, until
 from box_under_attack import PATIENCE, BoxUnderAttack
 
 SCRIPTS = Section("Budgets of running programs")
@@ -34,25 +34,27 @@ socket.getaddrinfo = look_up
 def _spend(box: BoxUnderAttack, seconds: float, *lines: str, setup: tuple[str, ...] = ()) -> str:
     """Run `lines` in an endless loop for so many seconds; the program ends with the stop."""
     box.send("secondary", "stop program\n")
-    before = _written(box)
+    after = log_since(box, 0)[1]
     box.run(*setup, "while True:", *(f"  {line}" for line in lines), "end")
-    until(lambda: _written(box) > before, "the program starts")
+    until(lambda: _has_begun(box, after), "the program starts")
     time.sleep(seconds)
-    remark = _state(box)
+    remark = _state(box, after)
     box.send("secondary", "stop program\n")
     return remark
 
 
-def _written(box: BoxUnderAttack) -> int:
-    """Return how many entries the log has."""
-    return request(box, "GET", "log?level=CRITICAL_FAULT")[1]["next"]
+def _has_begun(box: BoxUnderAttack, after: int) -> bool:
+    return any(
+        entry["level"] == "FAULT" or entry["text"].startswith("Starting program")
+        for entry in log_since(box, after)[0]
+    )
 
 
-def _state(box: BoxUnderAttack) -> str:
+def _state(box: BoxUnderAttack, after: int) -> str:
     if plays(box):
         return "the program runs on"
-    entries = request(box, "GET", "log?level=FAULT")[1]["entries"]
-    return f"the program was ended: {entries[-1]['text'][:90]}" if entries else "no program runs"
+    faults, _ = log_since(box, after, "FAULT")
+    return f"the program was ended: {faults[-1]['text'][:90]}" if faults else "no program runs"
 
 
 def _times(n: int, *lines: str) -> tuple[str, ...]:
@@ -91,12 +93,13 @@ def long_globals(box: BoxUnderAttack, seconds: float) -> str:
 )
 def line_of_a_long_function(box: BoxUnderAttack, seconds: float) -> str:
     with crowd(box, "rtde", 4, _RTDE_LINE):
+        after = log_since(box, 0)[1]
         n = min(100_000, round(12_500 * seconds))
         box.run("while True:", *n * ("  x = 1",), "  sync()", "end")
         until(lambda: plays(box), "the program starts", 90.0)
         time.sleep(seconds / 2)
     time.sleep(seconds / 2)  # the clients have gone
-    return _state(box)
+    return _state(box, after)
 
 
 @SCRIPTS.attack("Loops of 3,000 to 100,000 steps between two `sync()`", "the script gets slower, or is ended")
