@@ -10,7 +10,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist lo
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: ablation pictures help setup demo draw explore soak test check check-static bench format docs clean
+.PHONY: ablation attack pictures help setup demo draw explore soak test check check-static bench format docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -37,6 +37,10 @@ test: $(STAMP) ## all tests, in as many processes as there are cores, at most fo
 
 explore: $(STAMP) ## the property tests with new random cases (make test draws the same ones every time)
 	HYPOTHESIS_PROFILE=explore $(PYTEST) -m hypothesis
+
+attack: $(STAMP) ## attack a served box in every way, into docs/security.md (a quarter of an hour)
+	$(BIN)/python tests/attack
+	$(BIN)/python -m docs.generate
 
 check-static: $(STAMP)
 	$(BIN)/ruff check .

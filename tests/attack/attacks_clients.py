@@ -34,7 +34,6 @@ def ten_dashboards(box: BoxUnderAttack, seconds: float) -> None:
 def ten_dashboards_that_load(box: BoxUnderAttack, seconds: float) -> None:
     (box.programs / "spin.script").write_text("while True:\n  sync()\nend\n")
     flood(box, "dashboard", 20 * b"load spin.script\nload nothing.urp\nplay\nstop\n", seconds, clients=10)
-    box.ask("stop")
 
 
 @CLIENTS.attack("Twenty Modbus masters read and write all registers without pause")

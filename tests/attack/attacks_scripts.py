@@ -24,7 +24,7 @@ import socket, time
 _look_up = socket.getaddrinfo
 def look_up(host, *rest, **more):
     if str(host).endswith(".invalid"):
-        time.sleep(15)
+        time.sleep(3)
         raise socket.gaierror("no such name")
     return _look_up(host, *rest, **more)
 socket.getaddrinfo = look_up
@@ -213,7 +213,7 @@ def flood_of_sendings(box: BoxUnderAttack, seconds: float) -> None:
 
 
 @SCRIPTS.attack(
-    "Programs look up names that take 15 s each, in 20 threads, and are replaced by others",
+    "Programs look up names that take 3 s each, in 20 threads, and are replaced by others",
     "further look-ups fail at once",
     prelude=_SLOW_NAMES,
 )

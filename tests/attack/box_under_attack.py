@@ -114,8 +114,8 @@ class BoxUnderAttack:
         found = []
         for check in (
             self._answers,
-            self._moves,
             self._keeps_nothing,
+            self._moves,
             self._memory_is_bounded,
             self._is_calm,
         ):
@@ -159,7 +159,8 @@ class BoxUnderAttack:
         return "" if sum(peaks) < MOST_MEMORY else f"memory: {sum(peaks) / 1e6:.0f} MB"
 
     def _is_calm(self) -> str:
-        return "a traceback on stderr" if "Traceback" in self.errors.read_text() else ""
+        _, is_there, told = self.errors.read_text().partition("Traceback")
+        return f"a traceback on stderr: {' / '.join(told.split(chr(10))[-8:])}" if is_there else ""
 
     def stop(self) -> float:
         """Tell the box to end; return how long that takes [s], infinity if it must be killed."""
