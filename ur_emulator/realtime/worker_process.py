@@ -232,6 +232,7 @@ def _answer(task: bytes) -> bytes:
         error = WorkerError(f"it needs more than {limit} MiB of memory: make it shorter")
     except Exception as problem:
         error = WorkerError(place_of(problem))
+    gc.collect()  # what the task has left behind in circles; the next one has the same memory
     return pickle.dumps((None, error))
 
 
