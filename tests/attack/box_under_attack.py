@@ -29,11 +29,13 @@ from protocol.ur_types import Ports, SoftwareVersion
 
 LAYOUT = layout_for_version(SoftwareVersion(3, 15, 8))
 PATIENCE = 20.0  # s; a box that has not answered by then does not answer
+PERIOD = 0.008  # s
 MOST_MEMORY = 300e6  # bytes; of the box and its worker processes together
 # Away from the standard ports, and below those that the kernel gives to clients.
 PORT_BASE, CONTROL_PORT = 1000, 30_900
 _START = "import sys\nsys.argv[0] = 'ur-emulator'\n{prelude}\nfrom ur_emulator.cli import main\nmain()\n"
 _MOVE = "def alive():\n  speedj([{speed}, 0, 0, 0, 0, 0], 2.0, 0.1)\n  stopj(5.0)\nend\n"
+_TELL_AGAIN = 250  # frames
 _numbers = count(1)
 
 
@@ -133,9 +135,9 @@ class BoxUnderAttack:
     def _moves(self) -> str:
         speed = 0.1 * (-1) ** next(self._turns)
         with self.connect("realtime") as sock, sock.makefile("rb") as frames:
-            self.send("secondary", _MOVE.format(speed=speed))
-            end = time.monotonic() + PATIENCE
-            while time.monotonic() < end:
+            for k in range(round(PATIENCE / PERIOD)):
+                if k % _TELL_AGAIN == 0:  # what others have sent before may take the place of the program
+                    self.send("secondary", _MOVE.format(speed=speed))
                 frame = frames.read(LAYOUT.size)
                 if len(frame) < LAYOUT.size:
                     return "the stream of port 30003 was closed"
