@@ -163,6 +163,7 @@ class TaskQueue:
         else:
             self._under_way[process] = task
             process.send(task.request)
+            task.request = b""  # the process keeps what it has not sent yet
             self._watch(process)
 
     def _take_next(self) -> Task | None:

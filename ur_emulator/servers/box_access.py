@@ -129,9 +129,12 @@ class BoxAccess:
         try:
             while not outcome.done():
                 yield
+            return outcome.result()
         finally:
             self._loop.tasks.drop(task)
-        return outcome.result()
+            # An error holds this frame by its traceback, and the frame would hold the error: with the
+            # arguments both would wait for the collector, which looks rarely.
+            del outcome, settled, done, task, arguments
 
     def _failed(self, error: Exception) -> None:
         """Report an error in what was to follow steps or a task."""
