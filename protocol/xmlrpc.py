@@ -23,7 +23,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NoReturn
 from xml.parsers.expat import ExpatError, ParserCreate
-from xml.sax.saxutils import escape
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 
@@ -32,6 +31,7 @@ __all__ = ["AnswerReader", "RemoteFaultError", "encode_call"]
 DEEPEST: Final = 32
 """Elements inside each other; an array of arrays has eleven."""
 
+_ESCAPED: Final = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\r": "&#13;"})
 _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -77,7 +77,7 @@ def _text(text: str) -> str:
         raise LocalProtocolError(
             f"a text with character {ord(wrong[0])} cannot be sent: XML does not have it"
         )
-    return escape(text, {"\r": "&#13;"})
+    return text.translate(_ESCAPED)
 
 
 # --- answers

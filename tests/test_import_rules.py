@@ -196,7 +196,6 @@ def test_effects_stay_at_the_rim(package):
                 "matplotlib",
                 "mcap",
                 "asyncio",
-                "h11",
                 "ur_emulator.control.http_port",
             },
         ),

@@ -14,8 +14,8 @@ from ur_emulator.descriptor_limit import WANTED
 LATE = {
     "lark": "nothing at all: programs are compiled in a process of their own",
     "pymodbus": "tests",
-    "xmlrpc": "the first XML-RPC call",
-    "http": "the first XML-RPC call",
+    "xmlrpc": "nothing at all",
+    "http": "nothing at all",
     "ssl": "nothing at all",
     "rich": "help and errors of the command line",
     "asyncio": "nothing at all",

@@ -119,22 +119,21 @@ class BoxAccess:
             Its result; what it raises is raised here.
         """
         outcome: Future[T] = Future()
-        settled = settle(outcome)
 
         def done(result: Any, error: Exception | None) -> None:
-            settled(result, error)
+            settle(outcome)(result, error)
             self.steps.advance()
 
-        task = self._loop.tasks.submit(done, self._failed, Place(outcome), function, *arguments)
+        task = self._loop.tasks.submit(done, self._failed, Place(done), function, *arguments)
         try:
             while not outcome.done():
                 yield
             return outcome.result()
         finally:
             self._loop.tasks.drop(task)
-            # An error holds this frame by its traceback, and the frame would hold the error: with the
+            # An error holds this frame by its traceback, and the frame must not hold the error: with the
             # arguments both would wait for the collector, which looks rarely.
-            del outcome, settled, done, task, arguments
+            outcome, arguments = Future(), ()
 
     def _failed(self, error: Exception) -> None:
         """Report an error in what was to follow steps or a task."""

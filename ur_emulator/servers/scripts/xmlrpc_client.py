@@ -6,16 +6,20 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from protocol.errors import LocalProtocolError
+from protocol.xmlrpc import encode_call
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.realtime.barrier import Report
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.network import RemoteCallError, ScriptSocket
-
-if TYPE_CHECKING:
-    from ur_emulator.servers.scripts.xmlrpc_exchange import Exchange, HttpChannel
+from ur_emulator.servers.scripts.xmlrpc_exchange import (
+    Exchange,
+    HttpChannel,
+    ServerAddress,
+    UnansweredError,
+)
 
 # How often time-outs are looked at [s]; bytes that come wake the loop.
 _LOOK_EVERY = 0.05
@@ -129,8 +133,6 @@ class XmlRpcServer:
 
     def call(self, method: str, arguments: Sequence[Any]) -> XmlRpcCall:
         """Begin to call a procedure; calls are made one after the other."""
-        from protocol.xmlrpc import encode_call  # the first call loads what it needs
-
         call = XmlRpcCall()
         try:
             self._calls.append((call, encode_call(method, arguments)))
@@ -174,8 +176,6 @@ class XmlRpcServer:
 
     def _make(self, body: bytes) -> Exchange:
         """Make a call, on the connection that there is or on a new one."""
-        from ur_emulator.servers.scripts.xmlrpc_exchange import HttpChannel, ServerAddress, UnansweredError
-
         address = ServerAddress(self._url)
         if self._channel is not None and self._channel.is_reusable:
             self._client.used(self)
