@@ -12,6 +12,7 @@ from docs.generate import (
     realtime_page,
     rtde_page,
     scripts_page,
+    security_page,
     security_policy,
     states_page,
 )
@@ -28,6 +29,7 @@ PAGES = {
     "protocol/realtime.md": realtime_page.render,
     "protocol/rtde.md": rtde_page.render,
     "protocol/scripts.md": scripts_page.render,
+    "security.md": security_page.render,
     "../SECURITY.md": security_policy.render,
 }
 """What makes each page, by its path below `docs/`."""

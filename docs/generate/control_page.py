@@ -54,6 +54,7 @@ whoever reaches the port controls the box then. On any other address a control p
   closes the one that has been silent longest for a new one.
 - Pages in a browser cannot reach the box: `Host` must be the address that it listens on, or `localhost` (403
   otherwise, against DNS rebinding), and requests of foreign origins are refused (`Origin`, `Sec-Fetch-Site`).
+- Scripts of the box cannot reach it either. What else was tried: [security.md](security.md).
 
 ```sh
 curl http://127.0.0.1:{DEFAULT_PORT}/v1/state

@@ -20,7 +20,7 @@ generation, data loggers and MATLAB read it, and they write script lines into th
 
 A frame is its size in bytes (a 32-bit integer, itself included) and then 64-bit floats, all big-endian. There
 has no type and no version: the size is the only hint. A frame of an older version is the beginning of a newer
-one. A client that does not read loses whole frames, never parts, and holds up nobody.
+one. A client that does not read loses whole frames, never parts ([tested](../security.md)).
 """
 
 _SAMPLE = (

@@ -44,10 +44,7 @@ def _spend(box: BoxUnderAttack, seconds: float, *lines: str, setup: tuple[str, .
 
 
 def _has_begun(box: BoxUnderAttack, after: int) -> bool:
-    return any(
-        entry["level"] == "FAULT" or entry["text"].startswith("Starting program")
-        for entry in log_since(box, after)[0]
-    )
+    return any(entry["source"] in ("Program", "Controller") for entry in log_since(box, after)[0])
 
 
 def _state(box: BoxUnderAttack, after: int) -> str:
@@ -77,13 +74,13 @@ def text_messages(box: BoxUnderAttack, seconds: float) -> str:
 
 
 @SCRIPTS.attack(
-    "Globals of 50,000 elements, changed every cycle, with a reader of 30001",
-    "they are not reported whole",
+    "Ten globals of 30,000 elements, changed every cycle, with a reader of 30001",
+    "the program needs too much memory, or the values are not reported whole",
     is_short=False,
 )
 def long_globals(box: BoxUnderAttack, seconds: float) -> str:
-    names = [f"g{n}" for n in range(4)]
-    setup = (f"global g0 = [{', '.join(['0.125'] * 50_000)}]", *(f"global {name} = g0" for name in names[1:]))
+    names = [f"g{n}" for n in range(10)]
+    setup = (f"global g0 = [{','.join('0' * 30_000)}]", *(f"global {name} = g0" for name in names[1:]))
     with _reader(box, "primary"):
         return _spend(box, seconds, *(f"{name}[7] = {name}[7] + 1" for name in names), "sync()", setup=setup)
 
@@ -96,7 +93,7 @@ def line_of_a_long_function(box: BoxUnderAttack, seconds: float) -> str:
         after = log_since(box, 0)[1]
         n = min(100_000, round(12_500 * seconds))
         box.run("while True:", *n * ("  x = 1",), "  sync()", "end")
-        until(lambda: plays(box), "the program starts", 90.0)
+        until(lambda: _has_begun(box, after), "the program starts", 90.0)
         time.sleep(seconds / 2)
     time.sleep(seconds / 2)  # the clients have gone
     return _state(box, after)

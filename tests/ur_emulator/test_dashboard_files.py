@@ -1,5 +1,6 @@
 """Logs, flight reports and support files that the dashboard has the box write."""
 
+import gc
 import json
 import zipfile
 
@@ -7,6 +8,7 @@ import pytest
 from dashboard_support import Dashboard, write_programs
 
 from ur_emulator.emulator import ControlBox
+from ur_emulator.servers.dashboard.reports import BoxFacts
 
 
 @pytest.fixture
@@ -104,3 +106,14 @@ def test_places_that_are_none(folder, directory):
     replies, _ = session(folder, f"generate support file {directory}")
     assert replies == [f"Directory not found: {directory}"]
     assert not list(folder.glob("*.zip"))
+
+
+def test_a_report_that_is_refused_leaves_nothing_to_the_garbage_collector(folder):
+    """What goes into a report is long: the log alone may have 5 MB."""
+    gc.collect()
+    gc.disable()
+    try:
+        session(folder, *["generate support file nowhere"] * 3, *["generate flight report unknown"] * 3)
+        assert [kept for kept in gc.get_objects() if isinstance(kept, BoxFacts)] == []
+    finally:
+        gc.enable()

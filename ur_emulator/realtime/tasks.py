@@ -20,7 +20,14 @@ from typing import Any, Protocol
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import WorkerError
 from ur_emulator.realtime.barrier import Failed, guarded
-from ur_emulator.realtime.worker_process import TAKES_LONG, WorkerProcess, leave_process, take_process
+from ur_emulator.realtime.worker_process import (
+    OUT_OF_MEMORY,
+    TAKES_LONG,
+    WorkerProcess,
+    leave_process,
+    out_of_memory,
+    take_process,
+)
 
 # Told of what has come of a task: its result and None, or None and what it raised.
 TaskDone = Callable[[Any, Exception | None], None]
@@ -248,5 +255,7 @@ class TaskQueue:
 def _reason(code: int) -> str:
     if code == -signal.SIGPROF:
         return f"it takes more than {BUDGETS.task_seconds:g} s of processor time: make it shorter"
+    if code == OUT_OF_MEMORY:
+        return out_of_memory()
     how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
     return f"the process that did it was ended {how}: try again"

@@ -32,6 +32,8 @@ _LONG = 1.0
 _FOR_EVER = 60.0
 # By so much the priority of a long task is lower: the loop comes first.
 _NICENESS = 10
+# Exit code of a process that has no memory left, not even for saying so.
+OUT_OF_MEMORY = 77
 # Bytes of the length in front of a task and of an answer, big-endian.
 _HEAD = 8
 _READ_SIZE = 1 << 18
@@ -193,16 +195,24 @@ def work() -> None:
             os.nice(_NICENESS)
             sock.sendall(_framed(TAKES_LONG))
 
-        while head := stream.read(_HEAD):
-            task = stream.read(int.from_bytes(head, "big"))
-            signal.signal(signal.SIGALRM, takes_long)
-            signal.setitimer(signal.ITIMER_REAL, _LONG)
-            signal.setitimer(signal.ITIMER_PROF, BUDGETS.task_seconds)  # its signal ends the process
-            answer = _answer(task)
-            for timer in (signal.ITIMER_REAL, signal.ITIMER_PROF):
-                signal.setitimer(timer, 0.0)
-            sock.sendall(_framed(answer))
+        try:
+            while head := stream.read(_HEAD):
+                task = stream.read(int.from_bytes(head, "big"))
+                signal.signal(signal.SIGALRM, takes_long)
+                signal.setitimer(signal.ITIMER_REAL, _LONG)
+                signal.setitimer(signal.ITIMER_PROF, BUDGETS.task_seconds)  # its signal ends the process
+                answer = _answer(task)
+                for timer in (signal.ITIMER_REAL, signal.ITIMER_PROF):
+                    signal.setitimer(timer, 0.0)
+                sock.sendall(_framed(answer))
+        except MemoryError:
+            os._exit(OUT_OF_MEMORY)
     os._exit(0)
+
+
+def out_of_memory() -> str:
+    """Say why a task is refused that needs too much memory."""
+    return f"it needs more than {BUDGETS.task_memory >> 20} MiB of memory: make it shorter"
 
 
 def _limit_memory() -> None:
@@ -228,8 +238,7 @@ def _answer(task: bytes) -> bytes:
     except (EmulatorError, OSError) as problem:
         error = problem
     except MemoryError:
-        limit = BUDGETS.task_memory >> 20
-        error = WorkerError(f"it needs more than {limit} MiB of memory: make it shorter")
+        error = WorkerError(out_of_memory())
     except Exception as problem:
         error = WorkerError(place_of(problem))
     gc.collect()  # what the task has left behind in circles; the next one has the same memory
