@@ -51,7 +51,8 @@ All ports take several clients at once: {BUDGETS.clients_of_port} of an address 
 {_OF_ADDRESS} of an address, {BUDGETS.clients} of a box. Further ones are accepted and closed
 at once, and the log says so. What a client does not read is dropped in whole packages
 (where every reply counts, the client is cut off instead). What clients send is taken a piece of each in turn,
-and never when a cycle is due: a client that sends faster than it is served waits. How well others keep their
+and never when a cycle is due: a client that sends faster than it is served waits. One that begins with a
+request over HTTP is closed: a page in a browser could have sent it. How well others keep their
 streams under attack is measured: [security.md](../security.md). Who may do what through which port:
 [SECURITY.md](../../SECURITY.md).
 """

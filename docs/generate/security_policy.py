@@ -72,14 +72,12 @@ _PROMISES = """\
 | What clients and programs use is bounded, also in total (below); beyond it the newest is refused. The box and its worker process stay below 300 MB together | `tests/attack` |
 | A client that has nothing to do with an attack keeps its stream, on an idle machine with the rate and the gaps of docs/security.md; that page also says which attacks do more than that | `make attack` |
 | Nothing is read or written outside of the folder `--programs`, by no name and through no link; without that option the box writes into a temporary folder, which it removes. No answer shows a path of this machine | `tests/attack` |
-| A web page cannot use the control port: `Host`, `Origin` and `Sec-Fetch-Site` are checked | `tests/attack` |
+| A web page that somebody of this machine looks at cannot use the box: the control port checks `Host`, `Origin` and `Sec-Fetch-Site`, all other ports close clients that begin like a browser | `tests/attack` |
 | The client ends a session with a hostile or broken robot in one line, with the arm at rest, and refuses files that are too large or damaged | `tests/attack` |
 
 ## What is not promised
 
 - Nothing protects the users of one machine from each other. The protocols have no passwords and no encryption.
-- A web page in a browser of this machine may be able to send text to ports 30001 to 30003 and 29999, which cannot
-  know where it comes from: a port that asks for nothing trusts what arrives.
 - The box is an ordinary process with the rights of its user. It compiles scripts to Python code of its own making;
   a defect in the compiler, in MuJoCo, numpy or Python is a defect of the box. Run it as a user who may do little,
   in a container where strangers reach it.

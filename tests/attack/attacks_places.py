@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 import zipfile
+from contextlib import suppress
 
 from attack_record import Section
 from attackers import log_since, request, run_to_end, until
@@ -124,6 +125,22 @@ def requests_of_web_pages(box: BoxUnderAttack, seconds: float) -> None:
     for headers in bad:
         status, _ = request(box, "POST", "power_off", b"{}", **headers)
         assert status in (400, 403), f"{headers} was answered {status}"
+    assert request(box, "GET", "state")[1]["robot_mode"] == "RUNNING"
+
+
+@PLACES.attack(
+    "A web page posts a program and words to the ports of scripts and to the dashboard", "it is closed"
+)
+def scripts_of_web_pages(box: BoxUnderAttack, seconds: float) -> None:
+    body = b'def page():\n  textmsg("from a page")\nend\npower off\n'
+    for port in ("primary", "secondary", "realtime", "dashboard"):
+        for path in ("/", "/" + 700 * "a"):
+            with box.connect(port) as sock, suppress(OSError):
+                sock.sendall(f"POST {path} HTTP/1.1\r\nHost: {box.host}\r\n\r\n".encode() + body)
+                while sock.recv(1 << 16):
+                    pass
+    said = [entry["text"] for entry in log_since(box, 0)[0]]
+    assert not any("POST" in text or "from a page" in text for text in said), said
     assert request(box, "GET", "state")[1]["robot_mode"] == "RUNNING"
 
 

@@ -83,7 +83,17 @@ class PortSet:
         if name == CONTROL:
             places, backlog, notice = Places(), set(), _no_line
         return Listener(
-            self._loop, self._host, number, port, backlog, notice, box.report, name, places, self._spare
+            self._loop,
+            self._host,
+            number,
+            port,
+            backlog,
+            notice,
+            box.report,
+            name,
+            places,
+            self._spare,
+            speaks_http=name == CONTROL,
         )
 
 

@@ -27,6 +27,7 @@ class Connection(BufferedSocket):
     """A connected client.
 
     Attributes:
+        on_data: called with what has come.
         peer: address of the client, for logs.
         dropped: packages that were dropped because the client did not read.
         has_ended: the client has closed its sending side, see `allow_half_close`.
@@ -52,7 +53,7 @@ class Connection(BufferedSocket):
             report: called with an error of ours in what the client has caused; it ends the connection.
         """
         super().__init__(loop, BUDGETS.outbox_bytes, BUDGETS.read_bytes)
-        self._on_data = on_data
+        self.on_data = on_data
         self._on_close = on_close
         self._backlog = backlog
         self._report = report
@@ -130,7 +131,7 @@ class Connection(BufferedSocket):
         self.close()
 
     def _received(self, data: bytes) -> None:
-        self._on_data(self, data)
+        self.on_data(self, data)
 
     def _ended(self) -> None:
         if self._on_end is None:

@@ -1,5 +1,8 @@
 """A listening port: accepts clients and hands each to the port that it belongs to.
 
+A page in a browser may send a request to any port of its machine, and lines of its choice after the head: on
+a port that does not speak HTTP such a client is closed before anything of it is read.
+
 Clients beyond the limits of a box (`places`), and those for whom the process has no descriptor left, are
 accepted and closed at once, so that they notice it; connected clients are not disturbed. The limits of a real
 controller are not known.
@@ -8,6 +11,7 @@ controller are not known.
 from __future__ import annotations
 
 import errno
+import re
 import selectors
 import socket
 from collections.abc import Callable
@@ -22,6 +26,8 @@ from ur_emulator.servers.tcp.connection import Connection
 from ur_emulator.servers.tcp.places import Places
 from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
+# The begin of a request over HTTP; no script, no command of the dashboard and no package begins so.
+_WEB_REQUEST = re.compile(rb"(GET|HEAD|POST|PUT|PATCH|DELETE|OPTIONS|CONNECT|TRACE) ")
 # Buffer of the system for what a client sends and the box has not read yet.
 RECEIVE_BUFFER = 64 * 1024
 # How long not to listen when a client can be neither accepted nor refused [s].
@@ -66,6 +72,8 @@ class Listener:
         name: str,
         places: Places,
         spare: SpareDescriptor | None = None,
+        *,
+        speaks_http: bool = False,
     ) -> None:
         """Listen.
 
@@ -80,6 +88,7 @@ class Listener:
             name: of the port, for notices.
             places: of the box, for its clients.
             spare: refuses clients when no descriptor is left; without one they wait.
+            speaks_http: requests of browsers are for this port.
 
         Raises:
             PortPermissionError: this user may not open ports below 1024.
@@ -93,6 +102,7 @@ class Listener:
         self._name = name
         self._places = places
         self._spare = spare
+        self._first_received = port.received if speaks_http else self._begin
         self._refuses = False
         self._paused_until: float | None = None
         self._sock = _listening_socket(host, number)
@@ -145,7 +155,7 @@ class Listener:
                 connection = Connection(
                     self._loop,
                     client,
-                    self._port.received,
+                    self._first_received,
                     partial(self._closed, address[0]),
                     self._backlog,
                     self._report,
@@ -157,6 +167,15 @@ class Listener:
             self.connections[connection] = None
             self._notice(f"{connection.peer} connected to {self._name} port {self.number}")
             guarded(connection.failed, self._port.opened, connection)
+
+    def _begin(self, connection: Connection, data: bytes) -> None:
+        """Take the first bytes of a client, unless a page in a browser has sent them."""
+        if _WEB_REQUEST.match(data):
+            self._notice(f"{connection.peer} is a browser, which {self._name} port {self.number} is not for")
+            connection.close()
+        else:
+            connection.on_data = self._port.received
+            self._port.received(connection, data)
 
     def _refuse_next(self, error: OSError) -> None:
         """Close the next client, or pause: the port stays readable, the loop would spin."""
