@@ -102,7 +102,7 @@ class Listener:
         self._name = name
         self._places = places
         self._spare = spare
-        self._first_received = port.received if speaks_http else self._begin
+        self._speaks_http = speaks_http
         self._refuses = False
         self._paused_until: float | None = None
         self._sock = _listening_socket(host, number)
@@ -155,7 +155,7 @@ class Listener:
                 connection = Connection(
                     self._loop,
                     client,
-                    self._first_received,
+                    self._port.received if self._speaks_http else self._begin,
                     partial(self._closed, address[0]),
                     self._backlog,
                     self._report,
