@@ -20,7 +20,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
+from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.movements.files import library_names
 from protocol.ur_types import Ports
 
@@ -29,7 +29,7 @@ HOST = "127.0.0.1"
 PAPER, PREVIEW, BEST = CONTROLLERS["paper"], CONTROLLERS["preview"], CONTROLLERS["best"]
 LAG = replace(BEST, compensates_gear=False, learns=False)
 
-COMPOSITIONS: dict[str, tuple[ControllerConfig, str]] = {
+COMPOSITIONS: dict[str, tuple[Controller, str]] = {
     "paper": (PAPER, "PI and feed-forward, as published"),
     "short ramp": (
         replace(PREVIEW, looks_ahead=False, path_tolerance=PAPER.path_tolerance),

@@ -17,7 +17,7 @@ from rich.console import Console
 
 from pc_client.analysis.report import build_report, build_tables
 from pc_client.analysis.side_by_side_page import build_side_by_side
-from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
+from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import ClientError
 from pc_client.experiment.prepare import Experiment, load_movements, prepare_experiment
@@ -68,7 +68,7 @@ def main() -> int:
     return 0
 
 
-def run(experiment: Experiment, config: ControllerConfig, box: Box, console: Console) -> None:
+def run(experiment: Experiment, config: Controller, box: Box, console: Console) -> None:
     """Run an experiment on a box, and say how fast that was."""
     with UrDriver(box.host, box.ports) as driver:
         streams = ExperimentRunner(driver, experiment, config).run().streams

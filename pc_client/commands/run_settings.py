@@ -27,9 +27,7 @@ from pc_client.commands.options import (
     cell_of,
     ports_of,
 )
-from pc_client.control.controller_config import ControllerConfig
-from pc_client.control.controller_fields import changed
-from pc_client.control.controller_file import DEFAULT, load_controller
+from pc_client.control.controller import DEFAULT, Controller, load_controller
 from pc_client.errors import ControllerError
 from pc_client.kinematics.cell import Cell
 from protocol.ur_types import Ports
@@ -49,7 +47,7 @@ class RunSettings:
         yes: do not ask before a real arm moves.
     """
 
-    controller: ControllerConfig
+    controller: Controller
     cell: Cell
     ports: Ports
     reverse_port: int | None
@@ -77,7 +75,7 @@ def read_settings(
     numbers = {name: value for name, value in given.items() if value is not None}
     base = load_controller(controller)
     try:
-        config = changed(base, numbers, _OPTIONS.__getitem__)
+        config = base.changed(numbers, _OPTIONS.__getitem__)
     except ControllerError as error:
         raise typer.BadParameter(str(error)) from error
     return RunSettings(config, cell_of(cell), ports_of(port_base), reverse_port, yes)

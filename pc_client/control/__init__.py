@@ -1,8 +1,7 @@
 """The feedback loop, without a robot: pure functions and small state, no sockets, no clock.
 
-controller_config  the named controllers and their numbers
+controller         the named controllers and their numbers, and those of a user's file
 controller_fields  what each number may be
-controller_file    a controller by name, or from a file of numbers
 reference          what the arm should do at any time, prepared for the loop
 pi_feedforward     PI + velocity feed-forward for six joints (the paper's Fig. 3)
 state_estimate     Kalman estimate of positions and velocities for the feedback

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 
-from pc_client.control.controller_config import ControllerConfig
 from pc_client.errors import ControllerError
 
 Value = float | bool
@@ -86,7 +85,7 @@ FIELDS: Mapping[str, Number | Switch] = MappingProxyType(
         "learning_acceleration": Number(0.0, 200.0, "rad/s2"),
     }
 )
-"""All fields of `ControllerConfig` but its name."""
+"""All fields of `Controller` but its name."""
 
 
 def checked(name: str, value: object, where: str) -> Value:
@@ -105,20 +104,3 @@ def checked(name: str, value: object, where: str) -> Value:
         raise ControllerError(f"{where}: {value!r}; give {field.text}")
     kept: Value = field.kind(value)
     return kept
-
-
-def changed(
-    base: ControllerConfig, values: Mapping[str, object], where: Callable[[str], str]
-) -> ControllerConfig:
-    """A controller with other values in some fields.
-
-    Args:
-        base: what to start from.
-        values: by field of `FIELDS`.
-        where: file and key, or option, that gave a field its value, for messages.
-
-    Raises:
-        ControllerError: a field cannot hold its value.
-    """
-    kept = {name: checked(name, value, where(name)) for name, value in values.items()}
-    return replace(base, **kept)  # type: ignore[arg-type]

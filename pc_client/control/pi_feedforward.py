@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller import Controller
 
 N_JOINTS = 6
 
@@ -27,7 +27,7 @@ class PiState:
 
 
 def step_pi(
-    config: ControllerConfig,
+    config: Controller,
     qd_max: Sequence[float],
     state: PiState,
     q_ref: Sequence[float],

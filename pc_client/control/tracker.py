@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller import Controller
 from pc_client.control.pi_feedforward import PiState, step_pi
 from pc_client.control.reference import ReferencePoint, ReferenceTable
 from pc_client.control.state_estimate import StateEstimator
@@ -65,7 +65,7 @@ class Tracker:
     def __init__(
         self,
         reference: ReferenceTable,
-        config: ControllerConfig,
+        config: Controller,
         model: RobotModel,
         estimator: StateEstimator | None = None,
     ) -> None:

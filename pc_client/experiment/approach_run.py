@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pc_client.control.controller_config import APPROACH
+from pc_client.control.controller import APPROACH
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver

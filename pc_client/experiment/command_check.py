@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller import Controller
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.checks import measure_joint_range
@@ -28,7 +28,7 @@ def broken_limit(
     commands: Array,
     learned: Array | None,
     model: RobotModel,
-    config: ControllerConfig,
+    config: Controller,
     period: float,
 ) -> str:
     """Name the first limit that a whole run of commands breaks.

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller import Controller
 from pc_client.control.delay import DelayEstimate, estimate_delay
 from pc_client.control.excitation import BRISK_PULSE, PULSE, Excitation
 from pc_client.control.lag import identify_loop
@@ -90,9 +90,7 @@ class Identification:
         return facts
 
 
-def identify(
-    driver: UrDriver, config: ControllerConfig, model: RobotModel
-) -> tuple[Identification, StreamReport]:
+def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[Identification, StreamReport]:
     """Identify the loop where the arm stands; it moves less than one degree and comes back.
 
     Args:
@@ -163,7 +161,7 @@ def _check_return(drift: NDArray[np.float64]) -> None:
         )
 
 
-def learning_filter(config: ControllerConfig, loop: LoopModel, period: float) -> LearningFilter | None:
+def learning_filter(config: Controller, loop: LoopModel, period: float) -> LearningFilter | None:
     """The filter of a controller that learns.
 
     Raises:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller import Controller
 from pc_client.control.gear import GearModel
 from pc_client.control.learning import LearningBounds, RunSignals, learn
 from pc_client.control.learning_filter import LearningFilter
@@ -98,7 +98,7 @@ class Repetitions:
 
     def __init__(
         self,
-        config: ControllerConfig,
+        config: Controller,
         loop: LoopModel,
         learning: LearningFilter | None,
         model: RobotModel,

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller import Controller
 from pc_client.control.gear import GearObserver, MotorReference
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.state_estimate import StateEstimator
@@ -67,7 +67,7 @@ class ExperimentRunner:
         self,
         driver: UrDriver,
         experiment: Experiment,
-        config: ControllerConfig,
+        config: Controller,
         observer: Observer | None = None,
     ) -> None:
         self._driver = driver

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller import Controller
 from pc_client.kinematics.cell import NO_CELL, Cell
 
 
@@ -77,7 +77,7 @@ class Case:
 
     movement: MovementFile
     arm: SimulatedArm | GivenRobot
-    controller: ControllerConfig
+    controller: Controller
     repeat: int
 
     def content(self) -> dict[str, Any]:
@@ -116,7 +116,7 @@ class Case:
 def all_cases(
     movements: Sequence[MovementFile],
     arms: Sequence[SimulatedArm] | Sequence[GivenRobot],
-    controllers: Sequence[ControllerConfig],
+    controllers: Sequence[Controller],
     repeat: int,
 ) -> list[Case]:
     """Every combination, arms outermost; cases that are equal appear once."""

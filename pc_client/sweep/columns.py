@@ -37,7 +37,7 @@ FACTORS = (
     Column("seed", int, "which simulated arm of its kind"),
     Column("movement", str, "name of the movement"),
     Column("controller", str, "named controller that the settings start from"),
-    *(Column(name, field.kind, f"as in ControllerConfig: {field.text}") for name, field in FIELDS.items()),
+    *(Column(name, field.kind, f"as in Controller: {field.text}") for name, field in FIELDS.items()),
 )
 """What a case is made of; the axes of a sweep are those of them that vary."""
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
+from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.control.controller_fields import FIELDS
 from pc_client.errors import MovementError, SweepError
 from pc_client.input_files import parse_toml, read_text
@@ -76,7 +76,7 @@ class SweepConfig:
     port_base: int
     reverse_port: int | None
     cell: Cell
-    controllers: tuple[ControllerConfig, ...]
+    controllers: tuple[Controller, ...]
     repeat: int
     keep_recordings: bool
     output: Path | None
@@ -136,7 +136,7 @@ def _parse(reader: _Reader, path: Path) -> SweepConfig:
     return config
 
 
-def _controllers(reader: _Reader) -> tuple[ControllerConfig, ...]:
+def _controllers(reader: _Reader) -> tuple[Controller, ...]:
     """All settings, of all named controllers."""
     bases = [CONTROLLERS[name] for name in reader.words("controllers", ("preview",), tuple(CONTROLLERS))]
     axes = read_axes(reader.table("controller"), reader.source)

@@ -1,4 +1,4 @@
-"""The table [controller] of a sweep: values of `ControllerConfig`'s fields, and the settings they span.
+"""The table [controller] of a sweep: values of `Controller`'s fields, and the settings they span.
 
 A field has one value, a list of values, or a range `{ from = a, to = b }`. Lists span a grid; with
 `random = N` they and the ranges are drawn from instead. Each field has a random stream of its own, made of
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from pc_client.control.controller_config import ControllerConfig
+from pc_client.control.controller import Controller
 from pc_client.control.controller_fields import FIELDS, Value, checked
 from pc_client.errors import SweepError
 from pc_client.spelling import check_keys
@@ -59,7 +59,7 @@ def read_axes(table: Mapping[str, Any], source: str) -> dict[str, Axis]:
     return {name: _read_axis(value, name, f"{source}: controller.{name}") for name, value in table.items()}
 
 
-def grid(base: ControllerConfig, axes: Mapping[str, Axis], source: str) -> list[ControllerConfig]:
+def grid(base: Controller, axes: Mapping[str, Axis], source: str) -> list[Controller]:
     """All combinations of the values; the last field changes first.
 
     Raises:
@@ -77,7 +77,7 @@ def grid(base: ControllerConfig, axes: Mapping[str, Axis], source: str) -> list[
     ]
 
 
-def samples(base: ControllerConfig, axes: Mapping[str, Axis], n: int, seed: int) -> list[ControllerConfig]:
+def samples(base: Controller, axes: Mapping[str, Axis], n: int, seed: int) -> list[Controller]:
     """Settings drawn at random; the same seed draws the same ones."""
     drawn = {name: _draw(axis, n, seed, name) for name, axis in axes.items()}
     return [

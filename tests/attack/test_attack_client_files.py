@@ -25,7 +25,7 @@ from recording_samples import SIGNALS, provenance, record_movement
 from pc_client import cli
 from pc_client.analysis.report import build_tables
 from pc_client.analysis.run import analyse_run
-from pc_client.control.controller_file import read_controller
+from pc_client.control.controller import Controller
 from pc_client.errors import ClientError, MovementError, RecordingError, one_line
 from pc_client.experiment.prepare import _refuse_to_lose
 from pc_client.extraction.files import MOST_SAMPLES, parse_pen
@@ -306,7 +306,7 @@ READERS = {
     "movement": (load_movement, LIBRARY),
     "uniform": (load_movement, (LIBRARY_FOLDER / "paper" / "uniform_4_1.toml").read_text()),
     "cell": (load_cell, (ROOT / "examples" / "cell.toml").read_text()),
-    "controller": (read_controller, 'base = "paper"\ngain_p = 10.0\nlearns = true\n'),
+    "controller": (Controller.from_toml, 'base = "paper"\ngain_p = 10.0\nlearns = true\n'),
     "sweep": (read_config, 'movements = ["uniform_4_1"]\nseeds = [1]\n[controller]\ngain_p = [1.0, 2.0]\n'),
 }
 ODD = [

@@ -11,7 +11,7 @@ from dying_client import CUT_OFF, FROZEN, KILLED, Bystander, DyingNetwork, Kille
 from integration_support import PERIOD, Frames
 
 import ur_emulator.realtime.pacing as pacing
-from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.controller import CONTROLLERS
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner

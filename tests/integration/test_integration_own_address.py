@@ -5,7 +5,7 @@ import socket
 import numpy as np
 import pytest
 
-from pc_client.control.controller_config import APPROACH
+from pc_client.control.controller import APPROACH
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker
 from pc_client.driver.ur_driver import UrDriver

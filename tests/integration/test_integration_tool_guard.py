@@ -4,7 +4,7 @@ from math import isfinite
 
 import pytest
 
-from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.controller import CONTROLLERS
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError
 from pc_client.experiment.prepare import load_movements, prepare_experiment

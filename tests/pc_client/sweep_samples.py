@@ -6,7 +6,7 @@ import dataclasses
 import os
 from pathlib import Path
 
-from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.controller import CONTROLLERS
 from pc_client.errors import GainMarginError
 from pc_client.movements.files import library_path
 from pc_client.sweep.case import Case, MovementFile, SimulatedArm

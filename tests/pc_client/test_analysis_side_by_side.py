@@ -14,7 +14,7 @@ from pc_client import cli
 from pc_client.analysis.report import Report, build_report, build_tables
 from pc_client.analysis.side_by_side import side_by_side
 from pc_client.analysis.side_by_side_page import build_side_by_side
-from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
+from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.errors import RecordingError
 
 PAPER, PREVIEW = CONTROLLERS["paper"], CONTROLLERS["preview"]
@@ -23,7 +23,7 @@ MOVEMENTS = ("uniform_4_1", "lognorm_4_1")
 
 
 def record(
-    folder: Path, config: ControllerConfig, movements: tuple[str, ...] = MOVEMENTS, **changes: object
+    folder: Path, config: Controller, movements: tuple[str, ...] = MOVEMENTS, **changes: object
 ) -> Path:
     folder.mkdir()
     for movement in movements:

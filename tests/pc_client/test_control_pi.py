@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.controller import CONTROLLERS
 from pc_client.control.pi_feedforward import PiState, step_pi
 
 PLAIN = replace(

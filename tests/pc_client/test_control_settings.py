@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pc_client.control.controller_config import CONTROLLERS, ControllerConfig
-from pc_client.control.controller_fields import FIELDS, Number, changed
-from pc_client.control.controller_file import load_controller
+from pc_client.control.controller import CONTROLLERS, Controller, load_controller
+from pc_client.control.controller_fields import FIELDS, Number
 from pc_client.errors import ControllerError
 
 PAPER = CONTROLLERS["paper"]
@@ -20,20 +19,20 @@ values = {
     for name, field in FIELDS.items()
 }
 controllers = st.builds(
-    lambda base, own: changed(base, own, str),
+    Controller.changed,
     st.sampled_from(list(CONTROLLERS.values())),
     st.fixed_dictionaries({}, optional=values),
 )
 
 
 def test_the_table_has_a_row_for_every_field_but_the_name():
-    assert {"name", *FIELDS} == {field.name for field in dataclasses.fields(ControllerConfig)}
+    assert {"name", *FIELDS} == {field.name for field in dataclasses.fields(Controller)}
 
 
 @pytest.mark.parametrize("config", CONTROLLERS.values(), ids=lambda config: config.name)
 def test_named_controllers_keep_the_ranges(config):
     own = {name: getattr(config, name) for name in FIELDS}
-    assert changed(config, own, str) == config
+    assert config.changed(own) == config
     assert config.title == config.name
 
 
@@ -44,8 +43,8 @@ def test_a_title_stands_for_one_setting(one, other):
 
 
 def test_a_title_names_what_differs_from_the_named_controller():
-    assert changed(PAPER, {"gain_p": 4, "gain_i": 2.0}, str).title == "paper"
-    own = changed(PAPER, {"gain_p": 10, "gain_i": 2.5, "learns": True}, str)
+    assert PAPER.changed({"gain_p": 4, "gain_i": 2.0}).title == "paper"
+    own = PAPER.changed({"gain_p": 10, "gain_i": 2.5, "learns": True})
     assert own.title == "paper with gain_p 10, gain_i 2.5, learns true"
 
 

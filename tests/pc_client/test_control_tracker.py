@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from control_loop import PERIOD, DelayedArm, Ramp
 
-from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.controller import CONTROLLERS
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker
 from pc_client.errors import DriverError

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pc_client.control.controller_config import APPROACH, CONTROLLERS
+from pc_client.control.controller import APPROACH, CONTROLLERS
 from pc_client.driver.receiver_script import MISSED_ALLOWED
 from pc_client.driver.reverse_server import REVERSE_PORT
 from pc_client.driver.watchdog import (

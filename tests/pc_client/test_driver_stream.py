@@ -9,7 +9,7 @@ import pytest
 from control_loop import Ramp
 from fake_robot import PERIOD, FakeRobot
 
-from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.controller import CONTROLLERS
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver

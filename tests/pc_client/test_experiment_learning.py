@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fake_robot import PERIOD, FakeRobot
 
-from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.controller import CONTROLLERS
 from pc_client.control.gear import GearModel
 from pc_client.control.learning_filter import design_filter
 from pc_client.control.loop_model import LoopModel

@@ -8,7 +8,7 @@ import pytest
 from fake_robot import PERIOD, FakeRobot
 from recording_samples import SIGNALS, provenance
 
-from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.controller import CONTROLLERS
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.stability import loop_margins
 from pc_client.driver.ur_driver import UrDriver

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sweep_samples import case, invented
 
-from pc_client.control.controller_config import CONTROLLERS
+from pc_client.control.controller import CONTROLLERS
 from pc_client.recording.origin import origin_of
 from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.folder import table_rows

@@ -1,16 +1,32 @@
-"""The named controllers: every number that shapes the loop, in one table.
+"""`Controller`: every number that shapes the loop; the named controllers, and those of a user's file.
 
-No number here may depend on the movement; a controller is chosen once for a whole experiment.
+No number here may depend on the movement; a controller is chosen once for a whole experiment. A file:
+
+    base = "paper"       # what the file starts from; preview by default
+    gain_p = 10.0        # 1/s
+    gain_i = 5.0         # 1/s2
+
+Every other key is a field of `Controller`; `controller_fields` says what it may hold.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from types import MappingProxyType
+
+from pc_client.control.controller_fields import FIELDS, Value, checked
+from pc_client.errors import ControllerError
+from pc_client.input_files import parse_toml, read_text
+from pc_client.spelling import check_keys, nearest
+
+DEFAULT = "preview"
+"""The controller when none is named."""
 
 
 @dataclass(frozen=True, slots=True)
-class ControllerConfig:
+class Controller:
     """One velocity controller: qd_cmd = feed-forward + gain_p * e + gain_i * integral of e, limited.
 
     Attributes:
@@ -55,6 +71,57 @@ class ControllerConfig:
     learning_speed: float = 0.2
     learning_acceleration: float = 20.0
 
+    @staticmethod
+    def paper(**numbers: Value) -> Controller:
+        """The paper's controller: PI and feed-forward of the current time.
+
+        Args:
+            numbers: fields with other values, such as `gain_p=4.0`.
+
+        Raises:
+            ControllerError: there is no such field, or it cannot hold the value.
+        """
+        return _PAPER.changed(numbers)
+
+    @staticmethod
+    def preview(**numbers: Value) -> Controller:
+        """Feed-forward ahead by the identified delay; arguments and errors as `paper`."""
+        return _PREVIEW.changed(numbers)
+
+    @staticmethod
+    def best(**numbers: Value) -> Controller:
+        """All that the identified loop allows, learning included; arguments and errors as `paper`."""
+        return _BEST.changed(numbers)
+
+    @staticmethod
+    def from_toml(path: Path | str) -> Controller:
+        """The controller of a file.
+
+        Raises:
+            ControllerError: the file cannot be read, a field does not exist or cannot hold its value.
+        """
+        path = Path(path)
+        values = parse_toml(read_text(path, "controller"), str(path), "controller")
+        check_keys(values, ("base", *FIELDS), f"{path}: ", ControllerError)
+        base = values.pop("base", DEFAULT)
+        if not isinstance(base, str) or base not in CONTROLLERS:
+            raise ControllerError(f"{path}: base: {base!r}; {nearest(str(base), CONTROLLERS)}")
+        return CONTROLLERS[base].changed(values, lambda name: f"{path}: {name}")
+
+    def changed(self, values: Mapping[str, object], where: Callable[[str], str] = str) -> Controller:
+        """This controller with other values in some fields.
+
+        Args:
+            values: by field of `FIELDS`.
+            where: file and key, or option, that gave a field its value, for messages.
+
+        Raises:
+            ControllerError: there is no such field, or it cannot hold its value.
+        """
+        check_keys(values, FIELDS, "", ControllerError)
+        kept = {name: checked(name, value, where(name)) for name, value in values.items()}
+        return replace(self, **kept)  # type: ignore[arg-type]
+
     @property
     def title(self) -> str:
         """The name, and all in which this differs from the controller of that name.
@@ -72,7 +139,7 @@ class ControllerConfig:
 # that the integral does not overshoot. One acceleration for all joints and movements, between movej's
 # default of 1.4 that UR's manual shows in its speedj examples and the 5 that users raise it to. It cuts
 # corners, by 7.2 mm at worst (docs/tracking.md): hence the wider path tolerance.
-_PAPER = ControllerConfig(
+_PAPER = Controller(
     name="paper",
     gain_p=4.0,
     gain_i=2.0,
@@ -86,7 +153,7 @@ _PAPER = ControllerConfig(
 
 # Feed-forward ahead by the identified delay; the robot's own ramp is made short (UR's client library
 # streams with a = 40), so that the delay is the only thing between command and motion.
-_PREVIEW = ControllerConfig(
+_PREVIEW = Controller(
     name="preview",
     gain_p=5.0,
     gain_i=3.0,
@@ -106,7 +173,7 @@ _BEST = replace(_PREVIEW, name="best", compensates_lag=True, compensates_gear=Tr
 # Of the way to a start, before anything is known of the loop: feedback that is stable with a delay of up to
 # 300 ms (pi/2T), and slow. It overshoots the end of its way by what the delay is worth (3 mm with 45 ms, 9 mm
 # with 100 ms): its tolerances leave room for that. Not for movements, so it has no place in the table.
-APPROACH = ControllerConfig(
+APPROACH = Controller(
     name="approach",
     gain_p=5.0,
     gain_i=0.0,
@@ -120,6 +187,25 @@ APPROACH = ControllerConfig(
 )
 
 CONTROLLERS = MappingProxyType({config.name: config for config in (_PAPER, _PREVIEW, _BEST)})
+
+
+def load_controller(name_or_file: str) -> Controller:
+    """Return a named controller, or the one of a file.
+
+    Args:
+        name_or_file: a name of `CONTROLLERS`, or a path that ends in .toml.
+
+    Raises:
+        ControllerError: no such controller, an unreadable file, or content that makes no sense.
+    """
+    if name_or_file.endswith(".toml"):
+        return Controller.from_toml(name_or_file)
+    if name_or_file not in CONTROLLERS:
+        raise ControllerError(
+            f"no controller is called {name_or_file!r}; choose one of {', '.join(CONTROLLERS)}, "
+            "or give a file FILE.toml"
+        )
+    return CONTROLLERS[name_or_file]
 
 
 def _short(value: object) -> str:
