@@ -1,4 +1,55 @@
-"""The PC side: plans human-like and robot-like movements and drives an arm along them, real or emulated.
+"""Plans human-like and robot-like movements and drives an arm along them, real or emulated.
 
-Nothing in here can tell an emulator from a robot; only the address differs.
+    import pc_client as ur
+
+    arm = ur.connect("127.0.0.1")
+    plan = ur.plan(ur.Movement.through([(0.3, -0.1, 0.3), (0.3, 0.1, 0.35)]), arm)
+    run = arm.run(plan, ur.Controller.preview())
+    print(run.snr, run.t, run.q)
+
+Nothing in here can tell an emulator from a robot; only the address differs. What is public is in `__all__`.
+Names are loaded when they are first asked for, so that importing the package costs nothing.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pc_client.api.arm import Arm as Arm
+    from pc_client.api.arm import connect as connect
+    from pc_client.api.arm import plan as plan
+    from pc_client.api.movement import Movement as Movement
+    from pc_client.api.signals import Run as Run
+    from pc_client.api.signals import Signals as Signals
+    from pc_client.control.controller import Controller as Controller
+    from pc_client.errors import ClientError as ClientError
+    from pc_client.experiment.prepare import Plan as Plan
+    from pc_client.kinematics.cell import Cell as Cell
+    from pc_client.movements.joint_trajectory import JointTrajectory as JointTrajectory
+
+_HOMES = {
+    "Arm": "api.arm",
+    "Cell": "kinematics.cell",
+    "ClientError": "errors",
+    "Controller": "control.controller",
+    "JointTrajectory": "movements.joint_trajectory",
+    "Movement": "api.movement",
+    "Plan": "experiment.prepare",
+    "Run": "api.signals",
+    "Signals": "api.signals",
+    "connect": "api.arm",
+    "plan": "api.arm",
+}
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -15,7 +15,7 @@ MAY_IMPORT = {
     "urscript": {"protocol", "lark", "numpy", "typer", "rich"},
     "ur_emulator": {"urscript", "protocol", "mujoco", "numpy", "h11", "typer", "rich", "pytest"},
     "pc_client": {
-        "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "pyarrow", "mpl_toolkits", "distributed",
+        "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "pyarrow", "polars", "mpl_toolkits", "distributed",
     },
 }  # fmt: skip
 # Modules of the standard library that a layer must not touch, and the folders in which it may.

@@ -22,10 +22,13 @@ from matplotlib.ticker import MaxNLocator
 
 from pc_client.analysis.budget import PARTS
 from pc_client.analysis.metrics import joint_errors, position_errors
-from pc_client.analysis.run import Run
+from pc_client.analysis.run import MeasuredRun
 from pc_client.analysis.table import Row, Table
 from pc_client.analysis.track import speed
+from pc_client.recording.origin import origin_of
 from protocol.ur_types import JOINT_NAMES
+
+Array = np.ndarray
 
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9"
 REFERENCE_GREY, PAPER_GREY = "#9A9A9A", "#B8B8B8"
@@ -60,21 +63,54 @@ _STYLE = {
 }
 
 
-def draw_movement(row: Row) -> str:
-    """Draw everything about one movement on one figure: the paper's figures 4 and 5 and what explains them.
-
-    Returns:
-        SVG text.
-    """
-    with svg_figure(11.0, 8.4, row.runs[0].provenance.origin.mark) as (figure, page):
+def movement_figure(runs: Sequence[MeasuredRun]) -> Figure:
+    """Draw everything about the runs of one movement: the paper's figures 4 and 5 and what explains them."""
+    with styled_figure(11.0, 8.4, runs[0].provenance.origin.mark) as figure:
         speed_axes = figure.add_axes((0.065, 0.645, 0.575, 0.3))
-        _draw_speed(speed_axes, row.runs)
-        _draw_speed_error(figure.add_axes((0.065, 0.425, 0.575, 0.165), sharex=speed_axes), row.runs)
-        _draw_path(figure.add_axes((0.665, 0.395, 0.3, 0.525), projection="3d"), row.runs)
-        _draw_joints(figure.add_axes((0.065, 0.06, 0.255, 0.27)), row.runs[0])
-        _draw_joint_errors(figure.add_axes((0.395, 0.06, 0.255, 0.27)), row.runs[0])
-        _draw_histogram(figure.add_axes((0.725, 0.06, 0.26, 0.27)), row.runs)
-    return page.getvalue()
+        _draw_speed(speed_axes, runs)
+        _draw_speed_error(figure.add_axes((0.065, 0.425, 0.575, 0.165), sharex=speed_axes), runs)
+        _draw_path(figure.add_axes((0.665, 0.395, 0.3, 0.525), projection="3d"), runs)
+        _draw_joints(figure.add_axes((0.065, 0.06, 0.255, 0.27)), runs[0])
+        _draw_joint_errors(figure.add_axes((0.395, 0.06, 0.255, 0.27)), runs[0])
+        _draw_histogram(figure.add_axes((0.725, 0.06, 0.26, 0.27)), runs)
+    return figure
+
+
+def signals_figure(
+    t: Array, tcp_speed: Array, q: Array, qd: Array, qd_cmd: Array, simulated: bool | None
+) -> Figure:
+    """Draw a motion without a reference.
+
+    Args:
+        t: (n,) [s].
+        tcp_speed: (n,) [m/s].
+        q: (n, 6) reported joint positions [rad].
+        qd: (n, 6) reported joint velocities [rad/s].
+        qd_cmd: (n, 6) commanded ones [rad/s].
+        simulated: True, False, or None where it is not known.
+    """
+    with styled_figure(11.0, 7.2, origin_of(simulated).mark) as figure:
+        upper = figure.add_axes((0.065, 0.71, 0.92, 0.24))
+        upper.plot(t, 1e3 * tcp_speed, color=BLUE, lw=1.0)
+        upper.set_ylim(bottom=0.0)
+        upper.set_ylabel("TCP speed [mm/s]")
+        middle = figure.add_axes((0.065, 0.39, 0.92, 0.24), sharex=upper)
+        lower = figure.add_axes((0.065, 0.07, 0.92, 0.24), sharex=upper)
+        for joint, colour in enumerate(JOINT_COLOURS):
+            middle.plot(t, q[:, joint], color=colour, lw=1.0, label=JOINT_NAMES[joint])
+            lower.step(t, qd_cmd[:, joint], color=REFERENCE_GREY, lw=2.0, where="post")
+            lower.plot(t, qd[:, joint], color=colour, lw=1.0)
+        middle.set_ylabel("joint angle [rad]")
+        middle.legend(ncols=6, loc="lower right", bbox_to_anchor=(1.0, 0.99), borderaxespad=0.1)
+        lower.set_ylabel("joint velocity [rad/s]")
+        lower.set_title("Commanded (grey) and reported")
+        lower.set_xlabel("time [s]")
+    return figure
+
+
+def draw_movement(row: Row) -> str:
+    """`movement_figure` as SVG text."""
+    return _svg_text(movement_figure(row.runs))
 
 
 def draw_table(table: Table) -> str:
@@ -110,7 +146,7 @@ def draw_table(table: Table) -> str:
 
 def draw_definitions(table: Table) -> str:
     """Draw the four SNR definitions for each movement, means over the repetitions."""
-    series: tuple[tuple[str, str, str, Callable[[Run], float]], ...] = (
+    series: tuple[tuple[str, str, str, Callable[[MeasuredRun], float]], ...] = (
         ("speed, as in Eq. 10", "o", BLUE, lambda run: run.snr.speed_db),
         ("speed, after best time shift", "^", SKY, lambda run: run.snr.speed_shifted_db),
         ("velocity vector", "s", RED, lambda run: run.snr.velocity_db),
@@ -159,7 +195,7 @@ def draw_budget(table: Table) -> str:
     return page.getvalue()
 
 
-def _draw_speed(axes: Axes, runs: Sequence[Run]) -> None:
+def _draw_speed(axes: Axes, runs: Sequence[MeasuredRun]) -> None:
     """Draw the paper's figure 4 or 5, without its smoothing."""
     first = runs[0].track
     t = _step_times(runs[0])
@@ -176,7 +212,7 @@ def _draw_speed(axes: Axes, runs: Sequence[Run]) -> None:
     axes.tick_params(labelbottom=False)
 
 
-def _draw_speed_error(axes: Axes, runs: Sequence[Run]) -> None:
+def _draw_speed_error(axes: Axes, runs: Sequence[MeasuredRun]) -> None:
     for run, colour in zip(runs, _colours(runs), strict=True):
         track = run.track
         error = speed(track.t, track.p_actual) - speed(track.t, track.p_ref)
@@ -187,7 +223,7 @@ def _draw_speed_error(axes: Axes, runs: Sequence[Run]) -> None:
     axes.set_title("Speed error, actual − desired")
 
 
-def _draw_path(axes: Any, runs: Sequence[Run]) -> None:
+def _draw_path(axes: Any, runs: Sequence[MeasuredRun]) -> None:
     first = runs[0]
     for run, colour in zip(runs, _colours(runs), strict=True):
         p = 1e3 * run.track.p_actual[run.track.movement]
@@ -216,7 +252,7 @@ def _draw_path(axes: Any, runs: Sequence[Run]) -> None:
     axes.set_title("TCP path and target points, base frame", pad=2.0)
 
 
-def _draw_joints(axes: Axes, run: Run) -> None:
+def _draw_joints(axes: Axes, run: MeasuredRun) -> None:
     rows, moving = run.track.rows, run.track.movement
     t = run.track.t[moving] - run.track.t_start
     ref = run.recording.column("ref_q")[rows][moving]
@@ -229,7 +265,7 @@ def _draw_joints(axes: Axes, run: Run) -> None:
     axes.set_title(f"Joints, reference (grey) and actual, r{run.provenance.repetition}")
 
 
-def _draw_joint_errors(axes: Axes, run: Run) -> None:
+def _draw_joint_errors(axes: Axes, run: MeasuredRun) -> None:
     moving = run.track.movement
     t = run.track.t[moving] - run.track.t_start
     errors = 1e3 * joint_errors(run.recording, run.track)[moving]
@@ -243,7 +279,7 @@ def _draw_joint_errors(axes: Axes, run: Run) -> None:
     axes.set_title(f"Joint tracking error, r{run.provenance.repetition}")
 
 
-def _draw_histogram(axes: Axes, runs: Sequence[Run]) -> None:
+def _draw_histogram(axes: Axes, runs: Sequence[MeasuredRun]) -> None:
     errors = [1e3 * position_errors(run.track) for run in runs]
     bins = np.linspace(0.0, max(1e-3, *(float(e.max()) for e in errors)), 31).tolist()
     for run, error, colour in zip(runs, errors, _colours(runs), strict=True):
@@ -257,33 +293,22 @@ def _draw_histogram(axes: Axes, runs: Sequence[Run]) -> None:
     axes.set_title("Position error over the movement")
 
 
-def _step_times(run: Run) -> np.ndarray:
+def _step_times(run: MeasuredRun) -> np.ndarray:
     """Return the middle of each first difference, s since the movement began."""
     t = run.track.t
     return 0.5 * (t[1:] + t[:-1]) - run.track.t_start
 
 
-def _colours(runs: Sequence[Run]) -> list[str]:
+def _colours(runs: Sequence[MeasuredRun]) -> list[str]:
     return [RUN_COLOURS[i % len(RUN_COLOURS)] for i in range(len(runs))]
 
 
 @contextmanager
-def svg_figure(width_in: float, height_in: float, mark: str) -> Iterator[tuple[Figure, io.StringIO]]:
-    """Give a figure in the report's style; on leaving, its SVG text is in the page.
-
-    Args:
-        width_in: width [inch].
-        height_in: height [inch].
-        mark: what the data are, written on it; empty for those of a real arm, or none at all.
-
-    Yields:
-        The figure, and the page that the text will be in.
-    """
-    page = io.StringIO()
+def styled_figure(width_in: float, height_in: float, mark: str) -> Iterator[Figure]:
+    """Give a figure in the report's style; arguments as of `svg_figure`."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(width_in, height_in))
-        FigureCanvasSVG(figure)
-        yield figure, page
+        yield figure
         if mark:
             box = {
                 "boxstyle": "round,pad=0.3",
@@ -301,4 +326,29 @@ def svg_figure(width_in: float, height_in: float, mark: str) -> Iterator[tuple[F
                 weight="bold",
                 bbox=box,
             )
+
+
+@contextmanager
+def svg_figure(width_in: float, height_in: float, mark: str) -> Iterator[tuple[Figure, io.StringIO]]:
+    """Give a figure in the report's style; on leaving, its SVG text is in the page.
+
+    Args:
+        width_in: width [inch].
+        height_in: height [inch].
+        mark: what the data are, written on it; empty for those of a real arm, or none at all.
+
+    Yields:
+        The figure, and the page that the text will be in.
+    """
+    page = io.StringIO()
+    with styled_figure(width_in, height_in, mark) as figure:
+        yield figure, page
+    page.write(_svg_text(figure))
+
+
+def _svg_text(figure: Figure) -> str:
+    page = io.StringIO()
+    with mpl.rc_context(_STYLE):
+        FigureCanvasSVG(figure)
         figure.savefig(page, format="svg", metadata={"Date": None, "Creator": None})
+    return page.getvalue()

@@ -25,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.analysis.run import Run
+from pc_client.analysis.run import MeasuredRun
 from pc_client.analysis.speed_noise import speed_noise
 from pc_client.analysis.track import speed, velocity
 from pc_client.control.loop_model import LoopModel, velocity_response
@@ -39,7 +39,7 @@ LEAST_STEPS = 30
 """Differences at rest from which C is worth estimating: its diagonal is good to 25 % then."""
 
 
-def rest_steps(run: Run) -> Array:
+def rest_steps(run: MeasuredRun) -> Array:
     """Return one-cycle differences (n, 6) [rad] of the reported joints at rest, each stretch less its mean.
 
     The half of each settling phase that is farther from the movement counts, as in `metrics.rest_noise`.
@@ -57,7 +57,7 @@ def rest_steps(run: Run) -> Array:
     return np.concatenate(centred) if centred else np.empty((0, q.shape[1]))
 
 
-def step_covariance(runs: Sequence[Run]) -> Array | None:
+def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
     """Return C (6, 6) [rad2] of all runs of one arm together; None with fewer than `LEAST_STEPS` steps."""
     steps = np.concatenate([rest_steps(run) for run in runs])
     if len(steps) < LEAST_STEPS:
@@ -68,7 +68,7 @@ def step_covariance(runs: Sequence[Run]) -> Array | None:
     return covariance
 
 
-def floor_power(run: Run, covariance: Array, model: RobotModel) -> float:
+def floor_power(run: MeasuredRun, covariance: Array, model: RobotModel) -> float:
     """Return P_floor [(m/s)2] of one run's movement.
 
     Args:
@@ -86,7 +86,7 @@ def floor_power(run: Run, covariance: Array, model: RobotModel) -> float:
     return float(np.mean(np.square(mean) + variance))
 
 
-def floor_db(run: Run, covariance: Array | None) -> float | None:
+def floor_db(run: MeasuredRun, covariance: Array | None) -> float | None:
     """Return the SNR [dB] at which noise alone would leave a run; None for an unknown arm or without rest."""
     name = run.provenance.robot_model.lower()
     if covariance is None or name not in ROBOTS:
@@ -96,7 +96,7 @@ def floor_db(run: Run, covariance: Array | None) -> float | None:
     return 10.0 * math.log10(signal / power) if power > 0.0 < signal else None
 
 
-def unrepeatable_power(runs: Sequence[Run]) -> float | None:
+def unrepeatable_power(runs: Sequence[MeasuredRun]) -> float | None:
     """Return half the mean square difference [(m/s)2] of the speeds of two runs, as if driven alike.
 
     What the commands of the second differ by from those of the first (learned or fed back) is taken out
@@ -118,7 +118,7 @@ def unrepeatable_power(runs: Sequence[Run]) -> float | None:
     return float(np.mean(halves)) if halves else None
 
 
-def _as_driven_like(first: Run, second: Run) -> Array | None:
+def _as_driven_like(first: MeasuredRun, second: MeasuredRun) -> Array | None:
     """Return the positions (n, 3) [m] of the second run as they would be with the commands of the first."""
     loop, name = _loop_of(first), first.provenance.robot_model.lower()
     if loop is None or name not in ROBOTS or len(first.track.t) != len(second.track.t):
@@ -137,7 +137,7 @@ def _as_driven_like(first: Run, second: Run) -> Array | None:
     return positions
 
 
-def _loop_of(run: Run) -> LoopModel | None:
+def _loop_of(run: MeasuredRun) -> LoopModel | None:
     """The loop that the client identified; None in old recordings."""
     loop, delay = run.provenance.loop, run.provenance.identified_delay_s
     if loop.keys() >= {"dead_time_s", "lag_s", "joint_spread_s"}:

@@ -17,7 +17,7 @@ from rich.progress import track as progress
 
 from pc_client.analysis.budget import PARTS, SPLIT_HZ
 from pc_client.analysis.page import data_uri, render, report_libraries
-from pc_client.analysis.run import Run, analyse_run
+from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.analysis.table import KINDS, Row, Table, build_table
 from pc_client.errors import CellError, RecordingError, one_line
 from pc_client.kinematics.cell import NO_CELL
@@ -81,7 +81,7 @@ def build_tables(run_dir: Path | str, console: Console | None = None) -> Report:
         raise RecordingError(
             f"{run_dir} holds no recordings (*.mcap); give the folder that an experiment wrote"
         )
-    runs: list[Run] = []
+    runs: list[MeasuredRun] = []
     left_out: list[str] = []
     for path in _shown(files, "reading", console):
         try:

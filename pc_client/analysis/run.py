@@ -13,7 +13,7 @@ from pc_client.recording.provenance import Provenance
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class MeasuredRun:
     """One recording and what was measured on it."""
 
     recording: Recording
@@ -28,7 +28,7 @@ class Run:
         return self.recording.provenance
 
 
-def analyse_run(recording: Recording) -> Run:
+def analyse_run(recording: Recording) -> MeasuredRun:
     """Measure one recording.
 
     Raises:
@@ -36,7 +36,7 @@ def analyse_run(recording: Recording) -> Run:
     """
     track = track_of(recording)
     snr = measure_snr(track)
-    return Run(
+    return MeasuredRun(
         recording=recording,
         track=track,
         snr=snr,

@@ -17,7 +17,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
-from pc_client.analysis.run import Run
+from pc_client.analysis.run import MeasuredRun
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance
 
@@ -54,7 +54,7 @@ class Row:
 
     name: str
     kind: str
-    runs: tuple[Run, ...]
+    runs: tuple[MeasuredRun, ...]
     noise_floor_db: float | None = None
 
     @property
@@ -218,7 +218,7 @@ class Table:
         return columns, rows
 
 
-def build_table(runs: Sequence[Run]) -> Table:
+def build_table(runs: Sequence[MeasuredRun]) -> Table:
     """Build the table of one experiment.
 
     Args:
@@ -248,7 +248,7 @@ def build_table(runs: Sequence[Run]) -> Table:
     return Table(*common, rows=tuple(rows))
 
 
-def _rank(run: Run) -> tuple[int, str, int, str]:
+def _rank(run: MeasuredRun) -> tuple[int, str, int, str]:
     """Order of rows: kinds as in the paper, the paper's movements in its order, then others by name."""
     name, kind = run.provenance.movement, run.provenance.kind
     paper = list(PAPER_SNR_DB)

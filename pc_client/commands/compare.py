@@ -14,7 +14,7 @@ from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import ClientError
 
 if TYPE_CHECKING:
-    from pc_client.analysis.run import Run
+    from pc_client.analysis.run import MeasuredRun
     from pc_client.comparison.movement_set import MovementSet
     from pc_client.comparison.table import Comparison
 
@@ -56,7 +56,7 @@ def compare(
         say(str(path))
 
 
-def _read_runs(out: Path) -> dict[str, Run]:
+def _read_runs(out: Path) -> dict[str, MeasuredRun]:
     """The runs of a folder by the movement's name."""
     from rich.progress import track
 
@@ -71,7 +71,9 @@ def _read_runs(out: Path) -> dict[str, Run]:
     return {run.provenance.movement: run for run in runs}
 
 
-def _write(table: Comparison, one: MovementSet, runs: Mapping[str, Run] | None, out: Path) -> list[Path]:
+def _write(
+    table: Comparison, one: MovementSet, runs: Mapping[str, MeasuredRun] | None, out: Path
+) -> list[Path]:
     """Write table and pictures; returns the files."""
     import json
 

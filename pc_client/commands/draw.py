@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.before_motion import ask_robot
+from pc_client.commands.before_motion import reach
 from pc_client.commands.experiment import execute
 from pc_client.commands.options import OutOption, RepeatOption, RobotOption, TimeUnitOption, console, say
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
@@ -169,7 +169,7 @@ def _make(
     from pc_client.extraction.extract import extract
     from pc_client.movements.geometry import WORKING_BOXES
 
-    _, model = ask_robot(robot, settings.ports, settings.cell)
+    model = reach(robot, settings.ports, settings.cell).model
     options = replace(options, box=WORKING_BOXES[model.name])
     bar = Progress(
         TextColumn("{task.description}"),

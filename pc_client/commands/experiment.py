@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.before_motion import ask_before_motion, ask_robot
+from pc_client.commands.before_motion import reach
 from pc_client.commands.options import (
     OutOption,
     RepeatOption,
@@ -22,7 +22,7 @@ from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import ClientError
 
 if TYPE_CHECKING:
-    from pc_client.movements.movement import Movement
+    from pc_client.experiment.prepare import Motion
 
 
 @takes_run_settings
@@ -69,7 +69,7 @@ def _run(movements: Sequence[str], robot: str, out: Path, repeat: int, settings:
     show_report(out)
 
 
-def execute(movements: Sequence[Movement], robot: str, out: Path, repeat: int, settings: RunSettings) -> None:
+def execute(movements: Sequence[Motion], robot: str, out: Path, repeat: int, settings: RunSettings) -> None:
     """Plan movements, ask where a real arm would move, run them, and say how it went.
 
     Args:
@@ -82,23 +82,15 @@ def execute(movements: Sequence[Movement], robot: str, out: Path, repeat: int, s
     Raises:
         ClientError: a check failed, the robot stopped or the user interrupted; the arm rests.
     """
-    from pc_client.driver.ur_driver import UrDriver
-    from pc_client.experiment.prepare import prepare_experiment
+    from pc_client.api.arm import plan
     from pc_client.experiment.progress import Progress
-    from pc_client.experiment.runner import ExperimentRunner
 
-    ports = settings.ports
     with console.status("planning"):
-        reported, model = ask_robot(robot, ports, settings.cell)
-        planned = prepare_experiment(movements, repeat=repeat, out=out, robot=model.name, cell=settings.cell)
-    if not settings.yes:
-        ask_before_motion(planned, robot, reported)
+        arm = reach(robot, settings.ports, settings.cell, settings.reverse_port, yes=settings.yes)
+        plans = [plan(movement, arm) for movement in movements]
     try:
-        with (
-            Progress(console, planned.n_runs) as progress,
-            UrDriver(robot, ports, reverse_port=settings.reverse_port) as driver,
-        ):
-            report = ExperimentRunner(driver, planned, settings.controller, progress).run()
+        with Progress(console, repeat * len(plans)) as progress:
+            report = arm.experiment(plans, repeat, settings.controller, out, progress)
     except KeyboardInterrupt as interrupt:
         doubts = "; ".join(getattr(interrupt, "__notes__", ())) or "the arm rests"
         raise ClientError(f"interrupted; {doubts}; recordings finished so far are in {out}") from interrupt

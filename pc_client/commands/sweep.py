@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.before_motion import ask_before_motion, ask_robot
+from pc_client.commands.before_motion import reach
 from pc_client.commands.options import (
     DaskOption,
     WorkersOption,
@@ -24,8 +24,8 @@ from pc_client.errors import ClientError, SweepError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from pc_client.driver.robot_report import RobotReport
-    from pc_client.sweep.case import Case, GivenRobot
+    from pc_client.api.arm import Arm
+    from pc_client.sweep.case import Case, GivenRobot, SimulatedArm
     from pc_client.sweep.config import SweepConfig
     from pc_client.sweep.folder import SweepFolder
     from pc_client.sweep.ledger import Ledger
@@ -66,28 +66,25 @@ def sweep(
         raise typer.BadParameter(f"robot = {plan.host!r} is one robot: no --workers and no --dask")
     folder = SweepFolder(_folder_of(plan, out))
     written_as = table_format(format)
-    given: tuple[GivenRobot, RobotReport] | None = None
+    arm: Arm | None = None
+    arms: Sequence[SimulatedArm] | Sequence[GivenRobot] = plan.arms
     if plan.host is not None:
-        report, model = ask_robot(plan.host, ports_of(plan.port_base), plan.cell)
-        arm = GivenRobot(
-            plan.host, plan.port_base, model.name, report.info.serial, plan.cell, plan.reverse_port
-        )
-        given = arm, report
-    cases = all_cases(
-        plan.movements, plan.arms if given is None else given[:1], plan.controllers, plan.repeat
-    )
+        arm = reach(plan.host, ports_of(plan.port_base), plan.cell, yes=yes)
+        serial = arm.report.info.serial
+        arms = (GivenRobot(plan.host, plan.port_base, arm.model.name, serial, plan.cell, plan.reverse_port),)
+    cases = all_cases(plan.movements, arms, plan.controllers, plan.repeat)
     folder.prepare()
     ledger = Ledger(cases, folder, plan.keep_recordings)
     waiting = ledger.waiting()
     say(f"{len(ledger)} cases, {ledger.n_settled} of them done before; results in {folder.path}")
-    if given is None:
+    if arm is None:
         outcomes = run_side_by_side(waiting, plan.keep_recordings, run_case, workers=workers, dask=dask)
     else:
-        if waiting and not yes:
-            _ask(*given, waiting)
+        if waiting:
+            _confirm(arm, waiting)
         outcomes = run_in_turn(waiting, plan.keep_recordings, run_case)
     try:
-        _work(ledger, outcomes, live=given is None)
+        _work(ledger, outcomes, live=arm is None)
     except KeyboardInterrupt as interrupt:
         doubts = "".join(f"; {note}" for note in getattr(interrupt, "__notes__", ()))
         raise ClientError(
@@ -128,7 +125,7 @@ def _folder_of(plan: SweepConfig, out: Path | None) -> Path:
     return folder
 
 
-def _ask(robot: GivenRobot, report: RobotReport, cases: Sequence[Case]) -> None:
+def _confirm(arm: Arm, cases: Sequence[Case]) -> None:
     """Show all that an arm is going to do, and ask.
 
     Raises:
@@ -141,7 +138,7 @@ def _ask(robot: GivenRobot, report: RobotReport, cases: Sequence[Case]) -> None:
     plans = [plan_case(case) for case in by_movement.values()]
     runs = sum(case.repeat for case in cases) // len(plans)
     planned = tuple(planned for plan in plans for planned in plan.planned)
-    ask_before_motion(Experiment(plans[0].model, planned, runs, Path()), robot.host, report)
+    arm.confirm(Experiment(plans[0].model, planned, runs, Path()))
 
 
 def _draw(folder: SweepFolder, name: str, table: Sequence[dict[str, object]]) -> None:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pc_client.analysis.figures import BLUE, REFERENCE_GREY, svg_figure
-from pc_client.analysis.run import Run
+from pc_client.analysis.run import MeasuredRun
 from pc_client.comparison.movement_set import MovementSet
 from pc_client.comparison.signals import executed_signal, planned_signal
 from pc_client.movements.movement import Movement
@@ -22,7 +22,7 @@ _COLUMNS = 2
 _PANEL_HEIGHT = 1.75
 
 
-def draw_comparison(one: MovementSet, runs: Mapping[str, Run] | None = None) -> str:
+def draw_comparison(one: MovementSet, runs: Mapping[str, MeasuredRun] | None = None) -> str:
     """Draw the movements of one seed.
 
     Args:
@@ -39,7 +39,7 @@ def draw_comparison(one: MovementSet, runs: Mapping[str, Run] | None = None) -> 
     return page.getvalue()
 
 
-def fill_page(figure: Figure, one: MovementSet, runs: Mapping[str, Run] | None = None) -> None:
+def fill_page(figure: Figure, one: MovementSet, runs: Mapping[str, MeasuredRun] | None = None) -> None:
     """Draw the movements of one seed into a figure; arguments as of `draw_comparison`."""
     rows = -(-len(one.movements) // _COLUMNS)
     height = figure.get_figheight()
@@ -78,7 +78,7 @@ def fill_page(figure: Figure, one: MovementSet, runs: Mapping[str, Run] | None =
         _draw_path(figure.add_subplot(grid[row, 2 * column + 1], projection="3d"), movement, run, view)
 
 
-def _draw_speed(axes: Axes, kind: str, movement: Movement, run: Run | None, top: float) -> None:
+def _draw_speed(axes: Axes, kind: str, movement: Movement, run: MeasuredRun | None, top: float) -> None:
     plan = planned_signal(movement)
     axes.plot(plan.t, 1e3 * plan.speed, color=REFERENCE_GREY, lw=2.6)
     if run is not None:
@@ -88,7 +88,9 @@ def _draw_speed(axes: Axes, kind: str, movement: Movement, run: Run | None, top:
     axes.set_title(f"{kind}: {GENERATORS[kind].says}", fontsize=8.5, pad=3.0)
 
 
-def _draw_path(axes: Any, movement: Movement, run: Run | None, view: tuple[np.ndarray, float]) -> None:
+def _draw_path(
+    axes: Any, movement: Movement, run: MeasuredRun | None, view: tuple[np.ndarray, float]
+) -> None:
     p = 1e3 * planned_signal(movement).motion.p
     axes.plot(*p.T, color=REFERENCE_GREY, lw=2.4, alpha=0.7)
     if run is not None:

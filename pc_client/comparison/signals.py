@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from pc_client.analysis.run import Run
+from pc_client.analysis.run import MeasuredRun
 from pc_client.comparison.filtering import filtered_motion
 from pc_client.movements.movement import Movement
 from pc_client.movements.stroke import Motion
@@ -64,7 +64,7 @@ def filtered_signal(movement: Movement, rate: float) -> Signal:
     return _inner(t, filtered_motion(movement.sample(t).p, rate), movement.duration, rate)
 
 
-def executed_signal(run: Run, duration: float) -> Signal:
+def executed_signal(run: MeasuredRun, duration: float) -> Signal:
     """What the robot did, through the filter.
 
     The window is that of the plan, later by the robot's lag, so that a late robot is not cut off.

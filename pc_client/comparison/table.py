@@ -15,7 +15,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from pc_client.analysis.run import Run
+from pc_client.analysis.run import MeasuredRun
 from pc_client.comparison.filtering import FILTER_TEXT
 from pc_client.comparison.likeness import Likeness, mean_likeness, measure_likeness
 from pc_client.comparison.movement_set import MovementSet
@@ -208,7 +208,7 @@ class Comparison:
 
 
 def build_comparison(
-    sets: Sequence[MovementSet], runs: Mapping[str, Run] | None = None, *, rate: float = 125.0
+    sets: Sequence[MovementSet], runs: Mapping[str, MeasuredRun] | None = None, *, rate: float = 125.0
 ) -> Comparison:
     """Measure all movements.
 
@@ -231,7 +231,7 @@ def build_comparison(
     return Comparison(rows, n_strokes, rate, robot)
 
 
-def _row(kind: str, movement: Movement, runs: Mapping[str, Run] | None, rate: float) -> Row:
+def _row(kind: str, movement: Movement, runs: Mapping[str, MeasuredRun] | None, rate: float) -> Row:
     run = None
     if runs:
         run = runs.get(movement.name)

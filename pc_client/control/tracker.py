@@ -13,6 +13,7 @@ from pc_client.control.tool_guard import ToolGuard
 from pc_client.kinematics.agreement import check_flange
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.recording.layout import Phase
+from protocol.realtime.layout import RealtimeFrame
 
 # After a gap in the frames the integral must not jump: no more than this many cycles count.
 _MOST_CYCLES_PER_STEP = 3
@@ -94,11 +95,15 @@ class Tracker:
         """
         check_flange(self._model, q, pose)
 
+    def answer(self, frame: RealtimeFrame) -> TrackerStep:
+        """Answer a new frame of the robot with a command; errors as `step`."""
+        return self.step(frame.timestamp, frame.actual_q.tolist())
+
     def step(self, stamp: float, q: Sequence[float]) -> TrackerStep:
-        """Answer a new frame with a command.
+        """Answer new positions with a command.
 
         Args:
-            stamp: the frame's time stamp [s], later than the last one.
+            stamp: their time [s], later than the last one.
             q: (6,) reported joint positions [rad].
 
         Raises:

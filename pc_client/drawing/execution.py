@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
-from pc_client.analysis.run import Run
+from pc_client.analysis.run import MeasuredRun
 from pc_client.drawing.drawing import Drawing
 from pc_client.errors import RecordingError
 from pc_client.extraction.smoothing import CUTOFF_HZ, RATE_HZ, velocity
@@ -62,14 +62,14 @@ class Execution:
         v: their velocities, (k, 3), m per s of the hand.
     """
 
-    run: Run
+    run: MeasuredRun
     parts: tuple[ExecutedPart, ...]
     t: NDArray[np.float64]
     p: NDArray[np.float64]
     v: NDArray[np.float64]
 
 
-def executed(drawing: Drawing, run: Run, shift: float = 0.0) -> Execution:
+def executed(drawing: Drawing, run: MeasuredRun, shift: float = 0.0) -> Execution:
     """Map a run back.
 
     Args:

@@ -15,7 +15,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.control.tracker import Tracker
 from pc_client.driver.package_stream import PackageStream, raise_on_error
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import receiver_script
@@ -24,7 +23,14 @@ from pc_client.driver.robot_info import RobotInfo, read_robot_info
 from pc_client.driver.robot_report import RobotReport, check_arm, make_report, read_payload, reported_slider
 from pc_client.driver.stop_script import STOP_WORD, stop_script
 from pc_client.driver.transport import Network, TcpNetwork, Transport
-from pc_client.driver.velocity_stream import RowSink, StreamReport, VelocityStream, collector_paused
+from pc_client.driver.velocity_stream import (
+    CommandSource,
+    RowSink,
+    S,
+    StreamReport,
+    VelocityStream,
+    collector_paused,
+)
 from pc_client.driver.waiting import REST_TIMEOUT, wait_for_rest, wait_until
 from pc_client.driver.watchdog import (
     ProgramEndedError,
@@ -154,11 +160,11 @@ class UrDriver:
         check_slider(reported_slider(self._primary))
         return frame
 
-    def stream(self, tracker: Tracker, on_row: RowSink, *, acceleration: float) -> StreamReport:
-        """Run one reference: start the receiver program, stream, stop, wait for rest.
+    def stream(self, source: CommandSource[S], on_row: RowSink[S], *, acceleration: float) -> StreamReport:
+        """Stream the commands of one source: start the receiver program, stream, stop, wait for rest.
 
         Args:
-            tracker: a fresh tracker; the arm must stand at the begin of its reference.
+            source: a fresh one; the arm must stand where its run begins.
             on_row: takes every new frame with the command sent; what it raises ends the run.
             acceleration: of the robot's `speedj` [rad/s2].
 
@@ -183,7 +189,7 @@ class UrDriver:
                 )
                 try:
                     with collector_paused():
-                        report = stream.run(tracker, on_row)
+                        report = stream.run(source, on_row)
                 except ProgramEndedError as error:
                     raise self._explain(error) from error
                 self._wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")

@@ -12,8 +12,8 @@ import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
-from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import READ_TIMEOUT
 from pc_client.driver.transport import Network, Transport
@@ -23,8 +23,48 @@ from protocol.patience import Patience
 from protocol.realtime.layout import RealtimeFrame
 from protocol.velocity_stream import VelocityMode, encode_velocity
 
-RowSink = Callable[[RealtimeFrame, TrackerStep], None]
-"""Takes every new frame with what the tracker made of it."""
+
+class Step(Protocol):
+    """What a source made of one frame."""
+
+    @property
+    def qd_cmd(self) -> list[float]:
+        """(6,) velocities to send [rad/s]."""
+        ...
+
+    @property
+    def finished(self) -> bool:
+        """True: the run is over, the stop word is sent instead of `qd_cmd`."""
+        ...
+
+
+S = TypeVar("S", bound=Step)
+S_co = TypeVar("S_co", bound=Step, covariant=True)
+
+
+class CommandSource(Protocol[S_co]):
+    """Where the commands of one run come from; `Tracker` is one."""
+
+    @property
+    def qd_max(self) -> tuple[float, ...]:
+        """(6,) the largest speeds that a step can command [rad/s]."""
+        ...
+
+    def answer(self, frame: RealtimeFrame) -> S_co:
+        """Answer a new frame with a command; what it raises ends the run."""
+        ...
+
+    def observe(self, stamp: float) -> S_co:
+        """Describe a frame [s] that gets no command of its own because a newer one is already here."""
+        ...
+
+    def check_report(self, q: Sequence[float], pose: Sequence[float]) -> None:
+        """Refuse a report whose joint angles (6,) [rad] and TCP pose (6,) [m, rad] do not belong together."""
+        ...
+
+
+RowSink = Callable[[RealtimeFrame, S], None]
+"""Takes every new frame with what the source made of it."""
 
 LONGEST_STANDSTILL = 5.0
 """Seconds of our clock that the robot's time may stand still: a command must have been lost. Longer where
@@ -92,11 +132,11 @@ class VelocityStream:
         self._period = period
         self._housekeeping = housekeeping
 
-    def run(self, tracker: Tracker, on_row: RowSink) -> StreamReport:
-        """Stream until the tracker has finished; then the stop word is sent.
+    def run(self, source: CommandSource[S], on_row: RowSink[S]) -> StreamReport:
+        """Stream until the source has finished; then the stop word is sent.
 
         Args:
-            tracker: a fresh tracker.
+            source: a fresh one.
             on_row: takes every row; what it raises ends the run.
 
         Returns:
@@ -109,16 +149,16 @@ class VelocityStream:
         report = StreamReport()
         frame = self._wait_for_trigger(report)
         began = self._network.now()
-        receive, send, limits = self._frames.receive, self._reverse.send, tracker.qd_max
+        receive, send, limits = self._frames.receive, self._reverse.send, source.qd_max
         first_stamp = last_stamp = frame.timestamp
         while True:
             stamp = frame.timestamp
             check_streaming(frame)
-            step = tracker.step(stamp, frame.actual_q.tolist())
+            step = source.answer(frame)
             if step.finished:
                 break
             if report.n_commands % _HOUSEKEEPING == 0:
-                tracker.check_report(frame.actual_q.tolist(), frame.actual_tcp_pose.tolist())
+                source.check_report(frame.actual_q.tolist(), frame.actual_tcp_pose.tolist())
             check_command(step.qd_cmd, limits)
             try:
                 send(encode_velocity(VelocityMode.VELOCITY, step.qd_cmd))
@@ -143,7 +183,7 @@ class VelocityStream:
                 report.late_frames += len(new) - 1
                 for late in new[:-1]:
                     check_angles(late)
-                    on_row(late, tracker.observe(late.timestamp))
+                    on_row(late, source.observe(late.timestamp))
             frame = new[-1]
             _check_silence(stamp, last_stamp)
         self.send_stop()

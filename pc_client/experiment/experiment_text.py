@@ -20,7 +20,7 @@ def experiment_text(experiment: Experiment) -> str:
     Returns:
         A few lines, the worst of all movements.
     """
-    reports = {planned.movement.name: planned.plan.report for planned in experiment.planned}
+    reports = {planned.movement.name: planned.joints.report for planned in experiment.planned}
     low = np.min([report.box_min for report in reports.values()], axis=0)
     high = np.max([report.box_max for report in reports.values()], axis=0)
     fastest = max(reports, key=lambda name: reports[name].tcp_speed.value)

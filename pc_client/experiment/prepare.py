@@ -6,30 +6,37 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from pc_client.errors import ClientError, RecordingError
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.robot_model import RobotModel, robot_model
-from pc_client.movements.files import load_movement, movement_text
+from pc_client.movements.files import load_motion, movement_text
+from pc_client.movements.joint_trajectory import JointTrajectory
 from pc_client.movements.movement import Movement
-from pc_client.planning.plan import JointPlan, plan_movement
+from pc_client.movements.samples import SampledLaw
+from pc_client.planning.plan import JointPlan, plan_joints, plan_movement
 from pc_client.recording.loader import load_recording
+
+Motion = Movement | JointTrajectory
+"""What can be planned: a movement of the TCP, or joint angles over time."""
 
 _SHORTEST_HEAD = 1024
 """A recording that is shorter [bytes] has no rows."""
 
 
 @dataclass(frozen=True, slots=True)
-class PlannedMovement:
-    """A movement and its checked plan.
+class Plan:
+    """What an arm shall do, checked against all limits.
 
     Attributes:
         movement: what the TCP shall do.
-        plan: what the joints shall do.
+        joints: what the joints shall do.
         text: the movement as its file says it; empty for one made of samples.
     """
 
     movement: Movement
-    plan: JointPlan
+    joints: JointPlan
     text: str
 
 
@@ -45,11 +52,15 @@ class Experiment:
     """
 
     model: RobotModel
-    planned: tuple[PlannedMovement, ...]
+    planned: tuple[Plan, ...]
     repeat: int
     out: Path
 
-    def recording_path(self, planned: PlannedMovement, repetition: int) -> Path:
+    def __post_init__(self) -> None:
+        if self.repeat < 1:
+            raise ClientError(f"{self.repeat} runs of each movement is nothing to do; give at least one")
+
+    def recording_path(self, planned: Plan, repetition: int) -> Path:
         """The file of one run; repetitions count from 1."""
         return self.out / f"{planned.movement.name}_r{repetition}.mcap"
 
@@ -59,7 +70,7 @@ class Experiment:
         return len(self.planned) * self.repeat
 
 
-def load_movements(sources: Sequence[str | Path]) -> list[Movement]:
+def load_movements(sources: Sequence[str | Path]) -> list[Motion]:
     """Load movements of one experiment.
 
     Args:
@@ -71,7 +82,7 @@ def load_movements(sources: Sequence[str | Path]) -> list[Movement]:
     """
     if not sources:
         raise ClientError("no movement is given; name at least one")
-    movements = [load_movement(source) for source in sources]
+    movements = [load_motion(source) for source in sources]
     names = [movement.name for movement in movements]
     for name in names:
         if names.count(name) > 1:
@@ -82,7 +93,7 @@ def load_movements(sources: Sequence[str | Path]) -> list[Movement]:
 
 
 def prepare_experiment(
-    movements: Sequence[Movement], *, repeat: int, out: Path, robot: str = "ur3", cell: Cell = NO_CELL
+    movements: Sequence[Motion], *, repeat: int, out: Path, robot: str = "ur3", cell: Cell = NO_CELL
 ) -> Experiment:
     """Plan all movements for an arm.
 
@@ -97,14 +108,26 @@ def prepare_experiment(
         PlanningError: a movement cannot be done by the arm, or there is no model of it.
         ClientError: nothing to repeat.
     """
-    if repeat < 1:
-        raise ClientError(f"{repeat} runs of each movement is nothing to do; give at least one")
     model = robot_model(robot, cell)
-    planned = tuple(
-        PlannedMovement(movement, plan_movement(movement, model=model), _text_of(movement))
-        for movement in movements
-    )
+    planned = tuple(make_plan(movement, model) for movement in movements)
     return Experiment(model, planned, repeat, out)
+
+
+def make_plan(motion: Motion, model: RobotModel) -> Plan:
+    """Plan what the TCP, or what the joints shall do.
+
+    Args:
+        motion: a movement of the TCP, or joint angles over time.
+        model: nominal arm.
+
+    Raises:
+        PlanningError: the arm cannot do it.
+    """
+    if isinstance(motion, JointTrajectory):
+        joints = plan_joints(motion, model=model)
+        law = SampledLaw(joints.t, joints.p)
+        return Plan(Movement(motion.name, law, np.array([law.duration])), joints, "")
+    return Plan(motion, plan_movement(motion, model=model, rotations=motion.rotations), _text_of(motion))
 
 
 def clear_folder(experiment: Experiment) -> None:

@@ -39,7 +39,6 @@ class Progress:
         self._task = self._bar.add_task("connecting", total=n_runs)
 
     def __enter__(self) -> Self:
-        self._bar.start()
         return self
 
     def __exit__(
@@ -48,7 +47,8 @@ class Progress:
         self._bar.stop()
 
     def connected(self, info: RobotInfo) -> None:
-        """Name the robot."""
+        """Name the robot; the bar begins here, after all that is asked."""
+        self._bar.start()
         self._console.print(f"robot: {info}", soft_wrap=True)
 
     def approaching(self, approach: Approach) -> None:

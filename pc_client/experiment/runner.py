@@ -21,7 +21,7 @@ from pc_client.experiment.approach_run import run_approach
 from pc_client.experiment.identification import Identification, identify
 from pc_client.experiment.observer import Observer, Silent
 from pc_client.experiment.preflight import preflight, require
-from pc_client.experiment.prepare import Experiment, PlannedMovement, clear_folder
+from pc_client.experiment.prepare import Experiment, Plan, clear_folder
 from pc_client.experiment.repetitions import Repetitions, RunLog
 from pc_client.planning.approach import plan_approach
 from pc_client.planning.plan import JointPlan
@@ -87,7 +87,7 @@ class ExperimentRunner:
         clear_folder(experiment)
         self._observer.connected(driver.info)
         # The loop is identified where the first run begins; that run needs no further approach.
-        there: JointPlan | None = self._approach(experiment.planned[0].plan)
+        there: JointPlan | None = self._approach(experiment.planned[0].joints)
         found, stream = identify(driver, self._config, experiment.model)
         self._observer.identified(found)
         report = ExperimentReport(found)
@@ -98,7 +98,7 @@ class ExperimentRunner:
             name = planned.movement.name
             repetitions = self._repetitions(found)
             for repetition in range(1, experiment.repeat + 1):
-                plan = self._approach(planned.plan) if there is None else there
+                plan = self._approach(planned.joints) if there is None else there
                 there = None
                 if self._config.compensates_gear:
                     repetitions.renew(gears.model())
@@ -125,7 +125,7 @@ class ExperimentRunner:
         return Repetitions(self._config, found.loop, found.learning, model, period)
 
     def _table(
-        self, planned: PlannedMovement, plan: JointPlan, found: Identification, repetitions: Repetitions
+        self, planned: Plan, plan: JointPlan, found: Identification, repetitions: Repetitions
     ) -> ReferenceTable:
         """The reference of one run, with the feed-forward that the controller makes of it."""
         config = self._config
@@ -145,7 +145,7 @@ class ExperimentRunner:
     def _record(
         self,
         path: Path,
-        planned: PlannedMovement,
+        planned: Plan,
         plan: JointPlan,
         provenance: Provenance,
         found: Identification,
@@ -183,9 +183,7 @@ class ExperimentRunner:
             repetitions.take(provenance.repetition, log, stream, LEAD, SETTLE)
         return stream
 
-    def _provenance(
-        self, planned: PlannedMovement, repetition: int, found: Identification, pace: str
-    ) -> Provenance:
+    def _provenance(self, planned: Plan, repetition: int, found: Identification, pace: str) -> Provenance:
         info, movement = self._driver.info, planned.movement
         points = tuple((float(x), float(y), float(z)) for x, y, z in movement.target_points)
         return Provenance(

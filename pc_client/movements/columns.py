@@ -35,7 +35,8 @@ def parse_rows(text: str, source: str, forms: Sequence[tuple[str, ...]], wanted:
     Args:
         text: the file's content.
         source: the file's name, for messages.
-        forms: the columns that the table may have, each form with another number of them.
+        forms: the columns that the table may have; without a first line of names, the only one with as many
+            columns.
         wanted: what the columns are, for messages.
 
     Raises:
@@ -53,7 +54,13 @@ def parse_rows(text: str, source: str, forms: Sequence[tuple[str, ...]], wanted:
         if not columns:
             names = [name.strip('"').lower() for name in fields]
             header = next((form for form in forms if sorted(names) == sorted(form)), None)
-            columns = header or next((form for form in forms if len(form) == len(fields)), ())
+            fitting = [form for form in forms if len(form) == len(fields)]
+            if not header and len(fitting) > 1:
+                raise MovementError(
+                    f"{source}, line {number}: {len(fields)} columns without names may be "
+                    f"{' or '.join(', '.join(form) for form in fitting)}; name them in the first line"
+                )
+            columns = header or next(iter(fitting), ())
             order = [names.index(name) for name in columns] if header else list(range(len(columns)))
             if header:
                 continue

@@ -16,9 +16,11 @@ import numpy as np
 
 from pc_client.errors import MovementError
 from pc_client.input_files import parse_toml, read_text
+from pc_client.movements.columns import parse_rows
+from pc_client.movements.joint_trajectory import JOINT_COLUMNS, JointTrajectory
 from pc_client.movements.law_tables import LAW_FIELDS, LAW_WORDS, law_lines, parse_law
 from pc_client.movements.movement import Movement, check_duration, check_name
-from pc_client.movements.samples import SampledLaw, parse_samples, write_samples
+from pc_client.movements.samples import FORMS, MIN_SAMPLES, SampledLaw, samples_of, write_samples
 from pc_client.toml_tables import TableReader, toml_value
 
 __all__ = [
@@ -27,6 +29,7 @@ __all__ = [
     "LIBRARY_SETS",
     "library_names",
     "library_path",
+    "load_motion",
     "load_movement",
     "movement_text",
     "save_movement",
@@ -82,6 +85,18 @@ def load_movement(name_or_path: str | Path) -> Movement:
         MovementError: unknown name, unreachable file, or content that makes no sense, naming file and field
             or line.
     """
+    motion = load_motion(name_or_path)
+    if isinstance(motion, JointTrajectory):
+        raise MovementError(f"{name_or_path} holds joint angles; give a movement of the TCP here")
+    return motion
+
+
+def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
+    """What an arm can be sent along: as `load_movement`, or a .csv file of joint angles.
+
+    Raises:
+        MovementError: as `load_movement`.
+    """
     found = library_path(name_or_path) if isinstance(name_or_path, str) else None
     if found:
         return _read(found)
@@ -110,7 +125,7 @@ def save_movement(movement: Movement, path: str | Path) -> None:
         raise MovementError(f"{path}: a movement of kind {movement.kind} is saved as a {wanted} file")
     try:
         if isinstance(law, SampledLaw):
-            write_samples(path, law.t, law.points)
+            write_samples(path, law)
         else:
             path.write_text(movement_text(movement), encoding="utf-8")
     except OSError as error:
@@ -147,15 +162,27 @@ def _toml_key(key: str) -> str:
     return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else toml_value(key)
 
 
-def _read(path: Path) -> Movement:
+def _read(path: Path) -> Movement | JointTrajectory:
     suffix = path.suffix.lower()
     if suffix not in (".toml", ".csv"):
-        raise MovementError(f"{path}: movement files are .toml (parameters) or .csv (x, y, z, t samples)")
+        raise MovementError(f"{path}: movement files are .toml (parameters) or .csv (samples)")
     text = read_text(path, "movement")
     if suffix == ".csv":
-        law = parse_samples(text, str(path))
-        return Movement(path.stem, law, np.array([law.duration]), {"file": path.name})
+        return _parse_samples(text, path)
     return _parse_movement(TableReader(parse_toml(text, str(path), "movement"), str(path)), str(path))
+
+
+def _parse_samples(text: str, path: Path) -> Movement | JointTrajectory:
+    """What a table of samples holds; without a first line of names its columns are x, y, z, t."""
+    wanted = "x, y, z in m and t in s, and docs/movements.md for poses and joint angles"
+    rows = parse_rows(text, str(path), (*FORMS, JOINT_COLUMNS), wanted)
+    if len(rows.values) < MIN_SAMPLES:
+        raise MovementError(f"{path}: {len(rows.values)} samples; a movement needs at least {MIN_SAMPLES}")
+    with _naming(str(path)):
+        if rows.columns == JOINT_COLUMNS:
+            return JointTrajectory(rows.values[:, 0], rows.values[:, 1:], path.stem)
+        law = samples_of(rows)
+        return Movement(path.stem, law, np.array([law.duration]), {"file": path.name})
 
 
 def _parse_movement(table: TableReader, source: str) -> Movement:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,7 @@ from pc_client.movements.geometry import Similarity, read_only
 from pc_client.movements.minimum_jerk import MinimumJerk
 from pc_client.movements.power_law import PowerLaw
 from pc_client.movements.robotic import RoboticLaw
+from pc_client.movements.samples import SampledLaw
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Motion
 
@@ -120,7 +121,7 @@ class MovementLaw(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Movement:
-    """A movement of the TCP from rest to rest; its orientation is fixed elsewhere.
+    """A movement of the TCP from rest to rest; its orientation is fixed by planning unless samples give it.
 
     Attributes:
         name: as in tables and file names.
@@ -187,27 +188,31 @@ class Movement:
         motion = self.motion(t)
         return MovementSample(motion.p, motion.v)
 
+    def rotations(self, t: ArrayLike) -> NDArray[np.float64] | None:
+        """R_base_tcp at the times t, s, (n, 3, 3); None: the TCP keeps the one that planning fixes."""
+        if not isinstance(self.law, SampledLaw):
+            return None
+        return self.law.rotations(np.clip(t, 0.0, self.duration))
+
     def speed(self, t: ArrayLike) -> NDArray[np.float64]:
         """Speed of the TCP at the times t, m/s, (n,)."""
         velocity = self.motion(t).v
         speed: NDArray[np.float64] = np.linalg.norm(velocity, axis=1)
         return speed
 
-    def transformed(self, similarity: Similarity) -> Movement:
+    def transformed(self, similarity: Similarity) -> Self:
         """Moved, scaled and rotated; the time is untouched, so the shape of the speed is too."""
-        return Movement(self.name, self.law.transformed(similarity), self.stroke_durations, self.provenance)
+        return replace(self, law=self.law.transformed(similarity))
 
-    def stretched(self, factor: float) -> Movement:
+    def stretched(self, factor: float) -> Self:
         """`factor` times as slow on the same path (the theory's own scaling of time): speeds / factor."""
         if not (math.isfinite(factor) and factor > 0.0):
             raise MovementError(f"time stretch of {factor}: give a number greater than 0")
-        return Movement(
-            self.name, self.law.stretched(factor), self.stroke_durations * factor, self.provenance
-        )
+        return replace(self, law=self.law.stretched(factor), stroke_durations=self.stroke_durations * factor)
 
-    def renamed(self, name: str) -> Movement:
+    def renamed(self, name: str) -> Self:
         """The same movement under another name."""
-        return Movement(name, self.law, self.stroke_durations, self.provenance)
+        return replace(self, name=name)
 
 
 def export_samples(movement: Movement, dt: float) -> SampleColumns:

@@ -1,6 +1,7 @@
-"""A movement brought along as (x, y, z, t) samples: a natural cubic spline through them.
+"""A movement brought along as samples of position, or of pose, over time: a spline through them.
 
-Samples are taken as they are: nothing is smoothed and nothing is resampled here.
+Samples are taken as they are: nothing is smoothed and nothing is resampled here. Positions get a natural
+cubic spline, orientations scipy's rotation spline, which has a continuous angular acceleration.
 """
 
 from __future__ import annotations
@@ -15,18 +16,27 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from pc_client.errors import MovementError
-from pc_client.movements.columns import parse_rows
+from pc_client.movements.columns import Rows
 from pc_client.movements.geometry import Similarity, read_only
 from pc_client.movements.stroke import Motion
 
-__all__ = ["MIN_SAMPLES", "SampledLaw", "parse_samples", "write_samples"]
+__all__ = ["FORMS", "MIN_SAMPLES", "SampledLaw", "rotations_of", "samples_of", "write_samples"]
 
 #: Fewest samples of a movement: a cubic has four coefficients.
 MIN_SAMPLES = 4
 
+#: How far from 1 the length of a quaternion may be: three digits in a file.
+_QUATERNION_TOLERANCE = 2e-3
+
 _COLUMNS = ("x", "y", "z", "t")
+_VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qx", "qy", "qz", "qw")
+
+#: What the columns of a file may be: position in m; with it a rotation vector in rad, as UR writes poses,
+#: or a unit quaternion, as ROS does.
+FORMS = (_COLUMNS, ("x", "y", "z", *_VECTOR, "t"), ("x", "y", "z", *_QUATERNION, "t"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,11 +46,14 @@ class SampledLaw:
     Attributes:
         t: times, (n,), s, increasing; shifted so that the first is 0.
         points: (n, 3), m.
+        orientations: of the TCP in the base frame, n of them; None: the fixed one of planning.
     """
 
     t: NDArray[np.float64]
     points: NDArray[np.float64]
+    orientations: Rotation | None = None
     _spline: CubicSpline = field(init=False, repr=False, compare=False)
+    _rotations: RotationSpline | None = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         t, points = read_only(self.t), read_only(self.points)
@@ -71,6 +84,10 @@ class SampledLaw:
                 "the speed between them is no number; give metres and seconds"
             )
         object.__setattr__(self, "_spline", spline)
+        turns = self.orientations
+        if turns is not None and (turns.single or len(turns) != len(t)):
+            raise MovementError(f"orientations for {len(t)} samples: give one for each")
+        object.__setattr__(self, "_rotations", None if turns is None else RotationSpline(t, turns))
 
     @property
     def duration(self) -> float:
@@ -87,37 +104,67 @@ class SampledLaw:
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         return Motion(self._spline(times), self._spline(times, 1), self._spline(times, 2))
 
+    def rotations(self, t: ArrayLike) -> NDArray[np.float64] | None:
+        """R_base_tcp at the times t (n,), s, (n, 3, 3); None without orientations."""
+        if self._rotations is None:
+            return None
+        return np.asarray(self._rotations(np.atleast_1d(t)).as_matrix(), dtype=np.float64)
+
     def transformed(self, similarity: Similarity) -> SampledLaw:
         """The samples moved, scaled and rotated."""
-        return SampledLaw(self.t, similarity.points(self.points))
+        turns = self.orientations
+        rotated = None if turns is None else Rotation.from_matrix(similarity.R) * turns
+        return SampledLaw(self.t, similarity.points(self.points), rotated)
 
     def stretched(self, factor: float) -> SampledLaw:
         """The samples `factor` times as slow."""
-        return SampledLaw(self.t * factor, self.points)
+        return SampledLaw(self.t * factor, self.points, self.orientations)
 
 
-def parse_samples(text: str, source: str) -> SampledLaw:
-    """Samples from text: one a line, columns x, y, z (m) and t (s).
-
-    Without a first line of names the order is x, y, z, t; the form is that of `columns`.
-
-    Args:
-        text: the file's content.
-        source: the file's name, for messages.
+def rotations_of(values: ArrayLike) -> Rotation:
+    """Orientations from rotation vectors (n, 3), rad, or quaternions (n, 4), x, y, z, w.
 
     Raises:
-        MovementError: naming the line.
+        MovementError: another shape, a value that is not finite, or a quaternion that is not of length 1.
     """
-    rows = parse_rows(text, source, [_COLUMNS], "four: x, y, z in m and t in s").values
-    if len(rows) < MIN_SAMPLES:
-        raise MovementError(f"{source}: {len(rows)} samples; a movement needs at least {MIN_SAMPLES}")
-    return SampledLaw(rows[:, 3], rows[:, :3])
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] not in (3, 4):
+        raise MovementError(
+            f"orientations of shape {array.shape}: give (n, 3) rotation vectors in rad, or (n, 4) "
+            "quaternions x, y, z, w"
+        )
+    if not np.isfinite(array).all():
+        raise MovementError("orientations with numbers that are not finite: give finite ones")
+    if array.shape[1] == 3:
+        return Rotation.from_rotvec(array)
+    odd = np.flatnonzero(np.abs(np.linalg.norm(array, axis=1) - 1.0) > _QUATERNION_TOLERANCE)
+    if len(odd):
+        raise MovementError(f"quaternion {array[odd[0]].tolist()} of sample {odd[0]}: give one of length 1")
+    return Rotation.from_quat(array)
 
 
-def write_samples(path: Path, t: NDArray[np.float64], points: NDArray[np.float64]) -> None:
-    """Write times (n,), s, and points (n, 3), m, as CSV with the columns x, y, z, t, to the last digit."""
+def samples_of(rows: Rows) -> SampledLaw:
+    """The movement that a table in one of `FORMS` holds.
+
+    Raises:
+        MovementError: the samples make no sense.
+    """
+    columns = rows.columns
+    values = {name: rows.values[:, k] for k, name in enumerate(columns)}
+    turn = next((names for names in (_VECTOR, _QUATERNION) if names[0] in columns), ())
+    return SampledLaw(
+        values["t"],
+        np.column_stack([values[name] for name in ("x", "y", "z")]),
+        rotations_of(np.column_stack([values[name] for name in turn])) if turn else None,
+    )
+
+
+def write_samples(path: Path, law: SampledLaw) -> None:
+    """Write samples as CSV, to the last digit; orientations as rotation vectors."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_COLUMNS)
-    writer.writerows([*point, time] for point, time in zip(points.tolist(), t.tolist(), strict=True))
+    turns = law.orientations
+    writer.writerow(FORMS[0] if turns is None else FORMS[1])
+    poses = law.points if turns is None else np.hstack((law.points, turns.as_rotvec()))
+    writer.writerows([*pose, time] for pose, time in zip(poses.tolist(), law.t.tolist(), strict=True))
     path.write_text(text.getvalue(), encoding="utf-8")

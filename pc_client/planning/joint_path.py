@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.forward import tcp_jacobian, tcp_pose
@@ -18,11 +19,13 @@ from pc_client.kinematics.inverse import IkSolution, solve_ik_se3
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.kinematics.singularity import SINGULARITIES, SingularityMeasure, measure_singularity
 from pc_client.planning.limits import PlanLimits
+from pc_client.planning.orientation import fixed_tcp_rotation
 from pc_client.planning.refusal import PathNames
 
 Array = NDArray[np.float64]
 
-_LEAD_IN_STEP = 0.01  # m between the solutions that carry the branch from its own posture to the first sample
+# Between the solutions that carry the branch from its own posture to the first sample [m, rad].
+_LEAD_IN_STEP, _LEAD_IN_TURN = 0.01, 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +55,12 @@ def follow_path(
     q_branch: ArrayLike | None = None,
     limits: PlanLimits,
 ) -> JointPath:
-    """Solve the inverse kinematics of a path with fixed orientation.
+    """Solve the inverse kinematics of a path.
 
     Args:
         model: nominal arm.
         names: time and TCP positions of the samples.
-        R_base_tcp: (3, 3) orientation of the TCP.
+        R_base_tcp: orientation of the TCP at all samples (3, 3), or at each (n, 3, 3).
         q_branch: (6,) posture whose branch is followed [rad]; the arm's preferred one by default.
         limits: which steps and singularity distance are allowed.
 
@@ -67,17 +70,18 @@ def follow_path(
     """
     _refuse_not_finite(names)
     branch = np.array(model.description.q_branch if q_branch is None else q_branch, dtype=np.float64)
-    q_before = _lead_in(model, names, R_base_tcp, branch, limits)
-
     n = len(names.p)
+    rotations = np.broadcast_to(R_base_tcp, (n, 3, 3))
+    q_before = _lead_in(model, names, rotations[0], branch, limits)
+
     q = np.empty((n, 6))
     errors = np.empty((n, 2))
     jacobians = np.empty((n, 6, 6))
     iterations = 0
-    goal = pin.SE3(R_base_tcp, names.p[0])
+    goal = pin.SE3(rotations[0], names.p[0])
     seed, refusal = q_before, None
     for k in range(n):
-        goal.translation = names.p[k]
+        goal.rotation, goal.translation = rotations[k], names.p[k]
         solution = solve_ik_se3(model, goal, seed)
         iterations += solution.iterations
         refusal = _refuse_step(model, names, k, solution, q_before, limits)
@@ -101,12 +105,19 @@ def follow_path(
 def _lead_in(
     model: RobotModel, names: PathNames, R_base_tcp: Array, q_branch: Array, limits: PlanLimits
 ) -> Array:
-    """Carry the branch of `q_branch` along a straight line to the first sample; return the posture there."""
+    """Carry the branch of `q_branch` along a straight line to the first sample; return the posture there.
+
+    The TCP begins in the orientation that belongs to the arm's branch and turns about one axis on the way.
+    """
     p_branch = tcp_pose(model, q_branch)[:3, 3]
-    steps = max(1, int(np.ceil(np.linalg.norm(names.p[0] - p_branch) / _LEAD_IN_STEP)))
-    goal = pin.SE3(R_base_tcp, p_branch)
+    R_branch = fixed_tcp_rotation()
+    turn = Rotation.from_matrix(R_base_tcp @ R_branch.T).as_rotvec()
+    way = float(np.linalg.norm(names.p[0] - p_branch)) / _LEAD_IN_STEP
+    steps = max(1, int(np.ceil(max(way, float(np.linalg.norm(turn)) / _LEAD_IN_TURN))))
+    goal = pin.SE3(R_branch, p_branch)
     q = q_branch
     for k in range(steps + 1):
+        goal.rotation = Rotation.from_rotvec(turn * (k / steps)).as_matrix() @ R_branch
         goal.translation = p_branch + (names.p[0] - p_branch) * (k / steps)
         solution = solve_ik_se3(model, goal, q)
         measure = measure_singularity(tcp_jacobian(model, solution.q)[None])

@@ -1,4 +1,4 @@
-"""The one orientation that the TCP keeps during every movement."""
+"""The orientation that the TCP keeps during every movement that says nothing else."""
 
 from __future__ import annotations
 
@@ -28,5 +28,5 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float
 
 
 def fixed_tcp_rotation() -> NDArray[np.float64]:
-    """Return R_base_tcp of every movement: tool z = (.7071, 0, -.7071), forward and 45 deg down."""
+    """Return R_base_tcp of the experiment: tool z = (.7071, 0, -.7071), forward and 45 deg down."""
     return rotation_from_rpy(*TCP_RPY)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import ceil
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
 
 from pc_client.errors import PlanningError
+from pc_client.kinematics.forward import tcp_jacobian, tcp_positions
 from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.kinematics.singularity import measure_singularity
 from pc_client.planning.checks import CartesianSamples, check_motion, check_samples, measure_joint_range
-from pc_client.planning.joint_path import follow_path
+from pc_client.planning.joint_path import JointPath, follow_path
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PlanLimits, limits_of
 from pc_client.planning.orientation import fixed_tcp_rotation
@@ -23,6 +27,10 @@ Array = NDArray[np.float64]
 
 DEFAULT_DT = 0.004
 """Time between samples of a plan [s]: half a control cycle; the spline between is then good to < 1 um."""
+
+
+Rotations = Callable[[Array], Array | None]
+"""R_base_tcp (n, 3, 3) at times (n,) [s]; None: fixed."""
 
 
 class PlannableMovement(Protocol):
@@ -40,6 +48,25 @@ class PlannableMovement(Protocol):
 
     def sample(self, t: Array, /) -> tuple[Array, Array]:
         """Return positions (n, 3) [m] and velocities (n, 3) [m/s] at times (n,) in [0, duration]."""
+        ...
+
+
+class PlannableJoints(Protocol):
+    """What planning needs of a motion in joint angles; `movements.JointTrajectory` is one."""
+
+    @property
+    def name(self) -> str:
+        """For messages and file names."""
+        ...
+
+    @property
+    def t(self) -> Array:
+        """(n,) times, the first 0 [s]."""
+        ...
+
+    @property
+    def q(self) -> Array:
+        """(n, 6) joint angles [rad]."""
         ...
 
 
@@ -116,8 +143,9 @@ def plan_movement(
     dt: float = DEFAULT_DT,
     limits: PlanLimits | None = None,
     q_branch: ArrayLike | None = None,
+    rotations: Rotations | None = None,
 ) -> JointPlan:
-    """Plan a movement of the TCP with the fixed orientation of the experiment.
+    """Plan a movement of the TCP.
 
     Args:
         movement: what the TCP shall do.
@@ -125,6 +153,8 @@ def plan_movement(
         dt: wanted time between samples [s]; shortened a little to make the duration a whole number of steps.
         limits: what the plan must keep; by default what belongs to the arm.
         q_branch: (6,) posture whose IK branch is followed [rad]; the arm's preferred one by default.
+        rotations: gives R_base_tcp (n, 3, 3) at times (n,) [s], or None for the experiment's fixed one, as
+            no function does.
 
     Returns:
         The plan, all limits kept.
@@ -137,10 +167,50 @@ def plan_movement(
     samples = _sample(movement, dt)
     names = PathNames(movement.name, samples.t, samples.p)
     tcp_speed = check_samples(names, samples, limits)
-    path = follow_path(arm, names, fixed_tcp_rotation(), q_branch=q_branch, limits=limits)
+    turned = None if rotations is None else rotations(samples.t)
+    path = follow_path(
+        arm, names, fixed_tcp_rotation() if turned is None else turned, q_branch=q_branch, limits=limits
+    )
     spline = JointSpline(float(samples.t[-1]), path.q)
     report = check_motion(arm, names, samples, tcp_speed, path, spline, limits)
     return JointPlan(movement.name, _frozen(samples.t), _frozen(samples.p), _frozen(path.q), spline, report)
+
+
+def plan_joints(
+    trajectory: PlannableJoints,
+    *,
+    model: RobotModel,
+    dt: float = DEFAULT_DT,
+    limits: PlanLimits | None = None,
+) -> JointPlan:
+    """Plan a motion that is given in joint angles: a clamped cubic spline through them, checked as all plans.
+
+    Args:
+        trajectory: what the joints shall do.
+        model: nominal arm.
+        dt: wanted time between samples of the plan [s].
+        limits: what the plan must keep; by default what belongs to the arm.
+
+    Raises:
+        PlanningError: a limit is broken; names the sample, its time and point, and the joint.
+    """
+    limits = limits_of(model) if limits is None else limits
+    duration = float(trajectory.t[-1])
+    steps = max(2, ceil(duration / dt - 1e-9))
+    t = np.linspace(0.0, duration, steps + 1)
+    q = np.asarray(CubicSpline(trajectory.t, trajectory.q, bc_type="clamped")(t), dtype=np.float64)
+    spline = JointSpline(duration, q)
+    q, qd = spline.sample(t)
+    jacobians = np.array([tcp_jacobian(model, posture) for posture in q])
+    p = tcp_positions(model, q)
+    v = np.einsum("nij,nj->ni", jacobians[:, :3], qd)
+    between = tcp_positions(model, spline.sample(0.5 * (t[1:] + t[:-1]))[0])
+    samples = CartesianSamples(t, p, v, between)
+    names = PathNames(trajectory.name, t, p)
+    exact = np.zeros(len(t))
+    path = JointPath(q, exact, exact, measure_singularity(jacobians), 0)
+    report = check_motion(model, names, samples, check_samples(names, samples, limits), path, spline, limits)
+    return JointPlan(trajectory.name, _frozen(t), _frozen(p), _frozen(q), spline, report)
 
 
 def _sample(movement: PlannableMovement, dt: float) -> CartesianSamples:

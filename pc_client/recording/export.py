@@ -6,6 +6,7 @@ Vectors become one column a component, `actual_q_0` .. `actual_q_5`; names and u
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -48,13 +49,17 @@ def export(recording: Recording, path: Path | str, format: ExportFormat = "csv")
 
 def flat_columns(recording: Recording) -> dict[str, NDArray[np.float64]]:
     """Return every number of the rows as its own column (n,), in file order."""
+    return split_columns({signal.name: recording.column(signal.name) for signal in recording.signals})
+
+
+def split_columns(signals: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    """Return every component of signals (n,) or (n, count) as its own column (n,), such as `actual_q_0`."""
     columns: dict[str, NDArray[np.float64]] = {}
-    for signal in recording.signals:
-        values = recording.column(signal.name)
-        if signal.count == 1:
-            columns[signal.name] = values
+    for name, values in signals.items():
+        if values.ndim == 1:
+            columns[name] = values
         else:
-            columns.update({f"{signal.name}_{i}": values[:, i] for i in range(signal.count)})
+            columns.update({f"{name}_{i}": values[:, i] for i in range(values.shape[1])})
     return columns
 
 

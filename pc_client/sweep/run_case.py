@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import ClientError, GainMarginError, full_message
-from pc_client.experiment.prepare import Experiment, PlannedMovement, prepare_experiment
+from pc_client.experiment.prepare import Experiment, Plan, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.robot_model import robot_model
@@ -79,7 +79,7 @@ def _run(
 
 
 @lru_cache(maxsize=64)
-def _planned(movement: MovementFile, robot: str, cell: Cell) -> PlannedMovement:
+def _planned(movement: MovementFile, robot: str, cell: Cell) -> Plan:
     """Plan a movement, once for all cases of this worker; a plan is never changed."""
     with TemporaryDirectory(prefix="ur-sweep-") as folder:
         path = Path(folder) / movement.file_name

@@ -12,11 +12,11 @@ from recording_samples import PERIOD, record_movement
 
 from pc_client.analysis.budget import PARTS
 from pc_client.analysis.metrics import rest_noise
-from pc_client.analysis.run import Run, analyse_run
+from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.recording.loader import load_recording
 
 
-def analysed(tmp_path: Path, **fault: Any) -> Run:
+def analysed(tmp_path: Path, **fault: Any) -> MeasuredRun:
     return analyse_run(load_recording(record_movement(tmp_path / "a.mcap", **fault)))
 
 

@@ -11,7 +11,7 @@ import pytest
 from recording_samples import N_VALUES, PERIOD, SIGNALS, bell, provenance, record_movement
 
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
-from pc_client.analysis.run import Run, analyse_run
+from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.analysis.speed_noise import speed_noise
 from pc_client.analysis.table import build_table
 from pc_client.control.loop_model import LoopModel, velocity_response
@@ -26,7 +26,7 @@ Q0 = np.array((0.4, -1.77, -2.1, -0.1, 1.3, 1.86))
 WAY = np.array((0.5, 0.3, -0.4, 0.2, -0.1, 0.3))
 
 
-def record_joints(path: Path, seed: int, *, ripple: float = 0.0, push: float = 0.0) -> Run:
+def record_joints(path: Path, seed: int, *, ripple: float = 0.0, push: float = 0.0) -> MeasuredRun:
     """A joint movement on a UR3 whose only fault is the noise of its encoders (and a ripple that repeats).
 
     `push` [rad/s] is the size of a command beside those that make it perfect, and of its effect.
@@ -55,12 +55,12 @@ def record_joints(path: Path, seed: int, *, ripple: float = 0.0, push: float = 0
 
 
 @pytest.fixture(scope="module")
-def perfect(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
+def perfect(tmp_path_factory: pytest.TempPathFactory) -> list[MeasuredRun]:
     folder = tmp_path_factory.mktemp("perfect")
     return [record_joints(folder / f"a_r{k}.mcap", k) for k in range(1, 7)]
 
 
-def test_a_perfect_arm_stands_on_its_floor(perfect: list[Run]) -> None:
+def test_a_perfect_arm_stands_on_its_floor(perfect: list[MeasuredRun]) -> None:
     covariance = step_covariance(perfect)
     assert covariance is not None
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), math.sqrt(2) * SIGMA, rtol=0.15)
@@ -70,7 +70,7 @@ def test_a_perfect_arm_stands_on_its_floor(perfect: list[Run]) -> None:
     assert snr == pytest.approx(floor_db(perfect[0], covariance), abs=0.5)
 
 
-def test_an_error_that_repeats_is_not_in_the_floor(tmp_path: Path, perfect: list[Run]) -> None:
+def test_an_error_that_repeats_is_not_in_the_floor(tmp_path: Path, perfect: list[MeasuredRun]) -> None:
     spoilt = [record_joints(tmp_path / f"a_r{k}.mcap", k, ripple=8e-4) for k in range(1, 7)]
     clean, ours = (floor_db(runs[0], step_covariance(runs)) for runs in (perfect, spoilt))
     assert clean is not None
@@ -83,7 +83,7 @@ def test_an_error_that_repeats_is_not_in_the_floor(tmp_path: Path, perfect: list
     assert ours - 0.3 < unrepeatable < ours + 2.0
 
 
-def test_what_the_commands_differ_by_is_taken_out(tmp_path: Path, perfect: list[Run]) -> None:
+def test_what_the_commands_differ_by_is_taken_out(tmp_path: Path, perfect: list[MeasuredRun]) -> None:
     pushed = [record_joints(tmp_path / f"a_r{k}.mcap", k, push=0.005 * k) for k in (1, 2, 3)]
     alike, driven = unrepeatable_power(perfect[:3]), unrepeatable_power(pushed)
     assert alike is not None
@@ -93,13 +93,15 @@ def test_what_the_commands_differ_by_is_taken_out(tmp_path: Path, perfect: list[
     assert np.std(differ[1] - differ[0]) > 1.2 * np.std(same[1] - same[0])
 
 
-def test_of_old_recordings_and_single_runs_nothing_is_known(tmp_path: Path, perfect: list[Run]) -> None:
+def test_of_old_recordings_and_single_runs_nothing_is_known(
+    tmp_path: Path, perfect: list[MeasuredRun]
+) -> None:
     assert unrepeatable_power(perfect[:1]) is None
     old = [record_movement(tmp_path / f"b_r{k}.mcap", prov=provenance(repetition=k)) for k in (1, 2)]
     assert unrepeatable_power([analyse_run(load_recording(path)) for path in old]) is None
 
 
-def test_table_shows_the_floor(perfect: list[Run]) -> None:
+def test_table_shows_the_floor(perfect: list[MeasuredRun]) -> None:
     table = build_table(perfect)
     row = table.to_json()["rows"][0]
     assert row["noise_floor_db"] == pytest.approx(table.rows[0].noise_floor_db, abs=1e-6)
@@ -115,7 +117,7 @@ def test_an_endless_margin_is_null_in_json(tmp_path: Path) -> None:
     assert written == {**loop, "gain_margin": None}
 
 
-def test_without_rest_or_a_known_arm_there_is_no_floor(tmp_path: Path, perfect: list[Run]) -> None:
+def test_without_rest_or_a_known_arm_there_is_no_floor(tmp_path: Path, perfect: list[MeasuredRun]) -> None:
     short = analyse_run(load_recording(record_movement(tmp_path / "a.mcap", rest=0.1)))
     assert step_covariance([short]) is None
     assert floor_db(perfect[0], None) is None

@@ -14,7 +14,7 @@ from recording_samples import SIGNALS, append_rows, provenance, record_movement
 from rich.console import Console
 
 from pc_client.analysis.report import build_report
-from pc_client.analysis.run import Run, analyse_run
+from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.analysis.table import PAPER_SNR_DB, Table, build_table
 from pc_client.errors import RecordingError
 from pc_client.recording.loader import load_recording
@@ -29,7 +29,7 @@ def record(folder: Path, movement: str, repetition: int, **changes: object) -> P
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[MeasuredRun]:
     folder = tmp_path_factory.mktemp("runs")
     names = ["lognorm_5_1", "zigzag", "uniform_5_1", "lognorm_4_1", "uniform_4_2"]
     paths = [record(folder, name, k) for name in names for k in (2, 1, 3)]
@@ -37,7 +37,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
 
 
 @pytest.fixture
-def table(runs: list[Run]) -> Table:
+def table(runs: list[MeasuredRun]) -> Table:
     return build_table(runs)
 
 
@@ -90,7 +90,7 @@ def test_json_is_what_others_rely_on(table: Table) -> None:
     assert data["mean_snr_db"]["uniform"] == pytest.approx(sum(uniform) / 2, abs=1e-5)
 
 
-def test_a_kind_without_rows_has_no_mean(runs: list[Run]) -> None:
+def test_a_kind_without_rows_has_no_mean(runs: list[MeasuredRun]) -> None:
     table = build_table([run for run in runs if run.provenance.kind == "uniform"])
     assert table.to_json()["mean_snr_db"]["lognormal"] is None
 
@@ -124,7 +124,9 @@ def test_terminal_table_fits_eighty_columns(table: Table) -> None:
 @pytest.mark.parametrize(
     "change", [{"controller": "paper"}, {"seed": 8}, {"simulated": False}, {"firmware": "3.14.3"}]
 )
-def test_different_experiments_do_not_mix(tmp_path: Path, runs: list[Run], change: dict[str, object]) -> None:
+def test_different_experiments_do_not_mix(
+    tmp_path: Path, runs: list[MeasuredRun], change: dict[str, object]
+) -> None:
     stranger = analyse_run(load_recording(record(tmp_path, "lognorm_5_2", 1, **change)))
     with pytest.raises(RecordingError, match=r"lognorm_5_2_r1\.mcap is of another experiment"):
         build_table([*runs, stranger])

@@ -210,4 +210,4 @@ def test_an_experiment_is_planned_in_its_cell(tmp_path):
     far = replace(press, solids=(replace(press.solids[0], centre=(2.0, 0.0, 0.0)),))
     experiment = prepare_experiment(movements, repeat=1, out=tmp_path, cell=far)
     assert experiment.model.cell.text == "the file"
-    assert experiment.planned[0].plan.report.cell is far
+    assert experiment.planned[0].joints.report.cell is far

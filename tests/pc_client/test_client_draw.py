@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from drawing_samples import one_part, recording_text, two_parts_and_a_dot
 from fake_robot import FakeRobot
 
+import pc_client.api.arm as arm_module
 import pc_client.commands.draw as draw_module
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
@@ -29,7 +31,7 @@ def robot(monkeypatch):
     """A robot in memory instead of the network."""
     fake = FakeRobot()
     fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
-    for module in (transport, ur_driver_module):
+    for module in (transport, ur_driver_module, arm_module):
         monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
     return fake
 
@@ -231,7 +233,7 @@ def test_a_drawing_is_placed_in_the_box_of_the_arm_that_answers(robot, file, tmp
         raise ClientError("far enough")
 
     monkeypatch.setattr(draw_module, "execute", stop)
-    monkeypatch.setattr(draw_module, "ask_robot", lambda *_: (None, robot_model("ur10")))
+    monkeypatch.setattr(draw_module, "reach", lambda *_: SimpleNamespace(model=robot_model("ur10")))
     assert cli.run(["draw", str(file), "--robot", "x", "--out", str(tmp_path / "o"), "--size", "max"]) == 1
     (movement,) = drawings
     p = movement.sample(np.linspace(0.0, movement.duration, 500)).p

@@ -140,5 +140,5 @@ def test_the_plan_of_the_page_is_the_clients(tmp_path):
     experiment = prepare_experiment(load_movements(["lognorm_4_1"]), repeat=1, out=tmp_path, cell=CELL)
     assert experiment_text(experiment) in PAGE
     q_now = np.radians((22.6, -101.1, -120.3, -5.9, 74.2, 106.4))
-    way = plan_approach(experiment.planned[0].plan, q_now, model=experiment.model)
+    way = plan_approach(experiment.planned[0].joints, q_now, model=experiment.model)
     assert approach_text(way) in PAGE

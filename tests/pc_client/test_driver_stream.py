@@ -302,9 +302,9 @@ class Spoilt:
         self.inner, self.act, self.left = tracker(), act, after
         self.check_report = self.inner.check_report
 
-    def step(self, stamp, q):
+    def answer(self, frame):
         self.left -= 1
-        step = self.inner.step(stamp, q)
+        step = self.inner.answer(frame)
         return self.act(step) if self.left == 0 else step
 
 

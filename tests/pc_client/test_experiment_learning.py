@@ -51,7 +51,7 @@ def two(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def plan(two):
-    return two.planned[1].plan
+    return two.planned[1].joints
 
 
 def run(robot, experiment, out, config=BEST):

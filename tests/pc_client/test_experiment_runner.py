@@ -238,7 +238,7 @@ def test_an_arm_that_does_not_follow_is_found_before_the_first_movement(two, tmp
 @pytest.mark.parametrize(("cycles", "words"), [(21, "gain margin"), (30, "200 ms or more")])
 def test_too_slow_a_loop_is_refused(cycles, words, two, tmp_path):
     with pytest.raises(DriverError, match=words):
-        run(FakeRobot(delay=cycles), with_folder(two, tmp_path), posture=two.planned[0].plan.start_q)
+        run(FakeRobot(delay=cycles), with_folder(two, tmp_path), posture=two.planned[0].joints.start_q)
 
 
 def test_plans_for_a_ur3_do_not_run_on_another_arm(two, tmp_path):

@@ -11,6 +11,7 @@ import sweep_samples
 from fake_robot import FakeRobot
 from sweep_samples import write
 
+import pc_client.api.arm as arm_module
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
@@ -221,7 +222,7 @@ def robot(monkeypatch):
     """A robot in memory instead of the network."""
     fake = FakeRobot()
     fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
-    for module in (transport, ur_driver_module):
+    for module in (transport, ur_driver_module, arm_module):
         monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
     return fake
 

@@ -151,7 +151,7 @@ def test_a_given_robot_stands_in_its_cell(tmp_path):
     # The cell belongs to what a case is; the port does not.
     assert cases[0].identity != cases[1].identity == cases[2].identity
     assert plan_case(cases[1]).model.cell is config.cell
-    assert plan_case(cases[1]).planned[0].plan.report.cell == config.cell
+    assert plan_case(cases[1]).planned[0].joints.report.cell == config.cell
 
 
 def test_a_file_that_is_not_there(tmp_path):

@@ -1,0 +1,278 @@
+"""`connect` and `Arm`: a robot, real or emulated, that runs plans and velocity laws.
+
+Nothing here can tell an emulator from a robot; only the address differs. Each motion opens a session, holds
+the robot against its model, streams under the watchdog and leaves the arm at rest; between motions no
+connection is open.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from pc_client.api.signals import Run, Signals
+from pc_client.control.controller import CONTROLLERS, DEFAULT, Controller
+from pc_client.driver.condition import conditions_text
+from pc_client.driver.robot_report import RobotReport, read_report
+from pc_client.driver.transport import TcpNetwork
+from pc_client.driver.ur_driver import UrDriver
+from pc_client.errors import ClientError
+from pc_client.experiment.experiment_text import experiment_text
+from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
+from pc_client.experiment.observer import Observer
+from pc_client.experiment.preflight import model_of, preflight, require
+from pc_client.experiment.prepare import Experiment, Motion, Plan, make_plan
+from pc_client.experiment.runner import ExperimentReport, ExperimentRunner
+from pc_client.kinematics.cell import NO_CELL, Cell
+from pc_client.kinematics.cell_file import load_cell
+from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.planning.approach import plan_approach
+from pc_client.planning.plan_text import approach_text
+from protocol.realtime.layout import RealtimeFrame
+from protocol.ur_types import Ports
+
+__all__ = ["Arm", "Confirm", "connect", "plan"]
+
+Confirm = Callable[[str], bool]
+"""Is shown what an arm is going to do that is not known to be simulated; returns whether it may."""
+
+_NOBODY = (
+    "nobody can be asked whether the arm may move: run this at a terminal, or give "
+    "connect(..., confirm=lambda text: True) where somebody has made sure"
+)
+QUESTION = "The arm is going to move. Is the space around it free, and the emergency stop at hand?"
+
+
+def ask_at_terminal(text: str) -> bool:
+    """Show what is going to happen and ask at the terminal.
+
+    Raises:
+        ClientError: nobody can be asked.
+    """
+    if sys.stdin is None or sys.stdin.closed:
+        raise ClientError(_NOBODY)
+    print(text)
+    try:
+        return input(f"{QUESTION} [y/N]: ").strip().lower() in ("y", "yes")
+    except EOFError:
+        raise ClientError(_NOBODY) from None
+
+
+def connect(
+    host: str,
+    ports: Ports | None = None,
+    *,
+    cell: Cell | str | Path | None = None,
+    reverse_port: int | None = None,
+    confirm: Confirm = ask_at_terminal,
+) -> Arm:
+    """Ask a robot what it is and hold it against its model; it stays as it is.
+
+    Args:
+        host: its name or address.
+        ports: its ports; the standard ones by default.
+        cell: what stands around it and what it carries: a record or a file (docs/real-arm.md).
+        reverse_port: where its programs dial back; 31000 by default.
+        confirm: is asked before a motion of an arm that is not known to be simulated.
+
+    Raises:
+        ClientError: it does not answer, does not tell which arm it is, or is not as it must be.
+    """
+    surroundings = load_cell(cell) if isinstance(cell, str | Path) else cell or NO_CELL
+    numbers = ports or Ports.standard()
+    report = read_report(TcpNetwork(), host, numbers)
+    model = model_of(report, surroundings)
+    require(preflight(report, model))
+    if model is None:
+        raise ClientError(f"{host} does not tell which arm it is: there is no plan for it")
+    return Arm(host, numbers, report, model, reverse_port, confirm)
+
+
+def plan(motion: Motion, arm: Arm | str = "ur3", cell: Cell = NO_CELL) -> Plan:
+    """Plan a motion: inverse kinematics, spline, all limits checked. Nothing moves.
+
+    Args:
+        motion: a movement of the TCP, or a `JointTrajectory`.
+        arm: a connected one, or the name of a model, such as "ur3".
+        cell: what stands around a named model and what it carries; a connected arm has its own.
+
+    Raises:
+        PlanningError: the arm cannot do it; names the sample, its time and point, and the joint.
+    """
+    return make_plan(motion, robot_model(arm, cell) if isinstance(arm, str) else arm.model)
+
+
+class Arm:
+    """A robot that is as its model expects; made by `connect`. Use as a context manager or not.
+
+    Attributes:
+        report: what it reported when it was connected.
+        model: the nominal model of its arm in its cell.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        ports: Ports,
+        report: RobotReport,
+        model: RobotModel,
+        reverse_port: int | None,
+        confirm: Confirm,
+    ) -> None:
+        self._host = host
+        self._ports = ports
+        self.report = report
+        self.model = model
+        self._reverse_port = reverse_port
+        self._confirm = confirm
+
+    def __repr__(self) -> str:
+        return f"<Arm {self.report.info} at {self._host}>"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Nothing is open between motions: there is nothing to close."""
+
+    @property
+    def simulated(self) -> bool | None:
+        """True, False, or None where the robot does not tell."""
+        return self.report.info.simulated
+
+    def frame(self) -> RealtimeFrame:
+        """The robot's state now: `actual_q`, `actual_TCP_pose` and so on, by RTDE name in lower case.
+
+        Raises:
+            DriverError: it does not answer.
+        """
+        return read_report(TcpNetwork(), self._host, self._ports).frame
+
+    def run(
+        self,
+        plan: Plan | Motion,
+        controller: Controller = CONTROLLERS[DEFAULT],
+        *,
+        out: str | Path | None = None,
+    ) -> Run:
+        """Move to the begin of a plan, identify the loop, follow the plan, and measure what came of it.
+
+        Args:
+            plan: from `plan`, or what it takes.
+            controller: which velocity controller.
+            out: folder where the recording stays; None: it is not kept.
+
+        Raises:
+            ClientError: a check failed or the robot stopped; the arm rests.
+        """
+        return self.repeat(plan, 1, controller, out=out)[0]
+
+    def repeat(
+        self,
+        plan: Plan | Motion,
+        times: int,
+        controller: Controller = CONTROLLERS[DEFAULT],
+        *,
+        out: str | Path | None = None,
+    ) -> tuple[Run, ...]:
+        """Run a plan several times; a controller that learns does so from one run to the next.
+
+        Arguments and errors are those of `run`.
+        """
+        made = plan if isinstance(plan, Plan) else make_plan(plan, self.model)
+        with tempfile.TemporaryDirectory(prefix="ur-client-") as folder:
+            report = self.experiment([made], times, controller, Path(folder) if out is None else Path(out))
+            return tuple(Run.from_file(path) for path in report.paths)
+
+    def experiment(
+        self,
+        plans: Sequence[Plan],
+        repeat: int,
+        controller: Controller,
+        out: Path,
+        observer: Observer | None = None,
+    ) -> ExperimentReport:
+        """Run several plans and keep their recordings.
+
+        Args:
+            plans: in order; their movements have different names.
+            repeat: runs of each, at least 1.
+            controller: the same for all runs.
+            out: folder of the recordings.
+            observer: is told what goes on.
+
+        Raises:
+            ClientError: a check failed, the robot stopped or the answer was no; the arm rests, recordings
+                finished until then are complete.
+        """
+        wanted = Experiment(self.model, tuple(plans), repeat, out)
+        self.confirm(wanted)
+        with self._session() as driver:
+            return ExperimentRunner(driver, wanted, controller, observer).run()
+
+    def stream(self, law: VelocityLaw, *, acceleration: float = ACCELERATION) -> Signals:
+        """Let a velocity law drive the arm from where it stands, under the watchdog of every motion.
+
+        Before each velocity is sent, the posture in which the arm could rest is held against joint ranges
+        and clearances. A law that raises ends the motion; the arm is stopped.
+
+        Args:
+            law: takes each frame, returns (6,) joint velocities [rad/s], or None to end.
+            acceleration: of the robot's `speedj` [rad/s2].
+
+        Raises:
+            ClientError: the law gave what cannot be sent, or the robot stopped; the arm rests.
+        """
+        source = LawStream(law, self.model)
+        top = np.degrees(max(source.qd_max))
+        self._ask(lambda: f"a velocity law drives the arm at {self._host}, joints up to {top:.0f} deg/s")
+        rows: list[tuple[float, np.ndarray, np.ndarray, np.ndarray, list[float]]] = []
+
+        def keep(frame: RealtimeFrame, step: LawStep) -> None:
+            pose = frame.actual_tcp_pose
+            rows.append((frame.timestamp, frame.actual_q, frame.actual_qd, pose, step.qd_cmd))
+
+        with self._session() as driver:
+            require(preflight(driver.report(), self.model))
+            driver.stream(source, keep, acceleration=acceleration)
+        if not rows:
+            raise ClientError("the velocity law ended before its first velocity: there are no signals")
+        t, q, qd, pose, command = (np.array(column, dtype=np.float64) for column in zip(*rows, strict=True))
+        return Signals(t - t[0], q, qd, pose, command, self.simulated)
+
+    def confirm(self, wanted: Experiment) -> None:
+        """Ask whether an arm that is not known to be simulated may do an experiment; nothing moves.
+
+        Raises:
+            ClientError: the answer was no, nobody can be asked, or there is no clear way to the start.
+        """
+        self._ask(lambda: self._text_of(wanted))
+
+    def _session(self) -> UrDriver:
+        return UrDriver(self._host, self._ports, reverse_port=self._reverse_port)
+
+    def _ask(self, text: Callable[[], str]) -> None:
+        """Ask whether an arm may move, unless it says itself that it is simulated."""
+        if self.simulated is not True and not self._confirm(text()):
+            raise ClientError("the arm was not moved: the answer was no")
+
+    def _text_of(self, wanted: Experiment) -> str:
+        """What an experiment is going to do, for people beside the arm."""
+        report = read_report(TcpNetwork(), self._host, self._ports)
+        approach = plan_approach(wanted.planned[0].joints, report.frame.actual_q, model=self.model)
+        return "\n".join(
+            (
+                f"robot at {self._host}: {report.info}",
+                conditions_text(preflight(report, self.model)),
+                experiment_text(wanted),
+                approach_text(approach),
+            )
+        )

@@ -1,0 +1,105 @@
+"""`Movement` with its constructors: through points, from samples, from files, from the library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pc_client.movements import movement
+from pc_client.movements.files import load_movement
+from pc_client.movements.own_points import Style, through
+from pc_client.movements.robotic import Corners
+from pc_client.movements.samples import SampledLaw, rotations_of
+from pc_client.movements.twins import SETBACK
+
+__all__ = ["Movement"]
+
+
+class Movement(movement.Movement):
+    """A movement of the TCP from rest to rest, in the robot's base frame; metres and seconds.
+
+    It knows no robot: `plan` says whether an arm can do it.
+    """
+
+    __slots__ = ()
+
+    @classmethod
+    def through(
+        cls,
+        points: ArrayLike,
+        style: Style = "human",
+        durations: ArrayLike | None = None,
+        *,
+        name: str = "through",
+        corners: Corners = "stop",
+        setback: float = SETBACK,
+    ) -> Self:
+        """A movement that begins at the first point, rests at each of the others and ends at the last.
+
+        Args:
+            points: (n, 3) [m]; at least two, consecutive ones apart.
+            style: "human", straight lognormal strokes by the paper's recipe; "robot", a smoothed trapezoid of
+                speed on the same lines.
+            durations: of the strokes between the points, (n - 1,) [s]; chosen from their lengths if None.
+            name: as in recordings and tables.
+            corners: of "robot" only: "stop" at inner points, or "blend" them.
+            setback: of blended corners [m].
+
+        Raises:
+            MovementError: points, durations or choices make no sense.
+        """
+        return cls._of(through(points, style, durations, name=name, corners=corners, setback=setback))
+
+    @classmethod
+    def from_samples(
+        cls, t: ArrayLike, points: ArrayLike, rotations: ArrayLike | None = None, *, name: str = "samples"
+    ) -> Self:
+        """A movement brought along as samples; a spline goes through them, nothing is smoothed.
+
+        Args:
+            t: (n,) increasing times [s], n >= 4.
+            points: (n, 3) positions [m].
+            rotations: orientation of the TCP at each sample: rotation vectors (n, 3) [rad] or quaternions
+                (n, 4) x, y, z, w. None: the experiment's fixed orientation, tool forward and 45 degrees down.
+            name: as in recordings and tables.
+
+        Raises:
+            MovementError: shapes or values make no sense.
+        """
+        turns = None if rotations is None else rotations_of(rotations)
+        law = SampledLaw(np.asarray(t, dtype=np.float64), np.asarray(points, dtype=np.float64), turns)
+        return cls(name, law, np.array([law.duration]))
+
+    @classmethod
+    def from_csv(cls, path: str | Path) -> Self:
+        """A movement from a table of samples: x, y, z, t, or with orientations; see docs/movements.md.
+
+        Raises:
+            MovementError: the file cannot be read or makes no sense; names the line.
+        """
+        return cls._of(load_movement(Path(path)))
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Self:
+        """A movement from a file of its parameters.
+
+        Raises:
+            MovementError: the file cannot be read or makes no sense; names the field.
+        """
+        return cls._of(load_movement(Path(path)))
+
+    @classmethod
+    def library(cls, name: str) -> Self:
+        """A movement of the library, such as "lognorm_4_1"; `ur-client movements list` names all.
+
+        Raises:
+            MovementError: there is none of that name.
+        """
+        return cls._of(load_movement(name))
+
+    @classmethod
+    def _of(cls, one: movement.Movement) -> Self:
+        return cls(one.name, one.law, one.stroke_durations, one.provenance)

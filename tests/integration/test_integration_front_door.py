@@ -1,0 +1,170 @@
+"""`import pc_client as ur` against a box on real sockets: what a user's program does, and what it is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pc_client as ur
+from pc_client.errors import PlanningError
+from pc_client.planning.orientation import fixed_tcp_rotation
+from ur_emulator import ControlBox
+
+POINTS = [(0.30, -0.10, 0.30), (0.30, 0.05, 0.35)]
+
+
+@pytest.fixture(scope="module")
+def box():
+    with ControlBox(pace="lockstep", port_base=None, seed=7) as box:
+        yield box
+
+
+@pytest.fixture
+def arm(box):
+    return ur.connect(box.host, box.ports)
+
+
+@pytest.fixture(scope="module")
+def run(box):
+    """One run of one movement."""
+    with ur.connect(box.host, box.ports) as arm:
+        plan = ur.plan(ur.Movement.through(POINTS, style="human", durations=[2.5]), arm)
+        return arm.run(plan, controller=ur.Controller.paper(gain_p=4.5))
+
+
+def test_a_run_has_its_signals_as_arrays(run):
+    n = len(run.t)
+    assert run.q.shape == run.qd.shape == run.tcp_pose.shape == run.qd_cmd.shape == run.ref_q.shape == (n, 6)
+    assert run.tcp_speed.shape == (n,)
+    assert run.ref_tcp_position.shape == (n, 3)
+    moving = (run.t >= 0.0) & (run.t <= 2.5)
+    assert run.tcp_speed[moving].max() == pytest.approx(run.tcp_speed.max())
+    np.testing.assert_allclose(run.tcp_pose[-1, :3], POINTS[-1], atol=5e-3)
+    np.testing.assert_allclose(run.ref_tcp_position[-1], POINTS[-1], atol=1e-5)
+
+
+def test_a_run_is_judged_by_the_speed_of_its_tcp(run):
+    moving = run.measured.track.movement_steps
+    wanted = np.linalg.norm(np.diff(run.ref_tcp_position, axis=0), axis=1) / np.diff(run.t)
+    error = (run.tcp_speed[1:] - wanted)[moving]
+    assert run.snr == pytest.approx(10.0 * np.log10(np.sum(wanted[moving] ** 2) / np.sum(error**2)))
+    assert run.simulated is True
+    assert "paper with gain_p 4.5" in repr(run)
+
+
+def test_a_run_is_a_table(run):
+    frame = run.to_frame()
+    assert len(frame) == len(run.t)
+    np.testing.assert_array_equal(frame["t"].to_numpy(), run.t)
+    np.testing.assert_array_equal(frame["actual_q_2"].to_numpy(), run.q[:, 2])
+
+
+def test_a_run_is_a_figure_that_says_it_is_simulated(run):
+    figure = run.plot()
+    assert [text.get_text() for text in figure.texts] == ["SIMULATED"]
+    assert "TCP speed" in {axes.get_title("left") for axes in figure.axes}
+
+
+def test_the_recording_stays_where_a_folder_is_given(arm, tmp_path):
+    run = arm.run(ur.Movement.through(POINTS, style="robot", durations=[2.0], name="mine"), out=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine_r1.mcap"]
+    again = ur.Run.from_file(tmp_path / "mine_r1.mcap")
+    assert again.snr == run.snr
+    np.testing.assert_array_equal(again.q, run.q)
+
+
+def test_a_controller_that_learns_does_so_from_run_to_run(arm):
+    first, second = arm.repeat(ur.Movement.through(POINTS, durations=[2.0]), 2, ur.Controller.best())
+    assert second.measured.recording.summary["learned_from"] == 1
+    assert second.snr > first.snr
+
+
+def test_a_velocity_law_moves_the_arm_and_ends(arm):
+    began = []
+
+    def law(frame):
+        began.append(frame.timestamp)
+        s = frame.timestamp - began[0]
+        return None if s > 1.0 else [0.2 * np.sin(np.pi * s), 0, 0, 0, 0, 0]
+
+    signals = arm.stream(law)
+    assert np.ptp(signals.q[:, 0]) == pytest.approx(0.2 * 2.0 / np.pi, abs=0.01)
+    assert len(signals.to_frame()) == len(signals.t)
+    assert len(signals.plot().axes) == 3
+
+
+@pytest.mark.parametrize(
+    ("law", "complaint"),
+    [
+        (lambda frame: [0.0] * 5, "six finite velocities"),
+        (lambda frame: [np.nan] * 6, "six finite velocities"),
+        (lambda frame: "fast", "six finite velocities"),
+        (lambda frame: [9.0, 0, 0, 0, 0, 0], "not safe to send"),
+        (lambda frame: [0, 0.8, 0, 0, 0, 0], "comes within"),
+        (lambda frame: None, "there are no signals"),
+    ],
+)
+def test_a_velocity_law_that_leads_out_of_the_limits_ends_at_rest(arm, law, complaint):
+    arm.run(ur.Movement.through(POINTS, durations=[2.0]))
+    with pytest.raises(ur.ClientError, match=complaint):
+        arm.stream(law)
+    assert np.abs(arm.frame().actual_qd).max() < 0.01
+
+
+def test_what_a_law_raises_comes_through_and_the_arm_rests(arm):
+    with pytest.raises(ZeroDivisionError):
+        arm.stream(lambda frame: [1.0 / 0.0])
+    assert np.abs(arm.frame().actual_qd).max() < 0.01
+
+
+def test_joint_angles_over_time_are_a_motion(arm):
+    begin = ur.plan(ur.Movement.through(POINTS), arm).joints.start_q
+    t = np.linspace(0.0, 2.0, 30)
+    q = begin + np.outer(0.5 * (1.0 - np.cos(np.pi * t / 2.0)), [0.2, 0.05, -0.1, 0.1, 0.0, 0.3])
+    run = arm.run(ur.JointTrajectory(t, q))
+    np.testing.assert_allclose(run.ref_q[-1], q[-1], atol=1e-9)
+    np.testing.assert_allclose(run.q[-1], q[-1], atol=2e-3)
+
+
+def test_samples_with_orientations_turn_the_tool(arm):
+    t = np.linspace(0.0, 2.0, 200)
+    points = np.array(POINTS[0]) + np.outer(0.5 * (1.0 - np.cos(np.pi * t / 2.0)), [0.02, 0.1, 0.0])
+    turn = np.outer(np.sin(np.pi * t / 2.0) ** 2, [0.0, 0.0, 0.3])
+    wanted = Rotation.from_rotvec(turn) * Rotation.from_matrix(fixed_tcp_rotation())
+    by_vectors = ur.Movement.from_samples(t, points, wanted.as_rotvec())
+    by_quaternions = ur.Movement.from_samples(t, points, wanted.as_quat())
+    np.testing.assert_allclose(
+        ur.plan(by_quaternions, arm).joints.q, ur.plan(by_vectors, arm).joints.q, atol=1e-9
+    )
+    run = arm.run(by_vectors)
+    reached = Rotation.from_rotvec(run.tcp_pose[:, 3:])
+    turned = (reached * Rotation.from_matrix(fixed_tcp_rotation()).inv()).magnitude()
+    assert turned.max() == pytest.approx(0.3, abs=0.01)
+    assert turned[-1] < 0.01
+
+
+def test_what_the_arm_cannot_do_is_refused_before_it_moves(arm):
+    with pytest.raises(PlanningError, match="singularity"):
+        arm.run(ur.Movement.through([(0.3, 0.0, 0.3), (1.3, 0.0, 0.3)]))
+
+
+def test_an_arm_that_may_be_real_is_asked_for(box, arm):
+    shown = []
+
+    def no(text):
+        shown.append(text)
+        return False
+
+    real = ur.connect(box.host, box.ports, confirm=no)
+    real.report = dataclasses.replace(
+        real.report, info=dataclasses.replace(real.report.info, simulated=None)
+    )
+    with pytest.raises(ur.ClientError, match="the answer was no"):
+        real.run(ur.Movement.through(POINTS))
+    with pytest.raises(ur.ClientError, match="the answer was no"):
+        real.stream(lambda frame: None)
+    assert "box of motion" in shown[0]
+    assert "velocity law" in shown[1]
