@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pc_client.api.arm import Arm as Arm
     from pc_client.api.arm import connect as connect
     from pc_client.api.arm import plan as plan
+    from pc_client.api.drawing import drawing as drawing
     from pc_client.api.movement import Movement as Movement
     from pc_client.api.signals import Run as Run
     from pc_client.api.signals import Signals as Signals
@@ -40,6 +41,7 @@ _HOMES = {
     "Run": "api.signals",
     "Signals": "api.signals",
     "connect": "api.arm",
+    "drawing": "api.drawing",
     "plan": "api.arm",
 }
 __all__ = sorted(_HOMES)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -23,6 +24,7 @@ from pc_client.driver.robot_report import RobotReport, read_report
 from pc_client.driver.transport import TcpNetwork
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import ClientError
+from pc_client.experiment.approach_run import run_approach
 from pc_client.experiment.experiment_text import experiment_text
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
 from pc_client.experiment.observer import Observer
@@ -217,6 +219,22 @@ class Arm:
         self.confirm(wanted)
         with self._session() as driver:
             return ExperimentRunner(driver, wanted, controller, observer).run()
+
+    def approach(self, plan: Plan) -> Plan:
+        """Move slowly to where a plan begins, on a checked way.
+
+        Returns:
+            The plan in the turns of the joints in which the arm stands now.
+
+        Raises:
+            ClientError: there is no clear way, a check failed or the robot stopped; the arm rests.
+        """
+        self.confirm(Experiment(self.model, (plan,), 1, Path()))
+        with self._session() as driver:
+            require(preflight(driver.report(), self.model))
+            approach = plan_approach(plan.joints, driver.actual_q(), model=self.model)
+            run_approach(driver, approach, self.model)
+        return replace(plan, joints=approach.plan)
 
     def stream(self, law: VelocityLaw, *, acceleration: float = ACCELERATION) -> Signals:
         """Let a velocity law drive the arm from where it stands, under the watchdog of every motion.

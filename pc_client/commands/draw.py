@@ -87,6 +87,7 @@ def draw(
 ) -> None:
     """Draw what people drew: extract strokes, fit them into the workspace, execute, compare."""
     from pc_client.extraction.files import TIME_UNITS
+    from pc_client.extraction.sources import read_recording
 
     if time_unit != "auto" and time_unit not in TIME_UNITS:
         raise typer.BadParameter(f"no time unit {time_unit!r}: give auto or one of {', '.join(TIME_UNITS)}")
@@ -95,7 +96,7 @@ def draw(
     options = _options(plane, size, rotate, lift, y)
     import matplotlib  # noqa: F401  # complains before the work is done
 
-    recordings = [_read(file, None if time_unit == "auto" else time_unit) for file in files]
+    recordings = [read_recording(file, None if time_unit == "auto" else time_unit) for file in files]
     drawings = _make(recordings, options, slower, robot, settings)
     if save is not None:
         from pc_client.movements.files import save_movement
@@ -131,28 +132,6 @@ def _number(text: str, option: str, word: str) -> float:
         return float(text)
     except ValueError as error:
         raise typer.BadParameter(f"{option} {text!r}: give a number or {word}") from error
-
-
-def _read(given: str, time_unit: str | None) -> PenRecording:
-    """The recording that a user means by a file, or by a path inside an archive.
-
-    Raises:
-        ClientError: it cannot be read, or is a folder or an archive of many.
-    """
-    from pc_client.extraction.files import parse_pen
-    from pc_client.extraction.sources import PenSource, contents
-
-    archive, inside, member = given.partition(".zip:")
-    if inside:
-        source = PenSource(member, Path(f"{archive}.zip"), member)
-    elif Path(given).is_dir() or given.lower().endswith(".zip"):
-        raise ClientError(f"{given} holds many recordings: name one, a file or ARCHIVE.zip:PATH")
-    else:
-        source = PenSource(given, Path(given))
-    ((_, content),) = contents([source])
-    if isinstance(content, Exception):
-        raise content
-    return parse_pen(content, source.name, time_unit)
 
 
 def _make(

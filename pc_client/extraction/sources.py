@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from pc_client.errors import RecordingError
+from pc_client.extraction.files import parse_pen
+from pc_client.extraction.recording import PenRecording
 from pc_client.input_files import FILE_KINDS, MIB, read_bytes
 
-__all__ = ["PenSource", "contents", "pen_sources"]
+__all__ = ["PenSource", "contents", "pen_sources", "read_recording"]
 
 #: Files that are taken for recordings in a folder or an archive; a file that is named itself is always.
 SUFFIXES = (".csv", ".tsv", ".txt")
@@ -76,6 +78,30 @@ def contents(sources: Iterable[PenSource]) -> Iterator[tuple[PenSource, bytes | 
                 yield source, RecordingError(f"{source.name}: cannot be read ({error.strerror or error})")
             except _BROKEN_ARCHIVE as error:
                 yield source, RecordingError(f"{source.name}: cannot be unpacked ({error})")
+
+
+def read_recording(given: str | Path, time_unit: str | None = None) -> PenRecording:
+    """The one recording that is meant by a file, or by `ARCHIVE.zip:PATH`.
+
+    Args:
+        given: which.
+        time_unit: of `files.TIME_UNITS`; None: found from the times.
+
+    Raises:
+        RecordingError: it cannot be read, or is a folder or an archive of many.
+    """
+    text = str(given)
+    archive, inside, member = text.partition(".zip:")
+    if inside:
+        source = PenSource(member, Path(f"{archive}.zip"), member)
+    elif Path(text).is_dir() or text.lower().endswith(".zip"):
+        raise RecordingError(f"{text} holds many recordings: name one, a file or ARCHIVE.zip:PATH")
+    else:
+        source = PenSource(text, Path(text))
+    ((_, content),) = contents([source])
+    if isinstance(content, RecordingError):
+        raise content
+    return parse_pen(content, source.name, time_unit)
 
 
 def _unpack(archive: zipfile.ZipFile, member: str) -> bytes:

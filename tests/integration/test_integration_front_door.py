@@ -159,9 +159,7 @@ def test_an_arm_that_may_be_real_is_asked_for(box, arm):
         return False
 
     real = ur.connect(box.host, box.ports, confirm=no)
-    real.report = dataclasses.replace(
-        real.report, info=dataclasses.replace(real.report.info, simulated=None)
-    )
+    real.report = dataclasses.replace(real.report, info=dataclasses.replace(real.report.info, simulated=None))
     with pytest.raises(ur.ClientError, match="the answer was no"):
         real.run(ur.Movement.through(POINTS))
     with pytest.raises(ur.ClientError, match="the answer was no"):
