@@ -16,6 +16,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from ur_hil import check_packages
+
 if TYPE_CHECKING:
     from pc_client.api.arm import Arm as Arm
     from pc_client.api.arm import connect as connect
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
     from pc_client.experiment.prepare import Plan as Plan
     from pc_client.kinematics.cell import Cell as Cell
     from pc_client.movements.joint_trajectory import JointTrajectory as JointTrajectory
+
+check_packages()
 
 _HOMES = {
     "Arm": "api.arm",

@@ -12,10 +12,10 @@ ROOT = Path(__file__).parent.parent
 OURS = {"protocol", "urscript", "ur_emulator", "pc_client"}
 MAY_IMPORT = {
     "protocol": {"numpy"},
-    "urscript": {"protocol", "lark", "numpy", "typer", "rich"},
-    "ur_emulator": {"urscript", "protocol", "mujoco", "numpy", "h11", "typer", "rich", "pytest"},
+    "urscript": {"ur_hil", "protocol", "lark", "numpy", "typer", "rich"},
+    "ur_emulator": {"ur_hil", "urscript", "protocol", "mujoco", "numpy", "h11", "typer", "rich", "pytest"},
     "pc_client": {
-        "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "pyarrow", "polars", "mpl_toolkits", "distributed",
+        "ur_hil", "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "pyarrow", "polars", "mpl_toolkits", "distributed",
     },
 }  # fmt: skip
 # Modules of the standard library that a layer must not touch, and the folders in which it may.

@@ -10,9 +10,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ur_hil import check_packages
+
 if TYPE_CHECKING:
     from ur_emulator.emulator import ControlBox
     from ur_emulator.rack import BoxRack
+
+check_packages()
 
 __all__ = ["BoxRack", "ControlBox"]
 

@@ -12,6 +12,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
+from ur_hil import check_packages
+
 if TYPE_CHECKING:
     from urscript.errors import (
         ScriptCompileError,
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
     from urscript.run.threads import ScriptThread
     from urscript.run.waits import NEXT_CYCLE, Blocked
     from urscript.values import Matrix, Pose
+
+check_packages()
 
 _HOME: Final = {
     "ScriptCompileError": "errors",
