@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,6 +26,9 @@ __all__ = ["FORMS", "MIN_SAMPLES", "SampledLaw", "rotations_of", "samples_of", "
 
 #: Fewest samples of a movement: a cubic has four coefficients.
 MIN_SAMPLES = 4
+
+#: No joint of a UR arm turns faster than 2 pi rad/s; three wrists together stay below this, rad/s.
+_FASTEST_TURN = 20.0
 
 #: How far from 1 the length of a quaternion may be: three digits in a file.
 _QUATERNION_TOLERANCE = 2e-3
@@ -75,19 +77,27 @@ class SampledLaw:
         t = read_only(t - t[0])
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "points", points)
-        spline = None
-        with np.errstate(over="ignore", divide="ignore", invalid="ignore"), suppress(ValueError):
-            spline = CubicSpline(t, points, bc_type="natural")
-        if spline is None or not np.isfinite(spline.c).all():
+        turns = self.orientations
+        if turns is not None and (turns.single or len(turns) != len(t)):
+            raise MovementError(f"orientations for {len(t)} samples: give one for each")
+        if turns is not None:
+            _check_turning(t, turns)
+        try:
+            with np.errstate(over="raise", divide="raise", invalid="raise"):
+                spline = CubicSpline(t, points, bc_type="natural")
+                rotations = None if turns is None else RotationSpline(t, turns)
+                between = t[:-1, None] + np.diff(t)[:, None] * [0.0, 0.5, 1.0]
+                values = [spline.c] if rotations is None else [spline.c, rotations(between.ravel()).as_quat()]
+                is_finite = all(np.isfinite(value).all() for value in values)
+        except (ValueError, FloatingPointError):
+            is_finite = False
+        if not is_finite:
             raise MovementError(
                 f"samples up to {np.abs(points).max():g} away with times from {np.diff(t).min():g} s apart: "
                 "the speed between them is no number; give metres and seconds"
             )
         object.__setattr__(self, "_spline", spline)
-        turns = self.orientations
-        if turns is not None and (turns.single or len(turns) != len(t)):
-            raise MovementError(f"orientations for {len(t)} samples: give one for each")
-        object.__setattr__(self, "_rotations", None if turns is None else RotationSpline(t, turns))
+        object.__setattr__(self, "_rotations", rotations)
 
     @property
     def duration(self) -> float:
@@ -119,6 +129,18 @@ class SampledLaw:
     def stretched(self, factor: float) -> SampledLaw:
         """The samples `factor` times as slow."""
         return SampledLaw(self.t * factor, self.points, self.orientations)
+
+
+def _check_turning(t: NDArray[np.float64], turns: Rotation) -> None:
+    """Refuse orientations that no wrist follows; through them there is no spline either."""
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        speed = (turns[:-1].inv() * turns[1:]).magnitude() / np.diff(t)
+    if not (speed <= _FASTEST_TURN).all():
+        k = int(np.argmax(~(speed <= _FASTEST_TURN)))
+        raise MovementError(
+            f"the orientation turns at {speed[k]:.3g} rad/s from sample {k} to {k + 1}: give samples that "
+            f"turn at {_FASTEST_TURN:g} rad/s at most"
+        )
 
 
 def rotations_of(values: ArrayLike) -> Rotation:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import fuzz_mutations as mutations
 from fuzz_cases import Target
+from pc_client.control.controller_file import read_controller
 from recording_samples import record_movement
 
 from pc_client.analysis.run import analyse_run
-from pc_client.control.controller_file import read_controller
 from pc_client.errors import ClientError
 from pc_client.extraction.files import parse_pen
 from pc_client.extraction.sources import contents, pen_sources
