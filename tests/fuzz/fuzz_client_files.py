@@ -8,10 +8,10 @@ from pathlib import Path
 
 import fuzz_mutations as mutations
 from fuzz_cases import Target
-from pc_client.control.controller_file import read_controller
 from recording_samples import record_movement
 
 from pc_client.analysis.run import analyse_run
+from pc_client.control.controller import Controller
 from pc_client.errors import ClientError
 from pc_client.extraction.files import parse_pen
 from pc_client.extraction.sources import contents, pen_sources
@@ -107,7 +107,7 @@ CLIENT_FILES = {
     "controller": Target(
         lambda: (b'base = "paper"\ngain_p = 10.0\ngain_i = 1.5\nlearns = true\n',),
         mutations.mutate_toml,
-        _file(".toml", read_controller),
+        _file(".toml", Controller.from_toml),
         (ClientError,),
     ),
     "sweep": Target(

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fake_robot import FakeRobot
 
+import pc_client.api.arm as arm_module
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
@@ -174,7 +175,7 @@ def test_page_shows_every_generator(sets):
 def robot(monkeypatch):
     fake = FakeRobot(delay=4)
     fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
-    for module in (transport, ur_driver_module):
+    for module in (transport, ur_driver_module, arm_module):
         monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
     return fake
 
