@@ -81,7 +81,7 @@ class Budgets:
         256 * KIB,
         "bytes",
         "script of clients that have gone",
-        "the newest is dropped unless it is the only one",
+        "the longest aside, the newest of who has left most is dropped",
     )
     # More than any client sends; each costs the cycle up to 0.5 ms.
     programs_per_cycle: int = _budget(4, "programs", "started or refused in a cycle", "the others wait")

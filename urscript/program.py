@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import marshal
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
@@ -134,10 +134,10 @@ class CompiledProgram:
 
     name: str
     kind: str
-    source: Source
-    dialect: Dialect
-    catalogue: Catalogue
-    compiled: CompiledCode
+    source: Source = field(repr=False)
+    dialect: Dialect = field(repr=False)
+    catalogue: Catalogue = field(repr=False)
+    compiled: CompiledCode = field(repr=False)
     builtins: frozenset[str]
     globals: frozenset[str]
     declared_globals: tuple[str, ...]

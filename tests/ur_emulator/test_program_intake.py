@@ -248,13 +248,23 @@ def test_of_a_client_that_has_gone_so_much_is_still_compiled(intake, tasks, box,
     for sender in (one, two):
         intake.received(sender, program("a", size=5000) * 3 + b"def b():\n")
         intake.closed(sender)
-    assert box.take() == [TOO_MUCH]
-    assert [task.place.sender for task in tasks.begun] == [one]
-    tasks.finish()
-    assert [task.place.sender for task in tasks.begun] == [intake]
-    tasks.finish(2)
+    assert box.take() == [TOO_MUCH, TOO_MUCH]
+    assert [len(sender.programs) for sender in (one, two)] == [2, 2]
+    tasks.finish(4)
     assert not tasks.begun
     assert intake._held == intake._held_gone == 0
+
+
+def test_who_sends_one_program_and_goes_loses_nothing_by_those_who_sent_many(
+    intake, tasks, box, budgets, one, two
+):
+    budgets(script_bytes_gone=22_000)
+    intake.received(one, b"end\n" * 200)
+    intake.closed(one)
+    intake.received(two, program("hello"))
+    intake.closed(two)
+    assert [program.text for program in two.programs] == [program("hello").decode()]
+    assert intake._held_gone < 30_000
 
 
 def test_a_box_that_closes_forgets_what_waits(intake, tasks, box, one):

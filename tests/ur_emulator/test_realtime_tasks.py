@@ -197,6 +197,7 @@ def test_the_process_ends_with_the_one_that_started_it(how):
     code = (
         "from ur_emulator import ControlBox\n"
         "import signal\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell may ignore it in the background
         "with ControlBox(pace='lockstep', port_base=None) as box:\n"
         "    print(box._loop.tasks._process._process.pid, flush=True)\n"
         "    signal.pause()\n"

@@ -12,16 +12,18 @@ from ur_emulator.box_log import BoxLog
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.power import PowerOff
 from ur_emulator.commands.programs import StopProgram
-from ur_emulator.commands.safety import PressEmergencyStop
+from ur_emulator.commands.safety import PressEmergencyStop, UnlockProtectiveStop
 from ur_emulator.controller.command import Command, Done, Result, Submitted
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event
+from ur_emulator.controller.safety.modes import MOVING_MODES
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import RefusedError
 from ur_emulator.realtime.barrier import Failed, guarded, place_of
 from ur_emulator.realtime.pacing import Pacer, RealtimePacer
 
-# What was sent before one of these does not begin after it.
+# What was sent before one of these does not begin after it. The same goes for the word that unlocks a
+# protective stop: in it programs are refused, and the arm must not move by one that was too long to compile.
 _STOPS = (StopProgram, PowerOff, PressEmergencyStop)
 
 
@@ -101,7 +103,8 @@ class ServedBox:
             done: called then with the result or the error.
             in_place_of: a name; one of the same name that waits for the cycle does not act any more.
         """
-        if isinstance(command, _STOPS):
+        is_stopped = self.controller.snapshot.safety_mode not in MOVING_MODES
+        if isinstance(command, _STOPS) or (is_stopped and isinstance(command, UnlockProtectiveStop)):
             self.stops += 1
         name = in_place_of or object()
         self._commands.pop(name, None)

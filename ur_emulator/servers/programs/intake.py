@@ -104,11 +104,7 @@ class ProgramIntake:
         self._hold(sender, -sender.channel.pending)
         sender.is_open = False
         self._held_gone += sender.held
-        while self._held_gone > BUDGETS.script_bytes_gone and sender.programs:
-            if not sender.waiting and self._held_gone == sender.held:
-                return  # nobody else has gone: one program is always kept
-            self._tell(sender)
-            self._drop(sender.waiting[-1] if sender.waiting else sender.programs[0])
+        self._drop_gone()
 
     def publish(self, snapshot: Snapshot) -> None:
         """Go on after a cycle."""
@@ -226,6 +222,23 @@ class ProgramIntake:
         else:
             self._newest = program.place.arrived
             self._box.submit(StartProgram(outcome, program.place.arrived < self._paused))
+
+    def _drop_gone(self) -> None:
+        """Drop programs of clients that have gone until the rest keeps its budget, the longest one aside.
+
+        Who has left most loses its newest first: nobody loses a program by what others have left.
+        """
+        gone = [other for other in self._senders if not other.is_open]
+        programs = [program for other in gone for program in other.programs]
+        if not programs:
+            return
+        longest = max(programs, key=lambda program: (program.cost, -program.place.arrived))
+        while self._held_gone - longest.cost > BUDGETS.script_bytes_gone:
+            greediest = max(gone, key=lambda other: other.held - (other is longest.sender) * longest.cost)
+            self._tell(greediest)
+            ordered = (*reversed(greediest.waiting), greediest.compiling)
+            newest = (program for program in ordered if program not in (None, longest))
+            self._drop(next(newest))
 
     def _drop_stopped(self) -> None:
         """Drop the programs that arrived before the last stop."""
