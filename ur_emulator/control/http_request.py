@@ -76,7 +76,7 @@ class Gate:
         if self.token is not None and not shows_token(headers.get("authorization", ""), self.token):
             raise HttpError(
                 401,
-                "this port needs its token: send the header Authorization: Bearer TOKEN",
+                "this port needs its token: ctl --token TOKEN, or the header Authorization: Bearer TOKEN",
                 ("WWW-Authenticate", "Bearer"),
             )
 
