@@ -212,7 +212,7 @@ def test_pause_is_answered_and_ends_the_data(client):
 
 def test_what_is_no_rtde_gets_a_text_and_the_end(box):
     with connect(box, "rtde") as sock:
-        sock.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        sock.sendall(b"HELO this is no robot\r\n\r\n")
         kind, text = raw_next(sock)
         assert kind == ord("M")
         assert b"RTDE" in text
