@@ -213,7 +213,7 @@ class Budgets:
     # 3,000 lines take 0.3 s, 20,000 moves 4.5 s.
     task_seconds: float = _budget(10, "s of processor time", "a program, file or report", "it is refused")
     # 3,000 lines take 35 MiB.
-    task_memory: int = _budget(64 * MIB, "bytes", "compiling, loading, reporting", "it is refused")
+    task_memory: int = _budget(96 * MIB, "bytes", "compiling, loading, reporting", "it is refused")
     task_result_bytes: int = _budget(16 * MIB, "bytes", "what was compiled or loaded", "it is refused")
     # Beyond it one that takes more than 1 s ends, and others take turns.
     long_tasks: int = _budget(1, "programs, files or reports", "that take more than 1 s", "they are refused")

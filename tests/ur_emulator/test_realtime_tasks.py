@@ -129,7 +129,7 @@ def test_a_task_may_need_so_much_memory_and_no_more(bench):
     pid = bench.ask(os.getpid)
     error = bench.ask(bytes, BUDGETS.task_memory)
     assert isinstance(error, WorkerError)
-    assert str(error) == "it needs more than 64 MiB of memory: make it shorter"
+    assert str(error) == "it needs more than 96 MiB of memory: make it shorter"
     assert (
         str(bench.ask(bytes, BUDGETS.task_result_bytes)) == "its result has more than 16 MiB: make it shorter"
     )
