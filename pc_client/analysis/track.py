@@ -46,6 +46,7 @@ class TcpTrack:
         p_actual: (n, 3) position that the robot reported at these times, m.
         rows: index of each sample's row in the recording, (n,).
         movement: samples first..last of the movement phase, as a slice.
+        t_begin: controller time at which the movement began, s: up to a cycle before its first sample.
     """
 
     t: NDArray[np.float64]
@@ -53,6 +54,7 @@ class TcpTrack:
     p_actual: NDArray[np.float64]
     rows: NDArray[np.intp]
     movement: slice
+    t_begin: float
 
     @property
     def movement_steps(self) -> slice:
@@ -103,6 +105,7 @@ def track_of(recording: Recording) -> TcpTrack:
         p_actual=recording.column("actual_TCP_pose")[rows, :3],
         rows=rows,
         movement=slice(int(moving[0]), int(moving[-1]) + 1),
+        t_begin=float((t - recording.column("ref_t"))[rows[moving[0]]]),
     )
 
 

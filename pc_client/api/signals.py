@@ -103,7 +103,7 @@ class Run(Signals):
             for name in ("actual_q", "actual_qd", "actual_TCP_pose", "cmd_qd")
         )
         simulated = recording.provenance.simulated
-        return cls(track.t - track.t_start, q, qd, pose, command, simulated, measured)
+        return cls(track.t - track.t_begin, q, qd, pose, command, simulated, measured)
 
     def __repr__(self) -> str:
         whose = self.measured.provenance

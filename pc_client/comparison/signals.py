@@ -75,7 +75,7 @@ def executed_signal(run: MeasuredRun, duration: float) -> Signal:
     """
     rate = 1.0 / run.provenance.cycle_time_s
     t = _grid(duration, rate)
-    at = t + run.track.t_start + run.snr.speed_lag_s
+    at = t + run.track.t_begin + run.snr.speed_lag_s
     # Frames come on the same grid but for the lag, which is no whole number of cycles.
     p = CubicSpline(run.track.t, run.track.p_actual)(np.clip(at, run.track.t[0], run.track.t[-1]))
     return _inner(t, filtered_motion(p, rate), duration, rate)

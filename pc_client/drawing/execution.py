@@ -81,8 +81,7 @@ def executed(drawing: Drawing, run: MeasuredRun, shift: float = 0.0) -> Executio
         RecordingError: the run ended before the drawing did.
     """
     track = run.track
-    ref_t = run.recording.column("ref_t")[track.rows]
-    t = track.t - track.t_start + float(ref_t[track.movement.start])
+    t = track.t - track.t_begin
     if t[-1] < float(drawing.joined.pen_down[-1, 1]) * drawing.factor:
         raise RecordingError(f"{run.recording.path}: ends at {t[-1]:.1f} s, before the drawing was done")
     path = CubicSpline(t - shift, track.p_actual)

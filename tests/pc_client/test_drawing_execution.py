@@ -39,7 +39,7 @@ def run_of(drawing, late=0.0, offset=(0.0, 0.0, 0.0), cut=0.0):
     moving = np.flatnonzero((ref_t >= 0.0) & (ref_t <= drawing.movement.duration))
     track = SimpleNamespace(
         t=4711.0 + ref_t,
-        t_start=4711.0 + ref_t[moving[0]],
+        t_begin=4711.0,
         rows=np.arange(len(ref_t)),
         movement=slice(int(moving[0]), int(moving[-1]) + 1),
         p_actual=drawing.movement.sample(ref_t - late).p + np.array(offset),
