@@ -19,7 +19,7 @@ from pc_client.comparison.figure import draw_comparison
 from pc_client.comparison.filtering import CUTOFF_HZ, filtered_motion
 from pc_client.comparison.likeness import Likeness, mean_likeness, measure_likeness
 from pc_client.comparison.movement_set import make_sets, save_sets
-from pc_client.comparison.signals import filtered_signal, planned_signal
+from pc_client.comparison.signals import executed_signal, filtered_signal, planned_signal
 from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, build_comparison
 from pc_client.errors import ClientError
 from pc_client.movements import load_movement
@@ -162,6 +162,19 @@ def test_table_in_three_forms(table):
     assert len(rows) == 2 + 2 * len(GENERATORS)
     assert {line.count("|") for line in rows} == {len(COLUMNS) + 3}
     assert len(table.to_rich().columns) == 2 + len(COLUMNS)
+
+
+def test_a_perfect_run_is_the_filtered_plan_wherever_its_frames_fall_in_a_cycle():
+    movement = load_movement("uniform_4_1")
+    t = (np.arange(-60, round(movement.duration * RATE) + 60) + 0.5) / RATE
+    track = SimpleNamespace(t=4711.0 + t, t_begin=4711.0, p_actual=movement.sample(t).p)
+    run = SimpleNamespace(
+        track=track,
+        provenance=SimpleNamespace(cycle_time_s=1.0 / RATE),
+        snr=SimpleNamespace(speed_lag_s=0.0),
+    )
+    done, wanted = executed_signal(run, movement.duration), filtered_signal(movement, RATE)
+    np.testing.assert_allclose(done.motion.p, wanted.motion.p, atol=2e-6)
 
 
 def test_page_shows_every_generator(sets):
