@@ -92,7 +92,8 @@ class StreamReport:
         n_commands: commands sent, the stop word not counted.
         late_frames: new frames that got no command of their own because a newer one was already there.
         lost_frames: cycles whose frame never came.
-        heartbeats: frames that repeated a time stamp; only a robot whose time waits for us sends them.
+        heartbeats: frames that repeated a time stamp.
+        time_waits: the robot's time stood still until its program had a command, as in lockstep.
         robot_time: [s] from the first to the last frame, by the robot's stamps.
         wall_time: [s] of the same by our clock.
     """
@@ -101,6 +102,7 @@ class StreamReport:
     late_frames: int = 0
     lost_frames: int = 0
     heartbeats: int = 0
+    time_waits: bool = False
     robot_time: float = 0.0
     wall_time: float = 0.0
 
@@ -216,6 +218,7 @@ class VelocityStream:
             stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
             if stands_still or n_new >= _FRAMES_BEFORE_START:
                 if stands_still or is_at_full_speed(arrival.latest) or n_new >= _LONGEST_RISE:
+                    report.time_waits = stands_still
                     return arrival.latest
                 self._reverse.send(encode_velocity(VelocityMode.HOLD))
 

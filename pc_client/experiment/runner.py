@@ -91,8 +91,7 @@ class ExperimentRunner:
         found, stream = identify(driver, self._config, experiment.model)
         self._observer.identified(found)
         report = ExperimentReport(found)
-        # Only a robot whose time waits for its client repeats a frame.
-        pace = "lockstep" if stream.heartbeats else "realtime"
+        pace = "lockstep" if stream.time_waits else "realtime"
         gears = GearObserver(found.loop, driver.info.period)
         for planned in experiment.planned:
             name = planned.movement.name

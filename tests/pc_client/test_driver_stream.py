@@ -98,6 +98,17 @@ def test_heartbeats_are_neither_answered_nor_logged():
     assert report.lost_frames == 0
 
 
+def test_a_robot_whose_time_waits_is_told_from_one_that_repeats_a_frame():
+    def repeat(robot):
+        if robot.tick == 1050:
+            robot.pipes["realtime"].incoming.append(robot.frame())
+
+    assert stream(FakeRobot())[0].time_waits
+    report, _ = stream(FakeRobot(lockstep=False, on_tick=repeat))
+    assert report.heartbeats == 1
+    assert not report.time_waits
+
+
 def test_waiting_frames_are_logged_and_the_newest_is_answered():
     def spoil(robot):
         if robot.tick == 1050:
