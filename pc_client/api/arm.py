@@ -19,6 +19,7 @@ import numpy as np
 
 from pc_client.api.signals import Run, Signals
 from pc_client.control.controller import CONTROLLERS, DEFAULT, Controller
+from pc_client.control.controller_fields import checked
 from pc_client.driver.condition import conditions_text
 from pc_client.driver.robot_report import RobotReport, read_report
 from pc_client.driver.transport import TcpNetwork
@@ -244,11 +245,12 @@ class Arm:
 
         Args:
             law: takes each frame, returns (6,) joint velocities [rad/s], or None to end.
-            acceleration: of the robot's `speedj` [rad/s2].
+            acceleration: of the robot's `speedj` [rad/s2], .1 to 100.
 
         Raises:
-            ClientError: the law gave what cannot be sent, or the robot stopped; the arm rests.
+            ClientError: the acceleration is out of its range, the law gave what cannot be sent, or the robot stopped; the arm rests.
         """
+        value = float(checked("speedj_acceleration", acceleration, "acceleration"))
         source = LawStream(law, self.model)
         top = np.degrees(max(source.qd_max))
         self._ask(lambda: f"a velocity law drives the arm at {self._host}, joints up to {top:.0f} deg/s")
@@ -260,7 +262,7 @@ class Arm:
 
         with self._session() as driver:
             require(preflight(driver.report(), self.model))
-            driver.stream(source, keep, acceleration=acceleration)
+            driver.stream(source, keep, acceleration=value)
         if not rows:
             raise ClientError("the velocity law ended before its first velocity: there are no signals")
         t, q, qd, pose, command = (np.array(column, dtype=np.float64) for column in zip(*rows, strict=True))

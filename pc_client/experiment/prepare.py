@@ -49,6 +49,9 @@ class Experiment:
         planned: the movements, in order.
         repeat: runs of each.
         out: folder of the recordings.
+
+    Raises:
+        ClientError: nothing to repeat, or a plan was made for another arm or another cell.
     """
 
     model: RobotModel
@@ -59,6 +62,14 @@ class Experiment:
     def __post_init__(self) -> None:
         if self.repeat < 1:
             raise ClientError(f"{self.repeat} runs of each movement is nothing to do; give at least one")
+        for plan in self.planned:
+            report = plan.joints.report
+            if report.robot != self.model.name or report.cell != self.model.cell:
+                raise ClientError(
+                    f"{plan.movement.name} was planned for a {report.robot.upper()} ({report.cell.summary}), "
+                    f"this arm is a {self.model.name.upper()} ({self.model.cell.summary}): "
+                    "plan it for this arm"
+                )
 
     def recording_path(self, planned: Plan, repetition: int) -> Path:
         """The file of one run; repetitions count from 1."""

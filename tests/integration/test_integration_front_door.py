@@ -114,6 +114,12 @@ def test_a_velocity_law_that_leads_out_of_the_limits_ends_at_rest(arm, law, comp
     assert np.abs(arm.frame().actual_qd).max() < 0.01
 
 
+@pytest.mark.parametrize("acceleration", [0.0, np.nan, 1e6])
+def test_an_acceleration_out_of_its_range_is_refused(arm, acceleration):
+    with pytest.raises(ur.ClientError, match="give a number from 0.1 to 100"):
+        arm.stream(lambda frame: None, acceleration=acceleration)
+
+
 def test_what_a_law_raises_comes_through_and_the_arm_rests(arm):
     with pytest.raises(ZeroDivisionError):
         arm.stream(lambda frame: [1.0 / 0.0])
@@ -149,6 +155,16 @@ def test_samples_with_orientations_turn_the_tool(arm):
 def test_what_the_arm_cannot_do_is_refused_before_it_moves(arm):
     with pytest.raises(PlanningError, match="singularity"):
         arm.run(ur.Movement.through([(0.3, 0.0, 0.3), (1.3, 0.0, 0.3)]))
+
+
+def test_a_plan_for_another_arm_or_cell_is_refused_before_it_moves(arm):
+    movement = ur.Movement.through(POINTS)
+    stranger = ur.plan(movement, "ur5")
+    for act in (arm.run, arm.approach):
+        with pytest.raises(ur.ClientError, match="planned for a UR5"):
+            act(stranger)
+    with pytest.raises(ur.ClientError, match="plan it for this arm"):
+        arm.run(ur.plan(movement, "ur3", ur.Cell(name="table", floor_z=-0.1)))
 
 
 def test_an_arm_that_may_be_real_is_asked_for(box, arm):
