@@ -248,7 +248,8 @@ class Arm:
             acceleration: of the robot's `speedj` [rad/s2], .1 to 100.
 
         Raises:
-            ClientError: the acceleration is out of its range, the law gave what cannot be sent, or the robot stopped; the arm rests.
+            ClientError: the acceleration is out of its range, the law gave what cannot be sent, or the robot
+                stopped; the arm rests.
         """
         value = float(checked("speedj_acceleration", acceleration, "acceleration"))
         source = LawStream(law, self.model)
