@@ -37,12 +37,10 @@ COMPOSITIONS: dict[str, tuple[Controller, str]] = {
     ),
     "preview": (PREVIEW, "+ feed-forward ahead by the identified delay"),
     "lag": (LAG, "+ dead time and lag apart: qd + lag qdd, ahead by the dead time"),
-    "lag, kalman": (replace(LAG, estimates=True), "lag + feedback of estimated positions"),
     "lag, gear": (replace(LAG, compensates_gear=True), "lag + feed-forward against the waves of the gears"),
     "lag, learning": (replace(LAG, learns=True), "lag + learning between repetitions"),
     "preview, learning": (replace(LAG, compensates_lag=False, learns=True), "the same without lag"),
     "best": (BEST, "lag + gear + learning"),
-    "best, kalman": (replace(BEST, estimates=True), "best + feedback of estimated positions"),
 }
 FIDELITIES = ("ideal", "typical", "poor")
 SEEDS = (0, 1, 2, 7)

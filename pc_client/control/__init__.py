@@ -4,7 +4,6 @@ controller         the named controllers and their numbers, and those of a user'
 controller_fields  what each number may be
 reference          what the arm should do at any time, prepared for the loop
 pi_feedforward     PI + velocity feed-forward for six joints (the paper's Fig. 3)
-state_estimate     Kalman estimate of positions and velocities for the feedback
 tracker            one frame in, one command out
 tool_guard         ends a run when the tool leaves its path
 excitation         the small movement that reveals the loop

@@ -47,7 +47,6 @@ class Controller:
         compensates_gear: with `looks_ahead`: the waves of the gears are found from the movements run so far,
             and the feed-forward is that of motors which make up for them (`gear`).
         learns: a repetition begins with what the run before it taught (`learning`).
-        estimates: the feedback takes positions from a Kalman filter (`state_estimate`).
         learning_gain: share of a run's error that is learned, 0..1.
         learning_speed: bound of the learned part of a command [rad/s].
         learning_acceleration: bound of its change [rad/s2].
@@ -66,7 +65,6 @@ class Controller:
     compensates_lag: bool = False
     compensates_gear: bool = False
     learns: bool = False
-    estimates: bool = False
     learning_gain: float = 0.8
     learning_speed: float = 0.2
     learning_acceleration: float = 20.0

@@ -79,7 +79,6 @@ FIELDS: Mapping[str, Number | Switch] = MappingProxyType(
         "compensates_lag": Switch(),
         "compensates_gear": Switch(),
         "learns": Switch(),
-        "estimates": Switch(),
         "learning_gain": Number(0.0, 1.0, ""),
         "learning_speed": Number(0.0, 1.0, "rad/s"),
         "learning_acceleration": Number(0.0, 200.0, "rad/s2"),

@@ -8,7 +8,6 @@ from typing import NamedTuple
 from pc_client.control.controller import Controller
 from pc_client.control.pi_feedforward import PiState, step_pi
 from pc_client.control.reference import ReferencePoint, ReferenceTable
-from pc_client.control.state_estimate import StateEstimator
 from pc_client.control.tool_guard import ToolGuard
 from pc_client.kinematics.agreement import check_flange
 from pc_client.kinematics.robot_model import RobotModel
@@ -47,13 +46,11 @@ class Tracker:
         config: the controller.
         model: the nominal arm: what its tool does is guarded, and the controller uses its share of the joint
             speed limits.
-        estimator: fresh, gives the positions that are fed back; None feeds back those that are reported.
     """
 
     __slots__ = (
         "_config",
         "_end",
-        "_estimator",
         "_guard",
         "_last_stamp",
         "_model",
@@ -63,15 +60,8 @@ class Tracker:
         "_state",
     )
 
-    def __init__(
-        self,
-        reference: ReferenceTable,
-        config: Controller,
-        model: RobotModel,
-        estimator: StateEstimator | None = None,
-    ) -> None:
+    def __init__(self, reference: ReferenceTable, config: Controller, model: RobotModel) -> None:
         self._reference = reference
-        self._estimator = estimator
         self._config = config
         self._model = model
         self._guard = ToolGuard(reference, model, config.path_tolerance, config.angle_tolerance)
@@ -113,19 +103,13 @@ class Tracker:
         if self._start is None:
             self._start = stamp + reference.lead
             dt = reference.period
-            cycles = 1
         else:
-            cycles = max(round((stamp - self._last_stamp) / reference.period), 1)
             dt = min(stamp - self._last_stamp, _MOST_CYCLES_PER_STEP * reference.period)
         self._last_stamp = stamp
         t = stamp - self._start
         point = reference.at(t)
         self._guard.check(t, q)
-        if self._estimator is not None:
-            q = self._estimator.update(q, cycles)
         command = step_pi(self._config, self._qd_max, self._state, point.q, point.qd_feedforward, q, dt)
-        if self._estimator is not None:
-            self._estimator.sent(command)
         return TrackerStep(t, self._phase(t), point, command, t >= self._end)
 
     def observe(self, stamp: float) -> TrackerStep:

@@ -20,7 +20,6 @@ from pc_client.control.learning_filter import LearningFilter, design_filter
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.stability import LEAST_GAIN_MARGIN, LoopMargins, loop_margins
-from pc_client.control.state_estimate import EstimatorGains, identify_estimator
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
@@ -29,8 +28,6 @@ from pc_client.kinematics.robot_model import RobotModel
 from protocol.realtime.layout import RealtimeFrame
 
 _LEAD, _SETTLE = 0.1, 0.3
-_AT_REST = 12
-"""The last frames of the excitation, in which the arm rests: the last third of `_SETTLE`."""
 
 _RETURN_TOLERANCE = 2e-3
 """How far from where it began the excitation may leave a joint [rad]."""
@@ -45,14 +42,12 @@ class Identification:
         loop: dead time and lag apart, for a controller that uses them; else the delay alone.
         margins: of the feedback on this loop.
         learning: the filter of a controller that learns; None for another.
-        estimator: the gains of a controller that estimates; None for another.
     """
 
     estimate: DelayEstimate
     loop: LoopModel
     margins: LoopMargins
     learning: LearningFilter | None
-    estimator: EstimatorGains | None
 
     @property
     def delay(self) -> float:
@@ -81,12 +76,6 @@ class Identification:
                 "learning_contraction": self.learning.contraction,
                 "learning_noise_share": self.learning.noise_share,
             }
-        if self.estimator is not None:
-            facts |= {
-                "estimator_k_q": self.estimator.k_q,
-                "estimator_k_qd": self.estimator.k_qd,
-                "encoder_sigma_rad": self.estimator.encoder_sigma,
-            }
         return facts
 
 
@@ -109,7 +98,7 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[I
     q_start = driver.actual_q()
     # Feed-forward alone, its mean over each cycle: the integral of the commands ends exactly where it began.
     open_loop = replace(config, name="excitation", gain_p=0.0, gain_i=0.0)
-    knows_lag = config.compensates_lag or config.compensates_gear or config.learns or config.estimates
+    knows_lag = config.compensates_lag or config.compensates_gear or config.learns
     excitation = Excitation(q_start.tolist(), BRISK_PULSE if knows_lag else PULSE)
     table = ReferenceTable(excitation, period=period, lead=_LEAD, settle=_SETTLE, lookahead=0.0)
     stamps: list[float] = []
@@ -147,7 +136,6 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[I
         loop=loop,
         margins=margins,
         learning=learning_filter(config, loop, period),
-        estimator=identify_estimator(qd_cmd, q, loop, period, _AT_REST) if config.estimates else None,
     ), report
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 from pc_client.control.controller import Controller
 from pc_client.control.gear import GearObserver, MotorReference
 from pc_client.control.reference import ReferenceTable
-from pc_client.control.state_estimate import StateEstimator
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
@@ -156,13 +155,10 @@ class ExperimentRunner:
         table = self._table(planned, plan, found, repetitions)
         if not repetitions.may_use(plan, table):
             table = self._table(planned, plan, found, repetitions)
-        estimator = None
-        if found.estimator is not None:
-            estimator = StateEstimator(found.loop, found.estimator, self._driver.info.period)
         log = RunLog() if config.learns or config.compensates_gear else None
         with Recorder(path, provenance, self._signals) as recorder:
             stream = self._driver.stream(
-                Tracker(table, config, self._experiment.model, estimator),
+                Tracker(table, config, self._experiment.model),
                 _row_sink(recorder, log),
                 acceleration=config.speedj_acceleration,
             )

@@ -126,13 +126,6 @@ def test_a_run_that_is_not_clean_teaches_no_command(two, tmp_path, attribute, co
     assert speed_error(recordings[2]) < 0.6 * speed_error(recordings[0])
 
 
-def test_an_estimating_controller_runs_as_well(two, tmp_path):
-    short = replace(two, planned=two.planned[:1], repeat=2)
-    _, recordings = run(WavyRobot(), short, tmp_path, replace(BEST, estimates=True))
-    assert speed_error(recordings[1]) < 0.4 * speed_error(recordings[0])
-    assert recordings[0].provenance.loop["encoder_sigma_rad"] < 1e-6  # this robot's encoders are perfect
-
-
 @pytest.mark.parametrize(("late", "lost", "clean"), [(0, 0, True), (1, 0, False), (0, 1, False)])
 def test_clean_runs(late, lost, clean):
     assert is_clean(StreamReport(late_frames=late, lost_frames=lost)) is clean
