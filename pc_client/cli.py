@@ -43,6 +43,7 @@ _EXTRAS = {
     "pinocchio": "client",
     "scipy": "client",
     "mcap": "client",
+    "polars": "client",
     "matplotlib": "report",
     "jinja2": "report",
     "pyarrow": "export",

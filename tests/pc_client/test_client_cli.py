@@ -365,6 +365,6 @@ def test_missing_extras_name_the_command_to_install(monkeypatch, capsys):
 def test_help_loads_nothing_heavy():
     code = (
         "import sys; from pc_client.cli import run; run(['--help']); "
-        "sys.exit(any(n in sys.modules for n in ('pinocchio', 'scipy', 'mcap', 'matplotlib', 'numpy')))"
+        "sys.exit(any(n in sys.modules for n in ('pinocchio', 'scipy', 'mcap', 'matplotlib', 'numpy', 'polars')))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 0
