@@ -1,6 +1,10 @@
 """Writes all pages that are made from tables: `make docs`."""
 
+import tomllib
+from collections.abc import Callable
 from pathlib import Path
+
+import mdformat
 
 from docs.generate import (
     control_page,
@@ -18,7 +22,8 @@ from docs.generate import (
 )
 
 DOCS = Path(__file__).parents[1]
-PAGES = {
+_LAYOUT = tomllib.loads((DOCS.parent / ".mdformat.toml").read_text(encoding="utf-8"))
+PAGES: dict[str, Callable[[], str]] = {
     "control.md": control_page.render,
     "states.md": states_page.render,
     "urscript-coverage.md": coverage_page.render,
@@ -34,6 +39,12 @@ PAGES = {
 }
 """What makes each page, by its path below `docs/`."""
 
+
+def page(path: str) -> str:
+    """Return the text of a page, in the layout of all pages."""
+    return mdformat.text(PAGES[path](), options=_LAYOUT, extensions=_LAYOUT["extensions"])
+
+
 if __name__ == "__main__":
-    for path, render in PAGES.items():
-        (DOCS / path).write_text(render(), encoding="utf-8")
+    for path in PAGES:
+        (DOCS / path).write_text(page(path), encoding="utf-8")

@@ -14,58 +14,72 @@ from ur_emulator.control.token import TOKEN_VARIABLE
 _INTRODUCTION = f"""\
 # The control API
 
-What a real arm has hands, wires and buttons for, the box has operations for: set an input, press the emergency
-stop, push the arm, answer a question, read the log. The same operations, with the same names, in three places:
+The control API replaces the hands, wires and buttons around a real arm: it sets an input, presses
+the emergency stop, pushes the arm, answers a question, reads the log. The same operations have the
+same names in three places:
 
 | from | how |
 |---|---|
-| Python | `box.push(force=(0, 0, 20), duration=0.5)` on a `ControlBox`, from any thread; reading ones are properties: `box.state.q` |
-| HTTP | `POST /v1/push` with `{{"force": [0, 0, 20], "duration": 0.5}}`; reading ones are `GET /v1/state` |
+| Python | `box.push(force=(0, 0, 20), duration=0.5)` on a `ControlBox`, from any thread; operations that only read are properties: `box.state.q` |
+| HTTP | `POST /v1/push` with `{{"force": [0, 0, 20], "duration": 0.5}}`; operations that only read use GET: `GET /v1/state`
+|
 | command line | `ur-emulator ctl push --force 0 0 20 --duration 0.5` |
 
-An operation returns after the cycle in which it was applied, with the number of that cycle. Its effect may take
-longer: `wait_until` waits for it. What changes something is written into the box's log, source `Control`.
+An operation returns after the cycle in which it was applied, with the number of that cycle. Its
+effect may take longer; `wait_until` waits for it. Every operation that changes something is written
+to the log of the box, with the source `Control`.
 
-In lockstep, time stands still while nothing goes on. An operation gets its cycle all the same; what needs time to
-happen (a push without duration, a wait for something that nobody brings about) waits for a program or a move.
+In lockstep, time stands still while the box is not active. An operation still gets its cycle. An
+effect that needs time (a push without duration, a wait for a condition) waits for a program or a
+move.
 
 ## Python
 
-Methods raise `ArgumentError` for what they do not take, `RefusedError` when the state of the box stands against
-it (`WaitTimeoutError`, also a `TimeoutError`, for a wait in vain), and `NotRunningError` when the box does not run;
-all are `EmulatorError`s with one line that says what to do. They return the number of the cycle.
+Methods raise `ArgumentError` for wrong arguments, `RefusedError` if the state of the box does not
+allow the operation (`WaitTimeoutError`, also a `TimeoutError`, if a wait times out), and
+`NotRunningError` if the box does not run. All are `EmulatorError`s with one line that says what to
+do. The methods return the number of the cycle.
 `box.log` is a tuple of all entries that are kept.
 
 ## HTTP
 
-Off unless asked for: `ur-emulator serve --control-port {DEFAULT_PORT}`, or `ControlBox(control_port=0)` for a free port,
-whose number is `box.control_port` then. It listens on the host of the box. With a token, every request must show it
-in the header `Authorization: Bearer TOKEN` (401 otherwise): `ur-emulator serve --token TOKEN`,
-`ControlBox(control_token="TOKEN")`, or the environment variable `{TOKEN_VARIABLE}` of `ur-emulator serve` and
-`ur-emulator ctl`, which other users of the machine do not see. On a loopback address the token may be left out:
-whoever reaches the port controls the box then. On any other address a control port needs one.
+The HTTP port is off by default. `ur-emulator serve --control-port {DEFAULT_PORT}` opens it;
+`ControlBox(control_port=0)` opens a free port, whose number is `box.control_port`. It listens on
+the host of the box. If a token is set, every request must contain the header `Authorization: Bearer
+TOKEN` (401 otherwise). The token is set by `ur-emulator serve --token TOKEN`,
+`ControlBox(control_token="TOKEN")`, or the environment variable `{TOKEN_VARIABLE}` of `ur-emulator
+serve` and `ur-emulator ctl`, which other users of the machine cannot see. On a loopback address the
+token is optional; without it, every program that reaches the port controls the box. On any other
+address a control port requires a token.
 
 - `GET /v1/operations` lists everything below as JSON.
 - `POST` takes a JSON object (content type `application/json`); without a body all defaults are taken.
-- The answer is a JSON object; an error is `{{"error": "one line"}}` with status 400 (does not fit), 401 (no token),
-  403 (see below), 404 (no such operation), 405 (GET and POST confused), 409 (the box is not in a state for it), 413 (too long:
-  {BUDGETS.body_bytes // KIB} KiB of body; longer programs go to port 30002) or 431 (16 KiB of header).
-- Connections are kept alive; one request of a client is answered after the other. The box keeps {BUDGETS.control_clients} connections and
-  closes the one that has been silent longest for a new one.
+- The answer is a JSON object. An error is `{{"error": "one line"}}` with status 400 (wrong
+  arguments), 401 (no token), 403 (see below), 404 (unknown operation), 405 (GET instead of POST, or
+  the reverse), 409 (the state of the box does not allow it), 413 (body above {
+    BUDGETS.body_bytes // KIB
+} KiB; send longer programs to port 30002) or 431 (header above 16 KiB).
+- Connections are kept alive; the requests of a client are answered one after the other. The box
+  keeps {BUDGETS.control_clients} connections; for a new one it closes the one that has been silent
+  longest.
 - Pages in a browser cannot reach the box: `Host` must be the address that it listens on, or `localhost` (403
   otherwise, against DNS rebinding), and requests of foreign origins are refused (`Origin`, `Sec-Fetch-Site`).
-- Scripts of the box cannot reach it either. What else was tried: [security.md](security.md).
+- Scripts of the box cannot reach the port either. [security.md](security.md) lists the attacks that
+  were tried.
 
 ```sh
-curl http://127.0.0.1:{DEFAULT_PORT}/v1/state
-curl -H 'Content-Type: application/json' -d '{{"group": "standard", "n": 3, "level": true}}' http://127.0.0.1:{DEFAULT_PORT}/v1/set_digital_input
+curl http://127.0.0.1:{DEFAULT_PORT}/v1/state curl -H 'Content-Type: application/json' -d
+'{{"group": "standard", "n": 3, "level": true}}'
+http://127.0.0.1:{DEFAULT_PORT}/v1/set_digital_input
 ```
 
 ## Command line
 
-`ur-emulator ctl OPERATION [--option value ...] [--host H] [--control-port {DEFAULT_PORT}] [--token TOKEN] [--json]`. Exit code 0:
-done; 1: refused, or no box answers; 2: wrong usage. `ctl log --follow` goes on until Ctrl-C; `ctl run_program --script-file FILE` sends a
-file of this machine; `ctl OPERATION --help` lists the options.
+`ur-emulator ctl OPERATION [--option value ...] [--host H] [--control-port {
+    DEFAULT_PORT
+}] [--token TOKEN] [--json]`. The exit code is 0 if the operation was applied, 1 if it was refused or no box answers, 2 for wrong
+usage. `ctl log --follow` runs until Ctrl-C; `ctl run_program --script-file FILE` sends a local
+file; `ctl OPERATION --help` lists the options.
 
 ## Operations
 """  # noqa: E501 - the lines of a page

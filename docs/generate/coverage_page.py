@@ -11,21 +11,23 @@ from urscript.catalogue.types import Builtin, Support
 _HEAD = """\
 # URScript coverage
 
-Every builtin function that a controller knows, and how this box models it. The page is generated from the
-tables in `urscript/catalogue/`; do not edit it, run `make docs`.
+This page lists every builtin function of a controller and how this box models it. It is generated
+from the tables in `urscript/catalogue/` by `make docs`.
 
-* **exact**: does what the manual says, as far as the manual says it.
-* **approximate**: works; the note says what differs or is assumed.
+* **exact**: does what the manual describes.
+* **approximate**: works; the note states differences and assumptions.
 * **declared only**: programs that name it compile, and the call ends the program with the run-time error
   `<name> is declared only: this box does not model it yet`.
 
-"Undocumented" names are missing in the script manual of that generation, but its controllers know them.
+"Undocumented" names are missing in the script manual of their generation, but its controllers
+accept them.
 """
 
 _LATER_HEAD = """\
-Functions, or forms of functions, that CB3 3.15 does not have. A program compiled for a version that has
-them passes the compiler; the calls are declared only. 5.0 and 10.0 stand for "as far back as the documents
-go": the first release is not known. The methods of lists and matrices that came with 5.15 are declared only
+Functions, or forms of functions, that CB3 3.15 does not have. A program compiled for a version that
+has them passes the compiler; the calls are declared only. 5.0 and 10.0 stand for the oldest
+documents: the first release is not known. The methods of lists and matrices that came with 5.15 are
+declared only
 as well."""
 
 

@@ -17,22 +17,24 @@ _FIRST_CB3 = SoftwareVersion(3, 0)
 _INTRODUCTION = f"""\
 # Dashboard server: port 29999
 
-Made from `protocol/dashboard/commands.py` by `make docs`. Programs, installations and files that the box
-writes: [programs.md](../programs.md).
+Made from `protocol/dashboard/commands.py` by `make docs`. Programs, installations and files that
+the box writes: [programs.md](../programs.md).
 
-On accept the box sends `{GREETING}`. Then every line of
-the client, ended by `\\n`, gets exactly one line in reply, in order; several may be sent at once. What
-follows the words of a command is its argument, up to the end of the line. Any other line, and a command that
-the software does not have yet, is answered with `{unknown_command_reply("line")}`. Names are
+On connection the box sends `{GREETING}`. Then every line of the client, ended by `\\n`, gets
+exactly one line in reply, in order; several lines may be sent at once. The text after the words of
+a command, up to the end of the line, is its argument. The reply to any other line, and to a command
+that the software does not have yet, is `{unknown_command_reply("line")}`. Commands are
 case-sensitive.
 
-A reply comes after the control cycle in which the command has acted, so that the next line sees what it did.
-Where a version stands in the last column, it comes when the command is carried out (the program is loaded,
-has started, the arm rests), from that software on; before, at once.
+A reply comes after the control cycle in which the command has acted, so that the next line sees its
+effect. If the last column gives a version, the reply comes from that software on only when the
+command is complete (the program is loaded or has started, the arm rests); older software replies at
+once.
 
-While a line waits for its reply, so do the lines behind it. A client whose line has more than
-{MAX_LINE} bytes is cut off, and so is one that does not read its replies. Who closes his end still gets all
-replies. What has begun is done even if the client is gone; the lines behind it are not.
+While a line waits for its reply, the lines after it wait too. The box closes the connection of a
+client that sends a line of more than {MAX_LINE} bytes or does not read its replies. A client that
+closes its sending side still gets all replies. A command that has begun is completed even if the
+client is gone; the lines after it are not executed.
 """
 
 

@@ -9,18 +9,18 @@ from protocol.wire_record import ValueOrigin
 __all__ = ["MARKS", "example", "table"]
 
 MARKS = """\
-Where the box takes a value from, in the column *origin*:
+The column *origin* says how the box obtains a value:
 
 | mark | meaning |
 |---|---|
 | measured | from the simulated arm through its sensors: late, noisy, in whole steps |
-| modelled | computed in the box: set-points, kinematics, estimates, states |
-| of this arm | from the numbers of its type and its calibration, the same as long as the box lives |
-| constant | a plausible fixed value, nothing is simulated behind it |
-| internal, zero | meaning unpublished, always 0 |
+| modelled | computed in the box: set points, kinematics, estimates, states |
+| of this arm | from the data of its type and its calibration, constant while the box runs |
+| constant | a plausible fixed value without a model |
+| internal, zero | no published meaning, always 0 |
 
-A test runs a box through everything that can happen to it and holds every mark: what is measured or modelled
-changes, the rest does not (`tests/ur_emulator/test_wire_origins.py`).
+A test (`tests/ur_emulator/test_wire_origins.py`) takes a box through all its states and checks
+every mark: measured and modelled values change, the others do not.
 """
 assert all(f"| {mark.value} |" in MARKS for mark in ValueOrigin)
 

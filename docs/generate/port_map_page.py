@@ -11,20 +11,22 @@ Made from `ur_emulator/controller/modbus/robot_map.py` by `make docs`.
 
 ## The box as a server: port 502
 
-The same in all versions of CB3. Functions 1 and 2 read coils, 3 and 4 registers; 5 and 15 write coils,
-6 and 16 registers. The unit number is not read. Several clients at once. Scripts reach the same map with
-`read_port_register` and its kin. A register is a word of 16 bits, signed values in two's complement.
+The same in all versions of CB3. Functions 1 and 2 read coils, 3 and 4 registers; 5 and 15 write
+coils, 6 and 16 registers. The unit number is ignored. Several clients can connect at once. Scripts
+access the same map with `read_port_register` and similar functions. A register is a word of 16
+bits; signed values are in two's complement.
 
 | refused | exception |
 |---|---|
 | another function | 1 |
-| an address that does not exist, or a write to one that can only be read; nothing is written then | 2 |
+| an address that does not exist, or a write to a read-only address; nothing is written then | 2 |
 | no address, or more than 125 registers or 2000 coils (to write: 123, 1968) | 3 |
 | sizes that do not match, a coil that is neither 0xFF00 nor 0 | 3 |
 
-Writes act in the next control cycle and are answered after it, so that a client reads what it has written.
-What is not Modbus ends the connection. Port 502 needs privileges on most systems: without them
-`ur-emulator serve` says so in one line and serves all other ports; `--port-base N` moves it with them.
+A write acts in the next control cycle and is answered after it, so that a client reads back the
+written value. Data that is not Modbus ends the connection. Port 502 needs privileges on most
+systems: without them `ur-emulator serve` reports this in one line and serves all other ports.
+`--port-base N` moves this port too.
 """
 
 _CLIENT = """\
@@ -40,11 +42,11 @@ _CLIENT = """\
 | 2 register input | 4 | |
 | 3 register output | 3, until a program has set it | 6 |
 
-Signals are refreshed at their frequency (10 Hz, or as `modbus_set_signal_update_frequency` says) in robot
-time and keep their last value meanwhile. One connection a unit; it is made anew when it breaks. When no valid
-answer has come for 2 s, the next use of the signal is a run-time error that says why. In lockstep nothing
-waits for a unit: a value comes in the cycle in which it comes. Choices are listed in
-[fidelity.md](../fidelity.md).
+Signals are refreshed at their frequency (10 Hz, or the value of
+`modbus_set_signal_update_frequency`) in robot time, and keep their last value meanwhile. Each unit
+has one connection, which is opened again after it breaks. If no valid answer has come for 2 s, the
+next use of the signal is a run-time error with the reason. In lockstep nothing waits for a unit:
+the cycle in which a value arrives is not fixed. [fidelity.md](../fidelity.md) lists the choices.
 """
 
 

@@ -1,4 +1,4 @@
-"""The page docs/protocol/README.md: all ports of a control box, and where to read about each."""
+"""The page docs/protocol/README.md: all ports of a control box, and the page of each."""
 
 from __future__ import annotations
 
@@ -43,18 +43,19 @@ _INTRODUCTION = f"""\
 
 Made from `docs/generate/ports_page.py` and `protocol/ur_types.py` by `make docs`.
 
-`ur-emulator serve` opens these ports, with the numbers of a real control box, which most clients have
-built in; `--port-base N` adds N to all of them, and several boxes live side by side on loopback addresses
-of their own. `--version` decides what software the box pretends to run, and with it the layouts.
+`ur-emulator serve` opens these ports, with the numbers of a real control box, which most clients
+have built in. `--port-base N` adds N to all of them. Several boxes can run side by side, each on
+its own loopback address. `--version` sets the software that the box reports, and with it the
+layouts.
 
-All ports take several clients at once: {BUDGETS.clients_of_port} of an address at a port,
-{_OF_ADDRESS} of an address, {BUDGETS.clients} of a box. Further ones are accepted and closed
-at once, and the log says so. What a client does not read is dropped in whole packages
-(where every reply counts, the client is cut off instead). What clients send is taken a piece of each in turn,
-and never when a cycle is due: a client that sends faster than it is served waits. One that begins with a
-request over HTTP is closed: a page in a browser could have sent it. How well others keep their
-streams under attack is measured: [security.md](../security.md). Who may do what through which port:
-[SECURITY.md](../../SECURITY.md).
+All ports accept several clients at once: at most {BUDGETS.clients_of_port} from one address at one
+port, {_OF_ADDRESS} from one address, {BUDGETS.clients} at one box. Further clients are accepted and
+closed at once, with a line in the log. If a client does not read, whole packages are dropped; on
+ports where every reply counts, the connection is closed instead. The box reads from all clients in
+turn, a piece at a time, and never when a cycle is due, so a client that sends too fast has to wait.
+A connection that begins with an HTTP request is closed, because a web page in a browser could have
+sent it. [security.md](../security.md) measures how well other clients keep their streams under
+attack. [SECURITY.md](../../SECURITY.md) says what each port allows.
 """
 
 _CHOICE = """\
@@ -62,15 +63,16 @@ _CHOICE = """\
 
 | to | use |
 |---|---|
-| watch the robot | RTDE; 30003 where a client cannot do that; 30001 for messages and errors |
-| make it move | a script to 30002 or 30003, [scripts.md](scripts.md); registers over RTDE to talk to it |
+| watch the robot | RTDE; 30003 if the client does not support RTDE; 30001 for messages and errors |
+| make it move | a script to 30002 or 30003, [scripts.md](scripts.md); RTDE registers for data |
 | load, play and stop programs, power the arm | the dashboard |
 | wire it to a PLC | Modbus, or RTDE registers |
-| press its buttons, push its arm, as no real client can | the control API, [control.md](../control.md) |
+| press its buttons or push its arm, which no real client can | the control API, [control.md](../control.md) |
 
-`python -m protocol layout` prints the tables behind these pages for any version; `python -m protocol decode`
-shows captured bytes, or those of a box that runs, as named fields. What is exact and what was chosen:
-[fidelity.md](../fidelity.md). What the modes mean: [states.md](../states.md).
+`python -m protocol layout` prints the tables behind these pages for any version; `python -m
+protocol decode` shows captured bytes, or those of a running box, as named fields.
+[fidelity.md](../fidelity.md) says what is exact and what was chosen; [states.md](../states.md)
+explains the modes.
 """
 
 

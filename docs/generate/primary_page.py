@@ -28,16 +28,18 @@ _INTRODUCTION = """\
 
 Made from `protocol/primary/layout.py` and `protocol/primary/messages.py` by `make docs`.
 
-What the teach pendant itself listens to: ten times a second the whole state of the robot in sub-packages, and
-between the states, on 30001 only, messages: what programs print, when they start, pause, end and fail, error
-codes, changes of the safety mode, popups and questions, global variables. All four ports send states;
-30001 and 30002 take scripts ([scripts.md](scripts.md)), 30011 and 30012 ignore what they are sent. urx
-lives on 30002, ur_modern_driver and the maker's client library on 30001.
+The teach pendant itself uses this interface. Ten times a second it sends the whole state of the
+robot in sub-packages. Between the states, port 30001 also sends messages: texts of programs, their
+start, pause, end and failure, error codes, changes of the safety mode, popups and questions, global
+variables. All four ports send states; 30001 and 30002 accept scripts ([scripts.md](scripts.md)),
+30011 and 30012 ignore all input. urx uses 30002, ur_modern_driver and the maker's client library
+use 30001.
 
-A package is its size (32 bits, itself included), a type byte and a body, all big-endian. A state is a row of
-sub-packages with a header like that of a package. Readers skip what they do not know by its size.
+A package is its size (32 bits, itself included), a type byte and a body, all big-endian. A state is
+a sequence of sub-packages, each with a header like that of a package. Readers use the size to skip
+unknown types.
 
-## On connect
+## On connection
 
 | | package | bytes in 3.15 | from |
 |---|---|---|---|
@@ -47,19 +49,19 @@ sub-packages with a header like that of a package. Readers skip what they do not
 | 4 | the first state, with kinematics and configuration | {first} | |
 | 5 | 30001 and 30011: names and values of the running program's global variables | from 16 on | |
 
-Then states without kinematics and configuration ({later} bytes). These two come again in the first state
-after the brakes have opened.
+The following states have no kinematics and configuration ({later} bytes). These two come again in
+the first state after the brakes have opened.
 """
 
 _MESSAGES = """\
 ## Messages
 
-Package type 20: time stamp in microseconds since the controller started (a multiple of the cycle, all ones
-for none), source, message type, fields. On the secondary ports only {secondary}.
+Package type 20: time stamp in microseconds since the controller started (a multiple of the cycle,
+all ones for none), source, message type, fields. The secondary ports send only {secondary}.
 
 * Sources: {sources}.
 * Levels of errors: {levels}. Codes print as `C<code>A<argument>`.
-* Wanted answers: {wanted}.
+* Requested types: {wanted}.
 """
 
 # When the box sends each message, by its name.
@@ -67,23 +69,23 @@ _WHEN = {
     "TextMessage": "`textmsg`",
     "ProgramLabelMessage": "up to 3.2: a `$` line was passed",
     "PopupMessage": "`popup`, and the dashboard's",
-    "VersionMessage": "on connect",
+    "VersionMessage": "on connection",
     "SafetyModeMessage": "the safety mode has changed",
     "ErrorCodeMessage": "a protective stop, a violation, a fault, a warning, a refused command",
     "KeyMessage": "a program has started, paused or stopped; a `sec` program has failed",
     "RequestValueMessage": "`request_..._from_primary_client`",
-    "RuntimeExceptionMessage": "a program did not compile, died or could not be started",
-    "StartupMessage": "on connect",
+    "RuntimeExceptionMessage": "a program did not compile, failed or could not be started",
+    "StartupMessage": "on connection",
     "ProgramThreadsMessage": "from 3.3: a thread has passed a `$` line",
 }
 
 _VARIABLES = """\
 ## Global variables
 
-Package type 25, on 30001 and 30011. Sub-type 0 gives the names of a program's `global` variables when it
-starts, sub-type 1 the values that have changed, ten times a second and at the end. A value is a type code
-and then: strings a length of 16 bits and the text; a pose six 32-bit floats; a list its length and its
-values; a matrix its rows, its columns and its values. Codes:
+Package type 25, on 30001 and 30011. Sub-type 0 gives the names of a program's `global` variables
+when it starts, sub-type 1 the values that have changed, ten times a second and at the end. A value
+is a type code and its data: a string is a length of 16 bits and the text; a pose six 32-bit floats;
+a list its length and its values; a matrix its rows, its columns and its values. The codes:
 """
 
 
@@ -110,7 +112,7 @@ def render() -> str:
             *table(("from software", "first", "later"), map(_size_row, _SIZES)),
             "\n## Sub-packages of a state\n",
             MARKS,
-            "In the order of the wire.\n",
+            "They follow each other in the order of this list.\n",
             *_sub_packages(),
             messages,
             *_message_rows(),

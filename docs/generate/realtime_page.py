@@ -13,14 +13,16 @@ _INTRODUCTION = """\
 
 Made from `protocol/realtime/columns.py` by `make docs`.
 
-The oldest way to watch a robot at full rate, and still the simplest: connect, and a frame comes in every
-control cycle (125 a second; nothing is greeted, nothing has to be asked for). Drivers of the first
-generation, data loggers and MATLAB read it, and they write script lines into the same socket
-([scripts.md](scripts.md)); nothing is answered there. Port 30013 sends the same and ignores what it is sent.
+This is the oldest interface that reports the robot at full rate, and the simplest: a client
+connects and receives a frame in every control cycle (125 a second), without greeting or request.
+Drivers of the first generation, data loggers and MATLAB read it. They write script lines into the
+same socket ([scripts.md](scripts.md)), which sends no answer to them. Port 30013 sends the same
+frames and ignores all input.
 
-A frame is its size in bytes (a 32-bit integer, itself included) and then 64-bit floats, all big-endian. There
-has no type and no version: the size is the only hint. A frame of an older version is the beginning of a newer
-one. A client that does not read loses whole frames, never parts ([tested](../security.md)).
+A frame is its size in bytes (a 32-bit integer, itself included) and then 64-bit floats, all
+big-endian. A frame has no type and no version: only the size tells them apart. A frame of an older
+version is the beginning of a newer one. A client that does not read loses whole frames, never parts
+([tested](../security.md)).
 """
 
 _SAMPLE = (
@@ -33,8 +35,8 @@ _SAMPLE = (
 )
 
 _NOTES = """\
-* The two words of digital bits travel as floats: 5.0 is bits 0 and 2. Three public clients read them as
-  integers and get nonsense, as they do from a real robot.
+* The two words of digital bits travel as floats: 5.0 is bits 0 and 2.
+  Three public clients read them as integers and get wrong values, as they do from a real robot.
 * Gnuplot columns, as in the maker's sheets, count floats from 1.
 """
 

@@ -22,12 +22,13 @@ _INTRODUCTION = f"""\
 
 Made from `protocol/rtde/fields.py` and `protocol/rtde/types.py` by `make docs`.
 
-The interface for programs of today: a client names the variables that it wants and how often, and gets just
-these in binary packages; it may also write inputs, which programs on the robot read. ur_rtde, the maker's
-client library and its Python client, fieldbus gateways and loggers use it.
+This is the interface for current programs. A client names the variables that it needs and their
+rate, and receives only these in binary packages; it can also write inputs, which programs on the
+robot read. ur_rtde, the maker's client library and its Python client, fieldbus gateways and loggers
+use it.
 
-A package is its size (16 bits, itself included), a type byte and a payload, all big-endian. A connection
-begins in protocol version 1; `V` asks for version 2, which every client of today does.
+A package is its size (16 bits, itself included), a type byte and a payload, all big-endian. A
+connection begins in protocol version 1; `V` requests version 2, as all current clients do.
 
 | type | client to robot | robot to client |
 |---|---|---|
@@ -39,16 +40,19 @@ begins in protocol version 1; `V` asks for version 2, which every client of toda
 | `U` | recipe number, values of inputs | recipe number (version 2 only), values of outputs |
 | `M` | text | text; only before the box ends a connection |
 
-* Every request gets exactly one reply, in order; nothing is said unasked before the reply to `S`.
-* Rates are whole divisions of 125 a second: 60 asked for are 62.5, 1 to 125 are possible.
-* One output recipe a connection, the last one counts. Input recipes: up to 255, numbered from 1.
-* A name that the software does not have is answered `NOT_FOUND`, an input that another connection has taken
-  `IN_USE`; either makes the whole recipe void (number 0). Inputs are free again as soon as their owner's
-  connection ends.
-* Inputs are taken at any time, also before `S`, and act in the next control cycle; the last value stays. A
-  package that is too long or too short is used as far as whole leading values go.
-* Data that a client does not read is dropped in whole packages. Names take {MAX_NAMES_SIZE} bytes at most,
-  a package {MAX_REQUEST_SIZE}; what cannot be RTDE ends the connection, with a text that says why.
+* Every request gets exactly one reply, in order; the box sends nothing else before the reply to
+  `S`.
+* Rates are 125 a second divided by a whole number: a request for 60 gives 62.5. Rates of 1 to 125
+  are possible.
+* A connection has one output recipe, the last one, and up to 255 input recipes, numbered from 1.
+* The reply to a name that the software does not have is `NOT_FOUND`, to an input that another
+  connection uses `IN_USE`; either makes the whole recipe void (number 0). Inputs are free again
+  when the connection that uses them ends.
+* Inputs are accepted at any time, also before `S`, and act in the next control cycle; the last
+  value stays. Of a package that is too long or too short, the complete leading values are used.
+* If a client does not read, whole packages are dropped. The names of a recipe have at most
+  {MAX_NAMES_SIZE} bytes, a package {MAX_REQUEST_SIZE}; data that is not RTDE ends the connection,
+  with a text message that gives the reason.
 * A program may watch that an input is written often enough (`rtde_set_watchdog`), and may take
   `external_force_torque` in place of the estimated force (`enable_external_ft_sensor`).
 """
@@ -58,14 +62,14 @@ _OUTPUTS = """\
 ## Outputs
 
 *From* gives the first software of CB3 and e-Series; before it, and where it is "-", the answer is
-`NOT_FOUND`. Variables of late e-Series software that are not listed are not answered in any version.
+`NOT_FOUND`. Variables of late e-Series software that are not listed are `NOT_FOUND` in every version.
 """
 
 _INPUTS = """\
 ## Inputs
 
-Masks say which of the values act; those that they leave out are never looked at. The registers are read by
-programs (`read_input_integer_register` and its kin) and can be read back as outputs.
+Masks select the values that act; the other values are ignored. Programs read the registers
+(`read_input_integer_register` and similar functions); they can be read back as outputs.
 """
 
 
@@ -76,7 +80,7 @@ def render() -> str:
             _INTRODUCTION,
             "## Try it\n",
             _example(),
-            "\nOf a box that runs; `decode rtde FILE --names ...` reads what was captured from one.\n",
+            "\nThis decodes a running box; `decode rtde FILE --names ...` decodes captured bytes.\n",
             _OUTPUTS,
             MARKS,
             *table(("name", "type", "unit", "origin", "meaning", "from"), _output_rows()),

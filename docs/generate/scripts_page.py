@@ -10,13 +10,13 @@ from ur_emulator.budgets import BUDGETS
 _INTRODUCTION = f"""\
 # Scripts over ports 30001, 30002 and 30003
 
-Made from `protocol/controller_words.py`, `protocol/script_channel.py` and `ur_emulator/budgets.py` by `make
-docs`.
+Made from `protocol/controller_words.py`, `protocol/script_channel.py` and `ur_emulator/budgets.py`
+by `make docs`.
 
-Whoever connects to one of the three ports can make the robot run [URScript](../urscript-coverage.md): drivers
-upload their control programs this way, urx and small tools send a line for every move. It is plain text
-without any frame, the same on all three. CB3 has no switch between local and remote control: what comes is
-run. The twins 30011 to 30013 run nothing.
+A client of one of these three ports can make the robot run [URScript](../urscript-coverage.md):
+drivers send their control programs, urx and small tools send a line for every move. The script is
+plain text without framing, the same on all three ports. CB3 has no switch between local and remote
+control: every script is run. The read-only ports 30011 to 30013 run nothing.
 
 ```python
 with socket.create_connection(("127.0.0.1", 30002)) as robot:
@@ -25,37 +25,39 @@ with socket.create_connection(("127.0.0.1", 30002)) as robot:
 
 ## What is a program
 
-* Lines end in `\\n`; a line without it does not exist yet. How the text was cut into segments does not
-  matter.
-* `def` or `sec` begins a program, the `end` that closes its last block ends it; indentation does not count.
-* Any other line is a program of one statement. A stream of them (`speedj(...)` in every cycle) gives one
-  smooth movement.
-* A `def` or a single statement stops and replaces the program that runs. A `sec` runs beside it, within one
-  control cycle, and may not move the arm.
-* The program goes on when its sender disconnects. One that is not complete then is dropped.
+* Lines end in `\\n`; a line is complete only with it. The division of the text into TCP segments
+  does not matter.
+* `def` or `sec` begins a program, and the `end` that closes its last block ends it; indentation has
+  no meaning.
+* Any other line is a program of one statement. A stream of such programs (`speedj(...)` in every
+  cycle) gives one smooth movement.
+* A `def` or a single statement stops and replaces the running program. A `sec` runs beside it,
+  within one control cycle, and may not move the arm.
+* A program continues when its sender disconnects. An incomplete one is dropped then.
 * Lines up to {MAX_LINE} bytes, programs up to {MAX_PROGRAM} bytes; longer ones are dropped, and a warning
   says so.
-* Programs begin in the order of arrival. Who sends many at once lets others go first; nobody waits longer
-  than a second for a long program of somebody else, which does not begin any more when a newer one has. At
-  most {BUDGETS.programs_per_cycle} programs begin in a control cycle, the others wait; what waits, and how
-  long a program may take to compile, is limited ([SECURITY.md](../../SECURITY.md)). What comes on top is
-  refused, and a warning says so.
-* A program that comes while the robot is not RUNNING, or stopped for safety, is not run; a runtime
-  exception says why.
+* Programs begin in the order of arrival. If one client sends many at once, the programs of other
+  clients go first. A program waits at most a second for the compilation of a long program of
+  another client; the long one does not begin any more if a newer one has begun. At most
+  {BUDGETS.programs_per_cycle} programs begin in a control cycle, the others wait. The number of
+  waiting programs and the time of a compilation are limited ([SECURITY.md](../../SECURITY.md));
+  programs beyond a limit are refused with a warning.
+* A program that arrives while the robot is not RUNNING, or is stopped for safety, is not run; a
+  runtime exception gives the reason.
 
-Nothing is answered on the port itself. Who wants to know listens to 30001 ([primary.md](primary.md)): a
-key message when a program starts, pauses or stops, with its name (of a single statement, that of the
-function it calls), a runtime exception with line and column (counted from 1, line 1 being the `def` line)
-when it does not compile or dies, and before the stop. `python -m protocol decode primary --live 127.0.0.1
---count 50` shows them.
+The port itself sends no answer. Port 30001 ([primary.md](primary.md)) reports a key message when a
+program starts, pauses or stops, with its name (for a single statement, the function that it calls),
+and a runtime exception with line and column (counted from 1; line 1 is the `def` line) if a program
+does not compile or fails; the exception comes before the stop. `python -m protocol decode primary
+--live 127.0.0.1 --count 50` shows these messages.
 
 ## Words that are not URScript
 
-Lines of their own, in lower case, outside of a program. They act in the next control cycle and never wait
-for a program; one that comes twice in a cycle acts once. `stop program` and `power off`, like `stop` and
-`power off` of the dashboard and an emergency stop, also end all programs that have come before and have not
-begun, whoever has sent them; only those of kind `sec` go on. A program that somebody has paused before it
-began begins with a pause.
+These words stand on their own lines, in lower case, outside a program. They act in the next control
+cycle and never wait for a program; a word that comes twice in a cycle acts once. `stop program` and
+`power off`, like `stop` and `power off` of the dashboard and an emergency stop, also end all
+programs of all clients that have arrived but have not begun; only `sec` programs continue. A
+program that is paused before it has begun begins with a pause.
 """
 
 
@@ -65,5 +67,5 @@ def render() -> str:
         (f"`{word.text}{' <number>' * word.takes_number}`", word.effect, word.source)
         for word in CONTROLLER_WORDS
     )
-    end = "\nTo its clients the emulated arm is the real one: `set real` and `set sim` change nothing.\n"
+    end = "\nClients see the emulated arm as a real one: `set real` and `set sim` change nothing.\n"
     return "\n".join((_INTRODUCTION, *table(("word", "does", "known from"), rows), end))

@@ -1,4 +1,4 @@
-"""The page docs/security.md: what was tried against a box, and what came of it (`make attack` measures)."""
+"""The page docs/security.md: attacks on a box and their results (`make attack` measures)."""
 
 from __future__ import annotations
 
@@ -15,28 +15,31 @@ LEAST_RATE, LONGEST_GAP = 0.99, 20.0  # robot time per real time; ms
 _HEADS = ("attack", "what stops it", "rate", "gap (timer)", "lost", "memory", "end")
 
 _INTRODUCTION = """\
-# What was tried against the box
+# Attacks on the box
 
-Made from `tests/attack/results.json`, which `make attack` writes, and `docs/generate/security_page.py` by
-`make docs`. [SECURITY.md](../SECURITY.md) says who may do what, and lists all limits.
+Made from `tests/attack/results.json`, which `make attack` writes, and
+`docs/generate/security_page.py` by `make docs`. [SECURITY.md](../SECURITY.md) says what each port
+allows, and lists all limits.
 
-Each attack has a box of its own: `ur-emulator serve` in real time, in its own process, on a loopback address,
-with a folder of programs and the control API. The attack is another process; it lasts about {seconds:g} s and is
-bounded in bytes and clients. Beside it, each in its own process, run a client of port 30003 that has nothing to do
-with the attack and a bare timer that wakes up every 8 ms. Afterwards the box must answer its dashboard, move a
-joint when a script tells it to, have no more descriptors and threads than before, have stayed below 300 MB
-together with its worker process, and end when it is told to. A short set of the attacks runs in `make test`; it
-asserts all of that, but no rate and no gap, which a busy machine decides.
+Each attack has its own box: `ur-emulator serve` in real time, in its own process, on a loopback
+address, with a folder of programs and the control API. The attack is another process; it lasts
+about {seconds:g} s and is bounded in bytes and clients. Two more processes run beside it: a client
+of port 30003 that is not part of the attack, and a bare timer that wakes up every 8 ms. Afterwards
+the box must answer its dashboard, run a script that moves a joint, have no more descriptors and
+threads than before, have stayed below 300 MB together with its worker process, and end on SIGTERM.
+`make test` runs a short set of the attacks; it asserts all of this, but no rate and no gap, because
+these depend on the load of the machine.
 
 | column | is |
 |---|---|
-| rate | robot time per real time, as the client of 30003 saw it; asked: at least {rate:g} |
-| gap (timer) | longest time between two of its frames, longest time between two wakes of the timer [ms]; asked: at most {gap:g} where the timer has less |
-| lost | cycles of which it got no frame |
-| memory | most that the box and its worker process held [MB] |
+| rate | robot time per real time at the client of 30003; required: at least {rate:g} |
+| gap (timer) | longest time between two of its frames, longest time between two wake-ups of the timer [ms]; required: at most {gap:g} if the timer has less |
+| lost | cycles without a frame at this client |
+| memory | peak memory of the box and its worker process [MB] |
 | end | from SIGTERM to the end of the process [s] |
 
-Measured on {date}: {machine}. The attackers use the same processors as the box: gaps of the timer show how much.
+Measured on {date}: {machine}. The attackers use the same processors as the box; the gaps of the
+timer show how much.
 """  # noqa: E501 - a row of a table
 
 
@@ -52,8 +55,8 @@ def render() -> str:
             date=found["date"],
             machine=found["machine"],
         ),
-        "## What does not hold\n",
-        *(_shortcomings(rows) or ["All attacks were withstood within the figures asked."]),
+        "## Missed figures\n",
+        *(_shortcomings(rows) or ["All attacks were withstood within the required figures."]),
         "",
     ]
     for title in dict.fromkeys(row["section"] for row in rows):

@@ -1,4 +1,4 @@
-"""The page SECURITY.md: who may do what through which port, what is promised, and all limits."""
+"""The page SECURITY.md: what each port allows, what is promised, and all limits."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _PORTS = (
         ("primary", "secondary", "realtime"),
         "run any URScript program: move the arm, set outputs and registers, **open connections from this "
         "machine to any address and port that it reaches** (sockets, XML-RPC, Modbus units), also to "
-        "services on loopback addresses that trust this machine, and pass on what comes back. A script reads "
-        "and writes no files, and does not reach the control port of its box",
+        "services on loopback addresses that trust this machine, and send the answers on. A script reads "
+        "and writes no files, and cannot reach the control port of its box",
         _NOTHING,
     ),
     _PortRow(
@@ -52,15 +52,17 @@ _PORTS = (
 _INTRODUCTION = """\
 # Security
 
-Made from `docs/generate/security_policy.py`, `ur_emulator/budgets.py` and `pc_client/input_files.py` by
-`make docs`. [docs/security.md](docs/security.md) says what was tried against the box, with figures.
+Made from `docs/generate/security_policy.py`, `ur_emulator/budgets.py` and
+`pc_client/input_files.py` by `make docs`. [docs/security.md](docs/security.md) lists the attacks
+that were tried, with figures.
 
 ## Who may do what
 
-The box trusts whoever reaches its ports, as a real CB3 does: its protocols know no password. So the address
-decides. `ur-emulator serve` listens on 127.0.0.1 unless `--host` says otherwise; then **every program and
-every user of this machine** may do what the table says. With another address, so may the network: do that
-only in a network of your own. The control port demands a token there.
+The box trusts every client that reaches its ports, as a real CB3 does: its protocols have no
+password. So the address decides. `ur-emulator serve` listens on 127.0.0.1 by default; then **every
+program and every user of this machine** may do what the table says. With another address
+(`--host`), the whole network may: use this only in your own network. The control port requires a
+token there.
 """
 
 _PROMISES = """\
@@ -68,28 +70,27 @@ _PROMISES = """\
 
 | promise | held by |
 |---|---|
-| No bytes that arrive at a port, and no program, end the process of a box or stop its other clients. An error ends the connection or the program that has caused it, with a line in the log | `tests/attack`, `tests/fuzz` |
-| What clients and programs use is bounded, also in total (below); beyond it the newest is refused. The box and its worker process stay below 300 MB together | `tests/attack` |
-| A client that has nothing to do with an attack keeps its stream, on an idle machine with the rate and the gaps of docs/security.md; that page also says which attacks do more than that | `make attack` |
-| Nothing is read or written outside of the folder `--programs`, by no name and through no link; without that option the box writes into a temporary folder, which it removes. No answer shows a path of this machine | `tests/attack` |
-| A web page that somebody of this machine looks at cannot use the box: the control port checks `Host`, `Origin` and `Sec-Fetch-Site`, all other ports close clients that begin like a browser | `tests/attack` |
+| No bytes that arrive at a port, and no program, end the process of a box or stop its other clients. An error ends the connection or the program that caused it, with a line in the log | `tests/attack`, `tests/fuzz` |
+| The use of resources by clients and programs is bounded, also in total (below); the newest request beyond a limit is refused. The box and its worker process stay below 300 MB together | `tests/attack` |
+| A client that is not part of an attack keeps its stream, on an idle machine with the rate and the gaps of docs/security.md; that page also lists the attacks that exceed them | `make attack` |
+| Nothing is read or written outside the folder `--programs`, by no name and through no link; without this option the box writes into a temporary folder, which it removes. No answer contains a path of this machine | `tests/attack` |
+| A web page in a browser on this machine cannot use the box: the control port checks `Host`, `Origin` and `Sec-Fetch-Site`, all other ports close connections that begin with an HTTP request | `tests/attack` |
 | The client ends a session with a hostile or broken robot in one line, with the arm at rest, and refuses files that are too large or damaged | `tests/attack` |
 
 ## What is not promised
 
 - Nothing protects the users of one machine from each other. The protocols have no passwords and no encryption.
-- The box is an ordinary process with the rights of its user. It compiles scripts to Python code of its own making;
-  a defect in the compiler, in MuJoCo, numpy or Python is a defect of the box. Run it as a user who may do little,
-  in a container where strangers reach it.
-- A machine that is too slow, or busy with other things, delays the box.
+- The box is an ordinary process with the rights of its user. It compiles scripts to Python code; a defect in the compiler, in MuJoCo, numpy or Python is a defect
+of the box. Run it as a user with few rights, and in a container if strangers can reach it.
+- A slow or busy machine delays the box.
 - The client (`ur-client`) moves real arms. Its checks do not replace the safety functions of the arm, and the box
   does not prove that an arm is safe: [docs/real-arm.md](docs/real-arm.md).
 
 ## How to report a weakness
 
-Tell the maintainers in private, by the private report of the repository that you have this from, before you tell
-others. Say the version (`pip show ur-hil`), the options of `ur-emulator serve`, and what was sent, best as a function for
-`tests/attack`. Only the last version gets corrections.
+Report it to the maintainers in private, by the private report of the repository, before you publish
+it. Give the version (`pip show ur-hil`), the options of `ur-emulator serve`, and the bytes that
+were sent, preferably as a function for `tests/attack`. Only the last version gets corrections.
 """  # noqa: E501 - rows of tables
 
 
@@ -98,7 +99,7 @@ def render() -> str:
     return "\n".join(
         (
             _INTRODUCTION,
-            *table(("port", "whoever reaches it may", "it asks for"), _ports()),
+            *table(("port", "every client may", "it requires"), _ports()),
             "",
             _PROMISES,
             "## Limits of a box",
@@ -117,7 +118,7 @@ def _ports() -> Iterator[tuple[str, ...]]:
     numbers = Ports()
     for row in _PORTS:
         given = ", ".join(str(getattr(numbers, name)) for name in row.names)
-        yield given or f"control port, e.g. {DEFAULT_PORT}; closed unless asked for", row.may, row.asks
+        yield given or f"control port, e.g. {DEFAULT_PORT}; closed by default", row.may, row.asks
 
 
 def _budgets() -> Iterator[tuple[str, ...]]:

@@ -13,8 +13,8 @@ from ur_emulator.controller.safety.modes import EVENTS, MODES, after, mode_of
 from ur_emulator.controller.safety.status_bits import safety_status_bits
 
 
-class ProgramWay(NamedTuple):
-    """A way of the primary program from state to state.
+class ProgramTransition(NamedTuple):
+    """A transition of the primary program.
 
     Attributes:
         state: where it begins.
@@ -28,21 +28,21 @@ class ProgramWay(NamedTuple):
 
 
 _P = ProgramState
-# What `scripting.program_slot` does; a test takes every way.
-PROGRAM_WAYS: tuple[ProgramWay, ...] = (
-    ProgramWay(_P.STOPPED, "a program is started", _P.PLAYING),
-    ProgramWay(_P.PLAYING, "pause, protective stop, safeguard stop", _P.PAUSING),
-    ProgramWay(_P.PAUSING, "the arm rests", _P.PAUSED),
-    ProgramWay(_P.PAUSED, "resume, safeguard closed", _P.RESUMING),
-    ProgramWay(_P.PAUSING, "resume, safeguard closed", _P.RESUMING),
-    ProgramWay(_P.RESUMING, "the arm is on its path", _P.PLAYING),
-    ProgramWay(_P.PLAYING, "end, stop, emergency stop, violation, fault, in motion", _P.STOPPING),
-    ProgramWay(_P.PLAYING, "any of them at rest, power off", _P.STOPPED),
-    ProgramWay(_P.PAUSING, "stop, emergency stop, violation, fault, in motion", _P.STOPPING),
-    ProgramWay(_P.PAUSING, "any of them at rest, power off", _P.STOPPED),
-    ProgramWay(_P.PAUSED, "stop, emergency stop, violation, fault, power off", _P.STOPPED),
-    ProgramWay(_P.STOPPING, "the arm rests", _P.STOPPED),
-    ProgramWay(_P.STOPPING, "a program is started", _P.PLAYING),
+# What `scripting.program_slot` does; a test takes every transition.
+PROGRAM_TRANSITIONS: tuple[ProgramTransition, ...] = (
+    ProgramTransition(_P.STOPPED, "a program is started", _P.PLAYING),
+    ProgramTransition(_P.PLAYING, "pause, protective stop, safeguard stop", _P.PAUSING),
+    ProgramTransition(_P.PAUSING, "the arm rests", _P.PAUSED),
+    ProgramTransition(_P.PAUSED, "resume, safeguard closed", _P.RESUMING),
+    ProgramTransition(_P.PAUSING, "resume, safeguard closed", _P.RESUMING),
+    ProgramTransition(_P.RESUMING, "the arm is on its path", _P.PLAYING),
+    ProgramTransition(_P.PLAYING, "end, stop, emergency stop, violation, fault, in motion", _P.STOPPING),
+    ProgramTransition(_P.PLAYING, "any of them at rest, power off", _P.STOPPED),
+    ProgramTransition(_P.PAUSING, "stop, emergency stop, violation, fault, in motion", _P.STOPPING),
+    ProgramTransition(_P.PAUSING, "any of them at rest, power off", _P.STOPPED),
+    ProgramTransition(_P.PAUSED, "stop, emergency stop, violation, fault, power off", _P.STOPPED),
+    ProgramTransition(_P.STOPPING, "the arm rests", _P.STOPPED),
+    ProgramTransition(_P.STOPPING, "a program is started", _P.PLAYING),
 )
 
 _HEAD = """\
@@ -56,60 +56,62 @@ Commands are those of `ur_emulator.commands`; `ControlBox.submit` takes them.
 
 ## Safety mode
 
-Every mode but NORMAL has a cause: a button, an input, or something that happened and stays until somebody
-deals with it. Several causes may stand at a time; the first of this table counts, and when it ends the next
-one does. `safety_status` is the same number.
+Every mode but NORMAL has a cause: a button, an input, or an event that stays until it is reset.
+Several causes can be active at a time; the mode is that of the first one in this table.
+`safety_status` is the same number.
 """
 
 _EVENTS = """
-### What may happen
+### Events
 
-A mode that latches is not entered from a mode above it in the table. When a mode without power is entered,
-the arm brakes with the deceleration of its model, and 50 ms after it rests the power is cut; releasing the
-button sooner cuts it at once.
+A latching mode is not entered from a mode above it in the table. When a mode without power is
+entered, the arm brakes with the deceleration of its model, and the power is cut 50 ms after it
+rests; if the button is released earlier, the power is cut at once.
 """
 
 _MATRIX = """
 ### From mode to mode
 
-Where only the cause of the mode in the head of the column stands; `.` means no change.
+Each column has only the cause of the mode in its head; `.` means no change.
 """
 
 _SPEEDS = """
 ### Reduced and recovery mode
 
-Half the rated joint speeds in reduced mode, 30 °/s in recovery mode: the time on the path runs slower,
-`speed_scaling` shows it. `set_safety_mode_transition_hardness(0)`, which is how a box begins, slows down, and
-stops for the safeguard, with the arm's full deceleration; `(1)` does so gently, within 0.25 s. A joint that
-is above its limit for more than 0.5 s is a protective stop, C191. Recovery begins when the brakes open with a
-joint out of its range, and ends when all are back.
+The joint speed limits are half the rated speeds in reduced mode and 30 °/s in recovery mode: the
+time on the path runs slower, and `speed_scaling` shows by how much. With
+`set_safety_mode_transition_hardness(0)`, the default, the arm slows down, and stops for the
+safeguard, with its full deceleration; with `(1)` it does so gently, within 0.25 s. A joint above
+its limit for more than 0.5 s causes a protective stop, C191. Recovery mode begins when the brakes
+open while a joint is out of its range, and ends when all joints are back.
 
 ### Safety inputs
 
-Emergency stop and safeguard have inputs of their own (EI, SI): `PressEmergencyStop`, `ReleaseEmergencyStop`,
-`SafeguardStop`. Pairs of configurable inputs can be set up with `AssignSafetyInput(pair, function)` as system
-emergency stop, reduced mode or safeguard reset; low is safe, one low channel is enough.
+Emergency stop and safeguard stop have dedicated inputs (EI, SI): `PressEmergencyStop`,
+`ReleaseEmergencyStop`, `SafeguardStop`. Pairs of configurable inputs can be set up with
+`AssignSafetyInput(pair, function)` as system emergency stop, reduced mode or safeguard reset; low
+is safe, one low channel is enough.
 """
 
 _ROBOT = """
 ## Robot mode
 
-`power on` and `brake release` are refused, with a word in the log, while the safety mode lets the joints have
-no power.
+`power on` and `brake release` are refused, with a line in the log, while the safety mode cuts the
+power of the joints.
 """
 
 _JOINTS = """
 ## Joint modes
 
-By robot mode; a safety mode that is named here says more.
+The joint mode depends on the robot mode. The safety modes in the last column override it.
 """
 
 _PROGRAM = """
 ## Program state
 
-A program is started or resumed only while the robot is RUNNING and in NORMAL, REDUCED or RECOVERY; otherwise
-a runtime exception on 30001 says why and what to do. PAUSED by a protective stop stays so after the
-unlocking.
+A program is started or resumed only while the robot is RUNNING and in NORMAL, REDUCED or RECOVERY;
+otherwise a runtime exception on port 30001 gives the reason and the remedy. A program that was
+paused by a protective stop stays paused after the stop is unlocked.
 """
 
 
@@ -118,7 +120,7 @@ def render() -> str:
     lines = [
         _HEAD,
         *_table(
-            ("mode", "number", "arm", "program", "latches", "way out", "source"),
+            ("mode", "number", "arm", "program", "latches", "left by", "source"),
             (
                 (
                     row.mode.name,
@@ -173,7 +175,7 @@ def render() -> str:
         *_diagram(_robot_edges()),
         "",
         *_table(
-            ("from", "command", "way"),
+            ("from", "command", "modes"),
             (
                 (
                     mode.name,
@@ -187,9 +189,9 @@ def render() -> str:
             ),
         ),
         _JOINTS,
-        *_table(("robot mode", "joints", "safety modes that say more"), _joint_rows()),
+        *_table(("robot mode", "joints", "overridden by safety modes"), _joint_rows()),
         _PROGRAM,
-        *_diagram((way.state.name, way.then.name, way.event) for way in PROGRAM_WAYS),
+        *_diagram((row.state.name, row.then.name, row.event) for row in PROGRAM_TRANSITIONS),
     ]
     return "\n".join(lines) + "\n"
 
@@ -216,7 +218,7 @@ def _diagram(edges: Iterable[tuple[str, str, str]]) -> Iterator[str]:
 
 
 def _safety_edges() -> Iterator[tuple[str, str, str]]:
-    """Give the ways from NORMAL and back; the rest is in the matrix."""
+    """Give the transitions from NORMAL and back; the rest is in the matrix."""
     for row in reversed(MODES):
         if row.mode is SafetyMode.NORMAL:
             continue
@@ -241,7 +243,7 @@ def _matrix() -> Iterator[str]:
 
 
 def _robot_edges() -> Iterator[tuple[str, str, str]]:
-    """Give each step once: the first of a way with its command, the others with the time before them."""
+    """Give each step once: the first of a transition with its command, the others with the time before."""
     first: dict[tuple[RobotMode, RobotMode], str] = {}
     later: dict[tuple[RobotMode, RobotMode], str] = {}
     for (mode, command), way in TRANSITIONS.items():

@@ -122,10 +122,14 @@ def test_port_margins_and_tolerances_are_those_of_the_code():
         round(1e3 * margin)
         for margin in (limits.floor_clearance_min, limits.own_clearance_min, limits.cell_clearance_min)
     )
-    assert f"{floor} mm from the floor, {around} mm from walls and solids, {own} mm of links and tool" in PAGE
+    page = " ".join(PAGE.split())
+    margins = (
+        f"{floor} mm from the floor, {around} mm from walls and solids, and {own} mm between links and tool"
+    )
+    assert f"at least {margins}" in page
     preview, paper = CONTROLLERS["preview"].path_tolerance, CONTROLLERS["paper"].path_tolerance
-    off = f"{1e3 * preview:g} mm off it before a run ends ({1e3 * paper:g} mm with the published controller"
-    assert f"{off}, {1e3 * APPROACH.path_tolerance:g} mm on the way to a start)" in PAGE.replace("\n", " ")
+    allowed = f"by {1e3 * preview:g} mm before a run ends ({1e3 * paper:g} mm with the published controller"
+    assert f"{allowed}, {1e3 * APPROACH.path_tolerance:g} mm in an approach)" in page
     assert f"repeats the last velocity for {MISSED_ALLOWED} cycles, then `stopj`" in PAGE
 
 

@@ -68,7 +68,7 @@ def test_every_way_of_the_page_is_taken_and_no_other():
     taken.update(ways_of(SafeguardStop(True), SafeguardStop(False)))
     taken.update(ways_of(StopProgram(), START))
     taken.update(ways_of((3, StopProgram()), START))
-    assert taken == {(way.state, way.then) for way in states_page.PROGRAM_WAYS}
+    assert taken == {(row.state, row.then) for row in states_page.PROGRAM_TRANSITIONS}
 
 
 @pytest.mark.parametrize("pause", PAUSES)

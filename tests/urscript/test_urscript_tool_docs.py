@@ -38,7 +38,7 @@ def played(session):
 
 def table_of_warnings():
     rows = "".join(f"| {rule.code} | {rule.meaning} | {rule.reason} |\n" for rule in RULES)
-    return f"| code | what | why it is probably a mistake |\n|---|---|---|\n{rows}"
+    return f"| code | what | why it is probably a mistake |\n| -- | -- | -- |\n{rows}"
 
 
 def rewritten(page):
