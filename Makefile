@@ -60,8 +60,9 @@ format: $(STAMP) ## put the code into its canonical layout
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-docs: $(STAMP) ## rewrite the generated pages
+docs: $(STAMP) ## rewrite the generated pages, build the documentation site into out/site
 	$(BIN)/python -m docs.generate
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 pictures: $(STAMP) ## draw the pictures of docs/contact.md (needs off-screen OpenGL, e.g. libegl1)
 	$(BIN)/python docs/make_contact_pictures.py
