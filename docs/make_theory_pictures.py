@@ -1,4 +1,4 @@
-"""The picture of docs/theory.md: a lognormal stroke with its points, and one stroke by several laws.
+"""The picture of docs/theory.md: a lognormal stroke with its points, and one stroke by several models.
 
 `python docs/make_theory_pictures.py` writes docs/img/theory.svg. docs/img/compare.svg is made by the
 command in theory.md.
@@ -18,29 +18,29 @@ from pc_client.movements.robotic import SmoothedSquareWave
 from pc_client.movements.timing import LiteralTiming, TwoSidedTiming
 
 IMG = Path(__file__).parent / "img"
-BELL = Lognormal(0.0, -1.6, 0.25)
+LOGNORMAL = Lognormal(0.0, -1.6, 0.25)
 
 
-def draw_bell(axes: Axes) -> None:
+def draw_lognormal(axes: Axes) -> None:
     t = np.linspace(0.0, 0.55, 1101)
-    axes.plot(t, BELL.evaluate(t).rate, color=BLUE, lw=2.0)
-    before, after = BELL.inflections
+    axes.plot(t, LOGNORMAL.evaluate(t).rate, color=BLUE, lw=2.0)
+    before, after = LOGNORMAL.inflections
     points = {
         "inflection": (before, (-8, 6), "right"),
-        "top: exp(mu − sigma²)": (BELL.mode, (0, 7), "center"),
-        "half the way: exp(mu)": (BELL.median, (10, 2), "left"),
-        "mean": (BELL.mean, (10, -8), "left"),
+        "top: exp(mu − sigma²)": (LOGNORMAL.mode, (0, 7), "center"),
+        "half the way: exp(mu)": (LOGNORMAL.median, (10, 2), "left"),
+        "mean": (LOGNORMAL.mean, (10, -8), "left"),
         "inflection ": (after, (10, 0), "left"),
     }
     for label, (time, offset, side) in points.items():
-        height = float(BELL.evaluate(time).rate)
+        height = float(LOGNORMAL.evaluate(time).rate)
         axes.plot([time], [height], "o", color=RED, ms=5)
         axes.annotate(label, (time, height), offset, textcoords="offset points", ha=side, fontsize=8)
     for z, name in ((-3.0, "z = −3"), (3.0, "z = 3")):
-        time = BELL.time_at_deviation(z)
+        time = LOGNORMAL.time_at_deviation(z)
         axes.axvline(time, color=REFERENCE_GREY, lw=0.9, ls=":")
         axes.annotate(name, (time, 6.2), (3, 0), textcoords="offset points", fontsize=8)
-    done = BELL.evaluate(t).done
+    done = LOGNORMAL.evaluate(t).done
     axes.plot(t, 8.0 * done, color=REFERENCE_GREY, lw=1.2)
     axes.annotate(
         "way done F (0 to 1)", (0.435, 7.9), (0, -11), textcoords="offset points", fontsize=8, color="#666666"
@@ -66,13 +66,13 @@ def draw_profiles(axes: Axes) -> None:
     for label, (speed, colour) in profiles.items():
         axes.plot(t, speed, color=colour, lw=1.7, label=label)
     axes.set(xlim=(0.0, 1.0), ylim=(0.0, 7.0), xlabel="t / T", ylabel="speed T / D")
-    axes.set_title("One stroke, six laws: the same way in the same window")
+    axes.set_title("One stroke, six models: the same length in the same window")
     axes.legend(loc="upper left", ncols=2)
 
 
 def main() -> None:
     with svg_figure(11.0, 3.6, mark="") as (figure, page):
-        draw_bell(figure.add_axes((0.055, 0.14, 0.4, 0.76)))
+        draw_lognormal(figure.add_axes((0.055, 0.14, 0.4, 0.76)))
         draw_profiles(figure.add_axes((0.53, 0.14, 0.455, 0.76)))
     (IMG / "theory.svg").write_text(page.getvalue(), encoding="utf-8", newline="\n")
 

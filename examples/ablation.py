@@ -27,19 +27,19 @@ from protocol.ur_types import Ports
 HOST = "127.0.0.1"
 
 PAPER, PREVIEW, BEST = CONTROLLERS["paper"], CONTROLLERS["preview"], CONTROLLERS["best"]
-LAG = replace(BEST, compensates_gear=False, learns=False)
+LAG = replace(BEST, compensates_gear=False, uses_ilc=False)
 
 COMPOSITIONS: dict[str, tuple[Controller, str]] = {
     "paper": (PAPER, "PI and feed-forward, as published"),
     "short ramp": (
-        replace(PREVIEW, looks_ahead=False, path_tolerance=PAPER.path_tolerance),
+        replace(PREVIEW, uses_preview=False, path_tolerance=PAPER.path_tolerance),
         "the robot's own ramp 40 rad/s2, other gains",
     ),
     "preview": (PREVIEW, "+ feed-forward ahead by the identified delay"),
     "lag": (LAG, "+ dead time and lag apart: qd + lag qdd, ahead by the dead time"),
     "lag, gear": (replace(LAG, compensates_gear=True), "lag + feed-forward against the waves of the gears"),
-    "lag, learning": (replace(LAG, learns=True), "lag + learning between repetitions"),
-    "preview, learning": (replace(LAG, compensates_lag=False, learns=True), "the same without lag"),
+    "lag, learning": (replace(LAG, uses_ilc=True), "lag + learning between repetitions"),
+    "preview, learning": (replace(LAG, compensates_lag=False, uses_ilc=True), "the same without lag"),
     "best": (BEST, "lag + gear + learning"),
 }
 FIDELITIES = ("ideal", "typical", "poor")

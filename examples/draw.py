@@ -22,7 +22,7 @@ CHARACTERS = (
 
 
 def made_up_letter(folder: Path) -> Path:
-    """Write a T, x, y, t in pixels and milliseconds, with the speed bells of two quick strokes."""
+    """Write a T, x, y, t in pixels and milliseconds, with the speed profiles of two quick strokes."""
     lines = ["START"]
     for begin, (x0, y0), (x1, y1) in ((0, (20, 20), (80, 22)), (900, (50, 20), (48, 90))):
         for k in range(41):

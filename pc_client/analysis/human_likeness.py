@@ -1,9 +1,11 @@
 """How human-like a movement is, in four figures that need no model of it.
 
-    sparc                    smoothness, from the speed's spectrum: near -1.4 for one bell, lower when
-    ragged log_dimensionless_jerk   smoothness, from the speed's second derivative: -5.3 for minimum jerk,
-    lower when worse speed_peaks              how many bells: a person needs one a stroke power_law_exponent
-    beta in speed = k curvature^-beta: one third for drawing hands
+    sparc                    smoothness, from the spectrum of the speed: about -1.4 for one speed peak,
+                             lower for a less smooth speed
+    log_dimensionless_jerk   smoothness, from the second derivative of the speed: -5.3 for minimum jerk,
+                             lower for a less smooth speed
+    speed_peaks              number of speed peaks: one a stroke in human movements
+    power_law_exponent       beta in speed = k curvature^-beta: one third for drawing hands
 
 Pure functions on samples at equal steps of time. None of them filters: noise that is differentiated twice
 is all that is left, so measured signals are smoothed before (`comparison.filtering`).

@@ -12,7 +12,7 @@ from pc_client.movements import movement
 from pc_client.movements.files import load_movement
 from pc_client.movements.own_points import Style, through
 from pc_client.movements.robotic import Corners
-from pc_client.movements.samples import SampledLaw, rotations_of
+from pc_client.movements.samples import SampledTrajectory, rotations_of
 from pc_client.movements.twins import SETBACK
 
 __all__ = ["Movement"]
@@ -70,8 +70,10 @@ class Movement(movement.Movement):
             MovementError: shapes or values make no sense.
         """
         turns = None if rotations is None else rotations_of(rotations)
-        law = SampledLaw(np.asarray(t, dtype=np.float64), np.asarray(points, dtype=np.float64), turns)
-        return cls(name, law, np.array([law.duration]))
+        trajectory = SampledTrajectory(
+            np.asarray(t, dtype=np.float64), np.asarray(points, dtype=np.float64), turns
+        )
+        return cls(name, trajectory, np.array([trajectory.duration]))
 
     @classmethod
     def from_csv(cls, path: str | Path) -> Self:
@@ -102,4 +104,4 @@ class Movement(movement.Movement):
 
     @classmethod
     def _of(cls, one: movement.Movement) -> Self:
-        return cls(one.name, one.law, one.stroke_durations, one.provenance)
+        return cls(one.name, one.trajectory, one.stroke_durations, one.provenance)

@@ -118,7 +118,7 @@ def new(
         typer.Option(
             "--targets",
             metavar="FILE.csv",
-            help="Your target points: columns x, y, z in m, base frame; and t in s, if you wish.",
+            help="Your target points: columns x, y, z in m, base frame; and optionally t in s.",
         ),
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Movement file to write, .toml.")],

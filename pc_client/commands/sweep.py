@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from pc_client.sweep.case import Case, GivenRobot, SimulatedArm
     from pc_client.sweep.config import SweepConfig
     from pc_client.sweep.folder import SweepFolder
-    from pc_client.sweep.ledger import Ledger
     from pc_client.sweep.ranking import Setting
+    from pc_client.sweep.result_store import ResultStore
     from pc_client.sweep.schedule import Outcomes
 
 _MOST_SHOWN = 5
@@ -55,7 +55,7 @@ def sweep(
     from pc_client.sweep.case import GivenRobot, all_cases
     from pc_client.sweep.config import read_config
     from pc_client.sweep.folder import SweepFolder
-    from pc_client.sweep.ledger import Ledger
+    from pc_client.sweep.result_store import ResultStore
     from pc_client.sweep.run_case import run_case
     from pc_client.sweep.schedule import run_in_turn, run_side_by_side
     from pc_client.sweep.table import table_content, table_format
@@ -74,9 +74,9 @@ def sweep(
         arms = (GivenRobot(plan.host, plan.port_base, arm.model.name, serial, plan.cell, plan.reverse_port),)
     cases = all_cases(plan.movements, arms, plan.controllers, plan.repeat)
     folder.prepare()
-    ledger = Ledger(cases, folder, plan.keep_recordings)
-    waiting = ledger.waiting()
-    say(f"{len(ledger)} cases, {ledger.n_settled} of them done before; results in {folder.path}")
+    store = ResultStore(cases, folder, plan.keep_recordings)
+    waiting = store.waiting()
+    say(f"{len(store)} cases, {store.n_settled} of them done before; results in {folder.path}")
     if arm is None:
         outcomes = run_side_by_side(waiting, plan.keep_recordings, run_case, workers=workers, dask=dask)
     else:
@@ -84,32 +84,32 @@ def sweep(
             _confirm(arm, waiting)
         outcomes = run_in_turn(waiting, plan.keep_recordings, run_case)
     try:
-        _work(ledger, outcomes, live=arm is None)
+        _work(store, outcomes, live=arm is None)
     except KeyboardInterrupt as interrupt:
         doubts = "".join(f"; {note}" for note in getattr(interrupt, "__notes__", ()))
         raise ClientError(
-            f"interrupted{doubts}; {ledger.n_settled} of {len(ledger)} cases are kept in {folder.path}, "
+            f"interrupted{doubts}; {store.n_settled} of {len(store)} cases are kept in {folder.path}, "
             "the same command goes on from there"
         ) from interrupt
     finally:  # of what there is, whatever ended it
-        table = ledger.rows()
+        table = store.rows()
         path = folder.write(f"sweep.{written_as}", table_content(table, written_as))
     say(f"table: {path}")
     _draw(folder, config.stem, table)
     _show(table)
-    if left := len(ledger.waiting()):
+    if left := len(store.waiting()):
         say(f"{left} cases have not begun: look at the arm, then give the same command again")
     if left or any(row["status"] == "failed" for row in table):
         raise typer.Exit(1)
 
 
-def _work(ledger: Ledger, outcomes: Outcomes, *, live: bool) -> None:
+def _work(store: ResultStore, outcomes: Outcomes, *, live: bool) -> None:
     """Settle case by case, and show how far it is."""
     from pc_client.sweep.progress import SweepProgress
 
-    with closing(outcomes), SweepProgress(console, len(ledger), ledger.n_settled, live=live) as progress:
+    with closing(outcomes), SweepProgress(console, len(store), store.n_settled, live=live) as progress:
         for case, outcome in outcomes:
-            ledger.settle(case, outcome)
+            store.settle(case, outcome)
             progress.finished(outcome)
 
 

@@ -1,4 +1,4 @@
-"""The comparison of generators: the same time and target points by every law, duplicates aside.
+"""The comparison of generators: the same time and target points by every model, duplicates aside.
 
     movement_set  which movements are compared
     filtering     one filter for what was planned and what was measured

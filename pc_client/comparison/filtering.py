@@ -4,8 +4,8 @@ The second derivative of the speed is the third of the position: the encoders' n
 the TCP, would drown it. A Butterworth filter of second order is run forwards and backwards over the
 positions, which shifts nothing in time and halves the amplitude at 5 Hz. Of noise of 5 micrometres it
 leaves less than .05 m/s^3, where executed movements have .3 to 6; what is lost are the corners of
-trapezoids, and they are lost from the plan, too. 5 Hz is far above the movements themselves: the bells of a
-robot's strokes last a second or more.
+trapezoids, and they are lost from the plan, too. 5 Hz is far above the movements themselves: the speed
+profiles of a robot's strokes last a second or more.
 """
 
 from __future__ import annotations

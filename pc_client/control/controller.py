@@ -33,7 +33,7 @@ class Controller:
         name: what `--controller` calls it, or what the numbers started from.
         gain_p: proportional gain [1/s].
         gain_i: integral gain [1/s2].
-        looks_ahead: True: the feed-forward is the mean reference velocity over the cycle in which the
+        uses_preview: True: the feed-forward is the mean reference velocity over the cycle in which the
             command will show in the reported position, i.e. shifted by the identified loop delay.
             False: the reference velocity at the current time.
         speedj_acceleration: the `a` of `speedj` in the robot's program [rad/s2], of the leading axis.
@@ -42,11 +42,11 @@ class Controller:
         speed_share: share of the joint speed limits that a command may use, 0..1.
         path_tolerance: distance of the tool from its path that ends the run [m].
         angle_tolerance: angle of the tool to its orientation on the path that ends it [rad].
-        compensates_lag: with `looks_ahead`: dead time and lag are identified apart; the feed-forward is ahead
-            by the dead time and adds lag * joint acceleration.
-        compensates_gear: with `looks_ahead`: the waves of the gears are found from the movements run so far,
+        compensates_lag: with `uses_preview`: dead time and lag are identified apart; the feed-forward is
+            ahead by the dead time and adds lag * joint acceleration.
+        compensates_gear: with `uses_preview`: the waves of the gears are found from the movements run so far,
             and the feed-forward is that of motors which make up for them (`gear`).
-        learns: a repetition begins with what the run before it taught (`learning`).
+        uses_ilc: a repetition begins with what the run before it taught (`learning`).
         learning_gain: share of a run's error that is learned, 0..1.
         learning_speed: bound of the learned part of a command [rad/s].
         learning_acceleration: bound of its change [rad/s2].
@@ -55,7 +55,7 @@ class Controller:
     name: str
     gain_p: float
     gain_i: float
-    looks_ahead: bool
+    uses_preview: bool
     speedj_acceleration: float
     slew_limit: float
     integral_limit: float
@@ -64,7 +64,7 @@ class Controller:
     angle_tolerance: float = 0.035
     compensates_lag: bool = False
     compensates_gear: bool = False
-    learns: bool = False
+    uses_ilc: bool = False
     learning_gain: float = 0.8
     learning_speed: float = 0.2
     learning_acceleration: float = 20.0
@@ -141,7 +141,7 @@ _PAPER = Controller(
     name="paper",
     gain_p=4.0,
     gain_i=2.0,
-    looks_ahead=False,
+    uses_preview=False,
     speedj_acceleration=3.0,
     slew_limit=15.0,
     integral_limit=0.1,
@@ -155,7 +155,7 @@ _PREVIEW = Controller(
     name="preview",
     gain_p=5.0,
     gain_i=3.0,
-    looks_ahead=True,
+    uses_preview=True,
     speedj_acceleration=40.0,
     slew_limit=30.0,
     integral_limit=0.1,
@@ -166,7 +166,7 @@ _PREVIEW = Controller(
 # All that the identified loop allows: its lag made up for as well, the waves of the gears once a movement has
 # shown them, and each repetition of a movement learns from the one before. The feedback is that of `preview`:
 # it has little left to do.
-_BEST = replace(_PREVIEW, name="best", compensates_lag=True, compensates_gear=True, learns=True)
+_BEST = replace(_PREVIEW, name="best", compensates_lag=True, compensates_gear=True, uses_ilc=True)
 
 # Of the way to a start, before anything is known of the loop: feedback that is stable with a delay of up to
 # 300 ms (pi/2T), and slow. It overshoots the end of its way by what the delay is worth (3 mm with 45 ms, 9 mm
@@ -175,7 +175,7 @@ APPROACH = Controller(
     name="approach",
     gain_p=5.0,
     gain_i=0.0,
-    looks_ahead=False,
+    uses_preview=False,
     speedj_acceleration=5.0,
     slew_limit=5.0,
     integral_limit=0.0,

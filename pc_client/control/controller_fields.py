@@ -69,7 +69,7 @@ FIELDS: Mapping[str, Number | Switch] = MappingProxyType(
     {
         "gain_p": Number(0.0, 200.0, "1/s"),
         "gain_i": Number(0.0, 2000.0, "1/s2"),
-        "looks_ahead": Switch(),
+        "uses_preview": Switch(),
         "speedj_acceleration": Number(0.1, 100.0, "rad/s2"),
         "slew_limit": Number(0.1, 200.0, "rad/s2"),
         "integral_limit": Number(0.0, 3.0, "rad/s"),
@@ -78,7 +78,7 @@ FIELDS: Mapping[str, Number | Switch] = MappingProxyType(
         "angle_tolerance": Number(0.005, 0.5, "rad"),
         "compensates_lag": Switch(),
         "compensates_gear": Switch(),
-        "learns": Switch(),
+        "uses_ilc": Switch(),
         "learning_gain": Number(0.0, 1.0, ""),
         "learning_speed": Number(0.0, 1.0, "rad/s"),
         "learning_acceleration": Number(0.0, 200.0, "rad/s2"),

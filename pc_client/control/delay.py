@@ -63,14 +63,14 @@ def estimate_delay(
     # Command k acts from its frame to the next one: the integral is piecewise linear, knots at the stamps.
     steps = np.append(np.diff(t), period)
     knots = np.append(t, t[-1] + period)
-    way = np.vstack([np.zeros(qd_cmd.shape[1]), np.cumsum(qd_cmd * steps[:, None], axis=0)])
-    moved = np.ptp(way, axis=0) > _LEAST_MOTION
+    displacement = np.vstack([np.zeros(qd_cmd.shape[1]), np.cumsum(qd_cmd * steps[:, None], axis=0)])
+    moved = np.ptp(displacement, axis=0) > _LEAST_MOTION
     if not moved.any():
         raise DriverError("the loop delay cannot be identified: the logged stream holds no motion")
-    way, q = way[:, moved], q[:, moved]
+    displacement, q = displacement[:, moved], q[:, moved]
 
     def mean_square(delay: float) -> float:
-        told = [np.interp(t - delay, knots, joint) for joint in way.T]
+        told = [np.interp(t - delay, knots, joint) for joint in displacement.T]
         return float(np.var(q.T - told, axis=1).mean())
 
     coarse = np.arange(0.0, LONGEST_DELAY + _COARSE_STEP, _COARSE_STEP)
@@ -86,7 +86,7 @@ def estimate_delay(
     delay = float(best + np.clip(-b / (2.0 * a), -_COARSE_STEP, _COARSE_STEP)) if a > 0.0 else float(best)
 
     residual = float(np.sqrt(mean_square(max(delay, 0.0))))
-    motion = float(np.sqrt(np.mean(np.var(way, axis=0))))
+    motion = float(np.sqrt(np.mean(np.var(displacement, axis=0))))
     if residual > _WORST_RESIDUAL * motion:
         raise DriverError(
             f"the loop delay cannot be identified: the arm's motion differs from the commands by "

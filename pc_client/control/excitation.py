@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import cos, pi, sin
 
-WAY = 0.0168
+DISPLACEMENT = 0.0168
 """Way of one pulse [rad]: 0.96 deg."""
 
 PULSE = 0.28
@@ -50,10 +50,10 @@ class Excitation:
             return self._q_start, (0.0,) * 6
         n, tau = divmod(t, self._pulse)
         w = 2.0 * pi / self._pulse
-        mean = WAY / self._pulse
+        mean = DISPLACEMENT / self._pulse
         speed = mean * (1.0 - cos(w * tau))
-        way = mean * (tau - sin(w * tau) / w)
+        displacement = mean * (tau - sin(w * tau) / w)
         if int(n) % 2:  # the way back
-            speed, way = -speed, WAY - way
-        q = tuple(q0 + sign * way for q0, sign in zip(self._q_start, _SIGNS, strict=True))
+            speed, displacement = -speed, DISPLACEMENT - displacement
+        q = tuple(q0 + sign * displacement for q0, sign in zip(self._q_start, _SIGNS, strict=True))
         return q, tuple(sign * speed for sign in _SIGNS)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pc_client.control.delay import LONGEST_DELAY, estimate_delay
-from pc_client.control.loop_model import NO_LAG, LoopModel, lagged_way
+from pc_client.control.loop_model import NO_LAG, LoopModel, lagged_displacement
 from pc_client.errors import DriverError
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 LONGEST_LAG = 0.06
 """Lags up to this are looked for [s]: a drive of 2.6 Hz."""
 
-_LEAST_WAY = 2e-3
+_LEAST_DISPLACEMENT = 2e-3
 """A joint that was commanded to move less than this [rad] says nothing."""
 
 _WORST_RESIDUAL = 0.1
@@ -43,13 +43,15 @@ def identify_loop(t: Array, qd_cmd: Array, q: Array, period: float) -> LoopModel
         DriverError: too little motion, or the arm did not do what it was told.
     """
     total = estimate_delay(t, qd_cmd, q, period).delay
-    moved = np.ptp(np.cumsum(qd_cmd, axis=0) * period, axis=0) > _LEAST_WAY
+    moved = np.ptp(np.cumsum(qd_cmd, axis=0) * period, axis=0) > _LEAST_DISPLACEMENT
     commands, actual = qd_cmd[:, moved], q[:, moved]
     knots = np.append(t, t[-1] + period)
 
     def unexplained(parameters: Array) -> Array:
-        way, _ = _delayed(t, knots, commands, *parameters)
-        return np.concatenate([_beside(way[:, j], actual[:, j]) for j in range(way.shape[1])])
+        displacement, _ = _delayed(t, knots, commands, *parameters)
+        return np.concatenate(
+            [_beside(displacement[:, j], actual[:, j]) for j in range(displacement.shape[1])]
+        )
 
     fit = least_squares(
         unexplained,
@@ -59,9 +61,9 @@ def identify_loop(t: Array, qd_cmd: Array, q: Array, period: float) -> LoopModel
         diff_step=1e-3,
     )
     dead_time, lag = (float(x) for x in fit.x)
-    way, velocity = _delayed(t, knots, commands, dead_time, lag)
+    displacement, velocity = _delayed(t, knots, commands, dead_time, lag)
     residual = float(np.sqrt(np.mean(np.square(fit.fun))))
-    motion = float(np.sqrt(np.mean(np.var(way, axis=0))))
+    motion = float(np.sqrt(np.mean(np.var(displacement, axis=0))))
     if residual > _WORST_RESIDUAL * motion:
         raise DriverError(
             f"dead time and lag cannot be told apart: {residual:.1e} rad rms of the arm's motion stay "
@@ -69,28 +71,28 @@ def identify_loop(t: Array, qd_cmd: Array, q: Array, period: float) -> LoopModel
         )
     # What a joint is later than the model: its rest against its own velocity.
     later = []
-    for j in range(way.shape[1]):
-        slope = _beside(way[:, j], velocity[:, j])
-        later.append(-float(slope @ _beside(way[:, j], actual[:, j])) / float(slope @ slope))
+    for j in range(displacement.shape[1]):
+        slope = _beside(displacement[:, j], velocity[:, j])
+        later.append(-float(slope @ _beside(displacement[:, j], actual[:, j])) / float(slope @ slope))
     return LoopModel(dead_time, lag, max(abs(x) for x in later), residual)
 
 
 def _delayed(t: Array, knots: Array, commands: Array, dead_time: float, lag: float) -> tuple[Array, Array]:
     """Way and velocity (n, j) that the model expects at the stamps t (n,)."""
-    way, velocity = lagged_way(knots, commands, lag)
+    displacement, velocity = lagged_displacement(knots, commands, lag)
     at = np.clip(t - dead_time, knots[0], knots[-1])
     k = np.minimum(np.searchsorted(knots, at, side="right") - 1, len(commands) - 1)
     since = (at - knots[k])[:, None]
     if lag < NO_LAG:
-        return way[k] + commands[k] * since, commands[k]
+        return displacement[k] + commands[k] * since, commands[k]
     excess = velocity[k] - commands[k]
     left = np.exp(-since / lag)
-    return way[k] + commands[k] * since + lag * excess * (1.0 - left), commands[k] + excess * left
+    return displacement[k] + commands[k] * since + lag * excess * (1.0 - left), commands[k] + excess * left
 
 
-def _beside(way: Array, signal: Array) -> Array:
+def _beside(displacement: Array, signal: Array) -> Array:
     """What of a signal (n,) is no cubic function of the way (n,)."""
-    centred = way - way.mean()
+    centred = displacement - displacement.mean()
     scaled = centred / max(float(np.abs(centred).max()), 1e-12)
     basis, _ = np.linalg.qr(np.vander(scaled, 4))
     rest: Array = signal - basis @ (basis.T @ signal)

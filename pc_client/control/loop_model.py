@@ -90,7 +90,7 @@ def velocity_response(loop: LoopModel, period: float) -> Array:
     """
     n = ceil((loop.dead_time + _SETTLED * loop.lag) / period) + 3
     t: Array = np.arange(-1, n, dtype=np.float64) * period - loop.dead_time
-    pulse = _way_after_step(t, loop.lag) - _way_after_step(t - period, loop.lag)
+    pulse = _displacement_after_step(t, loop.lag) - _displacement_after_step(t - period, loop.lag)
     response: Array = np.diff(pulse) / period
     return response
 
@@ -103,7 +103,7 @@ def frequency_response(loop: LoopModel, period: float, hertz: Array) -> NDArray[
     return values
 
 
-def lagged_way(knots: Array, commands: Array, lag: float) -> tuple[Array, Array]:
+def lagged_displacement(knots: Array, commands: Array, lag: float) -> tuple[Array, Array]:
     """Follow held velocities through the lag alone.
 
     Args:
@@ -121,14 +121,14 @@ def lagged_way(knots: Array, commands: Array, lag: float) -> tuple[Array, Array]
         for k, step in enumerate(steps):
             now = commands[k] + (now - commands[k]) * exp(-step / lag)
             velocity[k + 1] = now
-    way = np.vstack([np.zeros(commands.shape[1]), np.cumsum(commands * steps[:, None], axis=0)])
-    return way - lag * velocity, velocity
+    displacement = np.vstack([np.zeros(commands.shape[1]), np.cumsum(commands * steps[:, None], axis=0)])
+    return displacement - lag * velocity, velocity
 
 
-def _way_after_step(t: Array, lag: float) -> Array:
+def _displacement_after_step(t: Array, lag: float) -> Array:
     """Way at times t since a velocity step of 1 began, behind the lag: t - lag (1 - exp(-t / lag))."""
     since = np.maximum(t, 0.0)
     if lag < NO_LAG:
         return since
-    way: Array = since - lag * -np.expm1(-since / lag)
-    return way
+    displacement: Array = since - lag * -np.expm1(-since / lag)
+    return displacement

@@ -55,9 +55,9 @@ class Drawing:
         return _drawn(self.extraction, self.marks)
 
     @property
-    def law(self) -> SigmaLognormal:
-        """The movement's law, in the time of the arm."""
-        return self.joined.law.stretched(self.factor)
+    def trajectory(self) -> SigmaLognormal:
+        """The movement's trajectory, in the time of the arm."""
+        return self.joined.trajectory.stretched(self.factor)
 
     @property
     def delays(self) -> NDArray[np.float64]:
@@ -81,7 +81,7 @@ class Drawing:
 
     def planned(self, t: NDArray[np.float64], mark: int) -> Motion:
         """The plan at times of the recording that belong to a mark, in its frame, unit and time."""
-        motion = self.joined.law.evaluate(t + self.joined.shifts[mark])
+        motion = self.joined.trajectory.evaluate(t + self.joined.shifts[mark])
         back = inverse(self.placement.similarity)
         return Motion(back.points(motion.p), back.vectors(motion.v), back.vectors(motion.a))
 
@@ -125,8 +125,10 @@ def make_drawing(
     facts = _facts(extraction, placement, joined)
 
     def slowed(factor: float) -> Movement:
-        law = joined.law.stretched(factor)
-        return Movement(name, law, _between_slow_moments(law), {**facts, "slower_than_the_hand": factor})
+        trajectory = joined.trajectory.stretched(factor)
+        return Movement(
+            name, trajectory, _between_slow_moments(trajectory), {**facts, "slower_than_the_hand": factor}
+        )
 
     factor = slower * least_factor(slowed, guess, arm)[0]
     return Drawing(extraction, marks, placement, joined, factor, slowed(factor))
@@ -134,7 +136,7 @@ def make_drawing(
 
 def _drawn(extraction: Extraction, marks: Sequence[Mark]) -> NDArray[np.float64]:
     lines = [spatial(part.p) for part in extraction.parts]
-    return np.vstack([*lines, *(mark.first for mark in marks if mark.law is None)])
+    return np.vstack([*lines, *(mark.first for mark in marks if mark.trajectory is None)])
 
 
 def _is_flat(extraction: Extraction) -> bool:
@@ -152,8 +154,8 @@ def _facts(extraction: Extraction, placement: Placement, joined: Joined) -> dict
     }
 
 
-def _between_slow_moments(law: SigmaLognormal) -> NDArray[np.float64]:
-    """Times (s) between the least speeds of a movement, its begin and its end."""
-    t = np.linspace(0.0, law.duration, max(200, int(500 * law.duration)))
-    slow, _ = find_peaks(-np.linalg.norm(law.evaluate(t).v, axis=1))
-    return np.diff(np.concatenate(([0.0], t[slow], [law.duration])))
+def _between_slow_moments(trajectory: SigmaLognormal) -> NDArray[np.float64]:
+    """Times (s) between the speed minima of a movement, its begin and its end."""
+    t = np.linspace(0.0, trajectory.duration, max(200, int(500 * trajectory.duration)))
+    slow, _ = find_peaks(-np.linalg.norm(trajectory.evaluate(t).v, axis=1))
+    return np.diff(np.concatenate(([0.0], t[slow], [trajectory.duration])))

@@ -4,7 +4,7 @@ The similarity and the scaling of time are undone exactly; nothing is shifted or
 moves there are two signals: the positions at the robot's own time stamps, as they were reported, for
 signal-to-noise ratios; and the same on the grid of the recording, low-passed, for everything that is
 differentiated. That low-pass takes the encoders' noise and no more: it is twice as high as the one that the
-recording went through, since that one would blunt the bells a second time.
+recording went through, since that one would blunt the speed profiles a second time.
 """
 
 from __future__ import annotations
@@ -85,12 +85,12 @@ def executed(drawing: Drawing, run: MeasuredRun, shift: float = 0.0) -> Executio
     if t[-1] < float(drawing.joined.pen_down[-1, 1]) * drawing.factor:
         raise RecordingError(f"{run.recording.path}: ends at {t[-1]:.1f} s, before the drawing was done")
     path = CubicSpline(t - shift, track.p_actual)
-    moving = [index for index, mark in enumerate(drawing.marks) if mark.law is not None]
+    moving = [index for index, mark in enumerate(drawing.marks) if mark.trajectory is not None]
     parts = tuple(
         _part(drawing, index, part.t, path)
         for index, part in zip(moving, drawing.extraction.parts, strict=True)
     )
-    whole = np.arange(0.0, drawing.joined.law.duration, 1.0 / RATE_HZ)
+    whole = np.arange(0.0, drawing.joined.trajectory.duration, 1.0 / RATE_HZ)
     p = _less_noise(path(np.clip(whole * drawing.factor, path.x[0], path.x[-1])), RATE_HZ)
     return Execution(run, parts, read_only(whole), read_only(p), read_only(velocity(whole, p)))
 

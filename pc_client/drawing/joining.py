@@ -4,14 +4,14 @@ The sum of strokes does not care who made them, so marks and lifts stand in one 
 
     lowered pen   one stroke from above the begin of the first mark
     mark 1        its own strokes
-    hop           two strokes over a via point above the sheet, to the begin of mark 2, overlapping in time
+    pen-up move   two strokes over a via point above the sheet, to the begin of mark 2, overlapping in time
     mark 2 ...
     lifted pen    one stroke to above the end of the last mark
 
 Each mark keeps its strokes, shape and timing. Only the gaps between marks may become longer: where a tail
-of a mark's bells would reach into its neighbour, or where a hop needs more time. Strokes of lifts lie in the
-gaps but for `TAIL` of their way at either end; `TAIL` of the drawing's size is also what a mark may do of its
-way while its neighbour is drawn.
+of a mark's strokes would reach into its neighbour, or where a pen-up move needs more time. Strokes of lifts
+lie in the gaps but for `TAIL` of their way at either end; `TAIL` of the drawing's size is also what a mark
+may do of its way while its neighbour is drawn.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ _REST = 1e-4
 _LOWERING_S = 0.4
 #: Least time, s of the hand, between two marks.
 _LEAST_GAP_S = 0.1
-#: Of each of the two strokes of a hop, as a share of the gap: they overlap in its middle.
-_HOP_SHARE = 0.7
-#: Width of the bells of lifts; people show .1 to .35 in reaches.
+#: Of each of the two strokes of a pen-up move, as a share of the gap: they overlap in its middle.
+_PEN_UP_SHARE = 0.7
+#: Sigma of the lognormals of lifts; people show .1 to .35 in reaches.
 _LIFT_SIGMA = 0.15
 
 _COVERAGE = -float(ndtri(TAIL))
@@ -55,25 +55,25 @@ class Joined:
     """Marks and lifts in one movement.
 
     Attributes:
-        law: all strokes; the movement begins at 0 at rest, the pen lifted.
+        trajectory: all strokes; the movement begins at 0 at rest, the pen lifted.
         gaps: (n_marks + 1,), s: before the first mark, between the marks, after the last.
         shifts: (n_marks,), s: time of the movement less time of the recording, for each mark.
         pen_down: (n_marks, 2), s: when in the movement the pen comes down and goes up.
     """
 
-    law: SigmaLognormal
+    trajectory: SigmaLognormal
     gaps: NDArray[np.float64]
     shifts: NDArray[np.float64]
     pen_down: NDArray[np.float64]
 
     def gap_intervals(self) -> list[tuple[float, float]]:
         """Begin and end (s) of each gap."""
-        edges = [0.0, *self.pen_down.ravel().tolist(), self.law.duration]
+        edges = [0.0, *self.pen_down.ravel().tolist(), self.trajectory.duration]
         return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def least_gaps(marks: Sequence[Mark], size: float) -> NDArray[np.float64]:
-    """The gaps that the recording has, or longer where bells need it; (n_marks + 1,), s.
+    """The gaps that the recording has, or longer where strokes need it; (n_marks + 1,), s.
 
     Args:
         marks: in order of time.
@@ -106,19 +106,19 @@ def join(marks: Sequence[Mark], gaps: NDArray[np.float64], lift: NDArray[np.floa
     targets, strokes = [marks[0].first + lift], [_lift_stroke(0.0, float(gaps[0]))]
     for row, mark in enumerate(marks):
         targets.append(mark.first)
-        if mark.law is not None:
-            targets += list(mark.law.target_points[1:])
-            strokes += [_later(stroke, float(shifts[row])) for stroke in mark.law.strokes]
+        if mark.trajectory is not None:
+            targets += list(mark.trajectory.target_points[1:])
+            strokes += [_later(stroke, float(shifts[row])) for stroke in mark.trajectory.strokes]
         up, gap = float(downs[row, 1]), float(gaps[row + 1])
         if row + 1 < len(marks):
-            targets.append(0.5 * (mark.last + marks[row + 1].first) + lift / _hop_height())
-            share = _HOP_SHARE * gap
+            targets.append(0.5 * (mark.last + marks[row + 1].first) + lift / _pen_up_height())
+            share = _PEN_UP_SHARE * gap
             strokes += [_lift_stroke(up, share), _lift_stroke(up + gap - share, share)]
         else:
             targets.append(mark.last + lift)
             strokes.append(_lift_stroke(up, gap))
-    law = SigmaLognormal(np.array(targets), tuple(strokes), now + float(gaps[-1]))
-    return Joined(law, read_only(gaps), read_only(shifts), read_only(downs))
+    trajectory = SigmaLognormal(np.array(targets), tuple(strokes), now + float(gaps[-1]))
+    return Joined(trajectory, read_only(gaps), read_only(shifts), read_only(downs))
 
 
 def _lift_stroke(start: float, duration: float) -> Stroke:
@@ -126,14 +126,16 @@ def _lift_stroke(start: float, duration: float) -> Stroke:
 
 
 def _later(stroke: Stroke, shift: float) -> Stroke:
-    bell = stroke.timing.lognormal
-    return Stroke(Lognormal(bell.t0 + shift, bell.mu, bell.sigma), stroke.turn, stroke.tilt)
+    lognormal = stroke.timing.lognormal
+    return Stroke(
+        Lognormal(lognormal.t0 + shift, lognormal.mu, lognormal.sigma), stroke.arc_angle, stroke.tilt
+    )
 
 
 @lru_cache(maxsize=1)
-def _hop_height() -> float:
-    """Height that a hop reaches over the height of its via point: the two strokes cut the corner there."""
+def _pen_up_height() -> float:
+    """Height of a pen-up move over that of its via point: its two strokes cut the corner there."""
     t = np.linspace(0.0, 1.0, 20001)
-    up = _lift_stroke(0.0, _HOP_SHARE).timing.lognormal.evaluate(t).done
-    down = _lift_stroke(1.0 - _HOP_SHARE, _HOP_SHARE).timing.lognormal.evaluate(t).done
+    up = _lift_stroke(0.0, _PEN_UP_SHARE).timing.lognormal.evaluate(t).done
+    down = _lift_stroke(1.0 - _PEN_UP_SHARE, _PEN_UP_SHARE).timing.lognormal.evaluate(t).done
     return float((up - down).max())

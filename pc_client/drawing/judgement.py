@@ -136,11 +136,11 @@ class Verdict:
 
 def signals(drawing: Drawing, execution: Execution | None = None) -> dict[str, tuple[Signal, ...]]:
     """The parts that move as "human", "reconstructed", "planned" and, given a run, "executed"."""
-    moving = [index for index, mark in enumerate(drawing.marks) if mark.law is not None]
+    moving = [index for index, mark in enumerate(drawing.marks) if mark.trajectory is not None]
     parts = drawing.extraction.parts
     found: dict[str, tuple[Signal, ...]] = {
         "human": tuple(Signal(part.t, spatial(part.p), spatial(part.v)) for part in parts),
-        "reconstructed": tuple(Signal(part.t, *part.law.evaluate(part.t)[:2]) for part in parts),
+        "reconstructed": tuple(Signal(part.t, *part.trajectory.evaluate(part.t)[:2]) for part in parts),
         "planned": tuple(
             Signal(part.t, *drawing.planned(part.t, index)[:2])
             for index, part in zip(moving, parts, strict=True)
@@ -225,7 +225,7 @@ _Pair = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 def _against_plan(drawing: Drawing, execution: Execution) -> list[_Pair]:
     """Times, planned and executed positions of each part at the robot's time stamps."""
-    moving = [index for index, mark in enumerate(drawing.marks) if mark.law is not None]
+    moving = [index for index, mark in enumerate(drawing.marks) if mark.trajectory is not None]
     return [
         (part.frame_t, drawing.planned(part.frame_t, index).p, part.frame_p)
         for index, part in zip(moving, execution.parts, strict=True)

@@ -1,7 +1,7 @@
 """The marks of a drawing: what the pen left between coming down and going up, as strokes.
 
-A mark is a part of the recording. Its bells are taken whole: where the part begins in full motion they begin
-before the pen is down, and where it ends so they end after the pen is up.
+A mark is a part of the recording. Its strokes are taken whole: where the part begins in full motion they
+begin before the pen is down, and where it ends so they end after the pen is up.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pc_client.movements.sigma_lognormal import SigmaLognormal
 
 __all__ = ["Mark", "marks_of"]
 
-#: Deviation at which a bell is over for every purpose: 1e-9 of its way is left.
+#: Deviation at which a speed profile is over for every purpose: 1e-9 of its way is left.
 _OVER = 6.0
 #: Accuracy of times of tails, s.
 _TIME_ACCURACY = 1e-6
@@ -36,64 +36,64 @@ class Mark:
         end: when it goes up, s; of a dot maybe the same time.
         first: where the strokes begin, (3,): a virtual point; of a dot the dot.
         last: where they end, (3,), likewise.
-        law: the strokes on the same time axis, or None for a dot.
+        trajectory: the strokes on the same time axis, or None for a dot.
     """
 
     begin: float
     end: float
     first: NDArray[np.float64]
     last: NDArray[np.float64]
-    law: SigmaLognormal | None
+    trajectory: SigmaLognormal | None
 
     def transformed(self, similarity: Similarity) -> Mark:
         """Moved, scaled and rotated; the time is untouched."""
         first, last = similarity.points(np.vstack((self.first, self.last)))
-        law = None if self.law is None else self.law.transformed(similarity)
-        return Mark(self.begin, self.end, read_only(first), read_only(last), law)
+        trajectory = None if self.trajectory is None else self.trajectory.transformed(similarity)
+        return Mark(self.begin, self.end, read_only(first), read_only(last), trajectory)
 
-    def way_before(self, lead: float) -> float:
+    def length_before(self, lead: float) -> float:
         """Length of way that the strokes have done `lead` s before the pen comes down."""
-        return self._way(self.begin - lead, done=True)
+        return self._length(self.begin - lead, done=True)
 
-    def way_after(self, lag: float) -> float:
+    def length_after(self, lag: float) -> float:
         """Length of way that the strokes have still to do `lag` s after the pen went up."""
-        return self._way(self.end + lag, done=False)
+        return self._length(self.end + lag, done=False)
 
     def lead(self, tolerance: float) -> float:
         """How long (s) before the pen comes down the strokes have done no more than a length of way."""
-        if self.law is None or self.way_before(0.0) <= tolerance:
+        if self.trajectory is None or self.length_before(0.0) <= tolerance:
             return 0.0
-        begin = min(s.timing.lognormal.time_at_deviation(-_OVER) for s in self.law.strokes)
+        begin = min(s.timing.lognormal.time_at_deviation(-_OVER) for s in self.trajectory.strokes)
         most = self.begin - begin
-        if self.way_before(most) > tolerance:
+        if self.length_before(most) > tolerance:
             return most
-        return float(bisect(lambda u: self.way_before(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
+        return float(bisect(lambda u: self.length_before(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
 
     def lag(self, tolerance: float) -> float:
         """How long (s) after the pen went up the strokes have still to do more than a length of way."""
-        if self.law is None or self.way_after(0.0) <= tolerance:
+        if self.trajectory is None or self.length_after(0.0) <= tolerance:
             return 0.0
-        end = max(s.timing.lognormal.time_at_deviation(_OVER) for s in self.law.strokes)
+        end = max(s.timing.lognormal.time_at_deviation(_OVER) for s in self.trajectory.strokes)
         most = end - self.end
-        if self.way_after(most) > tolerance:
+        if self.length_after(most) > tolerance:
             return most
-        return float(bisect(lambda u: self.way_after(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
+        return float(bisect(lambda u: self.length_after(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
 
     def path(self, tolerance: float, n: int = 801) -> NDArray[np.float64]:
         """The whole path of the strokes, up to a length of way at both ends, and its end points; (m, 3)."""
         ends = np.vstack((self.first, self.last))
-        if self.law is None:
+        if self.trajectory is None:
             return ends
         t = np.linspace(self.begin - self.lead(tolerance), self.end + self.lag(tolerance), n)
-        return np.vstack((ends, self.law.evaluate(t).p))
+        return np.vstack((ends, self.trajectory.evaluate(t).p))
 
-    def _way(self, t: float, *, done: bool) -> float:
-        if self.law is None:
+    def _length(self, t: float, *, done: bool) -> float:
+        if self.trajectory is None:
             return 0.0
-        shares = [float(stroke.timing.lognormal.evaluate(t).done) for stroke in self.law.strokes]
+        shares = [float(stroke.timing.lognormal.evaluate(t).done) for stroke in self.trajectory.strokes]
         return math.fsum(
             length * (share if done else 1.0 - share)
-            for length, share in zip(self.law.lengths.tolist(), shares, strict=True)
+            for length, share in zip(self.trajectory.lengths.tolist(), shares, strict=True)
         )
 
 
@@ -111,9 +111,9 @@ def marks_of(extraction: Extraction) -> tuple[Mark, ...]:
         Mark(
             float(part.t[0]),
             float(part.t[-1]),
-            part.law.target_points[0],
-            part.law.target_points[-1],
-            part.law,
+            part.trajectory.target_points[0],
+            part.trajectory.target_points[-1],
+            part.trajectory,
         )
         for part in extraction.parts
     ]

@@ -1,9 +1,9 @@
-"""How slow a drawing must be for an arm: one factor for all of it, longer hops where only they are too fast.
+"""How slow a drawing must be for an arm: one factor for all of it; only pen-up moves may become longer.
 
 Slowed down by a factor a, on the same path, joint speeds fall by a and joint accelerations by a^2; so one
-plan tells for every moment which factor it needs. Marks come first: they are what is drawn. A hop that would
-need a larger factor than they do gets more time instead, and the marks behind it come later. The factor
-itself is then found by bisection, with planning's own checks as the judge.
+plan tells for every moment which factor it needs. Marks come first: they are what is drawn. A pen-up move
+that would need a larger factor than they do gets more time instead, and the marks behind it come later. The
+factor itself is then found by bisection, with planning's own checks as the judge.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.limits import limits_of
 from pc_client.planning.plan import JointPlan, PlannableMovement, plan_movement
 
-__all__ = ["ACCURACY", "LawMovement", "factor_needed", "least_factor", "paced"]
+__all__ = ["ACCURACY", "StretchedMovement", "factor_needed", "least_factor", "paced"]
 
 #: Relative accuracy of the factor.
 ACCURACY = 1e-3
-#: Hops with this time, s of the hand, hold nothing up.
+#: Pen-up moves with this time, s of the hand, hold nothing up.
 _WIDE_GAP_S = 3.0
-#: A hop that is too fast gets this much more time at least and at most, per attempt.
+#: A pen-up move that is too fast gets this much more time at least and at most, per attempt.
 _LONGER = (1.03, 1.5)
 _ATTEMPTS = 40
 #: Speed, m/s, at which a path is planned first: far from any limit, so that its samples lie close.
 _EASY_SPEED = 0.3
 
 
-class LawMovement:
-    """A law as planning wants it, slowed down.
+class StretchedMovement:
+    """A trajectory as planning wants it, slowed down.
 
     Args:
         name: for messages.
@@ -45,16 +45,16 @@ class LawMovement:
 
     def __init__(self, name: str, joined: Joined, factor: float = 1.0) -> None:
         self.name = name
-        self._law = joined.law.stretched(factor)
+        self._trajectory = joined.trajectory.stretched(factor)
 
     @property
     def duration(self) -> float:
         """[s]."""
-        return self._law.duration
+        return self._trajectory.duration
 
     def sample(self, t: NDArray[np.float64], /) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return positions (n, 3) [m] and velocities (n, 3) [m/s] at times (n,)."""
-        motion = self._law.evaluate(t)
+        motion = self._trajectory.evaluate(t)
         return motion.p, motion.v
 
 
@@ -74,14 +74,14 @@ def factor_needed(
     Raises:
         PlanningError: the path itself cannot be done, at any speed.
     """
-    t = np.linspace(0.0, joined.law.duration, 2001)
-    easy = max(1.0, float(np.linalg.norm(joined.law.evaluate(t).v, axis=1).max()) / _EASY_SPEED)
+    t = np.linspace(0.0, joined.trajectory.duration, 2001)
+    easy = max(1.0, float(np.linalg.norm(joined.trajectory.evaluate(t).v, axis=1).max()) / _EASY_SPEED)
     limits = limits_of(arm)
     no_speeds = replace(limits, speed_fraction=1e6, qdd_max=(1e9,) * 6, tcp_speed_max=1e6, rest_speed_max=1e6)
-    plan = plan_movement(LawMovement(name, joined, easy), model=arm, limits=no_speeds)
+    plan = plan_movement(StretchedMovement(name, joined, easy), model=arm, limits=no_speeds)
     qd = np.abs(plan.spline.sample(plan.t)[1]) / (limits.speed_fraction * np.array(arm.limits.qd_max))
     qdd = np.abs(plan.spline.qdd(plan.t)) / np.array(limits.qdd_max)
-    tcp = np.linalg.norm(joined.law.stretched(easy).evaluate(plan.t).v, axis=1) / limits.tcp_speed_max
+    tcp = np.linalg.norm(joined.trajectory.stretched(easy).evaluate(plan.t).v, axis=1) / limits.tcp_speed_max
     need = np.maximum(np.maximum(qd.max(axis=1), np.sqrt(qdd.max(axis=1))), tcp)
     return plan.t / easy, easy * need
 
@@ -89,7 +89,7 @@ def factor_needed(
 def paced(
     name: str, marks: Sequence[Mark], gaps: NDArray[np.float64], lift: NDArray[np.float64], arm: RobotModel
 ) -> Joined:
-    """Join marks with hops that ask no more of the arm than the marks do.
+    """Join marks with pen-up moves that ask no more of the arm than the marks do.
 
     Args:
         name: for messages.

@@ -41,7 +41,7 @@ def fill_paths(figure: Figure, shown: Shown) -> None:
         for part in shown.parts[name]:
             axes.plot(*shown.on_page(part.p).T, color=COLOURS[name], lw=2.0, solid_capstyle="round")
         for mark in shown.drawing.marks:
-            if mark.law is None:
+            if mark.trajectory is None:
                 axes.plot(*shown.on_page(mark.first[None]).T, "o", ms=5.0, color=COLOURS[name])
         if name == "human":
             for part in shown.parts[name]:
@@ -70,12 +70,12 @@ def _half_width(shown: Shown) -> float:
 
 
 def _targets(shown: Shown) -> NDArray[np.float64]:
-    return np.vstack([part.law.target_points for part in shown.drawing.extraction.parts])
+    return np.vstack([part.trajectory.target_points for part in shown.drawing.extraction.parts])
 
 
 def _draw_targets(axes: Axes, shown: Shown, half: float) -> None:
     for part in shown.drawing.extraction.parts:
-        points = shown.on_page(part.law.target_points)
+        points = shown.on_page(part.trajectory.target_points)
         axes.plot(*points.T, color="#9FB8CC", lw=0.7, zorder=1.5)
         axes.plot(
             *points.T,
@@ -138,8 +138,8 @@ def _air(shown: Shown, *, executed: bool) -> NDArray[np.float64]:
     if executed:
         t, p = shown.execution.t, shown.execution.p
     else:
-        t = np.linspace(0.0, joined.law.duration, 1500)
-        p = joined.law.evaluate(t).p
+        t = np.linspace(0.0, joined.trajectory.duration, 1500)
+        p = joined.trajectory.evaluate(t).p
     page = shown.on_page(shown.drawing.points_back(p))
     page[pen_is_down(t, joined.pen_down)] = np.nan
     return page

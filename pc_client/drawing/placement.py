@@ -33,7 +33,7 @@ PLANES: Mapping[str, tuple[float, float, float]] = MappingProxyType(
     {"vertical": (1.0, 0.0, 0.0), "horizontal": (0.0, 0.0, -1.0), "inclined": (_HALF, 0.0, -_HALF)}
 )
 
-#: Tails of bells shorter than this share of the drawing's size are not looked at when it is placed.
+#: Tails of strokes shorter than this share of the drawing's size are not looked at when it is placed.
 _PATH_SHARE = 1e-4
 
 

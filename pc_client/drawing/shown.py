@@ -56,7 +56,7 @@ class Shown:
     @property
     def moving(self) -> list[int]:
         """Indices of the marks that move."""
-        return [index for index, mark in enumerate(self.drawing.marks) if mark.law is not None]
+        return [index for index, mark in enumerate(self.drawing.marks) if mark.trajectory is not None]
 
     def on_page(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (n, 3) in the recording's frame, on the page: (n, 2), mm, from the middle of the drawing."""

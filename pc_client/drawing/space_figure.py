@@ -24,20 +24,22 @@ def fill_space(figure: Figure, shown: Shown) -> None:
     axes = figure.add_axes((0.585, 0.14, 0.395, 0.72))
     shade_pen_down(axes, shown)
     start = float(shown.drawing.joined.pen_down[0, 0])
-    placement, law = shown.drawing.placement, shown.drawing.joined.law
+    placement, trajectory = shown.drawing.placement, shown.drawing.joined.trajectory
     out = placement.lift / float(np.linalg.norm(placement.lift))
     sheet = float(placement.similarity.shift @ out)
-    t = np.linspace(0.0, law.duration, 1500)
+    t = np.linspace(0.0, trajectory.duration, 1500)
     if shown.drawing.flat:
-        planned, done = law.evaluate(t).p @ out - sheet, shown.execution.p @ out - sheet
+        planned, done = trajectory.evaluate(t).p @ out - sheet, shown.execution.p @ out - sheet
         axes.set_title("height of the pen over the sheet")
     else:
-        planned, done = law.evaluate(t).p[:, 2], shown.execution.p[:, 2]
+        planned, done = trajectory.evaluate(t).p[:, 2], shown.execution.p[:, 2]
         axes.set_title("height of the pen, z of the base frame")
     axes.plot(t - start, 1e3 * planned, color=COLOURS["planned"], lw=4.0, alpha=0.45, label="planned")
     axes.plot(shown.execution.t - start, 1e3 * done, color=COLOURS["executed"], lw=1.4, label="executed")
     axes.set(
-        xlim=(-start, law.duration - start), xlabel="time of the hand [s]; shaded: pen down", ylabel="mm"
+        xlim=(-start, trajectory.duration - start),
+        xlabel="time of the hand [s]; shaded: pen down",
+        ylabel="mm",
     )
     axes.set_ylim(top=axes.get_ylim()[1] * 1.16)
     axes.legend(loc="upper right", ncols=2, borderaxespad=0.2)
@@ -45,8 +47,8 @@ def fill_space(figure: Figure, shown: Shown) -> None:
 
 def _draw_space(axes: Any, shown: Shown) -> None:
     joined = shown.drawing.joined
-    t = np.linspace(0.0, joined.law.duration, 2500)
-    p = 1e3 * joined.law.evaluate(t).p
+    t = np.linspace(0.0, joined.trajectory.duration, 2500)
+    p = 1e3 * joined.trajectory.evaluate(t).p
     down = pen_is_down(t, joined.pen_down)
     done = 1e3 * shown.execution.p
     corners = [p, done]
@@ -60,7 +62,7 @@ def _draw_space(axes: Any, shown: Shown) -> None:
     axes.plot(*line.T, color=COLOURS["planned"], lw=3.6, alpha=0.45)
     axes.plot(*done.T, color=COLOURS["executed"], lw=1.1)
     for mark in shown.drawing.marks:
-        if mark.law is None:
+        if mark.trajectory is None:
             point = 1e3 * shown.drawing.placement.similarity.points(mark.first[None])
             axes.plot(*point.T, "o", color=COLOURS["planned"], ms=5)
     axes.plot(*p[:1].T, "o", mfc="white", mec="black", ms=6)

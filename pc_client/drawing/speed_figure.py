@@ -14,10 +14,10 @@ from pc_client.drawing.shown import AIR, COLOURS, Shown, shade_pen_down
 
 __all__ = ["fill_speeds"]
 
-#: Bells that are this many times as high as the speed itself, since they cancel, are cut off.
+#: Strokes that are this many times as high as the speed itself, since they cancel, are cut off.
 _TALL = 1.5
 
-_BELL = "#8DB9DC"
+_STROKE = "#8DB9DC"
 
 
 def fill_speeds(figure: Figure, shown: Shown) -> None:
@@ -28,12 +28,12 @@ def fill_speeds(figure: Figure, shown: Shown) -> None:
     )
     rows = [figure.add_subplot(grid[row]) for row in range(len(heights))]
     start = float(shown.drawing.joined.pen_down[0, 0])
-    span = (-start, shown.drawing.joined.law.duration - start)
+    span = (-start, shown.drawing.joined.trajectory.duration - start)
     top = _top_speed(shown)
     for axes, name in zip(rows, COLOURS, strict=False):
         shade_pen_down(axes, shown)
         if name == "reconstructed":
-            _draw_bells(axes, shown)
+            _draw_strokes(axes, shown)
         if name in ("planned", "executed"):
             t, speed = _whole_speed(shown, executed=name == "executed")
             axes.plot(t, speed, color=AIR, lw=1.1)
@@ -52,7 +52,7 @@ def fill_speeds(figure: Figure, shown: Shown) -> None:
     shade_pen_down(rows[4], shown)
     for name, width in zip(COLOURS, (4.5, 2.0, 1.4, 1.2), strict=True):
         _draw_speed(rows[4], shown, name, width, faint=name == "human", dashed=name == "planned")
-    rows[4].set(xlim=span, ylim=(0.0, 1.22 * _top_speed(shown, bells=False)))
+    rows[4].set(xlim=span, ylim=(0.0, 1.22 * _top_speed(shown, lognormals=False)))
     rows[4].legend(loc="upper right", ncols=4, borderaxespad=0.2, columnspacing=1.2, handlelength=1.6)
     shade_pen_down(rows[5], shown)
     for name in ("reconstructed", "executed"):
@@ -74,15 +74,15 @@ def fill_speeds(figure: Figure, shown: Shown) -> None:
         figure.text(0.988, 0.5, "speed of the arm [mm/s]", rotation=270, va="center", ha="right")
 
 
-def _draw_bells(axes: Axes, shown: Shown) -> None:
+def _draw_strokes(axes: Axes, shown: Shown) -> None:
     for index, part in zip(shown.moving, shown.drawing.extraction.parts, strict=True):
         mark, nearly = shown.drawing.marks[index], 1e-3 * float(np.ptp(part.p, axis=0).max())
         t = np.arange(mark.begin - mark.lead(nearly), mark.end + mark.lag(nearly), 0.002)
-        for bell in shown.unit * part.law.stroke_speeds(t).T:
-            visible = bell > 1e-3 * bell.max()
+        for lognormal in shown.unit * part.trajectory.stroke_speeds(t).T:
+            visible = lognormal > 1e-3 * lognormal.max()
             at = shown.since_pen_down(t[visible], index)
-            axes.fill_between(at, bell[visible], color=_BELL, alpha=0.28, lw=0)
-            axes.plot(at, bell[visible], color=_BELL, lw=0.8)
+            axes.fill_between(at, lognormal[visible], color=_STROKE, alpha=0.28, lw=0)
+            axes.plot(at, lognormal[visible], color=_STROKE, lw=0.8)
 
 
 def _draw_speed(
@@ -99,11 +99,13 @@ def _draw_speed(
         )
 
 
-def _top_speed(shown: Shown, *, bells: bool = True) -> float:
-    """Highest speed (mm per s of the hand) of any signal and, unless it would dwarf them, of any bell."""
+def _top_speed(shown: Shown, *, lognormals: bool = True) -> float:
+    """Highest speed (mm per s of the hand) of any signal and, unless far higher, of any single stroke."""
     top = max(float(part.speed.max()) for parts in shown.parts.values() for part in parts)
-    highest = max(float(part.law.stroke_speeds(part.t).max()) for part in shown.drawing.extraction.parts)
-    return shown.unit * (max(top, min(highest, _TALL * top)) if bells else top)
+    highest = max(
+        float(part.trajectory.stroke_speeds(part.t).max()) for part in shown.drawing.extraction.parts
+    )
+    return shown.unit * (max(top, min(highest, _TALL * top)) if lognormals else top)
 
 
 def _whole_speed(shown: Shown, *, executed: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -112,8 +114,8 @@ def _whole_speed(shown: Shown, *, executed: bool) -> tuple[NDArray[np.float64], 
     if executed:
         t, v = shown.execution.t, shown.execution.v
     else:
-        t = np.linspace(0.0, joined.law.duration, 1500)
-        v = joined.law.evaluate(t).v
+        t = np.linspace(0.0, joined.trajectory.duration, 1500)
+        v = joined.trajectory.evaluate(t).v
     return t - joined.pen_down[0, 0], 1e3 * np.linalg.norm(v, axis=1)
 
 

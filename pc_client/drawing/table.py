@@ -87,7 +87,7 @@ def facts_of(entry: Entry) -> dict[str, str]:
     placement = drawing.placement
     scale, run = placement.similarity.scale, verdict.best
     drawn = 1e3 * scale * np.ptp(drawing.drawn, axis=0)[: 2 if drawing.flat else 3]
-    dots = sum(mark.law is None for mark in drawing.marks)
+    dots = sum(mark.trajectory is None for mark in drawing.marks)
     later = float(drawing.delays.max())
     lift = 1e3 * float(np.linalg.norm(placement.lift))
     t = np.linspace(0.0, drawing.movement.duration, 4001)

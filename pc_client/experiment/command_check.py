@@ -16,7 +16,7 @@ from pc_client.planning.plan import JointPlan
 
 Array = NDArray[np.float64]
 
-_LEARNED_WAY = 0.05
+_LEARNED_DISPLACEMENT = 0.05
 """What was learned may lead a joint this far [rad]."""
 
 _CLEARANCE_STEP = 4
@@ -45,20 +45,20 @@ def broken_limit(
         One phrase; empty when all limits are kept.
     """
     limits = plan.report.limits
-    way = plan.start_q + np.cumsum(commands, axis=0) * period
+    q_sent = plan.start_q + np.cumsum(commands, axis=0) * period
     acceleration = np.abs(np.diff(commands, axis=0)) / period
-    learned_way = np.zeros(1) if learned is None else np.abs(np.cumsum(learned, axis=0)) * period
+    learned_displacement = np.zeros(1) if learned is None else np.abs(np.cumsum(learned, axis=0)) * period
     motion = {
         "joint speed": np.abs(commands) / (config.speed_share * np.array(model.limits.qd_max)),
         "joint acceleration": acceleration / np.minimum(limits.qdd_max, config.slew_limit),
-        "learned way": learned_way / _LEARNED_WAY,
-        "joint range": np.array(measure_joint_range(way, model.limits, limits).share),
+        "learned way": learned_displacement / _LEARNED_DISPLACEMENT,
+        "joint range": np.array(measure_joint_range(q_sent, model.limits, limits).share),
     }
     for what, share in motion.items():
         # What is no number must not come to the clearance.
         if not (most := float(np.max(share))) <= 1.0:
             return f"{what} would be {most:.0%} of what is allowed"
-    clearance = clearance_model(model).along(way)
+    clearance = clearance_model(model).along(q_sent)
     for what, distances, needed in (
         ("itself", clearance.own, limits.own_clearance_min),
         ("the floor", clearance.floor, limits.floor_clearance_min),

@@ -98,7 +98,7 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[I
     q_start = driver.actual_q()
     # Feed-forward alone, its mean over each cycle: the integral of the commands ends exactly where it began.
     open_loop = replace(config, name="excitation", gain_p=0.0, gain_i=0.0)
-    knows_lag = config.compensates_lag or config.compensates_gear or config.learns
+    knows_lag = config.compensates_lag or config.compensates_gear or config.uses_ilc
     excitation = Excitation(q_start.tolist(), BRISK_PULSE if knows_lag else PULSE)
     table = ReferenceTable(excitation, period=period, lead=_LEAD, settle=_SETTLE, lookahead=0.0)
     stamps: list[float] = []
@@ -155,7 +155,7 @@ def learning_filter(config: Controller, loop: LoopModel, period: float) -> Learn
     Raises:
         DriverError: learning would not converge for every loop within the spread of the identified one.
     """
-    if not config.learns:
+    if not config.uses_ilc:
         return None
     learning = design_filter(
         loop,

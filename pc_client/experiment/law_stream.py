@@ -81,7 +81,7 @@ class LawStream:
         if qd is None:
             return LawStep(_REST, True)
         velocities = _six(qd)
-        self._check_way(frame.actual_q, velocities)
+        self._check_path(frame.actual_q, velocities)
         self._last = velocities.tolist()
         return LawStep(self._last, False)
 
@@ -97,7 +97,7 @@ class LawStream:
         """
         check_flange(self._model, q, pose)
 
-    def _check_way(self, q: Array, qd: Array) -> None:
+    def _check_path(self, q: Array, qd: Array) -> None:
         """Refuse velocities from which the arm could not stop inside its limits."""
         braking = _REACTION + float(np.abs(qd).max()) / (2.0 * STOP_DECELERATION)
         at_rest = q + braking * qd

@@ -14,7 +14,7 @@ from pc_client.kinematics.robot_model import RobotModel, robot_model
 from pc_client.movements.files import load_motion, movement_text
 from pc_client.movements.joint_trajectory import JointTrajectory
 from pc_client.movements.movement import Movement
-from pc_client.movements.samples import SampledLaw
+from pc_client.movements.samples import SampledTrajectory
 from pc_client.planning.plan import JointPlan, plan_joints, plan_movement
 from pc_client.recording.loader import load_recording
 
@@ -136,8 +136,8 @@ def make_plan(motion: Motion, model: RobotModel) -> Plan:
     """
     if isinstance(motion, JointTrajectory):
         joints = plan_joints(motion, model=model)
-        law = SampledLaw(joints.t, joints.p)
-        return Plan(Movement(motion.name, law, np.array([law.duration])), joints, "")
+        trajectory = SampledTrajectory(joints.t, joints.p)
+        return Plan(Movement(motion.name, trajectory, np.array([trajectory.duration])), joints, "")
     return Plan(motion, plan_movement(motion, model=model, rotations=motion.rotations), _text_of(motion))
 
 

@@ -133,7 +133,7 @@ class ExperimentRunner:
             period=self._driver.info.period,
             lead=LEAD,
             settle=SETTLE,
-            lookahead=lookahead if config.looks_ahead else None,
+            lookahead=lookahead if config.uses_preview else None,
             motors=None if repetitions.gear is None else MotorReference(plan.spline, repetitions.gear),
             lag=found.loop.lag if config.compensates_lag else 0.0,
             learned=repetitions.learned,
@@ -155,7 +155,7 @@ class ExperimentRunner:
         table = self._table(planned, plan, found, repetitions)
         if not repetitions.may_use(plan, table):
             table = self._table(planned, plan, found, repetitions)
-        log = RunLog() if config.learns or config.compensates_gear else None
+        log = RunLog() if config.uses_ilc or config.compensates_gear else None
         with Recorder(path, provenance, self._signals) as recorder:
             stream = self._driver.stream(
                 Tracker(table, config, self._experiment.model),

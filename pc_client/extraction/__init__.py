@@ -2,7 +2,7 @@
 
     recording, files, sources    what was recorded, and how it is read
     smoothing                    the signal on a uniform grid, low-passed at 12 Hz, and its speed peaks
-    closed_forms, initial        first strokes from the shape of the speed bells
+    closed_forms, initial        first strokes from the shape of the speed profiles
     chain, model, refine         strokes as arrays, their derivatives, joint least squares in space and time
     addition, fitting            further strokes while they pay; the order of it all
     extract                      the result: strokes and how well they tell the recording

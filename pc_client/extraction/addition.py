@@ -1,7 +1,7 @@
 """Where a further stroke would pay most, and which strokes do nothing.
 
-Candidates are found by matched pursuit: a bell of some width at some time, with the amplitude vector that
-fits best, takes a certain energy out of the residual velocity; the one that takes most is chosen and
+Candidates are found by matched pursuit: a lognormal of some width at some time, with the amplitude vector
+that fits best, takes a certain energy out of the residual velocity; the one that takes most is chosen and
 subtracted, and the search goes on. This only looks; all strokes are refined together afterwards.
 
 Source: the order of Robust XZERO (largest first, subtract, go on), section 3.1 of the theory notes.
@@ -18,13 +18,13 @@ from pc_client.extraction.chain import Chain
 
 __all__ = ["Candidate", "best_candidates", "idle_strokes"]
 
-#: Widths (s) of the bells that are tried: of the strokes of handwriting, from hasty to calm.
+#: Widths (s) of the lognormals that are tried: of the strokes of handwriting, from hasty to calm.
 TRIED_WIDTHS_S = (0.02, 0.032, 0.05)
 _REACH = 3.0
 
 
 class Candidate(NamedTuple):
-    """A bell worth adding: its place, and the energy (squared velocity summed over samples) it takes away."""
+    """A candidate stroke: its place, and the energy (squared velocity summed over samples) it explains."""
 
     median: float
     width: float
@@ -32,7 +32,7 @@ class Candidate(NamedTuple):
 
 
 def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: int) -> list[Candidate]:
-    """The bells that take most of a residual velocity, best first.
+    """The lognormals that take most of a residual velocity, best first.
 
     Args:
         t: uniform times, (n,), s.
@@ -74,14 +74,14 @@ def idle_strokes(chain: Chain, v_scale: float, step: float, cost: float) -> NDAr
         step: distance of the samples, s.
         cost: what is left.
     """
-    # Energy of a bell: D^2 integral Lambda^2 dt = D^2 exp(sigma^2 / 4) / (2 w sqrt(pi)).
+    # Energy of a lognormal: D^2 integral Lambda^2 dt = D^2 exp(sigma^2 / 4) / (2 w sqrt(pi)).
     energy = chain.lengths**2 * np.exp(0.25 * chain.sigma**2) / (2.0 * chain.width * np.sqrt(np.pi)) / step
     idle: NDArray[np.bool_] = v_scale**2 * energy < 0.01 * cost
     return idle
 
 
 def _kernel(width: float) -> NDArray[np.float64]:
-    """A bell with energy 1, width in samples."""
+    """A lognormal with energy 1, width in samples."""
     reach = max(1, round(_REACH * width))
     shape = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
     scaled: NDArray[np.float64] = shape / np.sqrt(shape @ shape)

@@ -2,7 +2,7 @@
 
 The theory's (t0, mu, sigma) slide along a ridge: for small sigma a lognormal tends to a Gaussian, and only
 the median time t0 + e^mu and the width e^mu sigma are left fixed by the data. So these two are variables
-here, and sigma beside them is a pure number that says how skew the bell is:
+here, and sigma beside them is a pure number that says how skew the lognormal is:
 
     median m = t0 + e^mu,   width w = e^mu sigma,   sigma     <=>     t0 = m - w / sigma,   mu = ln(w / sigma)
 
@@ -47,17 +47,17 @@ class Bounds(NamedTuple):
 
     Attributes:
         sigma: below .08 a lognormal is a Gaussian for all purposes (skewness .24), and its t0 runs away.
-        width: s; from the narrowest bell that a 12 Hz signal can show to one of a slow sweep.
-        turn: rad; an arc of 2 pi has no chord, so its target points could not carry it.
+        width: s; from the narrowest lognormal that a 12 Hz signal can show to one of a slow sweep.
+        arc_angle: rad; an arc of 2 pi has no chord, so its target points could not carry it.
     """
 
     sigma: tuple[float, float] = (0.08, 0.6)
     width: tuple[float, float] = (0.012, 4.0)
-    turn: tuple[float, float] = (-4.5, 4.5)
+    arc_angle: tuple[float, float] = (-4.5, 4.5)
 
     @classmethod
     def of(cls, duration: float) -> Bounds:
-        """Bounds for a part of this duration, s: a bell far wider than the part would be a made-up drift."""
+        """Bounds for a part of this duration, s: a much wider stroke would be an invented drift."""
         least, most = cls().width
         return cls(width=(least, min(most, max(2.0 * least, WIDEST * duration))))
 
@@ -70,7 +70,7 @@ class Chain:
         median: times at which half of each stroke is done, (s,), s.
         width: e^mu sigma, (s,), s.
         sigma: (s,).
-        turn: (s,), rad; positive turns from the chord towards normal x chord.
+        arc_angle: (s,), rad; positive turns from the chord towards normal x chord.
         normal: unit vectors (s, 3) about which the strokes turn, at right angles to their chords. Flat
             strokes have +z.
         targets: (s + 1, 2) or (s + 1, 3).
@@ -79,7 +79,7 @@ class Chain:
     median: NDArray[np.float64]
     width: NDArray[np.float64]
     sigma: NDArray[np.float64]
-    turn: NDArray[np.float64]
+    arc_angle: NDArray[np.float64]
     normal: NDArray[np.float64]
     targets: NDArray[np.float64]
 
@@ -96,12 +96,12 @@ class Chain:
     def lengths(self) -> NDArray[np.float64]:
         """Arc lengths D, (s,)."""
         lengths: NDArray[np.float64] = np.linalg.norm(self.chords, axis=1) / np.sinc(
-            self.turn / (2 * math.pi)
+            self.arc_angle / (2 * math.pi)
         )
         return lengths
 
     def time_at_deviation(self, z: float) -> NDArray[np.float64]:
-        """Times (s,) at which each bell has done Phi(z) of its way."""
+        """Times (s,) at which each lognormal has done Phi(z) of its way."""
         times: NDArray[np.float64] = self.median + self.width * np.expm1(self.sigma * z) / self.sigma
         return times
 
@@ -138,7 +138,7 @@ def inserted(chain: Chain, median: NDArray[np.float64], width: NDArray[np.float6
         np.insert(chain.median, at, median[order]),
         np.insert(chain.width, at, width[order]),
         np.insert(chain.sigma, at, sigma),
-        np.insert(chain.turn, at, 0.0),
+        np.insert(chain.arc_angle, at, 0.0),
         np.insert(chain.normal, at, up / np.linalg.norm(up), axis=0),
         np.insert(chain.targets, at, chain.targets[at], axis=0),
     )
@@ -157,7 +157,7 @@ def without(chain: Chain, drop: NDArray[np.bool_]) -> Chain:
         chain.median[keep],
         chain.width[keep],
         chain.sigma[keep],
-        chain.turn[keep],
+        chain.arc_angle[keep],
         chain.normal[keep],
         targets,
     )
@@ -190,7 +190,7 @@ def in_order(chain: Chain) -> Chain:
         chain.median[order],
         chain.width[order],
         chain.sigma[order],
-        chain.turn[order],
+        chain.arc_angle[order],
         chain.normal[order],
         np.vstack((chain.targets[:1], ends)),
     )
@@ -216,5 +216,5 @@ def sigma_lognormal(chain: Chain, duration: float) -> SigmaLognormal:
         # A stroke of the package swings from -m to +m, m the normal in its plane: turning about n, that is
         # n x chord.
         tilt = tilt_of_normal(unit, np.cross(chain.normal[j], unit))
-        strokes.append(Stroke(timing, float(chain.turn[j]), tilt))
+        strokes.append(Stroke(timing, float(chain.arc_angle[j]), tilt))
     return SigmaLognormal(targets, tuple(strokes), duration)

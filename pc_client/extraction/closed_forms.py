@@ -1,7 +1,7 @@
-"""A lognormal from characteristic points of one speed bell, in closed form.
+"""A lognormal from characteristic points of one speed profile, in closed form.
 
-Of a bell three points are used: the inflection before the peak (2), the peak (3) and the inflection behind it
-(4). Their heights give sigma, each in its own way, and with sigma any two of their times give mu:
+Of a lognormal three points are used: the inflection before the peak (2), the peak (3) and the inflection
+behind it (4). Their heights give sigma, each in its own way, and with sigma any two of their times give mu:
 
     sigma^2 = -2 - 2 b - 1 / (2 b),   b = ln(v_i / v_3), i = 2 or 4
     sigma^2 = 2 sqrt(1 + b^2) - 2,    b = ln(v_4 / v_2)
@@ -22,9 +22,9 @@ from pc_client.errors import MovementError
 from pc_client.movements.lognormal import Lognormal
 
 __all__ = [
-    "Bell",
     "CharacteristicPoints",
-    "bell_from_points",
+    "ScaledLognormal",
+    "lognormal_from_points",
     "sigma_from_peak_ratio",
     "sigma_from_slope_ratio",
     "turn_rate",
@@ -32,13 +32,13 @@ __all__ = [
 
 
 class CharacteristicPoints(NamedTuple):
-    """Times (s) and speeds of the inflections and the peak of a bell, in this order: before, peak, after."""
+    """Times (s) and speeds of the inflection before the peak, the peak and the inflection after it."""
 
     times: tuple[float, float, float]
     speeds: tuple[float, float, float]
 
 
-class Bell(NamedTuple):
+class ScaledLognormal(NamedTuple):
     """A lognormal and its area D, the length of a stroke."""
 
     lognormal: Lognormal
@@ -65,8 +65,10 @@ def sigma_from_slope_ratio(ratio: float) -> float:
     return math.sqrt(2.0 * math.sqrt(1.0 + math.log(ratio) ** 2) - 2.0)
 
 
-def bell_from_points(points: CharacteristicPoints, sigma: float, i: int = 0, k: int = 2) -> Bell:
-    """The bell of a known sigma through two of the three points.
+def lognormal_from_points(
+    points: CharacteristicPoints, sigma: float, i: int = 0, k: int = 2
+) -> ScaledLognormal:
+    """The lognormal of a known sigma through two of the three points.
 
     Args:
         points: the characteristic points.
@@ -80,7 +82,7 @@ def bell_from_points(points: CharacteristicPoints, sigma: float, i: int = 0, k: 
     t0 = points.times[i] - math.exp(mu - a[i])
     exponent = mu - a[i] + a[i] ** 2 / (2.0 * sigma**2)
     length = math.sqrt(2.0 * math.pi) * sigma * points.speeds[i] * math.exp(exponent)
-    return Bell(Lognormal(t0, mu, sigma), length)
+    return ScaledLognormal(Lognormal(t0, mu, sigma), length)
 
 
 def turn_rate(directions: tuple[float, float], distances: tuple[float, float]) -> float:

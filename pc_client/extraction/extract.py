@@ -1,7 +1,7 @@
 """From a recording to Sigma-Lognormal strokes, and how well they tell the recording.
 
     extraction = extract(read_pen(path))
-    extraction.snr_v_db, extraction.n_strokes, extraction.parts[0].law
+    extraction.snr_v_db, extraction.n_strokes, extraction.parts[0].trajectory
 
 The figures, over all parts of a recording that move, against the recording low-passed at 12 Hz:
 
@@ -10,7 +10,7 @@ The figures, over all parts of a recording that move, against the recording low-
     lognormality SNR_v / number of strokes
 
 A signal so clean that the strokes could be fitted through the low-pass is judged through it, too: the filter
-blunts fast bells, and so the recording shows them.
+blunts fast speed profiles, and so the recording shows them.
 
 Source: sections 3.1 and 3.3 of the theory notes.
 """
@@ -48,7 +48,7 @@ class ExtractOptions:
 
     @classmethod
     def strict(cls, strokes_per_peak: float) -> ExtractOptions:
-        """No more strokes than this per peak, but one for each bell, however little they tell."""
+        """No more strokes than this per peak, but one for each speed peak, however little they add."""
         return cls(strokes_per_peak, FitOptions(least_db=-math.inf))
 
 
@@ -60,8 +60,8 @@ class PartExtraction:
         t: uniform times, (n,), s, on the recording's axis.
         p: low-passed positions, (n, 2) or (n, 3), in the recording's unit.
         v: their velocities, the same shape, per second.
-        law: the reconstruction, on the same time axis (t0 of a stroke may be negative); flat parts lie in
-            z = 0.
+        trajectory: the reconstruction, on the same time axis (t0 of a stroke may be negative); flat parts lie
+            in z = 0.
         snr_v_db: of this part alone.
         snr_t_db: of this part alone.
         n_strokes: number of strokes.
@@ -71,7 +71,7 @@ class PartExtraction:
     t: NDArray[np.float64]
     p: NDArray[np.float64]
     v: NDArray[np.float64]
-    law: SigmaLognormal
+    trajectory: SigmaLognormal
     snr_v_db: float
     snr_t_db: float
     n_strokes: int
@@ -146,7 +146,7 @@ def _judge(
     part: SmoothPart, chain: Chain, n_peaks: int, through: bool
 ) -> tuple[PartExtraction, NDArray[np.float64]]:
     """A part's result, and its powers: of velocity and its error, of position and its error."""
-    law = sigma_lognormal(chain, float(part.t[-1]))
+    trajectory = sigma_lognormal(chain, float(part.t[-1]))
     p_left, v_left = left_over(chain, part, through=through)
     powers = np.array(
         [
@@ -157,7 +157,7 @@ def _judge(
         ]
     )
     snr_v, snr_t = _db(powers[0], powers[1]), _db(powers[2], powers[3])
-    result = PartExtraction(part.t, part.p, part.v, law, snr_v, snr_t, len(chain), n_peaks)
+    result = PartExtraction(part.t, part.p, part.v, trajectory, snr_v, snr_t, len(chain), n_peaks)
     return result, powers
 
 
@@ -168,7 +168,8 @@ def _degenerate(chains: Sequence[Chain]) -> list[str]:
     if not count:
         return []
     return [
-        f"{count} of {len(sigma)} strokes held at the least sigma, {least}: bells like Gaussians, t0 is open"
+        f"{count} of {len(sigma)} strokes held at the least sigma, {least}: "
+        "their speed profiles are near Gaussians, t0 is open"
     ]
 
 

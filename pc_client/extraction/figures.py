@@ -1,7 +1,7 @@
 """Pictures of extractions, as PNG bytes: one recording, and an overview of many.
 
 The only module of the package that loads matplotlib. The recording is the thick grey line, the reconstruction
-the thin one upon it; what stands alone (bells, virtual targets) has the colour of its own.
+the thin one upon it; what stands alone (single strokes, virtual targets) has the colour of its own.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from pc_client.movements.stroke import Motion
 
 __all__ = ["draw_extraction", "draw_overview"]
 
-_RECORDED, _RECONSTRUCTED, _BELLS, _TARGETS = "#A8A29E", "#D55E00", "#56B4E9", "#0072B2"
+_RECORDED, _RECONSTRUCTED, _STROKES, _TARGETS = "#A8A29E", "#D55E00", "#56B4E9", "#0072B2"
 _DPI = 110
-#: A part of more strokes is drawn without its single bells; a longer one at no more than so many times.
-_MOST_BELLS, _MOST_TIMES = 500, 5000
+#: A part of more strokes is drawn without its single strokes; a longer one at no more than so many times.
+_MOST_STROKES, _MOST_TIMES = 500, 5000
 
 
 def draw_extraction(extraction: Extraction) -> bytes:
-    """One recording: its path with the virtual targets, and its speed with the single bells.
+    """One recording: its path with the virtual targets, and its speed with the single strokes.
 
     Args:
         extraction: with at least one part that moves.
@@ -100,7 +100,7 @@ def _title(extraction: Extraction) -> str:
 def _draw_path(axes: Any, part: PartExtraction, *, labelled: bool) -> None:
     dim = part.p.shape[1]
     labels = ("recorded", "reconstructed", "virtual targets") if labelled else (None, None, None)
-    targets = part.law.target_points[:, :dim]
+    targets = part.trajectory.target_points[:, :dim]
     _, reconstruction = _reconstruction(part)
     axes.plot(*part.p.T, color=_RECORDED, linewidth=4.0, alpha=0.7, label=labels[0])
     axes.plot(*targets.T, color=_TARGETS, linewidth=0.5, linestyle=":")
@@ -115,9 +115,9 @@ def _draw_speed(axes: Any, part: PartExtraction, *, labelled: bool) -> None:
     speed = np.linalg.norm(part.v, axis=1)
     t, reconstruction = _reconstruction(part)
     axes.plot(part.t, speed, color=_RECORDED, linewidth=4.0, alpha=0.7, label=labels[0])
-    if part.n_strokes <= _MOST_BELLS:
-        for index, bell in enumerate(part.law.stroke_speeds(t).T):
-            axes.plot(t, bell, color=_BELLS, linewidth=0.8, label=labels[2] if index == 0 else None)
+    if part.n_strokes <= _MOST_STROKES:
+        for index, lognormal in enumerate(part.trajectory.stroke_speeds(t).T):
+            axes.plot(t, lognormal, color=_STROKES, linewidth=0.8, label=labels[2] if index == 0 else None)
     reconstructed = np.linalg.norm(reconstruction.v, axis=1)
     axes.plot(t, reconstructed, color=_RECONSTRUCTED, linewidth=1.3, label=labels[1])
 
@@ -125,7 +125,7 @@ def _draw_speed(axes: Any, part: PartExtraction, *, labelled: bool) -> None:
 def _reconstruction(part: PartExtraction) -> tuple[NDArray[np.float64], Motion]:
     """The movement of the strokes at up to `_MOST_TIMES` times, worked out a few hundred at a time."""
     t = part.t[:: 1 + len(part.t) // _MOST_TIMES]
-    blocks = [part.law.evaluate(block) for block in np.array_split(t, 1 + len(t) // 250)]
+    blocks = [part.trajectory.evaluate(block) for block in np.array_split(t, 1 + len(t) // 250)]
     return t, Motion(*(np.concatenate(values) for values in zip(*blocks, strict=True)))
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pc_client.extraction.addition import best_candidates, idle_strokes
 from pc_client.extraction.chain import Bounds, Chain, inserted, with_chords, without
 from pc_client.extraction.initial import TYPICAL_SIGMA, initial_chain
-from pc_client.extraction.refine import Aim, Fit, refine, residuals
+from pc_client.extraction.refine import Fit, FitTarget, refine, residuals
 from pc_client.extraction.smoothing import CUTOFF_HZ, SmoothPart, low_passed, velocity
 
 __all__ = ["FitOptions", "Fitted", "Scales", "fit_parts", "left_over"]
@@ -100,36 +100,38 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
     Args:
         parts: at least one; all move.
         budget: most strokes of all parts together, unless these would tell too little, see `FitOptions`.
-            Every part gets one for each of its bells in any case.
+            Every part gets one for each of its speed peaks in any case.
         options: effort.
     """
     scales = Scales.of(parts)
-    aims = [_aim(part, part.p, part.v, scales) for part in parts]
+    fit_targets = [_fit_target(part, part.p, part.v, scales) for part in parts]
     fits = [
-        refine(initial_chain(part), aim, options.iterations) for part, aim in zip(parts, aims, strict=True)
+        refine(initial_chain(part), fit_target, options.iterations)
+        for part, fit_target in zip(parts, fit_targets, strict=True)
     ]
     if _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_PERHAPS_CLEAN_DB / 10.0):
         sharp = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
         if _passed_cost(sharp, parts, scales) < 10.0 ** (-options.enough_db / 10.0):
-            return Fitted(_told(sharp, parts), through=True)
+            return Fitted(_with_all_chords(sharp, parts), through=True)
     for round_ in range(options.rounds):
         left = budget - sum(len(fit.chain) for fit in fits)
         wanted = left if round_ == options.rounds - 1 else math.ceil(left / 2)
-        if left <= 0 or not _add(fits, parts, aims, scales, wanted, options):
+        if left <= 0 or not _add(fits, parts, fit_targets, scales, wanted, options):
             break
     for _ in range(_RESCUES):
         chains = [fit.chain for fit in fits]
         if _velocity_cost(chains, parts, scales) < 10.0 ** (-options.least_db / 10.0):
             break
-        if not _add(fits, parts, aims, scales, math.ceil(0.1 * sum(map(len, chains))), options):
+        if not _add(fits, parts, fit_targets, scales, math.ceil(0.1 * sum(map(len, chains))), options):
             break
     fits = [
-        refine(_tidy(fit, aim), aim, options.last_iterations) for fit, aim in zip(fits, aims, strict=True)
+        refine(_tidy(fit, fit_target), fit_target, options.last_iterations)
+        for fit, fit_target in zip(fits, fit_targets, strict=True)
     ]
     is_clean = _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_CLEAN_DB / 10.0)
     if is_clean:
         fits = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
-    return Fitted(_told(fits, parts), through=is_clean)
+    return Fitted(_with_all_chords(fits, parts), through=is_clean)
 
 
 def left_over(
@@ -142,7 +144,8 @@ def left_over(
         part: low-passed.
         through: the strokes go through the same low-pass first.
     """
-    # What law.evaluate leaves, but piece by piece: all strokes at all times are too many in a long recording.
+    # What trajectory.evaluate leaves, but piece by piece: all strokes at all times are too many in a long
+    # recording.
     p_left, v_left = residuals(chain, part.t, part.p, part.v)
     if not through:
         return p_left, v_left
@@ -150,7 +153,7 @@ def left_over(
     return part.p - passed, part.v - velocity(part.t, passed)
 
 
-def _told(fits: Sequence[Fit], parts: Sequence[SmoothPart]) -> list[Chain]:
+def _with_all_chords(fits: Sequence[Fit], parts: Sequence[SmoothPart]) -> list[Chain]:
     """The chains of the fits, every stroke with a chord."""
     return [
         with_chords(fit.chain, _LEAST_CHORD * float(np.linalg.norm(np.ptp(part.p, axis=0))))
@@ -161,7 +164,7 @@ def _told(fits: Sequence[Fit], parts: Sequence[SmoothPart]) -> list[Chain]:
 def _add(
     fits: list[Fit],
     parts: Sequence[SmoothPart],
-    aims: Sequence[Aim],
+    fit_targets: Sequence[FitTarget],
     scales: Scales,
     wanted: int,
     options: FitOptions,
@@ -185,14 +188,14 @@ def _add(
         mine = [candidate for candidate, owner in found[:wanted] if owner == index]
         median = np.array([candidate.median for candidate in mine])
         width = np.array([candidate.width for candidate in mine])
-        chain = inserted(_tidy(fits[index], aims[index]), median, width, TYPICAL_SIGMA)
-        fits[index] = refine(chain, aims[index], options.iterations)
+        chain = inserted(_tidy(fits[index], fit_targets[index]), median, width, TYPICAL_SIGMA)
+        fits[index] = refine(chain, fit_targets[index], options.iterations)
     return bool(found)
 
 
-def _tidy(fit: Fit, aim: Aim) -> Chain:
+def _tidy(fit: Fit, fit_target: FitTarget) -> Chain:
     """The fit's chain without strokes that do nothing; one is kept in any case."""
-    idle = idle_strokes(fit.chain, aim.v_scale, float(aim.t[1] - aim.t[0]), fit.cost)
+    idle = idle_strokes(fit.chain, fit_target.v_scale, float(fit_target.t[1] - fit_target.t[0]), fit.cost)
     if idle.all():
         idle[int(np.argmax(fit.chain.lengths))] = False
     return without(fit.chain, idle) if idle.any() else fit.chain
@@ -201,15 +204,15 @@ def _tidy(fit: Fit, aim: Aim) -> Chain:
 def _given_back(fit: Fit, part: SmoothPart, scales: Scales, options: FitOptions) -> Fit:
     """Refine against the signal with what the low-pass takes from these strokes given back to it.
 
-    The low-pass blunts fast bells a little. That is far below the noise of a hand's recording, but strokes
-    fitted to a clean signal would come out too wide by it.
+    The low-pass blunts fast speed profiles a little. That is far below the noise of a hand's recording, but
+    strokes fitted to a clean signal would come out too wide by it.
     """
     for _ in range(_GIVE_BACKS):
         p_left, v_left = residuals(fit.chain, part.t, part.p, part.v)
         p_model, v_model = part.p - p_left, part.v - v_left
         passed = low_passed(p_model, 1.0 / part.step)
         p, v = part.p + p_model - passed, part.v + v_model - velocity(part.t, passed)
-        fit = refine(fit.chain, _aim(part, p, v, scales), options.last_iterations, tolerance=1e-4)
+        fit = refine(fit.chain, _fit_target(part, p, v, scales), options.last_iterations, tolerance=1e-4)
     return fit
 
 
@@ -226,7 +229,9 @@ def _velocity_cost(chains: Sequence[Chain], parts: Sequence[SmoothPart], scales:
     return sum(float(np.sum(v**2)) for v in left) / scales.v**2
 
 
-def _aim(part: SmoothPart, p: NDArray[np.float64], v: NDArray[np.float64], scales: Scales) -> Aim:
+def _fit_target(
+    part: SmoothPart, p: NDArray[np.float64], v: NDArray[np.float64], scales: Scales
+) -> FitTarget:
     decimation = max(1, min(_DECIMATION, len(part.t) // _LEAST_SAMPLES))
     rows = np.arange(0, len(part.t), decimation)
     if rows[-1] != len(part.t) - 1:
@@ -235,4 +240,4 @@ def _aim(part: SmoothPart, p: NDArray[np.float64], v: NDArray[np.float64], scale
     duration = float(part.t[-1] - part.t[0])
     freedom = part.p.shape[1] * (1.0 + 2.0 * CUTOFF_HZ * duration)
     bounds = Bounds.of(duration)
-    return Aim(part.t[rows], p[rows], v[rows], weight / scales.p, weight / scales.v, freedom, bounds)
+    return FitTarget(part.t[rows], p[rows], v[rows], weight / scales.p, weight / scales.v, freedom, bounds)

@@ -1,9 +1,9 @@
-"""The first strokes of a part: one for every bell of the speed, from minimum to minimum.
+"""The first strokes of a part: one for each interval between speed minima.
 
-The minima are the salient points; in time they divide the part into bells, in space they are the first
+The minima are the salient points; in time they divide the part into intervals, in space they are the first
 virtual targets. Sigma, median and width of each stroke come from the closed forms, by the candidate that fits
-the bell best; its turn from the directions at its inflections. What they get wrong, overlap above all, is the
-business of the joint refinement.
+the measured speed best; its arc angle from the directions at its inflections. What they get wrong, overlap
+above all, is the business of the joint refinement.
 
 Source: section 3.1 of the theory notes: segmentation of iDeLog, parameters of Robust XZERO.
 """
@@ -20,29 +20,29 @@ from scipy.signal import find_peaks
 from pc_client.extraction.chain import Bounds, Chain, normals_across
 from pc_client.extraction.closed_forms import (
     CharacteristicPoints,
-    bell_from_points,
+    lognormal_from_points,
     sigma_from_peak_ratio,
     sigma_from_slope_ratio,
     turn_rate,
 )
 from pc_client.extraction.smoothing import SmoothPart
-from pc_client.movements.lognormal import evaluate_bells
+from pc_client.movements.lognormal import evaluate_lognormals
 
 __all__ = ["initial_chain", "salient_points"]
 
-#: Bells that stand out by less than this share of the top speed are ripples on their neighbours at first;
+#: Peaks that stand out by less than this share of the top speed are ripples on their neighbours at first;
 #: strokes for those that deserve one are added where the refined residual is worst.
 RIPPLE = 0.05
-#: Sigma of a bell whose shape says nothing: the middle of what is found in handwriting.
+#: Sigma of a speed profile whose shape says nothing: the middle of what is found in handwriting.
 TYPICAL_SIGMA = 0.2
-#: Peak speed times width over length of a bell, 1 / sqrt(2 pi), nearly for every sigma.
+#: Peak speed times width over length of a speed profile, 1 / sqrt(2 pi), nearly for every sigma.
 _PEAK_WIDTH = 1.0 / math.sqrt(2.0 * math.pi)
-#: Largest turn that a first guess may have, rad.
+#: Largest arc angle that a first guess may have, rad.
 _MAX_FIRST_TURN = 2.5
 
 
 def salient_points(part: SmoothPart) -> NDArray[np.intp]:
-    """Indices that divide a part into bells: its first sample, the speed minima, its last, (n_bells + 1,)."""
+    """Indices (n_intervals + 1,) that divide a part: its first sample, the speed minima, its last sample."""
     speed = part.speed
     peaks, _ = find_peaks(speed, prominence=RIPPLE * float(speed.max()))
     minima = [a + int(np.argmin(speed[a:b])) for a, b in pairwise(peaks)]
@@ -50,16 +50,16 @@ def salient_points(part: SmoothPart) -> NDArray[np.intp]:
 
 
 def initial_chain(part: SmoothPart) -> Chain:
-    """One stroke a bell."""
+    """One stroke for each interval."""
     marks = salient_points(part)
     speed = part.speed
-    way = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * part.step))
+    path_length = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * part.step))
     first = [_timing(part.t[a : b + 1], speed[a : b + 1]) for a, b in pairwise(marks)]
     median, width, sigma = np.array(first).T
     targets = part.p[marks]
     dim = targets.shape[1]
-    turns = [_turn(part, way, a, b) for a, b in pairwise(marks)]
-    vectors = np.array(turns)
+    arc_angles = [_arc_angle(part, path_length, a, b) for a, b in pairwise(marks)]
+    vectors = np.array(arc_angles)
     chords = np.zeros((len(vectors), 3))
     chords[:, :dim] = np.diff(targets, axis=0)
     if dim == 2:
@@ -72,11 +72,11 @@ def initial_chain(part: SmoothPart) -> Chain:
 
 
 def _timing(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Median, width and sigma for a bell given between its minima: the best of the candidates."""
+    """Median, width and sigma for a speed profile between two minima: the best of the candidates."""
     candidates = [_by_area(t, speed), *_by_closed_forms(t, speed)]
     errors = []
     for median, width, sigma in candidates:
-        shape = evaluate_bells(t, median - width / sigma, math.log(width / sigma), sigma).rate
+        shape = evaluate_lognormals(t, median - width / sigma, math.log(width / sigma), sigma).rate
         power = float(shape @ shape)
         scale = float(shape @ speed) / power if power > 0.0 else 0.0
         errors.append(float(np.sum((speed - scale * shape) ** 2)))
@@ -84,7 +84,7 @@ def _timing(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, 
 
 
 def _by_area(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
-    """The bell with the area and the peak of the measured one; it can be had of every bell."""
+    """The lognormal with the area and the peak of the measured speed profile; it always exists."""
     top = int(np.argmax(speed))
     area = float(np.sum(0.5 * (speed[1:] + speed[:-1]))) * float(t[1] - t[0])
     peak = float(speed[top])
@@ -103,14 +103,14 @@ def _by_closed_forms(t: NDArray[np.float64], speed: NDArray[np.float64]) -> list
         sigma_from_peak_ratio(v4 / v3),
         sigma_from_slope_ratio(v4 / v2),
     ):
-        law = bell_from_points(points, _clipped(sigma, Bounds().sigma)).lognormal
-        width = _clipped(math.exp(law.mu) * law.sigma, Bounds().width)
-        found.append((law.median, width, law.sigma))
+        lognormal = lognormal_from_points(points, _clipped(sigma, Bounds().sigma)).lognormal
+        width = _clipped(math.exp(lognormal.mu) * lognormal.sigma, Bounds().width)
+        found.append((lognormal.median, width, lognormal.sigma))
     return found
 
 
 def characteristic_points(t: NDArray[np.float64], speed: NDArray[np.float64]) -> CharacteristicPoints | None:
-    """Inflections and peak of a bell, or None where one of them is not inside."""
+    """Inflections and peak of a speed profile, or None where one of them is not inside."""
     top = int(np.argmax(speed))
     if top < 2 or top > len(speed) - 3:
         return None
@@ -124,21 +124,21 @@ def characteristic_points(t: NDArray[np.float64], speed: NDArray[np.float64]) ->
     return CharacteristicPoints(times, speeds)
 
 
-def _turn(part: SmoothPart, way: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
+def _arc_angle(part: SmoothPart, path_length: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
     """Turn of the stroke between two salient points as a vector along its axis, (3,), rad."""
-    length = float(way[b] - way[a])
+    length = float(path_length[b] - path_length[a])
     if length <= 0.0:
         return np.zeros(3)
     # A quarter and three quarters of the way stand for the inflections: they are always there.
-    i, k = np.searchsorted(way, (way[a] + 0.25 * length, way[a] + 0.75 * length))
+    i, k = np.searchsorted(path_length, (path_length[a] + 0.25 * length, path_length[a] + 0.75 * length))
     v = np.zeros((2, 3))
     v[:, : part.v.shape[1]] = part.v[[i, min(k, len(part.v) - 1)]]
     axis = np.cross(v[0], v[1])
     size = float(np.linalg.norm(axis))
-    if size == 0.0 or way[k] <= way[i]:
+    if size == 0.0 or path_length[k] <= path_length[i]:
         return np.zeros(3)
     angle = math.atan2(size, float(v[0] @ v[1]))
-    total = turn_rate((0.0, angle), (float(way[i]), float(way[k]))) * length
+    total = turn_rate((0.0, angle), (float(path_length[i]), float(path_length[k]))) * length
     turned: NDArray[np.float64] = min(total, _MAX_FIRST_TURN) * axis / size
     return turned
 

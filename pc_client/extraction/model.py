@@ -9,8 +9,8 @@ turn d about the normal n and k = 1 / sinc(d / 2) does
 Everything is a number per time and stroke, times one of two vectors, c and n x c. That holds for flat and
 spatial strokes alike; the latter have one variable more, the bending out of their plane, whose vector is n.
 
-Variables of a stroke, in this order: median (in units of its width), ln width, sigma, turn, bending (rad,
-spatial strokes only), end target. The first target stands before them all.
+Variables of a stroke, in this order: median (in units of its width), ln width, sigma, arc angle, bending
+(rad, spatial strokes only), end target. The first target stands before them all.
 
 Source: section 1.5 of the theory notes; derivatives by hand, held against differences by a test.
 """
@@ -58,13 +58,15 @@ def linearise(chain: Chain, t: NDArray[np.float64], first: int, last: int) -> Li
     The rows of the Jacobian: the target at which stroke `first` begins, then the variables of each stroke.
     """
     s = slice(first, last)
-    m, w, sigma, turn = (values[s, None] for values in (chain.median, chain.width, chain.sigma, chain.turn))
+    m, w, sigma, arc_angle = (
+        values[s, None] for values in (chain.median, chain.width, chain.sigma, chain.arc_angle)
+    )
     targets = chain.targets[first : last + 1]
     chord = targets[1:] - targets[:-1]
     dim = chord.shape[1]
     across = _cross(chain.normal[s], chord)
 
-    # The bells, (strokes, n): F, Lambda and the logarithmic derivatives of Lambda.
+    # The speed profiles, (strokes, n): F, Lambda and the logarithmic derivatives of Lambda.
     u = (t - m) / w
     x = 1.0 + sigma * u
     begun = x > 1e-12
@@ -81,20 +83,20 @@ def linearise(chain: Chain, t: NDArray[np.float64], first: int, last: int) -> Li
     done_by = (-phi_g, -u * phi_g, phi * z_sigma)
 
     # The arcs: coefficients of the chord and of the vector across it.
-    k = 1.0 / _sinc(0.5 * turn)
-    k_log_slope = np.where(np.abs(turn) < _STRAIGHT, turn / 12.0, _safe_slope(turn))
+    k = 1.0 / _sinc(0.5 * arc_angle)
+    k_log_slope = np.where(np.abs(arc_angle) < _STRAIGHT, arc_angle / 12.0, _safe_slope(arc_angle))
     lag = done - 0.5
-    beta = turn * lag
+    beta = arc_angle * lag
     cos, sin = k * np.cos(beta), k * np.sin(beta)
     v_c, v_q = rate * cos, rate * sin
-    p_c, p_q, dp_c, dp_q = _arc_integrals(turn, done, cos, sin, k)
+    p_c, p_q, dp_c, dp_q = _arc_integrals(arc_angle, done, cos, sin, k)
 
     n, size = len(t), variables_per_stroke(dim)
     jacobian = np.zeros((dim + (last - first) * size, 2, dim, n))
     by_stroke = jacobian[dim:].reshape(last - first, size, 2, dim, n)
     p_turned = (k_log_slope * p_c + dp_c, k_log_slope * p_q + dp_q)
     v_turned = (k_log_slope * v_c - lag * v_q, k_log_slope * v_q + lag * v_c)
-    turned_rates = tuple(rate * turn * change for change in done_by)
+    turned_rates = tuple(rate * arc_angle * change for change in done_by)
     gained_rates = tuple(rate * gain for gain in log_rate)
     for i in range(dim):
         c, q = chord[:, i, None], across[:, i, None]
@@ -107,8 +109,8 @@ def linearise(chain: Chain, t: NDArray[np.float64], first: int, last: int) -> Li
     if dim == 3:
         # Bending turns the vector across, n x c, towards -n at right angles to both.
         out_of_plane = -chain.normal[s] * np.linalg.norm(chord, axis=1)[:, None]
-        small = np.abs(turn) < _STRAIGHT
-        safe = np.where(small, 1.0, turn)
+        small = np.abs(arc_angle) < _STRAIGHT
+        safe = np.where(small, 1.0, arc_angle)
         bend_v = rate * np.where(small, k * lag, sin / safe)
         bend_p = np.where(small, 0.5 * k * (done * done - done), p_q / safe)
         by_stroke[:, 4, 0] = bend_p[:, None] * out_of_plane[:, :, None]
@@ -130,31 +132,31 @@ def _sinc(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return value
 
 
-def _safe_slope(turn: NDArray[np.float64]) -> NDArray[np.float64]:
-    safe = np.where(np.abs(turn) < _STRAIGHT, 1.0, turn)
+def _safe_slope(arc_angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    safe = np.where(np.abs(arc_angle) < _STRAIGHT, 1.0, arc_angle)
     slope: NDArray[np.float64] = 1.0 / safe - 0.5 / np.tan(0.5 * safe)
     return slope
 
 
 def _arc_integrals(
-    turn: NDArray[np.float64],
+    arc_angle: NDArray[np.float64],
     done: NDArray[np.float64],
     cos: NDArray[np.float64],
     sin: NDArray[np.float64],
     k: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """K C and k S, and k dC/dd and k dS/dd; cos and sin are those of the tangent, times k."""
-    half = 0.5 * turn
+    half = 0.5 * arc_angle
     reach = k * done * _sinc(half * done)
     angle = half * done - half
     c, s = reach * np.cos(angle), reach * np.sin(angle)
-    small = np.abs(turn) < _STRAIGHT
-    safe = np.where(small, 1.0, turn)
+    small = np.abs(arc_angle) < _STRAIGHT
+    safe = np.where(small, 1.0, arc_angle)
     lag = done - 0.5
     dc = (lag * cos + 0.5 * k * np.cos(half) - c) / safe
     ds = (lag * sin - 0.5 * k * np.sin(half) - s) / safe
     if small.any():
-        dc = np.where(small, -turn * (lag**3 + 0.125) / 3.0, dc)
+        dc = np.where(small, -arc_angle * (lag**3 + 0.125) / 3.0, dc)
         ds = np.where(small, 0.5 * (done * done - done), ds)
     return c, s, dc, ds
 

@@ -27,11 +27,11 @@ from scipy.linalg import LinAlgError, solveh_banded
 
 from pc_client.extraction.chain import Bounds, Chain, in_order, normals_across
 from pc_client.extraction.model import linearise, variables_per_stroke
-from pc_client.extraction.preference import Preference, wishes
+from pc_client.extraction.regularizer import Regularizer, regularizer_terms
 
-__all__ = ["Aim", "Fit", "moved", "refine", "residuals"]
+__all__ = ["Fit", "FitTarget", "moved", "refine", "residuals"]
 
-#: A bell counts as begun and as done at this deviation: Phi(-4.5) = 3.4e-6 of its way.
+#: A stroke counts as begun and as done at this deviation: Phi(-4.5) = 3.4e-6 of its way.
 _TAIL = 4.5
 #: Samples a piece of the time axis.
 _PIECE = 48
@@ -45,7 +45,7 @@ _PINNED = 1e12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Aim:
+class FitTarget:
     """What a fit comes as near to as it can.
 
     Attributes:
@@ -85,7 +85,7 @@ class _Equations(NamedTuple):
     Attributes:
         band: the matrix, (columns, bandwidth): each column from the diagonal down.
         gradient: downhill, (columns,).
-        cost: squared errors and wishes.
+        cost: squared errors and regularizer.
         error: squared errors alone.
     """
 
@@ -95,22 +95,22 @@ class _Equations(NamedTuple):
     error: float
 
 
-def refine(chain: Chain, aim: Aim, iterations: int, tolerance: float = 3e-3) -> Fit:
+def refine(chain: Chain, fit_target: FitTarget, iterations: int, tolerance: float = 3e-3) -> Fit:
     """Better the strokes for some iterations, or until one gains less than `tolerance` of the cost.
 
-    The cost never grows. Every stroke stays inside the aim's bounds. The strokes come back sorted by their
-    medians.
+    The cost never grows. Every stroke stays inside the bounds of the fit target. The strokes come back sorted
+    by their medians.
     """
     chain = in_order(chain)
-    data = _data_equations(chain, aim)
-    preference = Preference(data.error / aim.freedom, aim.top_speed)
-    now = _with_wishes(data, chain, preference)
+    data = _data_equations(chain, fit_target)
+    regularizer = Regularizer(data.error / fit_target.freedom, fit_target.top_speed)
+    now = _regularized(data, chain, regularizer)
     damping, growth = _DAMPING, 2.0
     for _ in range(iterations):
-        step = _solve(now, chain, aim.bounds, damping)
+        step = _solve(now, chain, fit_target.bounds, damping)
         if step is not None:
-            tried = moved(chain, step, aim.bounds)
-            then = _with_wishes(_data_equations(tried, aim), tried, preference)
+            tried = moved(chain, step, fit_target.bounds)
+            then = _regularized(_data_equations(tried, fit_target), tried, regularizer)
             foreseen = float(step @ (damping * _diagonal(now) * step + now.gradient))
             gain = (now.cost - then.cost) / max(foreseen, 1e-300)
             if then.cost < now.cost:
@@ -156,10 +156,10 @@ def _pieces(chain: Chain, t: NDArray[np.float64]) -> list[tuple[slice, int, int]
     return pieces
 
 
-def _data_equations(chain: Chain, aim: Aim) -> _Equations:
-    dim = aim.p.shape[1]
+def _data_equations(chain: Chain, fit_target: FitTarget) -> _Equations:
+    dim = fit_target.p.shape[1]
     size = variables_per_stroke(dim)
-    pieces = _pieces(chain, aim.t)
+    pieces = _pieces(chain, fit_target.t)
     bandwidth = max(last - first for _, first, last in pieces) * size + dim
     columns = dim + len(chain) * size
     # Column j of the matrix from its diagonal down is band[j, : bandwidth]. Seen with steps one shorter, the
@@ -173,10 +173,15 @@ def _data_equations(chain: Chain, aim: Aim) -> _Equations:
     gradient = np.zeros(columns)
     error = 0.0
     for rows, first, last in pieces:
-        model = linearise(chain, aim.t[rows], first, last)
-        left = np.stack(((aim.p[rows] - model.p).T * aim.p_scale, (aim.v[rows] - model.v).T * aim.v_scale))
-        model.jacobian[:, 0] *= aim.p_scale
-        model.jacobian[:, 1] *= aim.v_scale
+        model = linearise(chain, fit_target.t[rows], first, last)
+        left = np.stack(
+            (
+                (fit_target.p[rows] - model.p).T * fit_target.p_scale,
+                (fit_target.v[rows] - model.v).T * fit_target.v_scale,
+            )
+        )
+        model.jacobian[:, 0] *= fit_target.p_scale
+        model.jacobian[:, 1] *= fit_target.v_scale
         flat = model.jacobian.reshape(len(model.jacobian), -1)
         flat_left = left.reshape(-1)
         place = slice(first * size, first * size + len(flat))
@@ -189,15 +194,15 @@ def _data_equations(chain: Chain, aim: Aim) -> _Equations:
     return _Equations(band[1:, :bandwidth], gradient, error, error)
 
 
-def _with_wishes(data: _Equations, chain: Chain, preference: Preference) -> _Equations:
-    wished = wishes(chain, preference)
-    width = wished.gradient.shape[1]
+def _regularized(data: _Equations, chain: Chain, regularizer: Regularizer) -> _Equations:
+    terms = regularizer_terms(chain, regularizer)
+    width = terms.gradient.shape[1]
     size = variables_per_stroke(chain.targets.shape[1])
     for i in range(width):
         places = slice(i, i + size * len(chain), size)
-        data.gradient[places] += wished.gradient[:, i]
-        data.band[places, : width - i] += wished.matrix[:, i, i:]
-    return _Equations(data.band, data.gradient, data.error + wished.cost, data.error)
+        data.gradient[places] += terms.gradient[:, i]
+        data.band[places, : width - i] += terms.matrix[:, i, i:]
+    return _Equations(data.band, data.gradient, data.error + terms.cost, data.error)
 
 
 def _diagonal(equations: _Equations) -> NDArray[np.float64]:
@@ -226,7 +231,11 @@ def _pinned(chain: Chain, bounds: Bounds, downhill: NDArray[np.float64]) -> NDAr
     pinned = np.zeros(len(downhill), dtype=bool)
     table = pinned[dim:].reshape(len(chain), -1)
     pushes = downhill[dim:].reshape(len(chain), -1)
-    bounded = ((1, chain.width, bounds.width), (2, chain.sigma, bounds.sigma), (3, chain.turn, bounds.turn))
+    bounded = (
+        (1, chain.width, bounds.width),
+        (2, chain.sigma, bounds.sigma),
+        (3, chain.arc_angle, bounds.arc_angle),
+    )
     for column, values, (least, most) in bounded:
         push = pushes[:, column]
         table[:, column] = ((values <= least) & (push < 0.0)) | ((values >= most) & (push > 0.0))
@@ -240,28 +249,30 @@ def moved(chain: Chain, step: NDArray[np.float64], bounds: Bounds) -> Chain:
     limits = np.array(_STEP_LIMITS[: table.shape[1] - dim])
     change = np.clip(table[:, :-dim], -limits, limits)
     targets = chain.targets + np.vstack((step[:dim], table[:, -dim:]))
-    turn, normal = chain.turn + change[:, 3], chain.normal
+    arc_angle, normal = chain.arc_angle + change[:, 3], chain.normal
     if dim == 3:
-        turn, normal = _bent(chain, turn, change[:, 4], np.diff(targets, axis=0))
+        arc_angle, normal = _bent(chain, arc_angle, change[:, 4], np.diff(targets, axis=0))
     return Chain(
         chain.median + chain.width * change[:, 0],
         np.clip(chain.width * np.exp(change[:, 1]), *bounds.width),
         np.clip(chain.sigma + change[:, 2], *bounds.sigma),
-        np.clip(turn, *bounds.turn),
+        np.clip(arc_angle, *bounds.arc_angle),
         normal,
         targets,
     )
 
 
 def _bent(
-    chain: Chain, turn: NDArray[np.float64], bending: NDArray[np.float64], chords: NDArray[np.float64]
+    chain: Chain, arc_angle: NDArray[np.float64], bending: NDArray[np.float64], chords: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Turns and normals after a step: turn x normal is a vector, and bending moves it sideways."""
     sideways = np.cross(chain.normal, chain.chords)
     norms = np.linalg.norm(sideways, axis=1, keepdims=True)
-    vector = turn[:, None] * chain.normal + bending[:, None] * sideways / np.where(norms > 0.0, norms, 1.0)
+    vector = arc_angle[:, None] * chain.normal + bending[:, None] * sideways / np.where(
+        norms > 0.0, norms, 1.0
+    )
     size = np.linalg.norm(vector, axis=1)
     bent = size > 1e-12
     direction = np.where(bent[:, None], vector / np.where(bent, size, 1.0)[:, None], chain.normal)
     sign = np.where(np.einsum("ij,ij->i", direction, chain.normal) < 0.0, -1.0, 1.0)
-    return np.where(bent, sign * size, turn), normals_across(chords, sign[:, None] * direction)
+    return np.where(bent, sign * size, arc_angle), normals_across(chords, sign[:, None] * direction)

@@ -2,8 +2,8 @@
 
 `extraction.json` is a list of rows, one for each recording that could be read, in the order they were given.
 `strokes.csv` holds every stroke as the theory writes it, so that the movement can be had back from it alone.
-A stroke runs from (x0, y0, z0) to (x1, y1, z1), in the unit of the recording, turning by `turn` in the plane
-that `tilt` chooses (see `pc_client.movements.stroke.arc_frame`); length is D.
+A stroke runs from (x0, y0, z0) to (x1, y1, z1), in the unit of the recording, turning by `arc_angle` in the
+plane that `tilt` chooses (see `pc_client.movements.stroke.arc_frame`); length is D.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class StrokeRow(NamedTuple):
     mu: float
     sigma: float
     length: float
-    turn: float
+    arc_angle: float
     tilt: float
     x0: float
     y0: float
@@ -75,19 +75,24 @@ def row_of(extraction: Extraction) -> Row:
 def stroke_rows(extraction: Extraction) -> Iterator[StrokeRow]:
     """All strokes of an extraction, in their order."""
     for number, part in enumerate(extraction.parts, start=1):
-        law = part.law
-        for index, (stroke, length) in enumerate(zip(law.strokes, law.lengths.tolist(), strict=True)):
-            bell = stroke.timing.lognormal
-            begin, end = law.target_points[index].tolist(), law.target_points[index + 1].tolist()
+        trajectory = part.trajectory
+        for index, (stroke, length) in enumerate(
+            zip(trajectory.strokes, trajectory.lengths.tolist(), strict=True)
+        ):
+            lognormal = stroke.timing.lognormal
+            begin, end = (
+                trajectory.target_points[index].tolist(),
+                trajectory.target_points[index + 1].tolist(),
+            )
             yield StrokeRow(
                 extraction.name,
                 number,
                 index + 1,
-                bell.t0,
-                bell.mu,
-                bell.sigma,
+                lognormal.t0,
+                lognormal.mu,
+                lognormal.sigma,
                 length,
-                stroke.turn,
+                stroke.arc_angle,
                 stroke.tilt,
                 *begin,
                 *end,

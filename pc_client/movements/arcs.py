@@ -1,7 +1,7 @@
 """Human-like movements of arcs that overlap in time, each in a window of its own.
 
 People draw arcs and begin a stroke before the one before has ended; the paper's recipe (`recipe.py`) does
-neither. So the hand cuts the corner at an inner target point, and the bells lean to the left.
+neither. So the hand cuts the corner at an inner target point, and the speed profiles are skewed to the left.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ class ArcRules:
     Attributes:
         reference_leg: distance (m) that is run in `reference_window`.
         reference_window: window (s) of a stroke of that distance, both tails included; the visible part
-            between two least speeds is shorter by the overlap. Such a slow hand keeps a UR3 far from its
+            between two speed minima is shorter by the overlap. Such a slow hand keeps a UR3 far from its
             joint limits.
         isochrony: window = reference_window (leg / reference_leg)^isochrony: people hardly need longer for
             longer ways.
         variability: factors on the window from stroke to stroke.
-        sigma: widths of the bells.
+        sigma: of the lognormals.
         overlap: share of the shorter of two windows in which both strokes move.
-        turn: bending of the arcs, rad.
+        arc_angle: bending of the arcs, rad.
         rest: time at rest before the first and after the last window, s.
     """
 
@@ -51,7 +51,7 @@ class ArcRules:
     variability: tuple[float, float] = (0.92, 1.08)
     sigma: tuple[float, float] = (0.10, 0.20)
     overlap: tuple[float, float] = (0.35, 0.50)
-    turn: tuple[float, float] = (0.1, 0.6)
+    arc_angle: tuple[float, float] = (0.1, 0.6)
     rest: float = 0.1
 
 
@@ -80,15 +80,15 @@ def arcs_twin(movement: Movement, seed: int, name: str) -> Movement:
         seed: of the arcs.
         name: the twin's.
     """
-    law = _draw_strokes(movement.target_points, random.Random(seed), ARC_RULES)
-    drawn = _movement(name, law, {**movement.provenance, "twin": movement.name})
+    trajectory = _draw_strokes(movement.target_points, random.Random(seed), ARC_RULES)
+    drawn = _movement(name, trajectory, {**movement.provenance, "twin": movement.name})
     return drawn.stretched(movement.duration / drawn.duration)
 
 
-def _movement(name: str, law: SigmaLognormal, facts: dict[str, str | int | float]) -> Movement:
-    boundaries = np.concatenate(([0.0], np.round(law.speed_minima(), 3), [law.duration]))
+def _movement(name: str, trajectory: SigmaLognormal, facts: dict[str, str | int | float]) -> Movement:
+    boundaries = np.concatenate(([0.0], np.round(trajectory.speed_minima(), 3), [trajectory.duration]))
     durations = [round(duration, 3) for duration in np.diff(boundaries).tolist()]
-    return Movement(name, law, np.array(durations), facts)
+    return Movement(name, trajectory, np.array(durations), facts)
 
 
 def _draw_strokes(targets: NDArray[np.float64], source: random.Random, rules: ArcRules) -> SigmaLognormal:
@@ -105,6 +105,6 @@ def _draw_strokes(targets: NDArray[np.float64], source: random.Random, rules: Ar
         overlap = draw(*rules.overlap) * min(window, window_before) if strokes else 0.0
         start = round(end - overlap, 3)
         timing = TwoSidedTiming(start, window, draw(*rules.sigma))
-        strokes.append(Stroke(timing, turn=draw(*rules.turn), tilt=draw(-math.pi, math.pi)))
+        strokes.append(Stroke(timing, arc_angle=draw(*rules.arc_angle), tilt=draw(-math.pi, math.pi)))
         end, window_before = start + window, window
     return SigmaLognormal(targets, tuple(strokes), round(end + rules.rest, 3))

@@ -46,8 +46,8 @@ def describe(movement: Movement) -> dict[str, Any]:
         },
         "provenance": dict(movement.provenance),
     }
-    if isinstance(movement.law, SigmaLognormal):
-        figures["strokes"] = _describe_strokes(movement.law)
+    if isinstance(movement.trajectory, SigmaLognormal):
+        figures["strokes"] = _describe_strokes(movement.trajectory)
     return figures
 
 
@@ -82,22 +82,22 @@ def snr_of_delay(movement: Movement, delay: float, *, vector: bool = False) -> f
     return 10.0 * math.log10(float(desired @ desired) / float(error @ error))
 
 
-def _describe_strokes(law: SigmaLognormal) -> list[dict[str, float]]:
+def _describe_strokes(trajectory: SigmaLognormal) -> list[dict[str, float]]:
     described = []
-    for stroke, length in zip(law.strokes, law.lengths.tolist(), strict=True):
-        bell = stroke.timing.lognormal
+    for stroke, length in zip(trajectory.strokes, trajectory.lengths.tolist(), strict=True):
+        lognormal = stroke.timing.lognormal
         described.append(
             {
-                "t0_s": bell.t0,
-                "mu": bell.mu,
-                "sigma": bell.sigma,
+                "t0_s": lognormal.t0,
+                "mu": lognormal.mu,
+                "sigma": lognormal.sigma,
                 "length_m": length,
-                "turn_rad": stroke.turn,
+                "arc_angle_rad": stroke.arc_angle,
                 "tilt_rad": stroke.tilt,
-                "mode_s": bell.mode,
-                "skewness": bell.skewness,
-                "kurtosis": bell.kurtosis,
-                "peak_speed_m_s": length * bell.peak,
+                "mode_s": lognormal.mode,
+                "skewness": lognormal.skewness,
+                "kurtosis": lognormal.kurtosis,
+                "peak_speed_m_s": length * lognormal.peak,
             }
         )
     return described

@@ -82,7 +82,7 @@ class Fitts:
         """Durations (n,), s, of strokes of these lengths (n,), m.
 
         Raises:
-            MovementError: a stroke so short against the target's width that the law gives it no time.
+            MovementError: a stroke so short against the target's width that the rule gives it no time.
         """
         durations = self.intercept + self.slope * np.log2(2.0 * lengths / self.width)
         if not np.all(durations > 0.0):
@@ -127,22 +127,24 @@ def chained_windows(
     return scale * begins, scale * shape
 
 
-def retimed(law: SigmaLognormal, rule: DurationRule, *, overlap: float, rest: float) -> SigmaLognormal:
+def retimed(trajectory: SigmaLognormal, rule: DurationRule, *, overlap: float, rest: float) -> SigmaLognormal:
     """The same arcs with windows by a rule, one sigma (the mean) and one overlap, in the same total time.
 
     Args:
-        law: whose target points, arcs and duration are kept.
+        trajectory: whose target points, arcs and duration are kept.
         rule: how long a stroke lasts for the distance of its two target points.
         overlap: as of `chained_windows`.
         rest: time at rest before the first and after the last window, s.
     """
-    if not 0.0 <= 2.0 * rest < law.duration:
-        raise MovementError(f"rests of {rest} s in a movement of {law.duration} s: give less than half of it")
-    sigma = float(np.mean([stroke.timing.lognormal.sigma for stroke in law.strokes]))
-    durations = rule.durations(leg_lengths(law.target_points))
-    begins, windows = chained_windows(durations, law.duration - 2.0 * rest, overlap)
+    if not 0.0 <= 2.0 * rest < trajectory.duration:
+        raise MovementError(
+            f"rests of {rest} s in a movement of {trajectory.duration} s: give less than half of it"
+        )
+    sigma = float(np.mean([stroke.timing.lognormal.sigma for stroke in trajectory.strokes]))
+    durations = rule.durations(leg_lengths(trajectory.target_points))
+    begins, windows = chained_windows(durations, trajectory.duration - 2.0 * rest, overlap)
     strokes = tuple(
-        Stroke(TwoSidedTiming(rest + begin, window, sigma), stroke.turn, stroke.tilt)
-        for begin, window, stroke in zip(begins.tolist(), windows.tolist(), law.strokes, strict=True)
+        Stroke(TwoSidedTiming(rest + begin, window, sigma), stroke.arc_angle, stroke.tilt)
+        for begin, window, stroke in zip(begins.tolist(), windows.tolist(), trajectory.strokes, strict=True)
     )
-    return SigmaLognormal(law.target_points, strokes, law.duration)
+    return SigmaLognormal(trajectory.target_points, strokes, trajectory.duration)

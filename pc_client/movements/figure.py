@@ -53,8 +53,8 @@ def draw_library(path: Path, set_name: str = DEFAULT_SET) -> None:
 
 def _draw_speeds(axes: Any, human: Movement, robot: Movement) -> None:
     t = np.linspace(0.0, human.duration, 1200)
-    if isinstance(human.law, SigmaLognormal):
-        axes.plot(t, human.law.stroke_speeds(t), color=_FAINT, linewidth=1.0, zorder=1)
+    if isinstance(human.trajectory, SigmaLognormal):
+        axes.plot(t, human.trajectory.stroke_speeds(t), color=_FAINT, linewidth=1.0, zorder=1)
     axes.plot(t, robot.speed(t), color=_ROBOT, linewidth=1.8, label=robot.name)
     axes.plot(t, human.speed(t), color=_HUMAN, linewidth=1.8, label=human.name)
     for boundary in np.cumsum(human.stroke_durations)[:-1]:

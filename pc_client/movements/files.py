@@ -1,4 +1,4 @@
-"""Movement files: TOML for movements with a law, CSV for samples; and the library, two sets of ten.
+"""Movement files: TOML for movements in closed form, CSV for samples; and the library, two sets of ten.
 
 The format is described in `docs/movements.md`. Reading checks everything and names file and field (or line)
 of what is wrong.
@@ -18,9 +18,14 @@ from pc_client.errors import MovementError
 from pc_client.input_files import parse_toml, read_text
 from pc_client.movements.columns import parse_rows
 from pc_client.movements.joint_trajectory import JOINT_COLUMNS, JointTrajectory
-from pc_client.movements.law_tables import LAW_FIELDS, LAW_WORDS, law_lines, parse_law
 from pc_client.movements.movement import Movement, check_duration, check_name
-from pc_client.movements.samples import FORMS, MIN_SAMPLES, SampledLaw, samples_of, write_samples
+from pc_client.movements.samples import FORMS, MIN_SAMPLES, SampledTrajectory, samples_of, write_samples
+from pc_client.movements.trajectory_tables import (
+    KIND_WORDS,
+    TRAJECTORY_FIELDS,
+    parse_trajectory,
+    trajectory_lines,
+)
 from pc_client.toml_tables import TableReader, toml_value
 
 __all__ = [
@@ -51,7 +56,7 @@ MOST_POINTS = 1000
 """Most target points of a file: a page of handwriting has some 500."""
 
 _FORMAT = 1
-_FIELDS = f"format, name, kind, duration, stroke_durations, target_points, provenance, {LAW_FIELDS}"
+_FIELDS = f"format, name, kind, duration, stroke_durations, target_points, provenance, {TRAJECTORY_FIELDS}"
 
 
 def library_names(set_name: str = DEFAULT_SET) -> list[str]:
@@ -113,19 +118,19 @@ def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
 
 
 def save_movement(movement: Movement, path: str | Path) -> None:
-    """Write a movement file: .toml for one with a law, .csv for samples.
+    """Write a movement file: .toml for a closed form, .csv for samples.
 
     Raises:
         MovementError: wrong suffix for the kind of movement, or the file cannot be written.
     """
     path = Path(path)
-    law = movement.law
-    wanted = ".csv" if isinstance(law, SampledLaw) else ".toml"
+    trajectory = movement.trajectory
+    wanted = ".csv" if isinstance(trajectory, SampledTrajectory) else ".toml"
     if path.suffix.lower() != wanted:
         raise MovementError(f"{path}: a movement of kind {movement.kind} is saved as a {wanted} file")
     try:
-        if isinstance(law, SampledLaw):
-            write_samples(path, law)
+        if isinstance(trajectory, SampledTrajectory):
+            write_samples(path, trajectory)
         else:
             path.write_text(movement_text(movement), encoding="utf-8")
     except OSError as error:
@@ -135,12 +140,12 @@ def save_movement(movement: Movement, path: str | Path) -> None:
 
 
 def movement_text(movement: Movement) -> str:
-    """The TOML file of a movement with a law, complete and readable."""
-    law = movement.law
-    if movement.kind not in LAW_WORDS:
+    """The TOML file of a movement in closed form, complete and readable."""
+    trajectory = movement.trajectory
+    if movement.kind not in KIND_WORDS:
         raise MovementError(f"movement {movement.name} is made of samples: save it as a .csv file")
     lines = [
-        f"# A movement of the TCP, {LAW_WORDS[movement.kind]}.",
+        f"# A movement of the TCP, {KIND_WORDS[movement.kind]}.",
         "# x, y, z over t derive from it; docs/movements.md explains the fields.",
         f"format = {_FORMAT}",
         f"name = {toml_value(movement.name)}",
@@ -154,7 +159,7 @@ def movement_text(movement: Movement) -> str:
     if movement.provenance:
         lines += ["", "[provenance]"]
         lines += [f"{_toml_key(key)} = {toml_value(value)}" for key, value in movement.provenance.items()]
-    lines += law_lines(law)
+    lines += trajectory_lines(trajectory)
     return "\n".join(lines) + "\n"
 
 
@@ -181,8 +186,8 @@ def _parse_samples(text: str, path: Path) -> Movement | JointTrajectory:
     with _naming(str(path)):
         if rows.columns == JOINT_COLUMNS:
             return JointTrajectory(rows.values[:, 0], rows.values[:, 1:], path.stem)
-        law = samples_of(rows)
-        return Movement(path.stem, law, np.array([law.duration]), {"file": path.name})
+        trajectory = samples_of(rows)
+        return Movement(path.stem, trajectory, np.array([trajectory.duration]), {"file": path.name})
 
 
 def _parse_movement(table: TableReader, source: str) -> Movement:
@@ -199,9 +204,9 @@ def _parse_movement(table: TableReader, source: str) -> Movement:
     with _naming(source):
         check_name(name)
         check_duration(duration, f"movement {name}")
-        law, durations = parse_law(kind, table, points, duration, durations)
+        trajectory, durations = parse_trajectory(kind, table, points, duration, durations)
         table.finish(_FIELDS)
-        return Movement(name, law, durations, provenance)
+        return Movement(name, trajectory, durations, provenance)
 
 
 @contextmanager

@@ -1,7 +1,7 @@
-"""The lognormal speed bell: its values at any time, and everything about it that has a closed form.
+"""The lognormal speed profile: its values at any time, and everything about it that has a closed form.
 
-This is the mathematics of one bell of unit length (D = 1). It knows nothing of space; `stroke.py` gives the
-bell a place and a direction.
+This is the mathematics of one lognormal of unit length (D = 1). It knows nothing of space; `stroke.py` gives
+it a place and a direction.
 
     Lambda(t; t0, mu, sigma) = exp(-z^2 / 2) / (sigma sqrt(2 pi) (t - t0)),   z = (ln(t - t0) - mu) / sigma,
     t > t0 F(t)                     = integral of Lambda from t0 to t = Phi(z)
@@ -23,13 +23,13 @@ from scipy.special import ndtr
 
 from pc_client.errors import MovementError
 
-__all__ = ["BellValues", "Inflections", "Lognormal", "evaluate_bells"]
+__all__ = ["Inflections", "Lognormal", "LognormalValues", "evaluate_lognormals"]
 
 _SQRT_TWO_PI = math.sqrt(2.0 * math.pi)
 
 
-class BellValues(NamedTuple):
-    """A bell at given times: `done` is F, 0 to 1; `rate` is Lambda, 1/s; `rate_change` dLambda/dt, 1/s^2."""
+class LognormalValues(NamedTuple):
+    """A lognormal at some times: `done` is F, 0 to 1; `rate` Lambda, 1/s; `rate_change` dLambda/dt, 1/s^2."""
 
     done: NDArray[np.float64]
     rate: NDArray[np.float64]
@@ -43,12 +43,12 @@ class Inflections(NamedTuple):
     after: float
 
 
-# Ages below are taken for 0: a bell divides by its age [s].
+# Ages below are taken for 0: a lognormal divides by its age [s].
 _YOUNGEST = 1e-100
 
 
-def evaluate_bells(t: ArrayLike, t0: ArrayLike, mu: ArrayLike, sigma: ArrayLike) -> BellValues:
-    """F, Lambda and dLambda/dt of unit bells; all arguments broadcast against each other.
+def evaluate_lognormals(t: ArrayLike, t0: ArrayLike, mu: ArrayLike, sigma: ArrayLike) -> LognormalValues:
+    """F, Lambda and dLambda/dt of unit lognormals; all arguments broadcast against each other.
 
     Args:
         t: times, s.
@@ -62,20 +62,20 @@ def evaluate_bells(t: ArrayLike, t0: ArrayLike, mu: ArrayLike, sigma: ArrayLike)
     age = np.where(begun, age, 1.0)
     z = (np.log(age) - mu) / sigma
     done = np.where(begun, ndtr(z), 0.0)
-    # z**2 overflows to inf only where the bell is 0 anyhow; clipping keeps numpy silent about it.
+    # z**2 overflows to inf only where the lognormal is 0 anyhow; clipping keeps numpy silent about it.
     rate = np.where(begun, np.exp(-0.5 * np.minimum(z * z, 1e4)) / (sigma * _SQRT_TWO_PI * age), 0.0)
     rate_change = -rate / age * (1.0 + z / sigma)
-    return BellValues(done, rate, rate_change)
+    return LognormalValues(done, rate, rate_change)
 
 
 @dataclass(frozen=True, slots=True)
 class Lognormal:
-    """One bell by its three parameters.
+    """One lognormal by its three parameters.
 
     Attributes:
         t0: time at which the command is given, s; the visible motion begins later.
         mu: logarithm of the time from command to half the way, ln s.
-        sigma: width of the bell on the logarithmic time axis, > 0.
+        sigma: width of the lognormal on the logarithmic time axis, > 0.
     """
 
     t0: float
@@ -96,12 +96,12 @@ class Lognormal:
         return self
 
     def stretched(self, factor: float) -> Lognormal:
-        """The same bell `factor` times as slow: t0 and std times factor, mu + ln(factor), sigma kept."""
+        """The same lognormal `factor` times as slow: t0 and std times factor, mu + ln(factor), sigma kept."""
         return Lognormal(self.t0 * factor, self.mu + math.log(factor), self.sigma)
 
-    def evaluate(self, t: ArrayLike) -> BellValues:
+    def evaluate(self, t: ArrayLike) -> LognormalValues:
         """F, Lambda and dLambda/dt at the times t (s), in the shape of t."""
-        return evaluate_bells(t, self.t0, self.mu, self.sigma)
+        return evaluate_lognormals(t, self.t0, self.mu, self.sigma)
 
     def time_at_deviation(self, z: float) -> float:
         """Time (s) at which F = Phi(z), i.e. t0 + exp(mu + z sigma)."""
@@ -119,12 +119,12 @@ class Lognormal:
 
     @property
     def mean(self) -> float:
-        """Centre of gravity of the bell, s."""
+        """Centre of gravity of the lognormal, s."""
         return self.time_at_deviation(0.5 * self.sigma)
 
     @property
     def std(self) -> float:
-        """Standard deviation of the bell, s."""
+        """Standard deviation of the lognormal, s."""
         return math.exp(self.mu + 0.5 * self.sigma**2) * math.sqrt(math.expm1(self.sigma**2))
 
     @property

@@ -1,7 +1,7 @@
 """Minimum jerk: the movements whose third derivative, squared and added up over time, is least.
 
 Between two rests this is one polynomial, x = A (10 u^3 - 15 u^4 + 6 u^5) with u = t / T, along a straight
-line: a symmetric bell of speed with the peak 1.875 A / T. With points to pass on the way at given times it
+line: a symmetric speed profile with the peak 1.875 A / T. With points to pass on the way at given times it
 is the quintic spline through them, continuous up to the fourth derivative: the path is rounded, and the
 speed does not fall to zero at the points.
 

@@ -1,4 +1,4 @@
-"""`Movement`: a named path of the TCP in time, whatever law made it.
+"""`Movement`: a named path of the TCP in time, whatever model made it.
 
 This is what planning, running and analysis know of a movement. Files are read and written by `files.py`; new
 ones are made by `generate.py`.
@@ -20,8 +20,8 @@ from pc_client.file_names import ALLOWED, MOST_BYTES, is_file_name
 from pc_client.movements.geometry import Similarity, read_only
 from pc_client.movements.minimum_jerk import MinimumJerk
 from pc_client.movements.power_law import PowerLaw
-from pc_client.movements.robotic import RoboticLaw
-from pc_client.movements.samples import SampledLaw
+from pc_client.movements.robotic import RoboticTrajectory
+from pc_client.movements.samples import SampledTrajectory
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Motion
 
@@ -29,19 +29,19 @@ __all__ = [
     "LONGEST_DURATION",
     "Kind",
     "Movement",
-    "MovementLaw",
     "MovementSample",
     "SampleColumns",
+    "Trajectory",
     "export_samples",
 ]
 
-#: Which law made a movement, as its file says it; "samples" were brought along.
+#: Which model made a movement, as its file says it; "samples" were brought along.
 Kind = Literal["lognormal", "uniform", "minimum_jerk", "power_law", "samples"]
 
 _KINDS: Mapping[type, Kind] = MappingProxyType(
     {
         SigmaLognormal: "lognormal",
-        RoboticLaw: "uniform",
+        RoboticTrajectory: "uniform",
         MinimumJerk: "minimum_jerk",
         PowerLaw: "power_law",
     }
@@ -93,7 +93,7 @@ class SampleColumns(NamedTuple):
     z: NDArray[np.float64]
 
 
-class MovementLaw(Protocol):
+class Trajectory(Protocol):
     """What makes a movement: a closed form of position, velocity and acceleration in time."""
 
     @property
@@ -110,11 +110,11 @@ class MovementLaw(Protocol):
         """Position, velocity and acceleration at the times t (n,), s."""
         ...
 
-    def transformed(self, similarity: Similarity) -> MovementLaw:
+    def transformed(self, similarity: Similarity) -> Trajectory:
         """The same movement elsewhere."""
         ...
 
-    def stretched(self, factor: float) -> MovementLaw:
+    def stretched(self, factor: float) -> Trajectory:
         """The same movement, slower."""
         ...
 
@@ -125,15 +125,15 @@ class Movement:
 
     Attributes:
         name: as in tables and file names.
-        law: the closed form behind it.
+        trajectory: the closed form behind it.
         stroke_durations: (n_strokes,), s, one after the other from time 0: the windows of strokes that do not
-            overlap, the times between the least speeds of those that do, or, where a law names them, between
-            its passages at the target points; their sum is the duration.
+            overlap, the times between the speed minima of those that do, or, where a trajectory names them,
+            between its passages at the target points; their sum is the duration.
         provenance: how it was made, as short facts; written into its file.
     """
 
     name: str
-    law: MovementLaw
+    trajectory: Trajectory
     stroke_durations: NDArray[np.float64]
     provenance: Mapping[str, str | int | float] = field(default_factory=lambda: MappingProxyType({}))
 
@@ -155,18 +155,18 @@ class Movement:
 
     @property
     def kind(self) -> Kind:
-        """Which law made it."""
-        return _KINDS.get(type(self.law), "samples")
+        """Which model made it."""
+        return _KINDS.get(type(self.trajectory), "samples")
 
     @property
     def duration(self) -> float:
         """Total time, s; the movement begins at 0."""
-        return self.law.duration
+        return self.trajectory.duration
 
     @property
     def target_points(self) -> NDArray[np.float64]:
         """Target points, (n, 3), m. Inner ones of a human-like movement are aimed at, not reached."""
-        return self.law.target_points
+        return self.trajectory.target_points
 
     def motion(self, t: ArrayLike) -> Motion:
         """Position, velocity and acceleration at the times t, s; each (n, 3).
@@ -176,7 +176,7 @@ class Movement:
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         if not np.all(np.isfinite(times)):
             raise MovementError(f"movement {self.name} sampled at a time that is not finite")
-        motion = self.law.evaluate(np.clip(times, 0.0, self.duration))
+        motion = self.trajectory.evaluate(np.clip(times, 0.0, self.duration))
         moving = ((times >= 0.0) & (times <= self.duration))[:, None]
         return Motion(motion.p, np.where(moving, motion.v, 0.0), np.where(moving, motion.a, 0.0))
 
@@ -190,9 +190,9 @@ class Movement:
 
     def rotations(self, t: ArrayLike) -> NDArray[np.float64] | None:
         """R_base_tcp at the times t, s, (n, 3, 3); None: the TCP keeps the one that planning fixes."""
-        if not isinstance(self.law, SampledLaw):
+        if not isinstance(self.trajectory, SampledTrajectory):
             return None
-        return self.law.rotations(np.clip(t, 0.0, self.duration))
+        return self.trajectory.rotations(np.clip(t, 0.0, self.duration))
 
     def speed(self, t: ArrayLike) -> NDArray[np.float64]:
         """Speed of the TCP at the times t, m/s, (n,)."""
@@ -202,13 +202,17 @@ class Movement:
 
     def transformed(self, similarity: Similarity) -> Self:
         """Moved, scaled and rotated; the time is untouched, so the shape of the speed is too."""
-        return replace(self, law=self.law.transformed(similarity))
+        return replace(self, trajectory=self.trajectory.transformed(similarity))
 
     def stretched(self, factor: float) -> Self:
         """`factor` times as slow on the same path (the theory's own scaling of time): speeds / factor."""
         if not (math.isfinite(factor) and factor > 0.0):
             raise MovementError(f"time stretch of {factor}: give a number greater than 0")
-        return replace(self, law=self.law.stretched(factor), stroke_durations=self.stroke_durations * factor)
+        return replace(
+            self,
+            trajectory=self.trajectory.stretched(factor),
+            stroke_durations=self.stroke_durations * factor,
+        )
 
     def renamed(self, name: str) -> Self:
         """The same movement under another name."""

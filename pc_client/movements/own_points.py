@@ -19,7 +19,7 @@ from pc_client.movements.movement import Movement
 from pc_client.movements.recipe import HAND, LEAD, TOP_SPEED, literal_strokes
 from pc_client.movements.robotic import Corners
 from pc_client.movements.timing import LiteralTiming
-from pc_client.movements.twins import SETBACK, robotic_law
+from pc_client.movements.twins import SETBACK, robotic_trajectory
 
 __all__ = ["Style", "TargetTable", "default_durations", "load_targets", "through"]
 
@@ -81,8 +81,10 @@ def through(
     if not np.all((times > 0.0) & (times <= _LONGEST)):
         raise MovementError(f"durations {times.tolist()} s: give times above 0, at most {_LONGEST:g} s")
     human = style == "human"
-    law = literal_strokes(targets, times) if human else robotic_law(targets, times, corners, setback)
-    return Movement(name, law, times, {"generator": "pc_client.movements.own_points"})
+    trajectory = (
+        literal_strokes(targets, times) if human else robotic_trajectory(targets, times, corners, setback)
+    )
+    return Movement(name, trajectory, times, {"generator": "pc_client.movements.own_points"})
 
 
 def default_durations(points: ArrayLike) -> NDArray[np.float64]:
@@ -100,7 +102,7 @@ def default_durations(points: ArrayLike) -> NDArray[np.float64]:
 
 
 def load_targets(path: str | Path) -> TargetTable:
-    """Target points from a text file: columns x, y, z in m, base frame; and, if one wishes, t in s.
+    """Target points from a text file: columns x, y, z in m, base frame; and optionally t in s.
 
     t is when a point is reached; the times between are the durations of the strokes. The form is that of
     `columns`.
@@ -112,7 +114,7 @@ def load_targets(path: str | Path) -> TargetTable:
         read_text(Path(path), "movement"),
         str(path),
         [("x", "y", "z"), ("x", "y", "z", "t")],
-        "x, y, z in m, and, if you wish, t in s",
+        "x, y, z in m, and optionally t in s",
     )
     if len(rows.values) < 2:
         raise MovementError(f"{path}: {len(rows.values)} target points; a movement needs at least 2")

@@ -102,12 +102,12 @@ class PowerLaw:
 
     def evaluate(self, t: ArrayLike) -> Motion:
         """Position, velocity and acceleration at the times t (n,), s; each (n, 3)."""
-        way = self._wave.evaluate(t)
-        w = np.clip(way.s, 0.0, self._targets_at[-1])
+        along = self._wave.evaluate(t)
+        w = np.clip(along.s, 0.0, self._targets_at[-1])
         u, rate, change = (self._parameter(w, order) for order in range(3))
         first, second = self.path.derivative(u, 1), self.path.derivative(u, 2)
-        u_dot = rate * way.v
-        u_dot_dot = change * way.v**2 + rate * way.a
+        u_dot = rate * along.v
+        u_dot_dot = change * along.v**2 + rate * along.a
         return Motion(
             self.path.derivative(u, 0),
             u_dot[:, None] * first,

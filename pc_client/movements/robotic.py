@@ -21,7 +21,7 @@ from pc_client.movements.geometry import Similarity, read_only
 from pc_client.movements.path import CornerPath
 from pc_client.movements.stroke import Motion
 
-__all__ = ["Corners", "RoboticLaw", "SmoothedSquareWave", "WayValues"]
+__all__ = ["Corners", "PathMotion", "RoboticTrajectory", "SmoothedSquareWave"]
 
 #: What happens at the inner target points: come to rest there, or pass a blended corner with the speed
 #: between two levels.
@@ -30,7 +30,7 @@ Corners = Literal["stop", "blend"]
 SHORTEST_RAMP = 1e-6
 
 
-class WayValues(NamedTuple):
+class PathMotion(NamedTuple):
     """Way along the path (m), speed (m/s) and acceleration along the path (m/s^2), each (n,)."""
 
     s: NDArray[np.float64]
@@ -58,16 +58,16 @@ class SmoothedSquareWave:
         object.__setattr__(self, "windows", read_only(self.windows, (-1, 2)))
         object.__setattr__(self, "levels", read_only(self.levels, (-1,)))
 
-    def evaluate(self, t: ArrayLike) -> WayValues:
+    def evaluate(self, t: ArrayLike) -> PathMotion:
         """Way, speed and acceleration at the times t (n,), s."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))[:, None]
         up = _smoothed_step(times - self.windows[:, 0], self.ramps)
         down = _smoothed_step(times - self.windows[:, 1], self.ramps)
-        return WayValues(*((rise - fall) @ self.levels for rise, fall in zip(up, down, strict=True)))
+        return PathMotion(*((rise - fall) @ self.levels for rise, fall in zip(up, down, strict=True)))
 
 
 @dataclass(frozen=True, slots=True)
-class RoboticLaw:
+class RoboticTrajectory:
     """The robot-like movement along target points with given stroke durations.
 
     Attributes:
@@ -121,15 +121,15 @@ class RoboticLaw:
 
     def evaluate(self, t: ArrayLike) -> Motion:
         """Position, velocity and acceleration at the times t (n,), s; each (n, 3)."""
-        way = self.wave.evaluate(t)
-        at = self.path.at(way.s)
-        velocity = way.v[:, None] * at.tangent
-        acceleration = way.a[:, None] * at.tangent + (way.v**2)[:, None] * at.curvature
+        along = self.wave.evaluate(t)
+        at = self.path.at(along.s)
+        velocity = along.v[:, None] * at.tangent
+        acceleration = along.a[:, None] * at.tangent + (along.v**2)[:, None] * at.curvature
         return Motion(at.p, velocity, acceleration)
 
-    def transformed(self, similarity: Similarity) -> RoboticLaw:
+    def transformed(self, similarity: Similarity) -> RoboticTrajectory:
         """The movement moved, scaled and rotated; its timing is untouched."""
-        return RoboticLaw(
+        return RoboticTrajectory(
             similarity.points(self.target_points),
             self.stroke_durations,
             self.ramps,
@@ -137,10 +137,12 @@ class RoboticLaw:
             self.blend * similarity.scale,
         )
 
-    def stretched(self, factor: float) -> RoboticLaw:
+    def stretched(self, factor: float) -> RoboticTrajectory:
         """The movement `factor` times as slow, ramps included."""
         ramps = tuple(ramp * factor for ramp in self.ramps)
-        return RoboticLaw(self.target_points, self.stroke_durations * factor, ramps, self.corners, self.blend)
+        return RoboticTrajectory(
+            self.target_points, self.stroke_durations * factor, ramps, self.corners, self.blend
+        )
 
 
 def check_ramps(ramps: tuple[float, ...]) -> None:
@@ -172,7 +174,7 @@ def _square_wave(
     )
 
 
-def _smoothed_step(t: NDArray[np.float64], ramps: tuple[float, ...]) -> WayValues:
+def _smoothed_step(t: NDArray[np.float64], ramps: tuple[float, ...]) -> PathMotion:
     """A unit step at 0 convolved with the boxcars, its integral and its derivative.
 
     Outside the ramp the values are exact (0, or t, 1, 0), so that no rounding gathers with time.
@@ -192,4 +194,4 @@ def _smoothed_step(t: NDArray[np.float64], ramps: tuple[float, ...]) -> WayValue
         a = sum((sign * x for sign, x in parts), np.zeros_like(inside)) / area
     over = t >= half
     ramping = np.abs(t) < half
-    return WayValues(np.where(over, t, s), np.where(over, 1.0, v), np.where(ramping, a, 0.0))
+    return PathMotion(np.where(over, t, s), np.where(over, 1.0, v), np.where(ramping, a, 0.0))

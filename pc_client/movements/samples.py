@@ -22,7 +22,7 @@ from pc_client.movements.columns import Rows
 from pc_client.movements.geometry import Similarity, read_only
 from pc_client.movements.stroke import Motion
 
-__all__ = ["FORMS", "MIN_SAMPLES", "SampledLaw", "rotations_of", "samples_of", "write_samples"]
+__all__ = ["FORMS", "MIN_SAMPLES", "SampledTrajectory", "rotations_of", "samples_of", "write_samples"]
 
 #: Fewest samples of a movement: a cubic has four coefficients.
 MIN_SAMPLES = 4
@@ -42,7 +42,7 @@ FORMS = (_COLUMNS, ("x", "y", "z", *_VECTOR, "t"), ("x", "y", "z", *_QUATERNION,
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SampledLaw:
+class SampledTrajectory:
     """The natural cubic spline through samples.
 
     Attributes:
@@ -120,15 +120,15 @@ class SampledLaw:
             return None
         return np.asarray(self._rotations(np.atleast_1d(t)).as_matrix(), dtype=np.float64)
 
-    def transformed(self, similarity: Similarity) -> SampledLaw:
+    def transformed(self, similarity: Similarity) -> SampledTrajectory:
         """The samples moved, scaled and rotated."""
         turns = self.orientations
         rotated = None if turns is None else Rotation.from_matrix(similarity.R) * turns
-        return SampledLaw(self.t, similarity.points(self.points), rotated)
+        return SampledTrajectory(self.t, similarity.points(self.points), rotated)
 
-    def stretched(self, factor: float) -> SampledLaw:
+    def stretched(self, factor: float) -> SampledTrajectory:
         """The samples `factor` times as slow."""
-        return SampledLaw(self.t * factor, self.points, self.orientations)
+        return SampledTrajectory(self.t * factor, self.points, self.orientations)
 
 
 def _check_turning(t: NDArray[np.float64], turns: Rotation) -> None:
@@ -165,7 +165,7 @@ def rotations_of(values: ArrayLike) -> Rotation:
     return Rotation.from_quat(array)
 
 
-def samples_of(rows: Rows) -> SampledLaw:
+def samples_of(rows: Rows) -> SampledTrajectory:
     """The movement that a table in one of `FORMS` holds.
 
     Raises:
@@ -174,19 +174,19 @@ def samples_of(rows: Rows) -> SampledLaw:
     columns = rows.columns
     values = {name: rows.values[:, k] for k, name in enumerate(columns)}
     turn = next((names for names in (_VECTOR, _QUATERNION) if names[0] in columns), ())
-    return SampledLaw(
+    return SampledTrajectory(
         values["t"],
         np.column_stack([values[name] for name in ("x", "y", "z")]),
         rotations_of(np.column_stack([values[name] for name in turn])) if turn else None,
     )
 
 
-def write_samples(path: Path, law: SampledLaw) -> None:
+def write_samples(path: Path, trajectory: SampledTrajectory) -> None:
     """Write samples as CSV, to the last digit; orientations as rotation vectors."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    turns = law.orientations
+    turns = trajectory.orientations
     writer.writerow(FORMS[0] if turns is None else FORMS[1])
-    poses = law.points if turns is None else np.hstack((law.points, turns.as_rotvec()))
-    writer.writerows([*pose, time] for pose, time in zip(poses.tolist(), law.t.tolist(), strict=True))
+    poses = trajectory.points if turns is None else np.hstack((trajectory.points, turns.as_rotvec()))
+    writer.writerows([*pose, time] for pose, time in zip(poses.tolist(), trajectory.t.tolist(), strict=True))
     path.write_text(text.getvalue(), encoding="utf-8")

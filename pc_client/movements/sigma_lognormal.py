@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 
 from pc_client.errors import MovementError
 from pc_client.movements.geometry import Similarity, read_only
-from pc_client.movements.lognormal import evaluate_bells
+from pc_client.movements.lognormal import evaluate_lognormals
 from pc_client.movements.stroke import Motion, PlanarStroke, Stroke, arc_frame, sinc, tilt_of_normal
 
 __all__ = ["SigmaLognormal", "planar_sum"]
@@ -62,10 +62,11 @@ class SigmaLognormal:
         frames = [
             arc_frame(a, b, s.tilt) for a, b, s in zip(targets[:-1], targets[1:], self.strokes, strict=True)
         ]
-        bells = [stroke.timing.lognormal for stroke in self.strokes]
+        lognormals = [stroke.timing.lognormal for stroke in self.strokes]
         lengths = [s.length(a, b) for a, b, s in zip(targets[:-1], targets[1:], self.strokes, strict=True)]
         columns = [
-            [b.t0, b.mu, b.sigma, d, s.turn] for b, d, s in zip(bells, lengths, self.strokes, strict=True)
+            [b.t0, b.mu, b.sigma, d, s.arc_angle]
+            for b, d, s in zip(lognormals, lengths, self.strokes, strict=True)
         ]
         object.__setattr__(self, "target_points", targets)
         object.__setattr__(self, "strokes", tuple(self.strokes))
@@ -82,14 +83,14 @@ class SigmaLognormal:
     def evaluate(self, t: ArrayLike) -> Motion:
         """Position, velocity and acceleration at the times t (n,), s; each (n, 3)."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))[:, None]
-        t0, mu, sigma, length, turn = self._columns
-        bell = evaluate_bells(times, t0, mu, sigma)
-        chord = length * bell.done * sinc(0.5 * turn * bell.done)
-        half_angle = 0.5 * turn * (bell.done - 1.0)
-        angle = turn * (bell.done - 0.5)
+        t0, mu, sigma, length, arc_angle = self._columns
+        lognormal = evaluate_lognormals(times, t0, mu, sigma)
+        chord = length * lognormal.done * sinc(0.5 * arc_angle * lognormal.done)
+        half_angle = 0.5 * arc_angle * (lognormal.done - 1.0)
+        angle = arc_angle * (lognormal.done - 0.5)
         cos, sin = np.cos(angle), np.sin(angle)
-        speed = length * bell.rate
-        along, across = length * bell.rate_change, length * turn * bell.rate**2
+        speed = length * lognormal.rate
+        along, across = length * lognormal.rate_change, length * arc_angle * lognormal.rate**2
         c, m = self._chords, self._normals
         return Motion(
             self.target_points[0] + (chord * np.cos(half_angle)) @ c + (chord * np.sin(half_angle)) @ m,
@@ -101,34 +102,34 @@ class SigmaLognormal:
         """Speed of every stroke alone, D_j Lambda_j, (n, n_strokes), m/s."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))[:, None]
         t0, mu, sigma, length, _ = self._columns
-        speeds: NDArray[np.float64] = length * evaluate_bells(times, t0, mu, sigma).rate
+        speeds: NDArray[np.float64] = length * evaluate_lognormals(times, t0, mu, sigma).rate
         return speeds
 
     def speed_minima(self) -> NDArray[np.float64]:
-        """Times (s) of the least speed between the peaks of consecutive strokes, (n_strokes - 1,).
+        """Times (s) of the speed minimum between the peaks of consecutive strokes, (n_strokes - 1,).
 
         Where strokes overlap so much that there is no minimum between the two peaks, the end of that interval
         with the lower speed.
         """
         modes = [stroke.timing.lognormal.mode for stroke in self.strokes]
-        return np.array([self._least_speed(min(a, b), max(a, b)) for a, b in pairwise(modes)])
+        return np.array([self._speed_minimum(min(a, b), max(a, b)) for a, b in pairwise(modes)])
 
     def transformed(self, similarity: Similarity) -> SigmaLognormal:
         """The movement moved, scaled and rotated; its timing, so the shape of its speed, is untouched."""
         normals = self._normals @ similarity.R.T
         chords = self._chords @ similarity.R.T
         strokes = tuple(
-            Stroke(stroke.timing, stroke.turn, tilt_of_normal(chord, normal))
+            Stroke(stroke.timing, stroke.arc_angle, tilt_of_normal(chord, normal))
             for stroke, chord, normal in zip(self.strokes, chords, normals, strict=True)
         )
         return SigmaLognormal(similarity.points(self.target_points), strokes, self.duration)
 
     def stretched(self, factor: float) -> SigmaLognormal:
         """`factor` times as slow: t0 -> factor t0, mu -> mu + ln factor, sigma and angles kept."""
-        strokes = tuple(Stroke(s.timing.stretched(factor), s.turn, s.tilt) for s in self.strokes)
+        strokes = tuple(Stroke(s.timing.stretched(factor), s.arc_angle, s.tilt) for s in self.strokes)
         return SigmaLognormal(self.target_points, strokes, self.duration * factor)
 
-    def _least_speed(self, begin: float, end: float) -> float:
+    def _speed_minimum(self, begin: float, end: float) -> float:
         grid = np.linspace(begin, end, 401)
         motion = self.evaluate(grid)
         least = int(np.argmin(np.einsum("ij,ij->i", motion.v, motion.v)))

@@ -53,28 +53,29 @@ class PlanarStroke:
 
     @classmethod
     def between(
-        cls, a: Sequence[float], b: Sequence[float], timing: Timing, turn: float = 0.0
+        cls, a: Sequence[float], b: Sequence[float], timing: Timing, arc_angle: float = 0.0
     ) -> PlanarStroke:
-        """The stroke from a to b, each (2,), m, that turns by `turn` rad on its way (positive: left)."""
+        """The stroke from a to b, each (2,), m, that turns by `arc_angle` rad on its way (positive: left)."""
         dx, dy = float(b[0]) - float(a[0]), float(b[1]) - float(a[1])
         chord_direction = math.atan2(dy, dx)
-        length = math.hypot(dx, dy) / _chord_ratio(turn)
-        return cls(timing, length, chord_direction - 0.5 * turn, chord_direction + 0.5 * turn)
+        length = math.hypot(dx, dy) / _chord_ratio(arc_angle)
+        return cls(timing, length, chord_direction - 0.5 * arc_angle, chord_direction + 0.5 * arc_angle)
 
     def evaluate(self, t: ArrayLike) -> Motion:
         """Displacement from the begin, velocity and acceleration at the times t (n,), s; each (n, 2)."""
-        bell = self.timing.lognormal.evaluate(np.atleast_1d(np.asarray(t, dtype=np.float64)))
+        lognormal = self.timing.lognormal.evaluate(np.atleast_1d(np.asarray(t, dtype=np.float64)))
         d = self.theta_end - self.theta_start
-        half = 0.5 * d * bell.done
+        half = 0.5 * d * lognormal.done
         along = self.theta_start + half
-        phi = self.theta_start + d * bell.done
-        chord = self.length * bell.done * sinc(half)
+        phi = self.theta_start + d * lognormal.done
+        chord = self.length * lognormal.done * sinc(half)
         tangent = np.column_stack((np.cos(phi), np.sin(phi)))
         normal = np.column_stack((-np.sin(phi), np.cos(phi)))
         return Motion(
             chord[:, None] * np.column_stack((np.cos(along), np.sin(along))),
-            self.length * bell.rate[:, None] * tangent,
-            self.length * (bell.rate_change[:, None] * tangent + d * (bell.rate**2)[:, None] * normal),
+            self.length * lognormal.rate[:, None] * tangent,
+            self.length
+            * (lognormal.rate_change[:, None] * tangent + d * (lognormal.rate**2)[:, None] * normal),
         )
 
 
@@ -84,23 +85,24 @@ class Stroke:
 
     Attributes:
         timing: when.
-        turn: how much the direction turns over the whole stroke, rad, in (-2 pi, 2 pi); 0 is a straight line.
+        arc_angle: how much the direction turns over the whole stroke, rad, in (-2 pi, 2 pi); 0 is a straight
+            line.
         tilt: which plane the arc lies in: angle about the chord, rad, from the upright reference plane of
             `arc_frame`.
     """
 
     timing: Timing
-    turn: float = 0.0
+    arc_angle: float = 0.0
     tilt: float = 0.0
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.tilt):
             raise MovementError(f"stroke with tilt {self.tilt} rad: give a finite angle")
-        _chord_ratio(self.turn)
+        _chord_ratio(self.arc_angle)
 
     def length(self, a: ArrayLike, b: ArrayLike) -> float:
         """Arc length D (m) of the stroke when it runs from a to b, each (3,), m."""
-        return float(np.linalg.norm(np.subtract(b, a))) / _chord_ratio(self.turn)
+        return float(np.linalg.norm(np.subtract(b, a))) / _chord_ratio(self.arc_angle)
 
 
 def arc_frame(a: ArrayLike, b: ArrayLike, tilt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -135,7 +137,7 @@ def tilt_of_normal(chord: NDArray[np.float64], normal: NDArray[np.float64]) -> f
 
 
 def lift_strokes(planar: Sequence[PlanarStroke]) -> tuple[Stroke, ...]:
-    """The paper's 2.5-D scheme: the speed law of strokes designed in a plane, on straight lines in space.
+    """The paper's 2.5-D scheme: the speed profile of strokes designed in a plane, on straight lines in space.
 
     Each stroke keeps its timing; its length becomes the distance of the two 3-D target points it is given,
     its bending is lost, as in the paper. Where strokes overlap their velocities are added as vectors, so
@@ -152,8 +154,10 @@ def _reference_normal(chord: NDArray[np.float64]) -> NDArray[np.float64]:
     return normal / float(np.linalg.norm(normal))
 
 
-def _chord_ratio(turn: float) -> float:
-    """Chord over arc length of an arc that turns by `turn` rad."""
-    if not (math.isfinite(turn) and abs(turn) < 2.0 * math.pi):
-        raise MovementError(f"stroke with turn {turn} rad: an arc between two points turns by less than 2 pi")
-    return float(sinc(0.5 * turn))
+def _chord_ratio(arc_angle: float) -> float:
+    """Chord over arc length of an arc that turns by `arc_angle` rad."""
+    if not (math.isfinite(arc_angle) and abs(arc_angle) < 2.0 * math.pi):
+        raise MovementError(
+            f"stroke with arc_angle {arc_angle} rad: an arc between two points turns by less than 2 pi"
+        )
+    return float(sinc(0.5 * arc_angle))

@@ -1,8 +1,8 @@
 """When a stroke happens: from a window in time to the lognormal that fills it.
 
 Two constructions, both exact. `LiteralTiming` is the paper's (Eq. 7-9) and what its recipe uses;
-`TwoSidedTiming` asks both tails of the bell to lie inside the window and is what strokes that overlap use.
-Each knows its lognormal and how to slow itself down. This module knows no space.
+`TwoSidedTiming` asks both tails of the lognormal to lie inside the window and is what strokes that overlap
+use. Each knows its lognormal and how to slow itself down. This module knows no space.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Timing(Protocol):
 
     @property
     def lognormal(self) -> Lognormal:
-        """The bell itself."""
+        """The lognormal itself."""
         ...
 
     def stretched(self, factor: float) -> Timing:
@@ -81,7 +81,7 @@ class LiteralTiming:
         duration: length of the window, s, > 0.
         lead: how long before the window the command is given, s, >= 0. The paper leaves it open. 0 is the
             literal reading (k = 2: the first quarter of the window is dead, kurtosis 3.4); a lead of one to
-            five durations gives the centred bells with kurtosis about 3 that its text asks for.
+            five durations gives the centred lognormals with kurtosis about 3 that its text asks for.
 
     Source: Eq. 7-9 with k = (lead + duration) / (lead + duration / 2).
     """
@@ -102,7 +102,7 @@ class LiteralTiming:
 
     @property
     def lognormal(self) -> Lognormal:
-        """The bell that fulfils Eq. 7 and 8."""
+        """The lognormal that fulfils Eq. 7 and 8."""
         sigma = sigma_for_k(self.k)
         return Lognormal(
             self.start - self.lead, math.log(self.lead + self.duration) - FULL_COVERAGE * sigma, sigma
@@ -120,7 +120,7 @@ class TwoSidedTiming:
     Attributes:
         start: begin of the window, s.
         duration: length of the window, s, > 0.
-        sigma: width and, with it, asymmetry of the bell, > 0: people show .1 to .35 in reaches.
+        sigma: width and, with it, asymmetry of the lognormal, > 0: people show .1 to .35 in reaches.
         coverage: c; 3 sqrt 2 leaves 2.2e-5 of the way outside the window, 3 leaves .27 %.
 
     Source: mu = ln(T / (2 sinh(c sigma))), t0 = start - exp(mu - c sigma), from the two conditions; the same
@@ -142,7 +142,7 @@ class TwoSidedTiming:
 
     @property
     def lognormal(self) -> Lognormal:
-        """The bell that has both tails in the window."""
+        """The lognormal that has both tails in the window."""
         mu = math.log(self.duration / (2.0 * math.sinh(self.coverage * self.sigma)))
         return Lognormal(self.start - math.exp(mu - self.coverage * self.sigma), mu, self.sigma)
 
@@ -157,7 +157,7 @@ class TwoSidedTiming:
 
 
 def sigma_for_mode_fraction(fraction: float, coverage: float = FULL_COVERAGE) -> float:
-    """The sigma whose two-sided bell has its peak at this fraction of the window (below 1/2, above .05)."""
+    """The sigma whose two-sided lognormal has its peak at this fraction of the window, in [.05, .5)."""
     if not (0.05 <= fraction < 0.5):
         raise MovementError(
             f"mode fraction {fraction}: the peak of a lognormal lies in [0.05, 0.5) of its window"

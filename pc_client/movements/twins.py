@@ -1,8 +1,8 @@
 """Twins: the same target points in the same time, by every other generator.
 
 A twin is made from the movement of the paper's recipe and keeps its duration and, but for the duplicate, its
-target points; whether it keeps the durations of its strokes, too, is up to the law. `GENERATORS` says both
-for each. So what is compared are the laws, not sizes or speeds.
+target points; whether it keeps the durations of its strokes, too, depends on the model. `GENERATORS` says
+both for each. So what is compared are the models, not sizes or speeds.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pc_client.movements.durations import DurationRule, Fitts, Isochrony, retime
 from pc_client.movements.minimum_jerk import MinimumJerk, Passing
 from pc_client.movements.movement import Movement
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS, PowerLaw
-from pc_client.movements.robotic import Corners, RoboticLaw
+from pc_client.movements.robotic import Corners, RoboticTrajectory
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.variability import duplicate
 
@@ -32,7 +32,7 @@ __all__ = [
     "minimum_jerk_twin",
     "power_law_twin",
     "retimed_twin",
-    "robotic_law",
+    "robotic_trajectory",
     "robotic_twin",
 ]
 
@@ -51,9 +51,9 @@ _RAMP_SHARE = 0.2
 _LARGEST_RADIUS = 1.0
 
 
-def robotic_law(
+def robotic_trajectory(
     target_points: ArrayLike, stroke_durations: ArrayLike, corners: Corners = "stop", setback: float = SETBACK
-) -> RoboticLaw:
+) -> RoboticTrajectory:
     """A constant speed a stroke, smoothed to ramps, on the straight lines between target points.
 
     Args:
@@ -65,7 +65,7 @@ def robotic_law(
     Source: section II.C.
     """
     points, durations = (np.asarray(values, dtype=np.float64) for values in (target_points, stroke_durations))
-    return RoboticLaw(points, durations, RAMPS, corners, setback if corners == "blend" else 0.0)
+    return RoboticTrajectory(points, durations, RAMPS, corners, setback if corners == "blend" else 0.0)
 
 
 def robotic_twin(
@@ -76,11 +76,11 @@ def robotic_twin(
     Args:
         movement: any movement with a stroke between each two target points.
         name: the twin's.
-        corners: as of `robotic_law`.
-        setback: as of `robotic_law`.
+        corners: as of `robotic_trajectory`.
+        setback: as of `robotic_trajectory`.
     """
-    law = robotic_law(movement.target_points, movement.stroke_durations, corners, setback)
-    return Movement(name, law, movement.stroke_durations, _facts(movement))
+    trajectory = robotic_trajectory(movement.target_points, movement.stroke_durations, corners, setback)
+    return Movement(name, trajectory, movement.stroke_durations, _facts(movement))
 
 
 def minimum_jerk_twin(movement: Movement, name: str, passing: Passing = "stop") -> Movement:
@@ -91,8 +91,8 @@ def minimum_jerk_twin(movement: Movement, name: str, passing: Passing = "stop") 
         name: the twin's.
         passing: whether it stops at the inner target points or passes through them at their times.
     """
-    law = MinimumJerk(movement.target_points, movement.stroke_durations, passing)
-    return Movement(name, law, movement.stroke_durations, _facts(movement))
+    trajectory = MinimumJerk(movement.target_points, movement.stroke_durations, passing)
+    return Movement(name, trajectory, movement.stroke_durations, _facts(movement))
 
 
 def power_law_twin(movement: Movement, name: str, *, torsion: bool = False) -> Movement:
@@ -104,7 +104,7 @@ def power_law_twin(movement: Movement, name: str, *, torsion: bool = False) -> M
         torsion: whether the torsion of the path counts, too.
     """
     ramp = _RAMP_SHARE * float(np.mean(movement.stroke_durations))
-    law = PowerLaw(
+    trajectory = PowerLaw(
         movement.target_points,
         movement.duration,
         (ramp, ramp),
@@ -112,7 +112,7 @@ def power_law_twin(movement: Movement, name: str, *, torsion: bool = False) -> M
         TWO_THIRDS,
         TORSION_EXPONENT if torsion else 0.0,
     )
-    return Movement(name, law, np.diff(law.passages), _facts(movement))
+    return Movement(name, trajectory, np.diff(trajectory.passages), _facts(movement))
 
 
 def retimed_twin(movement: Movement, name: str, rule: DurationRule) -> Movement:
@@ -123,13 +123,13 @@ def retimed_twin(movement: Movement, name: str, rule: DurationRule) -> Movement:
         name: the twin's.
         rule: how long a stroke lasts for its length.
     """
-    if not isinstance(movement.law, SigmaLognormal):
+    if not isinstance(movement.trajectory, SigmaLognormal):
         raise MovementError(
             f"movement {movement.name} is of kind {movement.kind}: give a lognormal one to re-time"
         )
-    law = retimed(movement.law, rule, overlap=_OVERLAP, rest=_REST)
-    boundaries = np.concatenate(([0.0], law.speed_minima(), [law.duration]))
-    return Movement(name, law, np.diff(boundaries), _facts(movement))
+    trajectory = retimed(movement.trajectory, rule, overlap=_OVERLAP, rest=_REST)
+    boundaries = np.concatenate(([0.0], trajectory.speed_minima(), [trajectory.duration]))
+    return Movement(name, trajectory, np.diff(boundaries), _facts(movement))
 
 
 @dataclass(frozen=True, slots=True)

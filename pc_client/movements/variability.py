@@ -43,10 +43,10 @@ from pc_client.movements.timing import FULL_COVERAGE
 
 __all__ = ["HUMAN_STROKE", "PUBLISHED", "VariabilityRanges", "duplicate"]
 
-#: Time (s) between least speeds that a hand takes for a stroke. Source: the median of five public signatures.
+#: Time (s) between speed minima that a hand takes for a stroke. Source: the median of five public signatures.
 HUMAN_STROKE = 0.15
-#: An arc cannot turn by a whole turn; changed turns are held below this, rad.
-_MAX_TURN = 6.2
+#: An arc angle is less than a whole turn; varied arc angles are held below this, rad.
+_MAX_ARC_ANGLE = 6.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +96,8 @@ def duplicate(
     Raises:
         MovementError: another kind of movement, or a share outside of 0 to 1.
     """
-    law = movement.law
-    if not isinstance(law, SigmaLognormal):
+    trajectory = movement.trajectory
+    if not isinstance(trajectory, SigmaLognormal):
         raise MovementError(
             f"movement {movement.name} is of kind {movement.kind}: only lognormal strokes have the "
             "parameters that people vary; give a lognormal movement"
@@ -112,9 +112,9 @@ def duplicate(
         low, high = limits
         return share * (low + (high - low) * source.random())
 
-    bells = _vary_timing(law, float(np.median(movement.stroke_durations)), draw, ranges)
-    targets, strokes = _vary_arcs(law, bells, draw, ranges)
-    varied = _framed(targets, strokes, law)
+    lognormals = _vary_timing(trajectory, float(np.median(movement.stroke_durations)), draw, ranges)
+    targets, strokes = _vary_arcs(trajectory, lognormals, draw, ranges)
+    varied = _framed(targets, strokes, trajectory)
     provenance = {**movement.provenance, "duplicate_of": movement.name, "variation_seed": seed}
     return Movement(
         name or f"{movement.name}_v{seed}",
@@ -125,73 +125,79 @@ def duplicate(
 
 
 def _vary_timing(
-    law: SigmaLognormal,
+    trajectory: SigmaLognormal,
     stroke_time: float,
     draw: Callable[[tuple[float, float]], float],
     ranges: VariabilityRanges,
 ) -> list[Lognormal]:
-    bells = [stroke.timing.lognormal for stroke in law.strokes]
+    lognormals = [stroke.timing.lognormal for stroke in trajectory.strokes]
     to_human = math.log(stroke_time / HUMAN_STROKE)
     rhythm, pace = 1.0 + draw(ranges.rhythm), draw(ranges.pace)
-    first = bells[0].t0
+    first = lognormals[0].t0
     return [
         Lognormal(
-            first + rhythm * (bell.t0 - first),
-            bell.mu + pace * (bell.mu - to_human),
-            bell.sigma * (1.0 + draw(ranges.sigma)),
+            first + rhythm * (lognormal.t0 - first),
+            lognormal.mu + pace * (lognormal.mu - to_human),
+            lognormal.sigma * (1.0 + draw(ranges.sigma)),
         )
-        for bell in bells
+        for lognormal in lognormals
     ]
 
 
 def _vary_arcs(
-    law: SigmaLognormal,
-    bells: list[Lognormal],
+    trajectory: SigmaLognormal,
+    lognormals: list[Lognormal],
     draw: Callable[[tuple[float, float]], float],
     ranges: VariabilityRanges,
 ) -> tuple[NDArray[np.float64], tuple[Stroke, ...]]:
     """New arcs, each in the plane of the old one, end to end from the same first point."""
-    points = law.target_points
+    points = trajectory.target_points
     targets, strokes = [points[0]], []
-    for a, b, stroke, length, bell in zip(
-        points[:-1], points[1:], law.strokes, law.lengths.tolist(), bells, strict=True
+    for a, b, stroke, length, lognormal in zip(
+        points[:-1], points[1:], trajectory.strokes, trajectory.lengths.tolist(), lognormals, strict=True
     ):
         chord, normal = arc_frame(a, b, stroke.tilt)
         length = length * (1.0 + draw(ranges.length))
         begins, ends = (0.5 * math.pi * draw(limits) for limits in (ranges.theta_start, ranges.theta_end))
-        turn = min(max(stroke.turn + ends - begins, -_MAX_TURN), _MAX_TURN)
+        arc_angle = min(max(stroke.arc_angle + ends - begins, -_MAX_ARC_ANGLE), _MAX_ARC_ANGLE)
         swing = 0.5 * (begins + ends)
         new_chord = math.cos(swing) * chord + math.sin(swing) * normal
         new_normal = math.cos(swing) * normal - math.sin(swing) * chord
-        targets.append(targets[-1] + length * float(sinc(0.5 * turn)) * new_chord)
-        strokes.append(Stroke(bell, turn, tilt_of_normal(new_chord, new_normal)))
+        targets.append(targets[-1] + length * float(sinc(0.5 * arc_angle)) * new_chord)
+        strokes.append(Stroke(lognormal, arc_angle, tilt_of_normal(new_chord, new_normal)))
     return np.array(targets), tuple(strokes)
 
 
-def _framed(targets: NDArray[np.float64], strokes: tuple[Stroke, ...], law: SigmaLognormal) -> SigmaLognormal:
-    """The strokes shifted and the end set so that the rests before and after are those of the law."""
-    old_begin, old_end = _extent(law.strokes)
+def _framed(
+    targets: NDArray[np.float64], strokes: tuple[Stroke, ...], trajectory: SigmaLognormal
+) -> SigmaLognormal:
+    """The strokes shifted and the end set so that the rests before and after are those of the trajectory."""
+    old_begin, old_end = _extent(trajectory.strokes)
     begin, end = _extent(strokes)
-    rest_before, rest_after = max(old_begin, 0.0), max(law.duration - old_end, 0.0)
+    rest_before, rest_after = max(old_begin, 0.0), max(trajectory.duration - old_end, 0.0)
     shift = rest_before - begin
     moved = []
     for stroke in strokes:
-        bell = stroke.timing.lognormal
-        moved.append(Stroke(Lognormal(bell.t0 + shift, bell.mu, bell.sigma), stroke.turn, stroke.tilt))
+        lognormal = stroke.timing.lognormal
+        moved.append(
+            Stroke(
+                Lognormal(lognormal.t0 + shift, lognormal.mu, lognormal.sigma), stroke.arc_angle, stroke.tilt
+            )
+        )
     return SigmaLognormal(targets, tuple(moved), end + shift + rest_after)
 
 
 def _extent(strokes: tuple[Stroke, ...]) -> tuple[float, float]:
     """When the first tail begins and the last one ends, s."""
-    bells = [stroke.timing.lognormal for stroke in strokes]
+    lognormals = [stroke.timing.lognormal for stroke in strokes]
     return (
-        min(bell.time_at_deviation(-FULL_COVERAGE) for bell in bells),
-        max(bell.time_at_deviation(FULL_COVERAGE) for bell in bells),
+        min(lognormal.time_at_deviation(-FULL_COVERAGE) for lognormal in lognormals),
+        max(lognormal.time_at_deviation(FULL_COVERAGE) for lognormal in lognormals),
     )
 
 
-def _durations(law: SigmaLognormal) -> NDArray[np.float64]:
-    """Times between least speeds; strokes that merged into one count as one."""
-    inner = np.unique(law.speed_minima())
-    inner = inner[(inner > 1e-3) & (inner < law.duration - 1e-3)]
-    return np.diff(np.concatenate(([0.0], inner, [law.duration])))
+def _durations(trajectory: SigmaLognormal) -> NDArray[np.float64]:
+    """Times between speed minima; strokes that merged into one count as one."""
+    inner = np.unique(trajectory.speed_minima())
+    inner = inner[(inner > 1e-3) & (inner < trajectory.duration - 1e-3)]
+    return np.diff(np.concatenate(([0.0], inner, [trajectory.duration])))

@@ -92,10 +92,10 @@ def plan_approach(plan: JointPlan, q_now: ArrayLike, *, model: RobotModel) -> Ap
     hulls = clearance_model(model)
     starts = _starts(plan, q_from)
     refusals = []
-    for way in _WAYS:
+    for route in _ROUTES:
         for start in starts:
-            waypoints = (*way(q_from, start.start_q), start.start_q)
-            clearance = _check_way(plan.name, hulls, limits, (q_from, *waypoints))
+            waypoints = (*route(q_from, start.start_q), start.start_q)
+            clearance = _check_route(plan.name, hulls, limits, (q_from, *waypoints))
             if isinstance(clearance, PlanningError):
                 refusals.append(clearance)
                 continue
@@ -157,7 +157,7 @@ def _raised(q: Array) -> Array:
     return posture
 
 
-def _check_way(
+def _check_route(
     name: str, hulls: ClearanceModel, limits: PlanLimits, postures: tuple[Array, ...]
 ) -> tuple[float, float, float] | PlanningError:
     """Return the least clearances on straight joint lines, or the first bad posture's error."""
@@ -191,7 +191,7 @@ def _check_way(
     return floor, own, cell
 
 
-_WAYS: tuple[Callable[[Array, Array], tuple[Array, ...]], ...] = (
+_ROUTES: tuple[Callable[[Array, Array], tuple[Array, ...]], ...] = (
     lambda q_from, q_to: (),
     lambda q_from, q_to: (_raised(q_from),),
     lambda q_from, q_to: (_raised(q_to),),

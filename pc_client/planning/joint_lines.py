@@ -29,7 +29,10 @@ class JointLines:
         self._postures = tuple(postures)
         self._v = v
         self._a = a
-        durations = [self._line_duration(_longest_way(begin, end)) for begin, end in pairwise(self._postures)]
+        durations = [
+            self._line_duration(_largest_joint_distance(begin, end))
+            for begin, end in pairwise(self._postures)
+        ]
         self._ends = tuple(accumulate(durations, initial=0.0))
 
     @property
@@ -46,26 +49,26 @@ class JointLines:
             return self._postures[-1], still
         line = next(k for k in range(1, len(self._ends)) if t < self._ends[k])
         begin, end = self._postures[line - 1], self._postures[line]
-        way = _longest_way(begin, end)
-        s, speed = self._on_line(t - self._ends[line - 1], way)
-        return begin + (s / way) * (end - begin), (speed / way) * (end - begin)
+        distance = _largest_joint_distance(begin, end)
+        s, speed = self._on_line(t - self._ends[line - 1], distance)
+        return begin + (s / distance) * (end - begin), (speed / distance) * (end - begin)
 
-    def _line_duration(self, way: float) -> float:
+    def _line_duration(self, distance: float) -> float:
         v, a = self._v, self._a
-        return way / v + v / a if way >= v * v / a else 2.0 * sqrt(way / a)
+        return distance / v + v / a if distance >= v * v / a else 2.0 * sqrt(distance / a)
 
-    def _on_line(self, t: float, way: float) -> tuple[float, float]:
+    def _on_line(self, t: float, distance: float) -> tuple[float, float]:
         """Way [rad] and speed [rad/s] of the leading joint, t [s] after its line begins."""
         a = self._a
-        duration = self._line_duration(way)
+        duration = self._line_duration(distance)
         ramp = min(self._v / a, duration / 2.0)
         if t < ramp:
             return 0.5 * a * t * t, a * t
         if t > duration - ramp:
             left = duration - t
-            return way - 0.5 * a * left * left, a * left
+            return distance - 0.5 * a * left * left, a * left
         return a * ramp * (t - 0.5 * ramp), a * ramp
 
 
-def _longest_way(begin: Array, end: Array) -> float:
+def _largest_joint_distance(begin: Array, end: Array) -> float:
     return float(np.abs(end - begin).max())

@@ -112,8 +112,8 @@ def _lead_in(
     p_branch = tcp_pose(model, q_branch)[:3, 3]
     R_branch = fixed_tcp_rotation()
     turn = Rotation.from_matrix(R_base_tcp @ R_branch.T).as_rotvec()
-    way = float(np.linalg.norm(names.p[0] - p_branch)) / _LEAD_IN_STEP
-    steps = max(1, int(np.ceil(max(way, float(np.linalg.norm(turn)) / _LEAD_IN_TURN))))
+    distance = float(np.linalg.norm(names.p[0] - p_branch)) / _LEAD_IN_STEP
+    steps = max(1, int(np.ceil(max(distance, float(np.linalg.norm(turn)) / _LEAD_IN_TURN))))
     goal = pin.SE3(R_branch, p_branch)
     q = q_branch
     for k in range(steps + 1):

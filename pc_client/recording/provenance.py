@@ -22,7 +22,7 @@ class Provenance:
 
     Attributes:
         movement: name of the movement, e.g. "lognorm_4_1".
-        kind: which law made it: "lognormal", "uniform", "minimum_jerk", "power_law" or "samples".
+        kind: which model made it: "lognormal", "uniform", "minimum_jerk", "power_law" or "samples".
         repetition: 1, 2, 3 ...
         controller: name of the controller configuration, e.g. "preview".
         controller_config: its numbers (gains, limits), by name.

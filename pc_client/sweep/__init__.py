@@ -11,7 +11,7 @@
     measure           a recording as a row
     schedule          all cases over processes or a Dask cluster
     folder            results on disk, one small file a case
-    ledger            which cases are settled, which are still to run
+    result_store      which cases are settled, which are still to run
     table             the table as Parquet or CSV
     ranking           which setting is the best
     figures, page     plots and the page that shows them

@@ -43,7 +43,7 @@ FACTORS = (
 
 FIGURES = (
     Column("simulated", bool, "true: the robot says so; false: a real arm; missing: not known"),
-    Column("kind", str, "law of the movement: lognormal, uniform ..."),
+    Column("kind", str, "model of the movement: lognormal, uniform ..."),
     Column("repetition", int, "run within the case, from 1"),
     Column("snr_db", float, "SNR of the TCP speed, Eq. 10 of the paper: neither shifted nor smoothed"),
     Column("snr_shifted_db", float, "the same after the one time shift that makes it best"),

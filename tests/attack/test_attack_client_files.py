@@ -306,7 +306,7 @@ READERS = {
     "movement": (load_movement, LIBRARY),
     "uniform": (load_movement, (LIBRARY_FOLDER / "paper" / "uniform_4_1.toml").read_text()),
     "cell": (load_cell, (ROOT / "examples" / "cell.toml").read_text()),
-    "controller": (Controller.from_toml, 'base = "paper"\ngain_p = 10.0\nlearns = true\n'),
+    "controller": (Controller.from_toml, 'base = "paper"\ngain_p = 10.0\nuses_ilc = true\n'),
     "sweep": (read_config, 'movements = ["uniform_4_1"]\nseeds = [1]\n[controller]\ngain_p = [1.0, 2.0]\n'),
 }
 ODD = [

@@ -105,7 +105,7 @@ CLIENT_FILES = {
         (ClientError,),
     ),
     "controller": Target(
-        lambda: (b'base = "paper"\ngain_p = 10.0\ngain_i = 1.5\nlearns = true\n',),
+        lambda: (b'base = "paper"\ngain_p = 10.0\ngain_i = 1.5\nuses_ilc = true\n',),
         mutations.mutate_toml,
         _file(".toml", Controller.from_toml),
         (ClientError,),

@@ -11,27 +11,29 @@ from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Stroke
 
 
-def flat_law(targets, onsets, end, sigma=0.2, mu=-1.6, turn=0.6):
-    """Strokes between points of the plane; the bells begin before the part does."""
+def flat_trajectory(targets, onsets, end, sigma=0.2, mu=-1.6, arc_angle=0.6):
+    """Strokes between points of the plane; the strokes begin before the part does."""
     points = np.column_stack((np.asarray(targets, float), np.zeros(len(targets))))
     # In the plane z = 0 the arc's normal is z x chord: a tilt of a quarter turn from the upright plane.
-    strokes = tuple(Stroke(Lognormal(t0, mu, sigma), turn, -np.pi / 2) for t0 in onsets)
+    strokes = tuple(Stroke(Lognormal(t0, mu, sigma), arc_angle, -np.pi / 2) for t0 in onsets)
     return SigmaLognormal(points, strokes, end)
 
 
-def part_of(law, begin, end):
+def part_of(trajectory, begin, end):
     """A part whose recording is exactly what its strokes say."""
     t = np.linspace(begin, end, round((end - begin) * 200) + 1)
-    motion = law.evaluate(t)
-    return PartExtraction(t, motion.p[:, :2], motion.v[:, :2], law, 60.0, 60.0, len(law.strokes), 2)
+    motion = trajectory.evaluate(t)
+    return PartExtraction(
+        t, motion.p[:, :2], motion.v[:, :2], trajectory, 60.0, 60.0, len(trajectory.strokes), 2
+    )
 
 
 def two_parts_and_a_dot(gap=0.6, dot=True):
     """Two pen-down parts, in motion at their ends, and a dot behind them; pixels, y down."""
-    first = part_of(flat_law([(20, 20), (60, 30), (55, 80)], (-0.15, 0.05), 0.3), 0.0, 0.3)
+    first = part_of(flat_trajectory([(20, 20), (60, 30), (55, 80)], (-0.15, 0.05), 0.3), 0.0, 0.3)
     begin = 0.3 + gap
     second = part_of(
-        flat_law([(30, 60), (80, 55), (90, 20)], (begin - 0.15, begin + 0.08), begin + 0.33),
+        flat_trajectory([(30, 60), (80, 55), (90, 20)], (begin - 0.15, begin + 0.08), begin + 0.33),
         begin,
         begin + 0.33,
     )
@@ -41,7 +43,7 @@ def two_parts_and_a_dot(gap=0.6, dot=True):
 
 def one_part():
     """A drawing of one part."""
-    part = part_of(flat_law([(20, 20), (60, 30), (55, 80)], (-0.15, 0.05), 0.3), 0.0, 0.3)
+    part = part_of(flat_trajectory([(20, 20), (60, 30), (55, 80)], (-0.15, 0.05), 0.3), 0.0, 0.3)
     return Extraction("one.txt", (part,), 60.0, 60.0, 2, 2, 30.0, (), ())
 
 

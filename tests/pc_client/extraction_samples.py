@@ -40,13 +40,13 @@ def own_strokes(seed, dim, n=5, stroke_time=1.0, overlap=0.4):
     return SigmaLognormal(targets, tuple(strokes), start + stroke_time)
 
 
-def recorded(law, dim, rate=200.0, noise=0.0, seed=0):
+def recorded(trajectory, dim, rate=200.0, noise=0.0, seed=0):
     """The movement as a recording that begins and ends at rest.
 
     Noise is that of the velocity, white, as a share of its rms.
     """
-    t = np.arange(-0.3, law.duration + 0.3, 1.0 / rate)
-    motion = law.evaluate(t)
+    t = np.arange(-0.3, trajectory.duration + 0.3, 1.0 / rate)
+    motion = trajectory.evaluate(t)
     rms = math.sqrt(float(np.mean(np.sum(motion.v**2, axis=1))))
     shaken = np.random.default_rng(seed).normal(size=(len(t), dim)) * noise * rms / math.sqrt(dim)
     return PenRecording("own", (PenPart(t, motion.p[:, :dim] + np.cumsum(shaken, axis=0) / rate),))

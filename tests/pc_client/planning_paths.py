@@ -26,10 +26,10 @@ class StraightStrokes:
     def sample(self, t):
         t = np.asarray(t, dtype=float)
         k = np.clip((t / self.stroke_time).astype(int), 0, len(self.target_points) - 2)
-        way, rate = min_jerk(t / self.stroke_time - k)
+        done, rate = min_jerk(t / self.stroke_time - k)
         begin = self.target_points[k]
         chord = self.target_points[k + 1] - begin
-        return begin + way[:, None] * chord, rate[:, None] / self.stroke_time * chord
+        return begin + done[:, None] * chord, rate[:, None] / self.stroke_time * chord
 
 
 class Arc:
@@ -44,8 +44,8 @@ class Arc:
         self.target_points = self.sample(np.array([0.0, duration]))[0]
 
     def sample(self, t):
-        way, rate = min_jerk(np.asarray(t, dtype=float) / self.duration)
-        angle, speed = self.turn * way, self.turn * rate / self.duration
+        done, rate = min_jerk(np.asarray(t, dtype=float) / self.duration)
+        angle, speed = self.turn * done, self.turn * rate / self.duration
         out = np.stack((np.cos(angle), np.sin(angle)), axis=1) @ self.axes
         along = np.stack((-np.sin(angle), np.cos(angle)), axis=1) @ self.axes
         return self.centre + self.radius * out, self.radius * speed[:, None] * along

@@ -56,8 +56,8 @@ def append_rows(recorder: Recorder, n: int) -> None:
         )
 
 
-def bell(t: np.ndarray, duration: float) -> np.ndarray:
-    """Path length share 0..1 of one smooth bell of speed, at rest outside [0, duration]."""
+def lognormal(t: np.ndarray, duration: float) -> np.ndarray:
+    """Path length share 0..1 of one smooth speed profile, at rest outside [0, duration]."""
     x = np.clip(t / duration, 0.0, 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
@@ -82,10 +82,10 @@ def record_movement(
     """
     rng = np.random.default_rng(seed)
     t = PERIOD * np.arange(-round(rest / PERIOD), round((duration + rest) / PERIOD) + 1)
-    ref = np.column_stack([np.full_like(t, 0.3), length * bell(t, duration), np.full_like(t, 0.2)])
+    ref = np.column_stack([np.full_like(t, 0.3), length * lognormal(t, duration), np.full_like(t, 0.2)])
     velocity = np.gradient(ref, t, axis=0)
     actual = np.column_stack(
-        [np.full_like(t, 0.3), gain * length * bell(t - lag, duration), np.full_like(t, 0.2)]
+        [np.full_like(t, 0.3), gain * length * lognormal(t - lag, duration), np.full_like(t, 0.2)]
     )
     actual += np.asarray(offset) + rng.normal(0.0, noise, actual.shape) if noise else np.asarray(offset)
     if distort is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording_samples import N_VALUES, PERIOD, SIGNALS, bell, provenance, record_movement
+from recording_samples import N_VALUES, PERIOD, SIGNALS, lognormal, provenance, record_movement
 
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
 from pc_client.analysis.run import MeasuredRun, analyse_run
@@ -23,7 +23,7 @@ from pc_client.recording.recorder import Recorder
 
 SIGMA = np.array((1.1e-5, 1.1e-5, 1.45e-5, 1.45e-5, 1.75e-5, 1.75e-5))
 Q0 = np.array((0.4, -1.77, -2.1, -0.1, 1.3, 1.86))
-WAY = np.array((0.5, 0.3, -0.4, 0.2, -0.1, 0.3))
+DISPLACEMENT = np.array((0.5, 0.3, -0.4, 0.2, -0.1, 0.3))
 
 
 def record_joints(path: Path, seed: int, *, ripple: float = 0.0, push: float = 0.0) -> MeasuredRun:
@@ -34,7 +34,7 @@ def record_joints(path: Path, seed: int, *, ripple: float = 0.0, push: float = 0
     model, random = robot_model("ur3"), np.random.default_rng(seed)
     rest, duration = 0.8, 6.0
     t = PERIOD * np.arange(-round(rest / PERIOD), round((duration + rest) / PERIOD) + 1)
-    q_ref = Q0 + bell(t, duration)[:, None] * WAY
+    q_ref = Q0 + lognormal(t, duration)[:, None] * DISPLACEMENT
     q = q_ref + ripple * np.sin(101 * q_ref) * np.square(np.sin(np.pi * np.clip(t / duration, 0, 1)))[:, None]
     cmd_qd = push * np.sin(2 * np.pi * 2.0 * t)[:, None] * ((t > 0.5) & (t < 4.5))[:, None] * np.ones(6)
     response = velocity_response(LoopModel(0.02, 0.01, 0.0, 0.0), PERIOD) * PERIOD

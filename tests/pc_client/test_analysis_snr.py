@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from recording_samples import PERIOD, SIGNALS, append_rows, bell, provenance, record_movement
+from recording_samples import PERIOD, SIGNALS, append_rows, lognormal, provenance, record_movement
 
 from pc_client.analysis.snr import Snr, measure_snr, snr_db
 from pc_client.analysis.track import speed, track_of
@@ -70,7 +70,7 @@ def test_delay_is_found_below_one_sample_and_costs_what_the_integral_says(tmp_pa
     assert snr.velocity_lag_s == pytest.approx(lag, abs=1e-5)
     assert snr.speed_shifted_db > 60.0
     t = np.linspace(0.0, 2.0, 20_001)
-    reference, actual = (np.gradient(bell(x, 2.0), t) for x in (t, t - lag))
+    reference, actual = (np.gradient(lognormal(x, 2.0), t) for x in (t, t - lag))
     assert snr.speed_db == pytest.approx(snr_db(reference, actual), abs=0.1)
     assert snr.velocity_db == pytest.approx(snr.speed_db, abs=1e-9)  # a straight line: no wrong direction
 
@@ -87,7 +87,7 @@ def test_position_noise(tmp_path: Path) -> None:
     sigma = 1.5e-5
     path = record_movement(tmp_path / "a.mcap", noise=sigma, duration=12.0, length=1.0)
     t = np.arange(0.0, 12.0, PERIOD)
-    power = np.mean(np.square(np.gradient(bell(t, 12.0), t)))
+    power = np.mean(np.square(np.gradient(lognormal(t, 12.0), t)))
     expected = 10.0 * math.log10(power / (2.0 * sigma**2 / PERIOD**2))
     snr = measured(path)
     assert snr.speed_db == pytest.approx(expected, abs=0.3)
@@ -97,7 +97,7 @@ def test_position_noise(tmp_path: Path) -> None:
 
 def test_only_the_vector_sees_a_wrong_direction(tmp_path: Path) -> None:
     def along_z(t: np.ndarray) -> np.ndarray:
-        return np.column_stack([0.0 * t, 0.0 * t, 0.3 * bell(t, 2.0)])
+        return np.column_stack([0.0 * t, 0.0 * t, 0.3 * lognormal(t, 2.0)])
 
     snr = measured(record_movement(tmp_path / "a.mcap", gain=0.0, distort=along_z))
     assert snr.speed_db > 200.0

@@ -185,10 +185,10 @@ def test_the_approach_is_led_around_what_stands_in_its_way():
     post = Solid("post", "cylinders", (0.02, 0.3), (*dh_pose(half_way)[:2, 3], 0.15))
     model = robot_model("ur3", Cell("c", solids=(post,)))
     plan = plan_movement(STROKES, model=model)
-    way = plan_approach(plan, q_now, model=model)
-    assert len(way.waypoints) > 1
-    assert way.cell_clearance >= plan.report.limits.cell_clearance_min
-    assert "of walls and solids of the cell" in approach_text(way)
+    path = plan_approach(plan, q_now, model=model)
+    assert len(path.waypoints) > 1
+    assert path.cell_clearance >= plan.report.limits.cell_clearance_min
+    assert "of walls and solids of the cell" in approach_text(path)
 
 
 def test_an_approach_without_a_free_way_is_refused_with_both_bodies():

@@ -51,7 +51,7 @@ def test_corners_of_a_generated_robot_like_movement_can_be_blended(tmp_path):
     assert (
         cli.run(["movements", "generate", "--kind", "uniform", "--corners", "blend", "--out", str(file)]) == 0
     )
-    assert (load_movement(file).law.corners, load_movement(file).law.blend) == ("blend", 0.03)
+    assert (load_movement(file).trajectory.corners, load_movement(file).trajectory.blend) == ("blend", 0.03)
 
 
 @pytest.mark.parametrize("kind", GENERATORS)

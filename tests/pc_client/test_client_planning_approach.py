@@ -23,7 +23,7 @@ FLOOR_MARGIN, OWN_MARGIN = PLAN.report.limits.floor_clearance_min, PLAN.report.l
 HOME = np.radians((0, -90, 0, -90, 0, 0))
 
 
-def way(approach, step=0.01):
+def path(approach, step=0.01):
     """All postures of an approach, finely."""
     postures = [approach.q_from, *approach.waypoints]
     for begin, end in pairwise(postures):
@@ -33,7 +33,7 @@ def way(approach, step=0.01):
 
 def assert_above_the_plane(approach):
     """Joint centres and TCP, by the DH table alone, stay above the plane."""
-    for q in way(approach):
+    for q in path(approach):
         heights = [T[2, 3] for T in frames(q)]
         assert min(heights[1:]) >= FLOOR_MARGIN
 
@@ -94,7 +94,7 @@ def test_when_the_direct_line_is_not_clear_the_arm_is_raised_on_the_way():
     assert hulls.along(line).own.least.min() < OWN_MARGIN
     assert len(approach.waypoints) == 2
     np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
-    fine = hulls.along(np.array(list(way(approach))))
+    fine = hulls.along(np.array(list(path(approach))))
     assert fine.own.least.min() >= OWN_MARGIN - 1e-3
     assert approach.own_clearance == pytest.approx(fine.own.least.min(), abs=1e-3)
     assert approach.floor_clearance == pytest.approx(fine.floor.least.min(), abs=2e-3)

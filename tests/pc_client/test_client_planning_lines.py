@@ -13,11 +13,11 @@ from pc_client.planning.joint_lines import JointLines
 
 angle = st.floats(-6.0, 6.0)
 posture = st.lists(angle, min_size=6, max_size=6).map(np.array)
-ways = st.lists(posture, min_size=2, max_size=4)
+distances = st.lists(posture, min_size=2, max_size=4)
 limits = {"v": st.floats(0.05, 0.5), "a": st.floats(0.05, 0.8)}
 
 
-@given(postures=ways, **limits)
+@given(postures=distances, **limits)
 def test_it_begins_and_ends_at_rest_in_the_first_and_the_last_posture(postures, v, a):
     lines = JointLines(postures, v, a)
     for t, wanted in (
@@ -33,19 +33,19 @@ def test_it_begins_and_ends_at_rest_in_the_first_and_the_last_posture(postures, 
         assert not qd.any()
 
 
-@given(way=st.floats(1e-4, 6.0), **limits)
-def test_the_leading_joint_has_the_trapezoid_of_v_and_a(way, v, a):
-    lines = JointLines([np.zeros(6), np.array((0, -way, way / 2, 0, 0, 0))], v, a)
+@given(distance=st.floats(1e-4, 6.0), **limits)
+def test_the_leading_joint_has_the_trapezoid_of_v_and_a(distance, v, a):
+    lines = JointLines([np.zeros(6), np.array((0, -distance, distance / 2, 0, 0, 0))], v, a)
     t = np.linspace(0.0, lines.duration, 401)
     expected = np.minimum(np.minimum(a * t, v), a * (lines.duration - t))
     q, qd = (np.array(x) for x in zip(*(lines.at(time) for time in t), strict=True))
     np.testing.assert_allclose(-qd[:, 1], expected, atol=1e-6)
     np.testing.assert_allclose(qd[:, 2], -qd[:, 1] / 2, atol=1e-12)
-    np.testing.assert_allclose(np.trapezoid(qd[:, 1], t), -way, rtol=5e-3)
+    np.testing.assert_allclose(np.trapezoid(qd[:, 1], t), -distance, rtol=5e-3)
     np.testing.assert_allclose(q[:, 2], -q[:, 1] / 2, atol=1e-12)
 
 
-@given(postures=ways, **limits)
+@given(postures=distances, **limits)
 def test_it_stays_on_the_lines_and_rests_at_each_posture(postures, v, a):
     lines = JointLines(postures, v, a)
     step = 0.05
@@ -62,7 +62,7 @@ def test_it_stays_on_the_lines_and_rests_at_each_posture(postures, v, a):
         np.testing.assert_allclose(middle, (begin + goal) / 2, atol=1e-6)
 
 
-def test_no_way_takes_no_time():
+def test_no_distance_takes_no_time():
     here = np.full(6, 0.3)
     lines = JointLines([here, here, here], 0.5, 0.8)
     assert lines.duration == 0.0

@@ -55,7 +55,8 @@ def test_sets_have_every_generator_on_the_same_points(sets):
 
 def test_the_first_seed_is_the_first_pair_of_the_library(sets):
     np.testing.assert_array_equal(
-        sets[0].movements["uniform"].law.evaluate(1.0).p, load_movement("uniform_4_1").law.evaluate(1.0).p
+        sets[0].movements["uniform"].trajectory.evaluate(1.0).p,
+        load_movement("uniform_4_1").trajectory.evaluate(1.0).p,
     )
 
 
@@ -131,8 +132,8 @@ def test_means_of_the_power_law_leave_out_those_without():
     assert math.isnan(mean_likeness([without]).exponent)
 
 
-def test_table_says_what_the_laws_promise(table):
-    """One bell a stroke, exponents of a third where the law imposes it, none on straight lines."""
+def test_the_table_has_the_figures_that_the_models_imply(table):
+    """One speed peak a stroke, exponents of a third where the law imposes it, none on straight lines."""
     means = {kind: table.means(kind)["planned"] for kind in table.kinds}
     for kind in ("lognormal", "arcs", "isochronous", "fitts", "minimum_jerk", "uniform"):
         assert means[kind].peaks == 3.0
@@ -145,7 +146,7 @@ def test_table_says_what_the_laws_promise(table):
     jerk = {kind: figures.log_jerk for kind, figures in means.items()}
     assert max(jerk, key=jerk.get) == "minimum_jerk_via"
     assert sorted(jerk, key=jerk.get)[:2] == ["uniform", "uniform_blend"]
-    # and it needs the least speed for the same way in the same time
+    # and it needs the lowest top speed for the same length in the same time
     assert min(means, key=lambda kind: means[kind].peak_speed) == "uniform_blend"
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pc_client.control.delay import estimate_delay
-from pc_client.control.excitation import BRISK_PULSE, PULSE, WAY, Excitation
+from pc_client.control.excitation import BRISK_PULSE, DISPLACEMENT, PULSE, Excitation
 from pc_client.control.reference import ReferenceTable
 from pc_client.errors import DriverError
 
@@ -26,8 +26,10 @@ def commands():
 def reported(t, qd_cmd, delay):
     """Positions of an arm with any real delay: the integral of the held commands, shifted."""
     knots = np.append(t, t[-1] + PERIOD)
-    way = np.vstack([np.zeros(6), np.cumsum(qd_cmd * PERIOD, axis=0)])
-    return np.array(Q0) + np.stack([np.interp(t - delay, knots, way[:, j]) for j in range(6)], axis=1)
+    displacement = np.vstack([np.zeros(6), np.cumsum(qd_cmd * PERIOD, axis=0)])
+    return np.array(Q0) + np.stack(
+        [np.interp(t - delay, knots, displacement[:, j]) for j in range(6)], axis=1
+    )
 
 
 @pytest.mark.parametrize(("pulse", "fastest"), [(PULSE, 0.12), (BRISK_PULSE, 0.28)])
@@ -37,7 +39,7 @@ def test_excitation_is_small_smooth_and_ends_where_it_began(pulse, fastest):
     q = np.array([excitation.at(x)[0] for x in t])
     qd = np.array([excitation.at(x)[1] for x in t])
     assert np.abs(qd).max() == pytest.approx(fastest, rel=1e-3)
-    assert np.abs(q - Q0).max() == pytest.approx(WAY, rel=1e-3)
+    assert np.abs(q - Q0).max() == pytest.approx(DISPLACEMENT, rel=1e-3)
     assert np.degrees(np.abs(q - Q0).max()) <= 1.0
     assert np.degrees(np.abs(q - Q0).max()) > 0.8
     np.testing.assert_allclose(q[-1], Q0)

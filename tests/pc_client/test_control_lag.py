@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pc_client.control.excitation import BRISK_PULSE, Excitation
 from pc_client.control.lag import identify_loop
-from pc_client.control.loop_model import LoopModel, frequency_response, lagged_way, velocity_response
+from pc_client.control.loop_model import LoopModel, frequency_response, lagged_displacement, velocity_response
 from pc_client.control.reference import ReferenceTable
 from pc_client.errors import DriverError
 
@@ -29,8 +29,8 @@ def reported(t, qd_cmd, dead_time, lag):
     """Positions of an arm of any real dead time and lag: the continuous solution, sampled finely."""
     fine = 40
     knots = np.arange(len(t) * fine + 1) * PERIOD / fine
-    way, _ = lagged_way(knots, np.repeat(qd_cmd, fine, axis=0), lag)
-    return Q0 + np.stack([np.interp(t - dead_time, knots, way[:, j]) for j in range(6)], axis=1)
+    displacement, _ = lagged_displacement(knots, np.repeat(qd_cmd, fine, axis=0), lag)
+    return Q0 + np.stack([np.interp(t - dead_time, knots, displacement[:, j]) for j in range(6)], axis=1)
 
 
 @pytest.mark.parametrize(("cycles", "lag"), [(0, 0.0), (3, 0.0), (2, 0.010), (0, 0.030)])

@@ -44,8 +44,8 @@ def test_a_title_stands_for_one_setting(one, other):
 
 def test_a_title_names_what_differs_from_the_named_controller():
     assert PAPER.changed({"gain_p": 4, "gain_i": 2.0}).title == "paper"
-    own = PAPER.changed({"gain_p": 10, "gain_i": 2.5, "learns": True})
-    assert own.title == "paper with gain_p 10, gain_i 2.5, learns true"
+    own = PAPER.changed({"gain_p": 10, "gain_i": 2.5, "uses_ilc": True})
+    assert own.title == "paper with gain_p 10, gain_i 2.5, uses_ilc true"
 
 
 def load(folder, text):
@@ -56,8 +56,8 @@ def load(folder, text):
 
 def test_a_file_starts_from_a_named_controller(tmp_path):
     assert load(tmp_path, "") == CONTROLLERS["preview"]
-    own = load(tmp_path, 'base = "paper"\ngain_p = 10\nlooks_ahead = true')
-    assert own == dataclasses.replace(PAPER, gain_p=10.0, looks_ahead=True)
+    own = load(tmp_path, 'base = "paper"\ngain_p = 10\nuses_preview = true')
+    assert own == dataclasses.replace(PAPER, gain_p=10.0, uses_preview=True)
     assert isinstance(own.gain_p, float)
 
 
@@ -85,7 +85,7 @@ def test_a_file_may_give_every_field(tmp_path):
         ("gain_p = [1, 2]", "gain_p: [1, 2]; give a number"),
         ("speedj_acceleration = 0", "give a number from 0.1 to 100 rad/s2"),
         ("learning_gain = 1.5", "give a number from 0 to 1"),
-        ("looks_ahead = 1", "looks_ahead: 1; give true or false"),
+        ("uses_preview = 1", "uses_preview: 1; give true or false"),
     ],
 )
 def test_a_file_that_makes_no_sense_is_one_line_with_file_and_field(text, words, tmp_path):

@@ -19,7 +19,7 @@ from pc_client.kinematics.robot_model import robot_model
 
 UR3 = robot_model("ur3")
 POSTURE = np.array([0.4, -1.77, -2.1, -0.1, 1.3, 1.86])
-WAY = np.array([0.5, 0.3, -0.4, 0.2, -0.1, 0.3])
+DISPLACEMENT = np.array([0.5, 0.3, -0.4, 0.2, -0.1, 0.3])
 LEAD, SETTLE, DURATION = 0.2, 0.3, 2.0
 ALLOWED, ALLOWED_ANGLE = 0.005, 0.035
 
@@ -32,12 +32,12 @@ class ThereAndBack:
     def at(self, t):
         w = 2 * np.pi / self.duration
         t = min(max(t, 0.0), self.duration)
-        return POSTURE + WAY * (0.5 - 0.5 * np.cos(w * t)), WAY * 0.5 * w * np.sin(w * t)
+        return POSTURE + DISPLACEMENT * (0.5 - 0.5 * np.cos(w * t)), DISPLACEMENT * 0.5 * w * np.sin(w * t)
 
 
 REFERENCES = {
     "there and back": ThereAndBack(),
-    "a line": Ramp(WAY, DURATION, POSTURE),
+    "a line": Ramp(DISPLACEMENT, DURATION, POSTURE),
     "excitation": Excitation(POSTURE.tolist()),
     "wrist 3 alone": Ramp([0, 0, 0, 0, 0, 1.0], DURATION, POSTURE),
 }

@@ -99,14 +99,14 @@ class Strokes:
     def __init__(self, window):
         self.duration = 4 * window
         self._t = np.arange(0.0, self.duration + 1e-4, 1e-4)
-        bells = [TwoSidedTiming(k * window, window, 0.1).lognormal for k in range(4)]
-        self._qd = sum(self._bell(b) for b in bells)
+        lognormals = [TwoSidedTiming(k * window, window, 0.1).lognormal for k in range(4)]
+        self._qd = sum(self._lognormal(b) for b in lognormals)
         self._q = np.concatenate([[0.0], np.cumsum(0.5 * (self._qd[1:] + self._qd[:-1]) * 1e-4)])
 
-    def _bell(self, bell):
-        age = np.maximum(self._t - bell.t0, 1e-9)
-        z = (np.log(age) - bell.mu) / bell.sigma
-        return 0.1 * np.exp(-0.5 * z * z) / (bell.sigma * np.sqrt(2 * np.pi) * age)
+    def _lognormal(self, lognormal):
+        age = np.maximum(self._t - lognormal.t0, 1e-9)
+        z = (np.log(age) - lognormal.mu) / lognormal.sigma
+        return 0.1 * np.exp(-0.5 * z * z) / (lognormal.sigma * np.sqrt(2 * np.pi) * age)
 
     def at(self, t):
         q = np.interp(t, self._t, self._q)

@@ -65,8 +65,10 @@ def test_k_decides_skewness_and_kurtosis() -> None:
         top, _, bottom = k.partition("/")
         assert ratio == pytest.approx(float(top) / float(bottom or 1))
         sigma = sigma_for_k(ratio)
-        bell = Lognormal(0.0, math.log(0.1 * (1.0 + lead_in_windows)) - FULL_COVERAGE * sigma, sigma)
-        for printed, value in zip(figures, (sigma, bell.skewness, bell.kurtosis, bell.mu), strict=True):
+        lognormal = Lognormal(0.0, math.log(0.1 * (1.0 + lead_in_windows)) - FULL_COVERAGE * sigma, sigma)
+        for printed, value in zip(
+            figures, (sigma, lognormal.skewness, lognormal.kurtosis, lognormal.mu), strict=True
+        ):
             assert float(printed) == pytest.approx(value, abs=0.51 * 10.0 ** -len(printed.partition(".")[2]))
 
 
@@ -101,7 +103,7 @@ def test_what_the_page_says_of_the_strokes_in_the_hands_time() -> None:
         stretch = float(movement.provenance["time_stretch"])
         mu += [stroke["mu"] - math.log(stretch) for stroke in describe(movement)["strokes"]]
         strokes += (movement.stroke_durations / stretch).tolist()
-        gaps += (movement.law.speed_minima() - np.cumsum(movement.stroke_durations)[:-1]).tolist()
+        gaps += (movement.trajectory.speed_minima() - np.cumsum(movement.stroke_durations)[:-1]).tolist()
     assert f"mu does: {min(mu):.2f} to {max(mu):.2f} in the hand's time" in SENTENCES
     assert f"at random: {min(strokes):.3f} to {max(strokes):.3f} s".replace("0.", ".") in SENTENCES
     assert (

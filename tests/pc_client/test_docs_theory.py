@@ -65,18 +65,18 @@ def test_overlaps(cells: list[str]) -> None:
 @pytest.mark.parametrize("cells", table("lead / T"), ids=lambda cells: cells[0])
 def test_literal_windows(cells: list[str]) -> None:
     timing = LiteralTiming(0.0, 1.0, float(cells[0]))
-    bell = timing.lognormal
+    lognormal = timing.lognormal
     over, _, under = cells[1].partition("/")
     assert timing.k == pytest.approx(float(over) / float(under or 1), rel=1e-14)
-    done = bell.evaluate([0.0, 1.0]).done
+    done = lognormal.evaluate([0.0, 1.0]).done
     figures = (
-        bell.sigma,
-        bell.mu,
+        lognormal.sigma,
+        lognormal.mu,
         float(done[1] - done[0]),
-        bell.time_at_deviation(-FULL_COVERAGE),
-        bell.skewness,
-        bell.kurtosis,
-        bell.peak,
+        lognormal.time_at_deviation(-FULL_COVERAGE),
+        lognormal.skewness,
+        lognormal.kurtosis,
+        lognormal.peak,
     )
     for value, text in zip(figures, cells[2:], strict=True):
         assert_printed(value, text)
@@ -85,14 +85,14 @@ def test_literal_windows(cells: list[str]) -> None:
 @pytest.mark.parametrize("cells", table("sigma", "top at"), ids=lambda cells: cells[0])
 def test_two_sided_windows(cells: list[str]) -> None:
     full, three = TwoSidedTiming(0.0, 1.0, float(cells[0])), TwoSidedTiming(0.0, 1.0, float(cells[0]), 3.0)
-    bell = full.lognormal
+    lognormal = full.lognormal
     figures = (
         full.mode_fraction,
-        bell.peak,
+        lognormal.peak,
         three.mode_fraction,
         three.lognormal.peak,
-        bell.skewness,
-        bell.kurtosis,
+        lognormal.skewness,
+        lognormal.kurtosis,
     )
     for value, text in zip(figures, cells[1:], strict=True):
         assert_printed(value, text)
@@ -102,9 +102,9 @@ def test_berios_letters_are_the_two_sided_window() -> None:
     for shape in (0.01, 0.1, 0.3):
         sigma = math.sqrt(-math.log(1.0 - shape))
         mu = 3.0 * sigma + math.log(0.7 / math.expm1(6.0 * sigma))
-        bell = TwoSidedTiming(0.2, 0.7, sigma, 3.0).lognormal
-        assert bell.mu == pytest.approx(mu, abs=1e-13)
-        assert bell.t0 == pytest.approx(0.2 - math.exp(mu - 3.0 * sigma), abs=1e-13)
+        lognormal = TwoSidedTiming(0.2, 0.7, sigma, 3.0).lognormal
+        assert lognormal.mu == pytest.approx(mu, abs=1e-13)
+        assert lognormal.t0 == pytest.approx(0.2 - math.exp(mu - 3.0 * sigma), abs=1e-13)
 
 
 PRINTED_NAMES = {
@@ -147,29 +147,29 @@ def check_figures() -> dict[tuple[str, str], float]:
     figures = {("-", "1 - erf(3)"): 1.0 - float(erf(3.0))}
     for z, name in ((3.0, "3"), (FULL_COVERAGE, "3 sqrt 2")):
         figures["-", f"Phi({name}) - Phi(-{name})"] = float(ndtr(z) - ndtr(-z))
-    for case, bell, length in (("A", a, 1.0), ("B", b, 0.2), ("C", c, 0.1), ("D", d, 0.3)):
-        first, second = bell.inflections
+    for case, lognormal, length in (("A", a, 1.0), ("B", b, 0.2), ("C", c, 0.1), ("D", d, 0.3)):
+        first, second = lognormal.inflections
         figures |= {
-            (case, "time at z = -3"): bell.time_at_deviation(-3.0),
+            (case, "time at z = -3"): lognormal.time_at_deviation(-3.0),
             (case, "time of the first inflection"): first,
-            (case, "time of the top speed"): bell.mode,
+            (case, "time of the top speed"): lognormal.mode,
             (case, "time of the second inflection"): second,
-            (case, "time at z = 3"): bell.time_at_deviation(3.0),
-            (case, "speed at the first inflection"): length * float(bell.evaluate(first).rate),
-            (case, "top speed"): length * bell.peak,
-            (case, "speed at the second inflection"): length * float(bell.evaluate(second).rate),
-            (case, "way done at the first inflection"): float(bell.evaluate(first).done),
-            (case, "way done at the top speed"): bell.done_at_mode,
-            (case, "way done at the second inflection"): float(bell.evaluate(second).done),
-            (case, "mean"): bell.mean,
-            (case, "median"): bell.median,
-            (case, "std"): bell.std,
-            (case, "skewness"): bell.skewness,
-            (case, "kurtosis"): bell.kurtosis,
-            (case, "power"): length**2 * bell.power,
-            (case, "sigma"): bell.sigma,
-            (case, "mu"): bell.mu,
-            (case, "share of D in the window"): float(bell.evaluate(0.1).done),
+            (case, "time at z = 3"): lognormal.time_at_deviation(3.0),
+            (case, "speed at the first inflection"): length * float(lognormal.evaluate(first).rate),
+            (case, "top speed"): length * lognormal.peak,
+            (case, "speed at the second inflection"): length * float(lognormal.evaluate(second).rate),
+            (case, "way done at the first inflection"): float(lognormal.evaluate(first).done),
+            (case, "way done at the top speed"): lognormal.done_at_mode,
+            (case, "way done at the second inflection"): float(lognormal.evaluate(second).done),
+            (case, "mean"): lognormal.mean,
+            (case, "median"): lognormal.median,
+            (case, "std"): lognormal.std,
+            (case, "skewness"): lognormal.skewness,
+            (case, "kurtosis"): lognormal.kurtosis,
+            (case, "power"): length**2 * lognormal.power,
+            (case, "sigma"): lognormal.sigma,
+            (case, "mu"): lognormal.mu,
+            (case, "share of D in the window"): float(lognormal.evaluate(0.1).done),
         }
     end = PlanarStroke(b, 0.2, 0.3, 1.5).evaluate(50.0).p[0]
     start, goal = (0.25, -0.1, 0.2), (0.35, 0.1, 0.3)
@@ -177,7 +177,7 @@ def check_figures() -> dict[tuple[str, str], float]:
         ("E", "end in the plane, x"): float(end[0]),
         ("E", "end in the plane, y"): float(end[1]),
         ("E", "chord in the plane"): float(np.hypot(*end)),
-        ("E", "D / distance in space"): Stroke(b, turn=0.9).length(start, goal) / math.dist(start, goal),
+        ("E", "D / distance in space"): Stroke(b, arc_angle=0.9).length(start, goal) / math.dist(start, goal),
     }
 
 
@@ -189,16 +189,16 @@ def test_check_figures(cells: list[str]) -> None:
 def test_inflections_of_the_page() -> None:
     """The formulas as they stand there, against the code: times, way done, and ratios of speeds (theory notes, section 3)."""
     s = 0.25
-    bell = Lognormal(0.0, -1.6, s)
+    lognormal = Lognormal(0.0, -1.6, s)
     root = s * math.sqrt(0.25 * s * s + 1.0)
     for sign, time, ratio in (
-        (1.0, bell.inflections.before, 0.526450600870),
-        (-1.0, bell.inflections.after, 0.677292380471),
+        (1.0, lognormal.inflections.before, 0.526450600870),
+        (-1.0, lognormal.inflections.after, 0.677292380471),
     ):
         a = 1.5 * s * s + sign * root
         assert time == pytest.approx(math.exp(-1.6 - a), rel=1e-14)
-        assert float(bell.evaluate(time).done) == pytest.approx(float(ndtr(-a / s)), abs=1e-14)
-        found = float(bell.evaluate(time).rate) / bell.peak
+        assert float(lognormal.evaluate(time).done) == pytest.approx(float(ndtr(-a / s)), abs=1e-14)
+        found = float(lognormal.evaluate(time).rate) / lognormal.peak
         assert found == pytest.approx(ratio, abs=5e-13)
         assert found == pytest.approx(
             math.exp(-(s * s + sign * s * math.sqrt(s * s + 4.0) + 2.0) / 4.0), rel=1e-12
@@ -208,8 +208,8 @@ def test_inflections_of_the_page() -> None:
 
 
 def rms_frequency() -> float:
-    bell = TwoSidedTiming(0.0, 1.0, 0.1).lognormal
-    values = bell.evaluate(np.linspace(0.0, 1.0, 20_001))
+    lognormal = TwoSidedTiming(0.0, 1.0, 0.1).lognormal
+    values = lognormal.evaluate(np.linspace(0.0, 1.0, 20_001))
     return math.sqrt(float(values.rate_change @ values.rate_change) / float(values.rate @ values.rate))
 
 
@@ -221,7 +221,7 @@ def textbook_error(d: float) -> float:
     return float(np.abs(textbook - stable).max())
 
 
-BELL = TwoSidedTiming(0.0, 1.0, 0.1).lognormal
+LOGNORMAL = TwoSidedTiming(0.0, 1.0, 0.1).lognormal
 T = np.linspace(0.0, 1.0, 100_001)
 TRAPEZOID = SmoothedSquareWave(np.array([[0.1, 0.9]]), np.array([1.25]), (0.2,))
 HUMAN_PACE = [math.exp(-2.0 * change) for change in (0.395, -0.3775)]
@@ -231,13 +231,16 @@ SAID: list[tuple[str, list[float]]] = [
     ("is missing of D is `(1 - erf 3) / 2 = {1.1045e-5}`", [0.5 * (1.0 - float(erf(3.0)))]),
     ("{2.2e-5} of the way lie outside", [2.0 * float(ndtr(-FULL_COVERAGE))]),
     ("leaves {.27} % outside", [200.0 * float(ndtr(-3.0))]),
-    ("a top speed of {3.51} L / T", [BELL.peak]),
-    ("an acceleration of {20.8} L / T^2", [float(np.abs(BELL.evaluate(T).rate_change).max())]),
+    ("a top speed of {3.51} L / T", [LOGNORMAL.peak]),
+    ("an acceleration of {20.8} L / T^2", [float(np.abs(LOGNORMAL.evaluate(T).rate_change).max())]),
     (
         "are {.70} m/s and {4.2} m/s^2",
-        [0.2 * BELL.peak, 0.2 * float(np.abs(BELL.evaluate(T).rate_change).max())],
+        [0.2 * LOGNORMAL.peak, 0.2 * float(np.abs(LOGNORMAL.evaluate(T).rate_change).max())],
     ),
-    ("needs {2.8} times the top speed of a trapezoid", [BELL.peak / float(TRAPEZOID.evaluate(T).v.max())]),
+    (
+        "needs {2.8} times the top speed of a trapezoid",
+        [LOGNORMAL.peak / float(TRAPEZOID.evaluate(T).v.max())],
+    ),
     ("has `w = {6.26} / T`", [rms_frequency()]),
     ("16 ms cost a stroke of 1 s {20.0} dB", [-20.0 * math.log10(0.016 * rms_frequency())]),
     ("top speed {1.875} A / T at T / 2", [float(stroke_shape(0.5).rate)]),
@@ -270,10 +273,10 @@ def test_figures_in_sentences(sentence: str, figures: list[float]) -> None:
 
 def test_small_sigma_is_a_small_skewness_and_a_kurtosis_near_three() -> None:
     assert "up to sigma = .1 the skewness stays below .303 and the kurtosis below 3.17" in SENTENCES
-    bells = [Lognormal(0.0, 0.0, sigma) for sigma in np.linspace(1e-3, 0.1, 50).tolist()]
-    assert 0.301 < max(bell.skewness for bell in bells) < 0.303
-    assert 3.16 < max(bell.kurtosis for bell in bells) < 3.17
-    assert min(bell.skewness for bell in bells) > 0.0
+    lognormals = [Lognormal(0.0, 0.0, sigma) for sigma in np.linspace(1e-3, 0.1, 50).tolist()]
+    assert 0.301 < max(lognormal.skewness for lognormal in lognormals) < 0.303
+    assert 3.16 < max(lognormal.kurtosis for lognormal in lognormals) < 3.17
+    assert min(lognormal.skewness for lognormal in lognormals) > 0.0
 
 
 def test_textbook_form_loses_digits() -> None:
@@ -283,12 +286,12 @@ def test_textbook_form_loses_digits() -> None:
     assert textbook_error(1.2) < 1e-15
 
 
-def test_moments_straight_from_the_bell() -> None:
-    """The page's closed forms, against quadrature of Lambda alone, for a wide bell."""
-    bell = Lognormal(0.0, 0.2, 0.4)
-    mean = quad(lambda t: t * float(bell.evaluate(t).rate), 0.0, 60.0, limit=300, points=[1.0])[0]
+def test_moments_by_quadrature_of_the_lognormal() -> None:
+    """The page's closed forms, against quadrature of Lambda alone, for a wide lognormal."""
+    lognormal = Lognormal(0.0, 0.2, 0.4)
+    mean = quad(lambda t: t * float(lognormal.evaluate(t).rate), 0.0, 60.0, limit=300, points=[1.0])[0]
     assert mean == pytest.approx(math.exp(0.2 + 0.08), rel=1e-9)
-    power = quad(lambda t: float(bell.evaluate(t).rate) ** 2, 0.0, 60.0, limit=300, points=[1.0])[0]
+    power = quad(lambda t: float(lognormal.evaluate(t).rate) ** 2, 0.0, 60.0, limit=300, points=[1.0])[0]
     assert power == pytest.approx(math.exp(-0.2 + 0.04) / (0.8 * math.sqrt(math.pi)), rel=1e-9)
 
 
@@ -300,7 +303,7 @@ def test_exponents_of_the_page() -> None:
     assert Isochrony().exponent == 0.0
     made = make_sets(4, 1, 1)[0].movements["power_law"]
     assert "R is 1 m here" in SENTENCES
-    assert made.law.largest_radius == 1.0
+    assert made.trajectory.largest_radius == 1.0
 
 
 def test_comparison_is_that_of_the_command() -> None:

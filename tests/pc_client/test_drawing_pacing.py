@@ -1,4 +1,4 @@
-"""As slow as the arm needs it, and no slower: the factor is the least, and only hops give way for hops."""
+"""As slow as the arm needs it, and no slower: the factor is the least, and only pen-up moves become longer for pen-up moves."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ def test_the_factor_is_the_least_that_planning_accepts(large):
 
 
 def test_slowing_down_is_the_theorys_own_scaling(large):
-    for fast, slow in zip(large.joined.law.strokes, large.law.strokes, strict=True):
+    for fast, slow in zip(large.joined.trajectory.strokes, large.trajectory.strokes, strict=True):
         a, b = fast.timing.lognormal, slow.timing.lognormal
         assert b.t0 == pytest.approx(large.factor * a.t0)
         assert b.mu == pytest.approx(a.mu + np.log(large.factor))
-        assert (b.sigma, slow.turn, slow.tilt) == (pytest.approx(a.sigma), fast.turn, fast.tilt)
-    np.testing.assert_array_equal(large.law.target_points, large.joined.law.target_points)
+        assert (b.sigma, slow.arc_angle, slow.tilt) == (pytest.approx(a.sigma), fast.arc_angle, fast.tilt)
+    np.testing.assert_array_equal(large.trajectory.target_points, large.joined.trajectory.target_points)
 
 
 def test_a_small_drawing_is_as_fast_as_the_hand():
     drawing = make_drawing(one_part(), "small", ARM, PlacementOptions(size=0.01, lift=0.01))
     assert drawing.factor == 1.0
-    assert drawing.movement.duration == pytest.approx(drawing.joined.law.duration)
+    assert drawing.movement.duration == pytest.approx(drawing.joined.trajectory.duration)
 
 
 def test_the_need_of_a_moment_is_what_planning_finds(large):
@@ -51,13 +51,13 @@ def test_the_need_of_a_moment_is_what_planning_finds(large):
     assert need.max() == pytest.approx(large.factor, rel=5e-3)
 
 
-def test_a_hop_that_is_too_fast_gets_time_and_the_marks_keep_theirs():
+def test_a_pen_up_move_that_is_too_fast_gets_time_and_the_marks_keep_theirs():
     drawing = make_drawing(two_parts_and_a_dot(gap=0.05), "x", ARM, PlacementOptions(size=0.08, lift=0.08))
     marks = [mark.transformed(drawing.placement.similarity) for mark in drawing.marks]
     gaps = least_gaps(marks, 0.08)
     recorded = factor_needed("x", join(marks, gaps, drawing.placement.lift), ARM)[1].max()
     own = max(1.0, factor_needed("x", join(marks, gaps + 3.0, drawing.placement.lift), ARM)[1].max())
-    assert recorded > 1.5 * own  # as recorded, the hops would slow the whole drawing down
+    assert recorded > 1.5 * own  # as recorded, the pen-up moves would slow the whole drawing down
     assert drawing.factor < 1.02 * own
     assert np.all(drawing.joined.gaps >= gaps)
     assert drawing.joined.gaps[1] > gaps[1]

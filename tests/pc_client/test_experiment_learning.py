@@ -89,7 +89,7 @@ def test_facts_of_the_loop_go_with_the_recording(two, tmp_path, lockstep):
     assert loop["dead_time_s"] + loop["lag_s"] == pytest.approx(3 * PERIOD, abs=1e-3)
     assert loop["gain_margin"] > 4.0
     assert loop["learning_contraction"] < 1.0
-    assert recording.provenance.controller_config["learns"] is True
+    assert recording.provenance.controller_config["uses_ilc"] is True
 
 
 def test_preview_neither_learns_nor_tells_lag_from_delay(two, tmp_path):
@@ -156,7 +156,7 @@ def test_commands_that_break_a_limit_are_named(two, plan, spoil, words):
     assert words in broken_limit(plan, spoil(commands_of(plan)[1]), None, two.model, BEST, PERIOD)
 
 
-def test_a_learned_way_has_an_end(two, plan):
+def test_a_learned_displacement_is_limited(two, plan):
     _, commands = commands_of(plan)
     learned = np.full_like(commands, 0.06 / (len(commands) * PERIOD))
     assert "learned way" in broken_limit(plan, commands, learned, two.model, BEST, PERIOD)

@@ -41,8 +41,8 @@ class AtOnce(Executor):
         return future
 
 
-def write(path, law, dim=2):
-    (part,) = recorded(law, dim).parts
+def write(path, trajectory, dim=2):
+    (part,) = recorded(trajectory, dim).parts
     rows = "".join(
         ",".join(map(repr, [t, *p])) + "\n" for t, p in zip(part.t.tolist(), part.p.tolist(), strict=True)
     )
@@ -161,12 +161,13 @@ def test_the_movement_comes_back_from_the_table_of_strokes_alone(dim):
     targets = [[row[f"{axis}0"] for axis in "xyz"] for row in numbers]
     targets.append([numbers[-1][f"{axis}1"] for axis in "xyz"])
     strokes = [
-        Stroke(Lognormal(row["t0"], row["mu"], row["sigma"]), row["turn"], row["tilt"]) for row in numbers
+        Stroke(Lognormal(row["t0"], row["mu"], row["sigma"]), row["arc_angle"], row["tilt"])
+        for row in numbers
     ]
-    law = SigmaLognormal(np.array(targets), tuple(strokes), 1.0)
+    trajectory = SigmaLognormal(np.array(targets), tuple(strokes), 1.0)
     part = result.parts[0]
-    assert law.evaluate(part.t).p == pytest.approx(part.law.evaluate(part.t).p, abs=1e-12)
-    assert law.lengths == pytest.approx([row["length"] for row in numbers])
+    assert trajectory.evaluate(part.t).p == pytest.approx(part.trajectory.evaluate(part.t).p, abs=1e-12)
+    assert trajectory.lengths == pytest.approx([row["length"] for row in numbers])
     assert row_of(result).n_strokes == 3
 
 

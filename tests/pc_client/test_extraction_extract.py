@@ -20,102 +20,102 @@ from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.stroke import arc_frame
 
 
-def numbers(law):
+def numbers(trajectory):
     """Everything about the strokes that the theory names, (strokes, numbers)."""
     rows = []
-    targets = law.target_points
-    for stroke, a, b in zip(law.strokes, targets[:-1], targets[1:], strict=True):
-        bell = stroke.timing.lognormal
+    targets = trajectory.target_points
+    for stroke, a, b in zip(trajectory.strokes, targets[:-1], targets[1:], strict=True):
+        lognormal = stroke.timing.lognormal
         axis = (
-            np.cross(*arc_frame(a, b, stroke.tilt)) * stroke.turn
-        )  # (tilt, turn) and (tilt + pi, -turn) are one
-        rows.append([bell.t0, bell.mu, bell.sigma, *axis, *(0.01 * b)])
+            np.cross(*arc_frame(a, b, stroke.tilt)) * stroke.arc_angle
+        )  # (tilt, arc_angle) and (tilt + pi, -arc_angle) are one
+        rows.append([lognormal.t0, lognormal.mu, lognormal.sigma, *axis, *(0.01 * b)])
     return np.array(rows)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
 def test_own_strokes_come_back(dim, seed):
-    law = own_strokes(seed, dim)
-    result = extract(recorded(law, dim))
+    trajectory = own_strokes(seed, dim)
+    result = extract(recorded(trajectory, dim))
     assert (result.n_strokes, result.n_speed_peaks) == (5, 5)
     assert result.snr_v_db >= 60.0
     assert result.snr_t_db >= 60.0
-    assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
+    assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
     assert result.lognormality == pytest.approx(result.snr_v_db / 5)
 
 
 @pytest.mark.parametrize("rate", [60.0, 133.0, 1000.0])
 def test_own_strokes_come_back_at_any_rate(rate):
-    law = own_strokes(4, 2)
-    result = extract(recorded(law, 2, rate=rate))
-    assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
+    trajectory = own_strokes(4, 2)
+    result = extract(recorded(trajectory, 2, rate=rate))
+    assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
 
 
 @pytest.mark.parametrize("stroke_time", [0.35, 0.5])
 def test_strokes_as_fast_as_handwriting_come_back_though_the_low_pass_blunts_them(stroke_time):
-    law = own_strokes(102, 2, stroke_time=stroke_time)
-    result = extract(recorded(law, 2))
-    assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
-    # Judged through the same low-pass; without it the blunted bells would stand against sharp ones.
+    trajectory = own_strokes(102, 2, stroke_time=stroke_time)
+    result = extract(recorded(trajectory, 2))
+    assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
+    # Judged through the same low-pass; without it the blunted speed profiles would stand against sharp ones.
     part = result.parts[0]
-    sharp = part.law.evaluate(part.t).v[:, :2]
+    sharp = part.trajectory.evaluate(part.t).v[:, :2]
     assert result.snr_v_db > 60.0 > 10.0 * math.log10(np.sum(part.v**2) / np.sum((part.v - sharp) ** 2))
 
 
 def test_own_strokes_come_back_from_an_irregular_clock():
-    law = own_strokes(5, 2)
+    trajectory = own_strokes(5, 2)
     rng = np.random.default_rng(0)
-    t = np.arange(-0.3, law.duration + 0.3, 0.01)
+    t = np.arange(-0.3, trajectory.duration + 0.3, 0.01)
     t[1:-1] += rng.uniform(-0.003, 0.003, len(t) - 2)
-    result = extract(PenRecording("irregular", (PenPart(t, law.evaluate(t).p[:, :2]),)))
-    assert numbers(result.parts[0].law) == pytest.approx(numbers(law), abs=1e-3)
+    result = extract(PenRecording("irregular", (PenPart(t, trajectory.evaluate(t).p[:, :2]),)))
+    assert numbers(result.parts[0].trajectory) == pytest.approx(numbers(trajectory), abs=1e-3)
     assert result.snr_v_db >= 60.0
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_one_per_cent_of_noise_is_borne(dim, seed):
-    law = own_strokes(seed, dim)
-    recording = recorded(law, dim, noise=0.01, seed=seed)
+    trajectory = own_strokes(seed, dim)
+    recording = recorded(trajectory, dim, noise=0.01, seed=seed)
     result = extract(recording)
     assert result.snr_v_db >= 35.0
     assert result.snr_t_db >= 40.0
     t = result.parts[0].t
-    truth, ours = law.evaluate(t).v, result.parts[0].law.evaluate(t).v
+    truth, ours = trajectory.evaluate(t).v, result.parts[0].trajectory.evaluate(t).v
     assert 10.0 * math.log10(np.sum(truth**2) / np.sum((truth - ours) ** 2)) >= 35.0
 
 
 def test_case_e_of_the_notes_comes_back():
     """D=.2, t0=.1, mu=-1.6, sigma=.25, theta .3 -> 1.5: end point (.116996, .147433)."""
-    bell = Lognormal(0.1, -1.6, 0.25)
+    lognormal = Lognormal(0.1, -1.6, 0.25)
     t = np.arange(0.0, 1.2, 0.005)
-    done = bell.evaluate(t).done
+    done = lognormal.evaluate(t).done
     chord = 0.2 * done * np.sinc(0.6 * done / math.pi)
     p = chord[:, None] * np.column_stack((np.cos(0.3 + 0.6 * done), np.sin(0.3 + 0.6 * done)))
-    law = extract(PenRecording("case E", (PenPart(t, p),))).parts[0].law
-    assert len(law.strokes) == 1
-    found = law.strokes[0].timing.lognormal
+    trajectory = extract(PenRecording("case E", (PenPart(t, p),))).parts[0].trajectory
+    assert len(trajectory.strokes) == 1
+    found = trajectory.strokes[0].timing.lognormal
     assert (found.t0, found.mu, found.sigma) == pytest.approx((0.1, -1.6, 0.25), abs=1e-3)
-    assert law.lengths[0] == pytest.approx(0.2, abs=2e-4)
-    assert law.target_points[1, :2] == pytest.approx([0.116996, 0.147433], abs=1e-4)
-    assert numbers(law)[0, 5] == pytest.approx(1.2, abs=1e-3)
+    assert trajectory.lengths[0] == pytest.approx(0.2, abs=2e-4)
+    assert trajectory.target_points[1, :2] == pytest.approx([0.116996, 0.147433], abs=1e-4)
+    assert numbers(trajectory)[0, 5] == pytest.approx(1.2, abs=1e-3)
 
 
 def hand(seed=3):
     """A rough movement: strokes of a hand, with noise, and a clock like a browser's."""
-    law = own_strokes(seed, 2, n=8, stroke_time=0.35)
+    trajectory = own_strokes(seed, 2, n=8, stroke_time=0.35)
     rng = np.random.default_rng(seed)
     t = np.cumsum(rng.choice([0.001, 0.008, 0.016, 0.024], 150))
-    p = np.round(law.evaluate(t).p[:, :2] + rng.normal(size=(len(t), 2)))
+    p = np.round(trajectory.evaluate(t).p[:, :2] + rng.normal(size=(len(t), 2)))
     part, _ = ordered_part(t, p)
     return on_one_axis("hand", [part])
 
 
-def test_the_figures_are_those_of_the_law_that_is_given():
+def test_the_figures_are_those_of_the_trajectory_that_is_given():
     result = extract(hand())
     (part,) = result.parts
-    motion = part.law.evaluate(part.t)
+    motion = part.trajectory.evaluate(part.t)
     error = part.v - motion.v[:, :2]
     assert result.snr_v_db == pytest.approx(10 * math.log10(np.sum(part.v**2) / np.sum(error**2)), abs=1e-3)
     assert result.snr_t_db == pytest.approx(
@@ -130,7 +130,7 @@ def test_the_figures_are_those_of_the_law_that_is_given():
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 1.2, 2.0])
 def test_the_budget_of_strokes_is_kept(ratio):
     result = extract(hand(), ExtractOptions(strokes_per_peak=ratio))
-    # One stroke for each bell stands at the beginning; the budget is for what is added.
+    # The fit begins with one stroke for each speed peak; the budget is for what is added.
     assert result.n_strokes <= max(ratio, 1.0) * result.n_speed_peaks
 
 
@@ -164,20 +164,20 @@ def test_no_stroke_is_degenerate():
     bounds = Bounds()
     for seed in range(3):
         for part in extract(hand(seed)).parts:
-            for stroke in part.law.strokes:
-                bell = stroke.timing.lognormal
-                assert bounds.sigma[0] - 1e-12 <= bell.sigma <= bounds.sigma[1] + 1e-12
-                assert math.exp(bell.mu) * bell.sigma >= bounds.width[0] - 1e-12
-                assert abs(stroke.turn) <= bounds.turn[1]
+            for stroke in part.trajectory.strokes:
+                lognormal = stroke.timing.lognormal
+                assert bounds.sigma[0] - 1e-12 <= lognormal.sigma <= bounds.sigma[1] + 1e-12
+                assert math.exp(lognormal.mu) * lognormal.sigma >= bounds.width[0] - 1e-12
+                assert abs(stroke.arc_angle) <= bounds.arc_angle[1]
             # No pair of strokes that grew against each other.
-            assert part.law.stroke_speeds(part.t).max() < 3.0 * np.linalg.norm(part.v, axis=1).max()
+            assert part.trajectory.stroke_speeds(part.t).max() < 3.0 * np.linalg.norm(part.v, axis=1).max()
 
 
-def test_a_gaussian_bell_is_held_at_the_least_sigma_and_told():
+def test_a_gaussian_profile_is_held_at_the_least_sigma_and_reported():
     t = np.arange(0.0, 3.0, 0.005)
     x = 100.0 * ndtr((t - 1.5) / 0.2)
     result = extract(PenRecording("gauss", (PenPart(t, np.column_stack((x, 0.0 * x))),)))
-    assert result.parts[0].law.strokes[0].timing.lognormal.sigma == pytest.approx(0.08)
+    assert result.parts[0].trajectory.strokes[0].timing.lognormal.sigma == pytest.approx(0.08)
     assert any("held at the least sigma" in remark for remark in result.remarks)
     assert result.snr_v_db > 25.0
 
@@ -191,20 +191,22 @@ def test_neither_place_nor_size_nor_direction_nor_unit_matters():
     one, other = extract(plain), extract(moved)
     assert other.n_strokes == one.n_strokes
     assert other.snr_v_db == pytest.approx(one.snr_v_db, abs=0.2)
-    assert other.parts[0].law.lengths.sum() == pytest.approx(1e-3 * one.parts[0].law.lengths.sum(), rel=0.1)
+    assert other.parts[0].trajectory.lengths.sum() == pytest.approx(
+        1e-3 * one.parts[0].trajectory.lengths.sum(), rel=0.1
+    )
 
 
 def test_slowed_down_movements_have_the_same_strokes_slowed_down():
-    law = own_strokes(6, 2)
-    slow = extract(recorded(law.stretched(3.0), 2)).parts[0].law
+    trajectory = own_strokes(6, 2)
+    slow = extract(recorded(trajectory.stretched(3.0), 2)).parts[0].trajectory
     assert [s.timing.lognormal.sigma for s in slow.strokes] == pytest.approx(
-        [s.timing.lognormal.sigma for s in law.strokes], abs=1e-3
+        [s.timing.lognormal.sigma for s in trajectory.strokes], abs=1e-3
     )
 
 
 def test_the_same_recording_gives_the_same_strokes():
     one, other = extract(hand()), extract(hand())
-    assert np.array_equal(one.parts[0].law.target_points, other.parts[0].law.target_points)
+    assert np.array_equal(one.parts[0].trajectory.target_points, other.parts[0].trajectory.target_points)
     assert one.snr_v_db == other.snr_v_db
 
 
@@ -218,7 +220,7 @@ def test_parts_share_a_time_axis_and_a_budget():
     assert result.n_strokes == sum(part.n_strokes for part in result.parts)
     assert result.n_speed_peaks == sum(part.n_speed_peaks for part in result.parts)
     for part in result.parts:
-        modes = [stroke.timing.lognormal.mode for stroke in part.law.strokes]
+        modes = [stroke.timing.lognormal.mode for stroke in part.trajectory.strokes]
         assert part.t[0] - 1.0 < min(modes)
         assert max(modes) < part.t[-1] + 1.0
     assert "1 of 3 parts hold no movement" in result.remarks[0]
@@ -261,7 +263,7 @@ def test_there_and_back_again_has_a_stroke_with_a_chord(x, dim):
     result = extract(PenRecording("back", (PenPart(t, p),)))
     assert result.n_strokes >= 1
     assert math.isfinite(result.snr_v_db)
-    assert np.isfinite(result.parts[0].law.evaluate(t).p).all()
+    assert np.isfinite(result.parts[0].trajectory.evaluate(t).p).all()
 
 
 rows = st.lists(
@@ -286,14 +288,14 @@ def test_no_samples_whatever_make_it_fail(rows, unit):
     if result.parts:
         assert math.isfinite(result.snr_v_db)
         assert math.isfinite(result.snr_t_db)
-        assert all(np.isfinite(part.law.evaluate(part.t).p).all() for part in result.parts)
+        assert all(np.isfinite(part.trajectory.evaluate(part.t).p).all() for part in result.parts)
 
 
 def test_a_long_recording_costs_memory_in_proportion_to_its_length():
     """A minute of movement: the equations are a band, never a square."""
-    law = own_strokes(7, 2, n=60, stroke_time=1.5, overlap=0.4)
+    trajectory = own_strokes(7, 2, n=60, stroke_time=1.5, overlap=0.4)
     options = ExtractOptions(fit=replace(FitOptions(), rounds=1, iterations=3, last_iterations=4))
-    result = extract(recorded(law, 2), options)
+    result = extract(recorded(trajectory, 2), options)
     assert result.parts[0].t[-1] > 50.0
     assert result.snr_v_db > 30.0
 

@@ -18,9 +18,9 @@ from pc_client.extraction.model import linearise, variables_per_stroke
 from pc_client.extraction.refine import moved
 
 
-def chain_of(dim, turns=(0.8, -1.5, 0.0, 1e-5), seed=0):
+def chain_of(dim, arc_angles=(0.8, -1.5, 0.0, 1e-5), seed=0):
     rng = np.random.default_rng(seed)
-    n = len(turns)
+    n = len(arc_angles)
     targets = rng.normal(size=(n + 1, dim))
     chords = np.zeros((n, 3))
     chords[:, :dim] = np.diff(targets, axis=0)
@@ -29,7 +29,7 @@ def chain_of(dim, turns=(0.8, -1.5, 0.0, 1e-5), seed=0):
         0.2 + 0.15 * np.arange(n),
         rng.uniform(0.03, 0.06, n),
         rng.uniform(0.1, 0.5, n),
-        np.array(turns),
+        np.array(arc_angles),
         normals_across(chords, normal),
         targets,
     )
@@ -50,9 +50,9 @@ def test_a_chain_is_the_movement_of_the_package(dim):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("turns", [(0.8, -1.5, 0.3), (1e-5, 0.0, -2e-4), (4.4, -4.4, 0.0011)])
-def test_the_jacobian_is_the_derivative(dim, turns):
-    chain = chain_of(dim, turns)
+@pytest.mark.parametrize("arc_angles", [(0.8, -1.5, 0.3), (1e-5, 0.0, -2e-4), (4.4, -4.4, 0.0011)])
+def test_the_jacobian_is_the_derivative(dim, arc_angles):
+    chain = chain_of(dim, arc_angles)
     jacobian = linearise(chain, TIMES, 0, len(chain)).jacobian
     assert jacobian.shape == (dim + len(chain) * variables_per_stroke(dim), 2, dim, len(TIMES))
     h = 1e-6
@@ -89,7 +89,9 @@ def test_inserted_strokes_move_nothing_and_taking_them_out_gives_the_chain_back(
 
 def test_strokes_put_in_order_still_make_the_same_movement():
     chain = chain_of(2)
-    shuffled = Chain(chain.median[::-1], chain.width, chain.sigma, chain.turn, chain.normal, chain.targets)
+    shuffled = Chain(
+        chain.median[::-1], chain.width, chain.sigma, chain.arc_angle, chain.normal, chain.targets
+    )
     sorted_ = in_order(shuffled)
     assert sorted_.median.tolist() == sorted(chain.median.tolist())
     assert linearise(sorted_, TIMES, 0, 4).p == pytest.approx(linearise(shuffled, TIMES, 0, 4).p, abs=1e-12)

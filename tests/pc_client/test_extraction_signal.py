@@ -85,41 +85,50 @@ def test_what_is_a_movement(t, p, expected):
     assert moves(PenPart(t, p)) is expected
 
 
-def bells(*laws):
+def smooth_sum(*lognormals):
     t = np.arange(0.0, 2.5, 0.005)
-    x = sum(length * law.evaluate(t).done for law, length in laws)
+    x = sum(length * lognormal.evaluate(t).done for lognormal, length in lognormals)
     return smooth_part(PenPart(t, np.column_stack((x, np.zeros_like(x)))))
 
 
-def test_bells_apart_are_one_peak_one_salient_interval_and_one_stroke_each():
-    laws = [Lognormal(0.1, -0.9, 0.25), Lognormal(0.8, -0.9, 0.2), Lognormal(1.4, -0.9, 0.3)]
-    smooth = bells(*((law, 10.0) for law in laws))
-    assert smooth.t[speed_peaks(smooth)] == pytest.approx([law.mode for law in laws], abs=0.01)
+def test_strokes_apart_are_one_peak_one_salient_interval_and_one_stroke_each():
+    lognormals = [Lognormal(0.1, -0.9, 0.25), Lognormal(0.8, -0.9, 0.2), Lognormal(1.4, -0.9, 0.3)]
+    smooth = smooth_sum(*((lognormal, 10.0) for lognormal in lognormals))
+    assert smooth.t[speed_peaks(smooth)] == pytest.approx(
+        [lognormal.mode for lognormal in lognormals], abs=0.01
+    )
     assert len(salient_points(smooth)) == 4
     chain = initial_chain(smooth)
-    assert chain.median == pytest.approx([law.median for law in laws], abs=0.03)
-    assert chain.width == pytest.approx([math.exp(law.mu) * law.sigma for law in laws], rel=0.2)
+    assert chain.median == pytest.approx([lognormal.median for lognormal in lognormals], abs=0.03)
+    assert chain.width == pytest.approx(
+        [math.exp(lognormal.mu) * lognormal.sigma for lognormal in lognormals], rel=0.2
+    )
     assert chain.targets[:, 0] == pytest.approx([0.0, 10.0, 20.0, 30.0], abs=0.5)
 
 
-def test_a_lone_bell_is_found_by_the_closed_forms_alone():
-    law = Lognormal(0.1, -0.5, 0.25)
-    smooth = bells((law, 10.0))
+def test_a_single_stroke_is_found_by_the_closed_forms_alone():
+    lognormal = Lognormal(0.1, -0.5, 0.25)
+    smooth = smooth_sum((lognormal, 10.0))
     chain = initial_chain(smooth)
     assert (chain.sigma[0], chain.median[0]) == (
         pytest.approx(0.25, abs=0.02),
-        pytest.approx(law.median, abs=0.01),
+        pytest.approx(lognormal.median, abs=0.01),
     )
     points = characteristic_points(smooth.t, smooth.speed)
-    assert points.times == pytest.approx((law.inflections.before, law.mode, law.inflections.after), abs=0.01)
+    assert points.times == pytest.approx(
+        (lognormal.inflections.before, lognormal.mode, lognormal.inflections.after), abs=0.01
+    )
 
 
 def test_a_ripple_counts_as_a_peak_only_above_the_stated_prominence():
     t = np.arange(0.0, 2.0, 0.005)
     for height, peaks in ((0.05, 2), (0.002, 1)):
         speed = np.exp(-0.5 * ((t - 0.6) / 0.1) ** 2) + height * np.exp(-0.5 * ((t - 1.4) / 0.06) ** 2)
-        way = np.cumsum(speed) * 0.005
-        assert len(speed_peaks(smooth_part(PenPart(t, np.column_stack((way, 0.0 * way)))))) == peaks
+        path_length = np.cumsum(speed) * 0.005
+        assert (
+            len(speed_peaks(smooth_part(PenPart(t, np.column_stack((path_length, 0.0 * path_length))))))
+            == peaks
+        )
 
 
 def test_candidates_are_where_the_residual_is():

@@ -21,8 +21,8 @@ from pc_client.movements import (
 from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_SETS, movement_text
 from pc_client.movements.generate import write_library
 from pc_client.movements.lognormal import Lognormal
-from pc_client.movements.robotic import RoboticLaw
-from pc_client.movements.samples import SampledLaw
+from pc_client.movements.robotic import RoboticTrajectory
+from pc_client.movements.samples import SampledTrajectory
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Stroke
 from pc_client.movements.timing import LiteralTiming, TwoSidedTiming
@@ -85,10 +85,12 @@ def assert_equal(copy: Movement, movement: Movement) -> None:
 def test_every_timing_and_corner_survives_saving(tmp_path: Path) -> None:
     points = np.array([[0.3, 0.0, 0.2], [0.35, 0.1, 0.2], [0.3, 0.1, 0.3], [0.3, 0.2, 0.2]])
     timings = (TwoSidedTiming(0.1, 1.0, 0.1, 3.0), LiteralTiming(0.6, 1.0, 1.5), Lognormal(0.2, 0.5, 0.1))
-    law = SigmaLognormal(points, tuple(Stroke(timing, 0.1 / 3.0, 2.0) for timing in timings), 4.0)
-    human = Movement("odd name, ü", law, np.array([1.0, 1.0, 2.0]), {"a key": 'x "y"', "n": 3, "f": 0.1})
-    law = RoboticLaw(points, human.stroke_durations, (0.15,), "blend", 0.02)
-    blended = Movement("blended", law, human.stroke_durations)
+    trajectory = SigmaLognormal(points, tuple(Stroke(timing, 0.1 / 3.0, 2.0) for timing in timings), 4.0)
+    human = Movement(
+        "odd name, ü", trajectory, np.array([1.0, 1.0, 2.0]), {"a key": 'x "y"', "n": 3, "f": 0.1}
+    )
+    trajectory = RoboticTrajectory(points, human.stroke_durations, (0.15,), "blend", 0.02)
+    blended = Movement("blended", trajectory, human.stroke_durations)
     for movement in (human, blended):
         save_movement(movement, tmp_path / "copy.toml")
         copy = load_movement(tmp_path / "copy.toml")
@@ -100,15 +102,15 @@ def test_every_timing_and_corner_survives_saving(tmp_path: Path) -> None:
 def test_samples_survive_saving(tmp_path: Path) -> None:
     movement = load_movement("lognorm_4_1")
     columns = export_samples(movement, 0.01)
-    law = SampledLaw(columns.t, np.column_stack(columns[1:]))
-    save_movement(Movement("mine", law, np.array([law.duration])), tmp_path / "mine.csv")
+    trajectory = SampledTrajectory(columns.t, np.column_stack(columns[1:]))
+    save_movement(Movement("mine", trajectory, np.array([trajectory.duration])), tmp_path / "mine.csv")
     copy = load_movement(tmp_path / "mine.csv")
     assert (copy.kind, copy.name) == ("samples", "mine")
-    np.testing.assert_array_equal(copy.law.points, law.points)
+    np.testing.assert_array_equal(copy.trajectory.points, trajectory.points)
     t = np.linspace(0.0, movement.duration, 777)
     np.testing.assert_allclose(copy.sample(t).p, movement.sample(t).p, atol=1e-6)
     np.testing.assert_allclose(copy.sample(t).v, movement.sample(t).v, atol=1e-4)
-    np.testing.assert_array_equal(copy.target_points, law.points[[0, -1]])
+    np.testing.assert_array_equal(copy.target_points, trajectory.points[[0, -1]])
 
 
 def test_samples_by_hand(tmp_path: Path) -> None:
@@ -162,7 +164,11 @@ ROBOT = movement_text(load_movement("arcs/uniform_4_1"))
         (HUMAN, ("sigma = 0.183", "sigma = -1"), "sigma -1"),
         (HUMAN, ("sigma = 0.183", "sigma = nan"), "strokes[1].sigma: nan"),
         (HUMAN, ("sigma = 0.183", "sigma = true"), "strokes[1].sigma: True"),
-        (HUMAN, ("tilt = 1.327", "tlit = 1.327"), "strokes[0].tlit: no such field; known are turn, tilt"),
+        (
+            HUMAN,
+            ("tilt = 1.327", "tlit = 1.327"),
+            "strokes[0].tlit: no such field; known are arc_angle, tilt",
+        ),
         (HUMAN, ("[[strokes]]", "[[stroke]]"), "strokes: missing"),
         (
             HUMAN,
@@ -205,11 +211,11 @@ def test_without_stroke_durations_they_are_the_speed_minima(tmp_path: Path) -> N
 def test_a_stroke_by_k_is_a_stroke_by_its_lead(tmp_path: Path) -> None:
     text = 'format = 1\nname = "one"\nkind = "lognormal"\nduration = 1.2\n'
     text += "target_points = [[0, 0, 0], [0.1, 0, 0]]\n"
-    laws = []
+    trajectories = []
     for field in ("k = 1.5", "lead = 0.5"):
         (tmp_path / "one.toml").write_text(text + f"[[strokes]]\nstart = 0.1\nduration = 1.0\n{field}\n")
-        laws.append(load_movement(tmp_path / "one.toml").sample([0.5]).p)
-    np.testing.assert_allclose(laws[0], laws[1], atol=1e-15)
+        trajectories.append(load_movement(tmp_path / "one.toml").sample([0.5]).p)
+    np.testing.assert_allclose(trajectories[0], trajectories[1], atol=1e-15)
 
 
 @pytest.mark.parametrize(

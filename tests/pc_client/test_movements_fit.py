@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from pc_client.errors import MovementError
 from pc_client.movements import Movement, fit_movement, load_movement
 from pc_client.movements.geometry import UR3_BOX, Box, Similarity
-from pc_client.movements.samples import SampledLaw
+from pc_client.movements.samples import SampledTrajectory
 
 T = np.linspace(0.0, 1.0, 1501)
 
@@ -22,7 +22,7 @@ def drawing() -> Movement:
     """A flat figure such as a pen makes, 40 units wide."""
     t = np.linspace(0.0, 2.0, 60)
     points = np.column_stack((20.0 * np.cos(3.0 * t), 8.0 * np.sin(5.0 * t), np.zeros_like(t)))
-    return Movement("drawing", SampledLaw(t, points), np.array([2.0]))
+    return Movement("drawing", SampledTrajectory(t, points), np.array([2.0]))
 
 
 @pytest.mark.parametrize("rotate", ["none", "yaw", "any"])
@@ -95,11 +95,13 @@ def test_where_a_movement_came_from_does_not_matter(
         lambda: fit_movement(drawing(), rotate="upside down"),
         lambda: fit_movement(drawing(), max_scale=0.0),
         lambda: fit_movement(drawing(), max_speed=-1.0),
-        lambda: fit_movement(Movement("dot", SampledLaw(np.arange(4.0), np.ones((4, 3))), np.array([3.0]))),
+        lambda: fit_movement(
+            Movement("dot", SampledTrajectory(np.arange(4.0), np.ones((4, 3))), np.array([3.0]))
+        ),
         lambda: fit_movement(drawing(), Box((0.0, 0.0, 0.0), (0.0, 1.0, 1.0))),
         lambda: drawing().stretched(0.0),
-        lambda: Movement("", drawing().law, np.array([2.0])),
-        lambda: Movement("x", drawing().law, np.array([1.0])),
+        lambda: Movement("", drawing().trajectory, np.array([2.0])),
+        lambda: Movement("x", drawing().trajectory, np.array([1.0])),
     ],
 )
 def test_nonsense_is_refused(make: object) -> None:

@@ -122,13 +122,13 @@ def test_power_law_without_stroke_durations_takes_the_passages(tmp_path: Path) -
 
 def test_fitts_law() -> None:
     """Every doubling of the distance, or halving of the width, costs one slope more."""
-    law = Fitts(intercept=0.2, slope=0.15, width=0.02)
+    trajectory = Fitts(intercept=0.2, slope=0.15, width=0.02)
     np.testing.assert_allclose(
-        law.durations(np.array([0.01, 0.02, 0.04, 0.16])), [0.2, 0.35, 0.5, 0.8], atol=1e-15
+        trajectory.durations(np.array([0.01, 0.02, 0.04, 0.16])), [0.2, 0.35, 0.5, 0.8], atol=1e-15
     )
     assert Fitts(0.2, 0.15, 0.01).durations(np.array([0.02]))[0] == pytest.approx(0.5, abs=1e-15)
     with pytest.raises(MovementError, match="no time"):
-        law.durations(np.array([0.001]))
+        trajectory.durations(np.array([0.001]))
 
 
 def test_isochrony() -> None:
@@ -139,22 +139,24 @@ def test_isochrony() -> None:
 
 def test_strict_isochrony_keeps_mu_and_sigma_and_scales_only_the_length() -> None:
     twin = retimed_twin(HUMAN, "iso", Isochrony())
-    assert isinstance(twin.law, SigmaLognormal)
-    bells = [stroke.timing.lognormal for stroke in twin.law.strokes]
-    assert len({bell.sigma for bell in bells}) == 1
-    assert max(bell.mu for bell in bells) - min(bell.mu for bell in bells) < 1e-12
-    np.testing.assert_allclose(np.diff([bell.t0 for bell in bells], 2), 0.0, atol=1e-12)
-    np.testing.assert_array_equal(twin.law.lengths, HUMAN.law.lengths)
+    assert isinstance(twin.trajectory, SigmaLognormal)
+    lognormals = [stroke.timing.lognormal for stroke in twin.trajectory.strokes]
+    assert len({lognormal.sigma for lognormal in lognormals}) == 1
+    assert (
+        max(lognormal.mu for lognormal in lognormals) - min(lognormal.mu for lognormal in lognormals) < 1e-12
+    )
+    np.testing.assert_allclose(np.diff([lognormal.t0 for lognormal in lognormals], 2), 0.0, atol=1e-12)
+    np.testing.assert_array_equal(twin.trajectory.lengths, HUMAN.trajectory.lengths)
 
 
 def test_fitts_timed_strokes_have_windows_in_the_laws_proportions() -> None:
-    law = retimed(HUMAN.law, Fitts(), overlap=0.4, rest=0.1)
-    windows = [stroke.timing.duration for stroke in law.strokes]
+    trajectory = retimed(HUMAN.trajectory, Fitts(), overlap=0.4, rest=0.1)
+    windows = [stroke.timing.duration for stroke in trajectory.strokes]
     wanted = Fitts().durations(leg_lengths(HUMAN.target_points))
     np.testing.assert_allclose(windows / wanted, windows[0] / wanted[0], rtol=1e-12)
-    assert law.strokes[0].timing.start == 0.1
-    last = law.strokes[-1].timing
-    assert last.start + last.duration == pytest.approx(law.duration - 0.1, abs=1e-12)
+    assert trajectory.strokes[0].timing.start == 0.1
+    last = trajectory.strokes[-1].timing
+    assert last.start + last.duration == pytest.approx(trajectory.duration - 0.1, abs=1e-12)
 
 
 @given(
@@ -178,28 +180,30 @@ def test_windows_overlap_by_their_share_and_fill_the_total(
 def test_duplicates_are_valid_and_inside_the_published_ranges(seed: int, share: float, number: str) -> None:
     original = load_movement(f"arcs/lognorm_{number}")
     copy = duplicate(original, seed, share=share)
-    law, old = copy.law, original.law
-    assert isinstance(law, SigmaLognormal)
+    trajectory, old = copy.trajectory, original.trajectory
+    assert isinstance(trajectory, SigmaLognormal)
     slack = 1e-9
     low, high = (share * np.array([r[side] for r in (PUBLISHED.length, PUBLISHED.sigma)]) for side in (0, 1))
-    sigma, old_sigma = (np.array([s.timing.lognormal.sigma for s in x.strokes]) for x in (law, old))
-    for change, least, most in zip((law.lengths / old.lengths, sigma / old_sigma), low, high, strict=True):
+    sigma, old_sigma = (np.array([s.timing.lognormal.sigma for s in x.strokes]) for x in (trajectory, old))
+    for change, least, most in zip(
+        (trajectory.lengths / old.lengths, sigma / old_sigma), low, high, strict=True
+    ):
         assert np.all(change > 1.0 + least - slack)
         assert np.all(change < 1.0 + most + slack)
     assert np.all(sigma > 0.0)
     # one pace and one rhythm for the whole movement
-    t0, old_t0 = (np.diff([s.timing.lognormal.t0 for s in x.strokes]) for x in (law, old))
+    t0, old_t0 = (np.diff([s.timing.lognormal.t0 for s in x.strokes]) for x in (trajectory, old))
     np.testing.assert_allclose(t0 / old_t0, t0[0] / old_t0[0], rtol=1e-6)
     assert 1.0 - 0.085 * share - slack < t0[0] / old_t0[0] < 1.0 + 0.0825 * share + slack
     shift = math.log(float(np.median(original.stroke_durations)) / HUMAN_STROKE)
-    mu, old_mu = (np.array([s.timing.lognormal.mu for s in x.strokes]) for x in (law, old))
+    mu, old_mu = (np.array([s.timing.lognormal.mu for s in x.strokes]) for x in (trajectory, old))
     human, old_human = mu - shift, old_mu - shift
     assert np.all(old_human < -1.5)  # as published for hands, so a relative change means what it says there
     np.testing.assert_allclose(human / old_human, human[0] / old_human[0], rtol=1e-9)
     assert 1.0 - 0.3775 * share - slack < human[0] / old_human[0] < 1.0 + 0.395 * share + slack
     # directions of begin and end: at most 3 % of a quarter turn, in the plane of the arc
-    for a, b in zip(law.strokes, old.strokes, strict=True):
-        assert abs(a.turn - b.turn) < share * 0.5 * math.pi * 0.045 + slack
+    for a, b in zip(trajectory.strokes, old.strokes, strict=True):
+        assert abs(a.arc_angle - b.arc_angle) < share * 0.5 * math.pi * 0.045 + slack
     assert copy.speed([0.0, copy.duration]).max() < 1e-4
     assert math.fsum(copy.stroke_durations) == pytest.approx(copy.duration, abs=1e-6)
 
@@ -223,16 +227,16 @@ def test_duplicates_differ_by_seed_and_are_reproducible() -> None:
 def test_turned_directions_stay_in_the_plane_of_the_arc() -> None:
     """Only the angles vary: a stroke in the plane z = 0 stays there, and turns by what was asked."""
     points = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]])
-    law = SigmaLognormal(points, (Stroke(TwoSidedTiming(0.1, 1.0, 0.1), 0.5, -math.pi / 2),), 1.2)
+    trajectory = SigmaLognormal(points, (Stroke(TwoSidedTiming(0.1, 1.0, 0.1), 0.5, -math.pi / 2),), 1.2)
     nothing = (0.0, 0.0)
     ranges = VariabilityRanges(nothing, nothing, nothing, nothing, (0.1, 0.1), (0.2, 0.2))
-    copy = duplicate(Movement("flat", law, np.array([1.2])), 1, ranges=ranges)
+    copy = duplicate(Movement("flat", trajectory, np.array([1.2])), 1, ranges=ranges)
     motion = copy.motion(np.linspace(0.3, 0.9, 20))
     np.testing.assert_allclose(motion.p[:, 2], 0.0, atol=1e-15)
-    assert copy.law.strokes[0].turn == pytest.approx(0.5 + 0.05 * math.pi)
+    assert copy.trajectory.strokes[0].arc_angle == pytest.approx(0.5 + 0.05 * math.pi)
     chord = copy.target_points[1] - copy.target_points[0]
     assert math.atan2(chord[1], chord[0]) == pytest.approx(0.075 * math.pi)
-    assert copy.law.lengths[0] == pytest.approx(law.lengths[0], abs=1e-15)
+    assert copy.trajectory.lengths[0] == pytest.approx(trajectory.lengths[0], abs=1e-15)
 
 
 def test_slowing_a_movement_down_changes_nothing_about_its_duplicates() -> None:
@@ -245,8 +249,8 @@ def test_slowing_a_movement_down_changes_nothing_about_its_duplicates() -> None:
 
 def test_rests_of_the_original_are_kept() -> None:
     copy = duplicate(HUMAN, 3)
-    begins = [s.timing.lognormal.time_at_deviation(-FULL_COVERAGE) for s in copy.law.strokes]
-    ends = [s.timing.lognormal.time_at_deviation(FULL_COVERAGE) for s in copy.law.strokes]
+    begins = [s.timing.lognormal.time_at_deviation(-FULL_COVERAGE) for s in copy.trajectory.strokes]
+    ends = [s.timing.lognormal.time_at_deviation(FULL_COVERAGE) for s in copy.trajectory.strokes]
     assert min(begins) == pytest.approx(0.1, abs=1e-9)
     assert copy.duration - max(ends) == pytest.approx(0.1, abs=1e-9)
 
@@ -258,7 +262,7 @@ def test_rests_of_the_original_are_kept() -> None:
         lambda: duplicate(HUMAN, -1),
         lambda: duplicate(HUMAN, 1, share=1.5),
         lambda: retimed_twin(load_movement("uniform_4_1"), "x", Fitts()),
-        lambda: retimed(HUMAN.law, Fitts(), overlap=0.4, rest=9.0),
+        lambda: retimed(HUMAN.trajectory, Fitts(), overlap=0.4, rest=9.0),
         lambda: chained_windows([1.0, 0.0], 1.0, 0.1),
         lambda: chained_windows([1.0], 0.0, 0.1),
         lambda: chained_windows([1.0], 1.0, 1.0),

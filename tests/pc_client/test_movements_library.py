@@ -40,8 +40,10 @@ def test_twins(name: str) -> None:
 @pytest.mark.parametrize("name", ARCS[5:])
 def test_a_stroke_of_the_arcs_ends_where_the_speed_is_least(name: str) -> None:
     human = load_movement(name)
-    assert isinstance(human.law, SigmaLognormal)
-    np.testing.assert_allclose(np.cumsum(human.stroke_durations)[:-1], human.law.speed_minima(), atol=5.1e-4)
+    assert isinstance(human.trajectory, SigmaLognormal)
+    np.testing.assert_allclose(
+        np.cumsum(human.stroke_durations)[:-1], human.trajectory.speed_minima(), atol=5.1e-4
+    )
 
 
 @pytest.mark.parametrize("name", PAPER + ARCS)
@@ -80,8 +82,8 @@ def test_delay_costs_what_the_theory_says(window: float) -> None:
     """Four separate strokes of one length: 20.0 dB at 16 ms and T = 1 s, the same for the same delay / T."""
     timings = [TwoSidedTiming(window * j, window, 0.1) for j in range(4)]
     points = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.0, 0.1, 0.0], [0.0, 0.1, 0.1]])
-    law = SigmaLognormal(points, tuple(Stroke(timing) for timing in timings), 4.0 * window)
-    movement = Movement("four", law, np.full(4, window))
+    trajectory = SigmaLognormal(points, tuple(Stroke(timing) for timing in timings), 4.0 * window)
+    movement = Movement("four", trajectory, np.full(4, window))
     assert snr_of_delay(movement, 0.016 * window) == pytest.approx(20.0, abs=0.06)
     assert snr_of_delay(movement, 0.024 * window) == pytest.approx(16.5, abs=0.06)
     assert snr_of_delay(movement, 0.048 * window) == pytest.approx(10.5, abs=0.06)
@@ -90,7 +92,7 @@ def test_delay_costs_what_the_theory_says(window: float) -> None:
 def test_sums_of_strokes_reach_the_last_target() -> None:
     for name in PAPER[5:] + ARCS[5:]:
         movement = load_movement(name)
-        assert np.linalg.norm(movement.law.evaluate(60.0).p[0] - movement.target_points[-1]) < 1e-14
+        assert np.linalg.norm(movement.trajectory.evaluate(60.0).p[0] - movement.target_points[-1]) < 1e-14
 
 
 @settings(max_examples=25)

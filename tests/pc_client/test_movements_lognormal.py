@@ -1,4 +1,4 @@
-"""The bell and its two constructions against the acceptance figures of the theory."""
+"""The lognormal and its two constructions against the acceptance figures of the theory."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ CASE_A = Lognormal(0.0, -1.6, 0.25)
 DIGITS_12 = {"rel": 0.0, "abs": 5.1e-13}
 
 
-def figures(bell: Lognormal, length: float = 1.0) -> dict[str, float]:
-    before, after = bell.inflections
-    at_before, at_after = bell.evaluate(before), bell.evaluate(after)
+def figures(lognormal: Lognormal, length: float = 1.0) -> dict[str, float]:
+    before, after = lognormal.inflections
+    at_before, at_after = lognormal.evaluate(before), lognormal.evaluate(after)
     return {
-        "t1": bell.time_at_deviation(-3.0),
+        "t1": lognormal.time_at_deviation(-3.0),
         "t2": before,
-        "t3": bell.mode,
+        "t3": lognormal.mode,
         "t4": after,
-        "t5": bell.time_at_deviation(3.0),
-        "v3": length * bell.peak,
+        "t5": lognormal.time_at_deviation(3.0),
+        "v3": length * lognormal.peak,
         "v2": length * float(at_before.rate),
         "v4": length * float(at_after.rate),
         "s2": float(at_before.done),
-        "s3": bell.done_at_mode,
+        "s3": lognormal.done_at_mode,
         "s4": float(at_after.done),
-        "mean": bell.mean,
-        "median": bell.median,
-        "std": bell.std,
-        "skew": bell.skewness,
-        "kurt": bell.kurtosis,
-        "power": length**2 * bell.power,
+        "mean": lognormal.mean,
+        "median": lognormal.median,
+        "std": lognormal.std,
+        "skew": lognormal.skewness,
+        "kurt": lognormal.kurtosis,
+        "power": length**2 * lognormal.power,
     }
 
 
@@ -88,14 +88,14 @@ def test_case_b_shift_and_length() -> None:
 
 def test_case_c_the_papers_isolated_stroke() -> None:
     timing = LiteralTiming(start=0.0, duration=0.1, lead=0.0)
-    bell = timing.lognormal
+    lognormal = timing.lognormal
     assert timing.k == 2.0
-    assert bell.sigma == pytest.approx(0.157527431, abs=5e-10)
-    assert bell.mu == pytest.approx(-2.970917382, abs=5e-10)
-    assert bell.mode == pytest.approx(0.05, abs=2e-12)
+    assert lognormal.sigma == pytest.approx(0.157527431, abs=5e-10)
+    assert lognormal.mu == pytest.approx(-2.970917382, abs=5e-10)
+    assert lognormal.mode == pytest.approx(0.05, abs=2e-12)
     # The notes' further digits come from sigma and mu rounded to nine decimals.
     rounded = Lognormal(0.0, -2.970917382, 0.157527431)
-    for figures_of, tolerance in ((rounded, 5e-10), (bell, 8e-9)):
+    for figures_of, tolerance in ((rounded, 5e-10), (lognormal, 8e-9)):
         assert 0.1 * figures_of.peak == pytest.approx(5.002595473, abs=tolerance)
         assert figures_of.done_at_mode == pytest.approx(0.437414595, abs=tolerance)
         assert figures_of.skewness == pytest.approx(0.479511888, abs=tolerance)
@@ -124,15 +124,15 @@ def test_case_f_the_quadratic(k: float, sigma: float) -> None:
 
 @given(a=st.floats(0.05, 50.0), b=st.floats(0.01, 10.0), sigma=st.floats(0.03, 0.6), mu=st.floats(-3.0, 1.5))
 def test_case_g_scaling_of_time_and_space(a: float, b: float, sigma: float, mu: float) -> None:
-    bell = Lognormal(0.3, mu, sigma)
-    slow = bell.stretched(a)
-    assert slow.t0 == pytest.approx(a * bell.t0)
-    assert slow.mode - slow.t0 == pytest.approx(a * (bell.mode - bell.t0), rel=1e-9)
-    assert slow.std == pytest.approx(a * bell.std, rel=1e-9)
-    assert b * slow.peak == pytest.approx(b * bell.peak / a, rel=1e-9)
-    assert (slow.skewness, slow.kurtosis) == (bell.skewness, bell.kurtosis)
+    lognormal = Lognormal(0.3, mu, sigma)
+    slow = lognormal.stretched(a)
+    assert slow.t0 == pytest.approx(a * lognormal.t0)
+    assert slow.mode - slow.t0 == pytest.approx(a * (lognormal.mode - lognormal.t0), rel=1e-9)
+    assert slow.std == pytest.approx(a * lognormal.std, rel=1e-9)
+    assert b * slow.peak == pytest.approx(b * lognormal.peak / a, rel=1e-9)
+    assert (slow.skewness, slow.kurtosis) == (lognormal.skewness, lognormal.kurtosis)
     t = np.linspace(0.0, 5.0, 50)
-    np.testing.assert_allclose(slow.evaluate(a * t).done, bell.evaluate(t).done, atol=1e-9)
+    np.testing.assert_allclose(slow.evaluate(a * t).done, lognormal.evaluate(t).done, atol=1e-9)
 
 
 def test_case_h_tails() -> None:
@@ -159,20 +159,20 @@ LITERAL_TABLE = [
 def test_table_of_the_literal_construction(row: tuple[float, ...]) -> None:
     lead, k, sigma, mu, covered, start, mode, skew, kurt, peak = row
     timing = LiteralTiming(0.0, 1.0, lead)
-    bell = timing.lognormal
+    lognormal = timing.lognormal
     assert timing.k == pytest.approx(k, rel=1e-14)
     assert lead_from_k(k, 1.0) == pytest.approx(lead, abs=1e-13)
-    assert bell.sigma == pytest.approx(sigma, abs=6e-10)
-    assert bell.mu == pytest.approx(mu, abs=6e-10)
-    assert bell.mode == pytest.approx(0.5, abs=1e-12)
-    done = bell.evaluate([0.0, 1.0]).done
+    assert lognormal.sigma == pytest.approx(sigma, abs=6e-10)
+    assert lognormal.mu == pytest.approx(mu, abs=6e-10)
+    assert lognormal.mode == pytest.approx(0.5, abs=1e-12)
+    done = lognormal.evaluate([0.0, 1.0]).done
     assert done[1] - done[0] == pytest.approx(covered, abs=6e-9)
-    visible = bell.time_at_deviation(-FULL_COVERAGE)
+    visible = lognormal.time_at_deviation(-FULL_COVERAGE)
     assert visible == pytest.approx(start, abs=6e-4)
     assert (0.5 - visible) / (1.0 - visible) == pytest.approx(mode, abs=6e-4)
-    assert bell.skewness == pytest.approx(skew, abs=6e-4)
-    assert bell.kurtosis == pytest.approx(kurt, abs=6e-4)
-    assert bell.peak == pytest.approx(peak, abs=6e-4)
+    assert lognormal.skewness == pytest.approx(skew, abs=6e-4)
+    assert lognormal.kurtosis == pytest.approx(kurt, abs=6e-4)
+    assert lognormal.peak == pytest.approx(peak, abs=6e-4)
 
 
 # sigma -> mode fraction and peak for c = 3 sqrt 2 and for c = 3, skewness, kurtosis.
@@ -221,25 +221,25 @@ def test_window_ends_carry_the_tails_asked_for() -> None:
     assert done == pytest.approx([ndtr(-2.5), ndtr(2.5)], abs=1e-14)
 
 
-@pytest.mark.parametrize("bell", [CASE_A, Lognormal(-0.4, 0.3, 0.08), Lognormal(0.0, -0.5, 0.5)])
-def test_closed_forms_agree_with_quadrature(bell: Lognormal) -> None:
+@pytest.mark.parametrize("lognormal", [CASE_A, Lognormal(-0.4, 0.3, 0.08), Lognormal(0.0, -0.5, 0.5)])
+def test_closed_forms_agree_with_quadrature(lognormal: Lognormal) -> None:
     """Moments and power straight from Lambda, which uses none of their closed forms."""
-    low, high = bell.time_at_deviation(-9.0), bell.time_at_deviation(9.0)
+    low, high = lognormal.time_at_deviation(-9.0), lognormal.time_at_deviation(9.0)
 
     def integral(weight: object) -> float:
         def weighted(t: float) -> float:
-            return weight(t) * float(bell.evaluate(t).rate)
+            return weight(t) * float(lognormal.evaluate(t).rate)
 
-        return float(quad(weighted, low, high, points=[bell.mode], limit=400)[0])
+        return float(quad(weighted, low, high, points=[lognormal.mode], limit=400)[0])
 
     mean = integral(lambda t: t)
     std = math.sqrt(integral(lambda t: (t - mean) ** 2))
     assert integral(lambda t: 1.0) == pytest.approx(1.0, abs=1e-10)
-    assert mean == pytest.approx(bell.mean, rel=1e-9)
-    assert std == pytest.approx(bell.std, rel=1e-8)
-    assert integral(lambda t: ((t - mean) / std) ** 3) == pytest.approx(bell.skewness, rel=1e-6)
-    assert integral(lambda t: ((t - mean) / std) ** 4) == pytest.approx(bell.kurtosis, rel=1e-6)
-    assert integral(lambda t: float(bell.evaluate(t).rate)) == pytest.approx(bell.power, rel=1e-9)
+    assert mean == pytest.approx(lognormal.mean, rel=1e-9)
+    assert std == pytest.approx(lognormal.std, rel=1e-8)
+    assert integral(lambda t: ((t - mean) / std) ** 3) == pytest.approx(lognormal.skewness, rel=1e-6)
+    assert integral(lambda t: ((t - mean) / std) ** 4) == pytest.approx(lognormal.kurtosis, rel=1e-6)
+    assert integral(lambda t: float(lognormal.evaluate(t).rate)) == pytest.approx(lognormal.power, rel=1e-9)
 
 
 def test_rates_are_the_derivatives_of_the_values() -> None:
@@ -263,9 +263,9 @@ def test_nothing_moves_before_the_command() -> None:
 
 def test_power_as_a_signal_of_known_frequency() -> None:
     """The isolated stroke with sigma = .1 has w = 6.26 / T."""
-    bell = TwoSidedTiming(0.0, 1.0, 0.1).lognormal
+    lognormal = TwoSidedTiming(0.0, 1.0, 0.1).lognormal
     t = np.linspace(0.0, 1.0, 20_001)
-    values = bell.evaluate(t)
+    values = lognormal.evaluate(t)
     w = math.sqrt(float(values.rate_change @ values.rate_change) / float(values.rate @ values.rate))
     assert w == pytest.approx(6.26, abs=0.005)
 

@@ -32,24 +32,24 @@ def test_unit_stroke_is_the_published_polynomial() -> None:
     np.testing.assert_array_equal([*ends.rate, *ends.rate_change], 0.0)
 
 
-@pytest.mark.parametrize("law", [STOP, VIA])
-def test_targets_are_reached_exactly_at_their_times(law: MinimumJerk) -> None:
+@pytest.mark.parametrize("trajectory", [STOP, VIA])
+def test_targets_are_reached_exactly_at_their_times(trajectory: MinimumJerk) -> None:
     edges = np.concatenate(([0.0], np.cumsum(DURATIONS)))
-    at = law.evaluate(edges)
+    at = trajectory.evaluate(edges)
     np.testing.assert_allclose(at.p, POINTS, atol=1e-14)
     for ends in (at.v[[0, -1]], at.a[[0, -1]]):
         np.testing.assert_allclose(ends, 0.0, atol=1e-13)
-    if law is STOP:
+    if trajectory is STOP:
         np.testing.assert_allclose(at.v, 0.0, atol=1e-14)
     else:
         assert np.linalg.norm(at.v[1:-1], axis=1).min() > 0.05
-    assert law.duration == math.fsum(DURATIONS)
+    assert trajectory.duration == math.fsum(DURATIONS)
 
 
-@pytest.mark.parametrize("law", [STOP, VIA])
-def test_derivatives(law: MinimumJerk) -> None:
-    t, h = np.linspace(0.01, law.duration - 0.01, 401), 1e-6
-    before, at, after = (law.evaluate(t + shift) for shift in (-h, 0.0, h))
+@pytest.mark.parametrize("trajectory", [STOP, VIA])
+def test_derivatives(trajectory: MinimumJerk) -> None:
+    t, h = np.linspace(0.01, trajectory.duration - 0.01, 401), 1e-6
+    before, at, after = (trajectory.evaluate(t + shift) for shift in (-h, 0.0, h))
     np.testing.assert_allclose((after.p - before.p) / (2 * h), at.v, atol=1e-8)
     np.testing.assert_allclose((after.v - before.v) / (2 * h), at.a, atol=1e-5)
 
@@ -61,14 +61,14 @@ def test_two_points_to_pass_are_one_stroke() -> None:
         np.testing.assert_allclose(a, b, atol=1e-12)
 
 
-def jerk_cost(law: MinimumJerk, bump: float = 0.0) -> float:
+def jerk_cost(trajectory: MinimumJerk, bump: float = 0.0) -> float:
     """Integral of the squared jerk, of the movement plus a bump that is zero at all points and ends."""
-    t = np.linspace(0.0, law.duration, 40_001)
+    t = np.linspace(0.0, trajectory.duration, 40_001)
     edges = np.concatenate(([0.0], np.cumsum(DURATIONS)))
     zeros = np.polynomial.Polynomial.fromroots(
         [0.0, 0.0, 0.0, edges[1], edges[2], edges[3], edges[3], edges[3]]
     )
-    a = law.evaluate(t).a + bump * zeros.deriv(2)(t)[:, None] * [1.0, -0.5, 0.3]
+    a = trajectory.evaluate(t).a + bump * zeros.deriv(2)(t)[:, None] * [1.0, -0.5, 0.3]
     jerk = np.gradient(a, t, axis=0, edge_order=2)
     return float(simpson(np.einsum("ij,ij->i", jerk, jerk), x=t))
 
@@ -89,13 +89,16 @@ def test_no_movement_through_the_points_has_less_jerk() -> None:
     stretch=st.floats(0.2, 5.0),
     passing=st.sampled_from(["stop", "via"]),
 )
-def test_similarities_and_time_stretch_commute_with_the_law(
+def test_similarities_and_time_stretch_commute_with_evaluation(
     scale: float, angles: tuple[float, float, float], stretch: float, passing: str
 ) -> None:
-    law = MinimumJerk(POINTS, DURATIONS, passing)
+    trajectory = MinimumJerk(POINTS, DURATIONS, passing)
     similarity = Similarity(scale, Rotation.from_euler("xyz", angles).as_matrix(), np.array([1.0, -2.0, 0.3]))
-    t = np.linspace(0.0, law.duration, 101)
-    at, moved = law.evaluate(t), law.transformed(similarity).stretched(stretch).evaluate(stretch * t)
+    t = np.linspace(0.0, trajectory.duration, 101)
+    at, moved = (
+        trajectory.evaluate(t),
+        trajectory.transformed(similarity).stretched(stretch).evaluate(stretch * t),
+    )
     np.testing.assert_allclose(moved.p, similarity.points(at.p), atol=1e-12)
     np.testing.assert_allclose(moved.v, similarity.vectors(at.v) / stretch, atol=1e-10 * scale / stretch)
     np.testing.assert_allclose(moved.a, similarity.vectors(at.a) / stretch**2, atol=1e-9 * scale / stretch**2)

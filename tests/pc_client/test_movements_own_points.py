@@ -117,7 +117,7 @@ def test_every_form_of_a_table_of_points_is_read(text: str, tmp_path: Path) -> N
     [
         ("", "targets.csv: 0 target points; a movement needs at least 2"),
         ("x,y,z\n.3,0,.2\n", "targets.csv: 1 target points"),
-        ("x,y\n1,2\n", "targets.csv, line 1: 2 columns; give x, y, z in m, and, if you wish, t in s"),
+        ("x,y\n1,2\n", "targets.csv, line 1: 2 columns; give x, y, z in m, and optionally t in s"),
         (".3,0,.2\n.3,0\n", "targets.csv, line 2: 2 columns"),
         (".3,0,.2\n\n.3,0,far\n", 'targets.csv, line 3: z is "far"; give a finite number'),
         (".3,0,.2\n.3,inf,.2\n", 'targets.csv, line 2: y is "inf"'),

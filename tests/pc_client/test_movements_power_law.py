@@ -31,29 +31,31 @@ def frenet(path: SmoothPath, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return curvature, np.einsum("ij,ij->i", across, third) / np.einsum("ij,ij->i", across, across)
 
 
-@pytest.mark.parametrize("law", [PLANE, SPACE])
-def test_speed_follows_the_law_between_the_ramps(law: PowerLaw) -> None:
+@pytest.mark.parametrize("trajectory", [PLANE, SPACE])
+def test_speed_follows_the_law_between_the_ramps(trajectory: PowerLaw) -> None:
     """From the movement's own velocity and acceleration, and the textbook's curvature at the same point."""
-    t = np.linspace(sum(RAMPS), law.duration - sum(RAMPS), 2001)
-    motion = law.evaluate(t)
+    t = np.linspace(sum(RAMPS), trajectory.duration - sum(RAMPS), 2001)
+    motion = trajectory.evaluate(t)
     speed = np.linalg.norm(motion.v, axis=1)
     fine = np.linspace(0.0, 1.0, 200_001)
-    way = cumulative_simpson(np.linalg.norm(law.path.derivative(fine, 1), axis=1), x=fine, initial=0.0)
+    along = cumulative_simpson(
+        np.linalg.norm(trajectory.path.derivative(fine, 1), axis=1), x=fine, initial=0.0
+    )
     s = cumulative_simpson(speed, x=t, initial=0.0)
-    start = fine[np.linalg.norm(law.path.derivative(fine, 0) - motion.p[0], axis=1).argmin()]
-    u = np.interp(s + np.interp(start, fine, way), way, fine)
-    np.testing.assert_allclose(law.path.derivative(u, 0), motion.p, atol=2.0 * way[-1] / len(fine))
-    curvature, torsion = frenet(law.path, u)
+    start = fine[np.linalg.norm(trajectory.path.derivative(fine, 0) - motion.p[0], axis=1).argmin()]
+    u = np.interp(s + np.interp(start, fine, along), along, fine)
+    np.testing.assert_allclose(trajectory.path.derivative(u, 0), motion.p, atol=2.0 * along[-1] / len(fine))
+    curvature, torsion = frenet(trajectory.path, u)
     seen = torsion * curvature**2 / (curvature**2 + 1.0)
-    expected = (1 + curvature**2) ** (-1 / 6) * (1 + seen**2) ** (-0.5 * law.torsion_exponent)
+    expected = (1 + curvature**2) ** (-1 / 6) * (1 + seen**2) ** (-0.5 * trajectory.torsion_exponent)
     np.testing.assert_allclose(speed / expected, (speed / expected).mean(), rtol=2e-3)
 
 
 def test_exponent_is_one_third_where_the_path_is_bent() -> None:
     """R far above all radii: the bare law."""
-    law = PowerLaw(POINTS[:3], 6.0, RAMPS, 100.0)
+    trajectory = PowerLaw(POINTS[:3], 6.0, RAMPS, 100.0)
     t = np.linspace(0.6, 5.4, 3001)
-    motion = law.evaluate(t)
+    motion = trajectory.evaluate(t)
     fit = fit_power_law(motion.v, motion.a, max_radius=10.0)
     assert fit.exponent == pytest.approx(1 / 3, abs=1e-4)
     assert fit.r_squared == pytest.approx(1.0, abs=1e-6)
@@ -61,42 +63,42 @@ def test_exponent_is_one_third_where_the_path_is_bent() -> None:
 
 
 def test_exponent_zero_is_a_constant_speed() -> None:
-    law = PowerLaw(POINTS, 6.0, RAMPS, 1.0, 0.0)
-    speed = np.linalg.norm(law.evaluate(np.linspace(0.5, 5.5, 501)).v, axis=1)
+    trajectory = PowerLaw(POINTS, 6.0, RAMPS, 1.0, 0.0)
+    speed = np.linalg.norm(trajectory.evaluate(np.linspace(0.5, 5.5, 501)).v, axis=1)
     np.testing.assert_allclose(speed, speed.mean(), rtol=1e-6)
 
 
 def test_speed_is_bounded_where_the_path_is_straight() -> None:
     """Two points, a line: top speed V, and a way of V (T - half of the ramps, twice)."""
-    law = PowerLaw(POINTS[:2], 2.0, RAMPS, 1.0)
-    motion = law.evaluate(np.linspace(0.0, 2.0, 2001))
+    trajectory = PowerLaw(POINTS[:2], 2.0, RAMPS, 1.0)
+    motion = trajectory.evaluate(np.linspace(0.0, 2.0, 2001))
     length = np.linalg.norm(POINTS[1] - POINTS[0])
     assert np.linalg.norm(motion.v, axis=1).max() == pytest.approx(length / 1.5, rel=1e-9)
     inflected = PowerLaw(
         np.array([[0.0, 0.0, 0.0], [0.1, 0.1, 0.0], [0.2, 0.0, 0.0], [0.3, 0.1, 0.0]]), 4.0, RAMPS, 1.0
     )
     for gamma in (0.0, TORSION_EXPONENT):
-        law = PowerLaw(inflected.target_points, 4.0, RAMPS, 1.0, TWO_THIRDS, gamma)
-        speed = np.linalg.norm(law.evaluate(np.linspace(0.0, 4.0, 4001)).v, axis=1)
+        trajectory = PowerLaw(inflected.target_points, 4.0, RAMPS, 1.0, TWO_THIRDS, gamma)
+        speed = np.linalg.norm(trajectory.evaluate(np.linspace(0.0, 4.0, 4001)).v, axis=1)
         assert speed.max() < 4.0 * speed.mean()
         # a flat path has no torsion: both laws are one
-        np.testing.assert_allclose(law.evaluate(1.7).p, inflected.evaluate(1.7).p, atol=1e-12)
+        np.testing.assert_allclose(trajectory.evaluate(1.7).p, inflected.evaluate(1.7).p, atol=1e-12)
 
 
-@pytest.mark.parametrize("law", [PLANE, SPACE])
-def test_targets_are_passed_exactly(law: PowerLaw) -> None:
-    at = law.evaluate(law.passages)
+@pytest.mark.parametrize("trajectory", [PLANE, SPACE])
+def test_targets_are_passed_exactly(trajectory: PowerLaw) -> None:
+    at = trajectory.evaluate(trajectory.passages)
     np.testing.assert_allclose(at.p, POINTS, atol=1e-12)
     np.testing.assert_allclose(at.v[[0, -1]], 0.0, atol=1e-12)
-    assert np.all(np.diff(law.passages) > 0.3)
+    assert np.all(np.diff(trajectory.passages) > 0.3)
 
 
-@pytest.mark.parametrize("law", [PLANE, SPACE, PowerLaw(POINTS[:2], 1.0, (0.3,), 0.1)])
-def test_derivatives(law: PowerLaw) -> None:
-    t, h = np.linspace(0.0011, law.duration - 0.0011, 1001), 1e-6
-    before, at, after = (law.evaluate(t + shift) for shift in (-h, 0.0, h))
+@pytest.mark.parametrize("trajectory", [PLANE, SPACE, PowerLaw(POINTS[:2], 1.0, (0.3,), 0.1)])
+def test_derivatives(trajectory: PowerLaw) -> None:
+    t, h = np.linspace(0.0011, trajectory.duration - 0.0011, 1001), 1e-6
+    before, at, after = (trajectory.evaluate(t + shift) for shift in (-h, 0.0, h))
     np.testing.assert_allclose((after.p - before.p) / (2 * h), at.v, atol=1e-8)
-    if len(law.ramps) == 2:
+    if len(trajectory.ramps) == 2:
         np.testing.assert_allclose((after.v - before.v) / (2 * h), at.a, atol=1e-5)
 
 
@@ -106,7 +108,7 @@ def test_derivatives(law: PowerLaw) -> None:
     angles=st.tuples(*(st.floats(-3.0, 3.0) for _ in range(3))),
     stretch=st.floats(0.2, 5.0),
 )
-def test_similarities_and_time_stretch_commute_with_the_law(
+def test_similarities_and_time_stretch_commute_with_evaluation(
     scale: float, angles: tuple[float, float, float], stretch: float
 ) -> None:
     similarity = Similarity(scale, Rotation.from_euler("xyz", angles).as_matrix(), np.array([1.0, -2.0, 0.3]))

@@ -1,4 +1,4 @@
-"""The robot-like law: exact lengths and times, smoothness, paths by arc length."""
+"""The robot-like trajectory: exact lengths and times, smoothness, paths by arc length."""
 
 from __future__ import annotations
 
@@ -14,49 +14,51 @@ from scipy.spatial.transform import Rotation
 from pc_client.errors import MovementError
 from pc_client.movements.geometry import Similarity
 from pc_client.movements.path import CornerPath
-from pc_client.movements.robotic import RoboticLaw, SmoothedSquareWave
+from pc_client.movements.robotic import RoboticTrajectory, SmoothedSquareWave
 
 POINTS = np.array([[0.30, 0.0, 0.2], [0.40, 0.1, 0.3], [0.30, 0.15, 0.2], [0.35, -0.05, 0.25]])
 DURATIONS = np.array([1.7, 1.3, 2.2])
-LAWS = [
-    RoboticLaw(POINTS, DURATIONS, (0.2,)),
-    RoboticLaw(POINTS, DURATIONS, (0.2, 0.1)),
-    RoboticLaw(POINTS, DURATIONS, (0.1, 0.2), "blend", 0.03),
-    RoboticLaw(POINTS, DURATIONS, (0.25,), "blend", 0.02),
+TRAJECTORIES = [
+    RoboticTrajectory(POINTS, DURATIONS, (0.2,)),
+    RoboticTrajectory(POINTS, DURATIONS, (0.2, 0.1)),
+    RoboticTrajectory(POINTS, DURATIONS, (0.1, 0.2), "blend", 0.03),
+    RoboticTrajectory(POINTS, DURATIONS, (0.25,), "blend", 0.02),
 ]
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_length_and_time_are_kept(law: RoboticLaw) -> None:
-    assert law.duration == math.fsum(DURATIONS)
-    way = law.wave.evaluate([0.0, law.duration, law.duration + 100.0])
-    np.testing.assert_allclose(way.s, [0.0, law.path.length, law.path.length], atol=1e-12)
-    np.testing.assert_allclose(way.v, 0.0, atol=1e-12)
-    np.testing.assert_allclose(law.evaluate(law.duration).p[0], POINTS[-1], atol=1e-12)
+@pytest.mark.parametrize("trajectory", TRAJECTORIES)
+def test_length_and_time_are_kept(trajectory: RoboticTrajectory) -> None:
+    assert trajectory.duration == math.fsum(DURATIONS)
+    along = trajectory.wave.evaluate([0.0, trajectory.duration, trajectory.duration + 100.0])
+    np.testing.assert_allclose(along.s, [0.0, trajectory.path.length, trajectory.path.length], atol=1e-12)
+    np.testing.assert_allclose(along.v, 0.0, atol=1e-12)
+    np.testing.assert_allclose(trajectory.evaluate(trajectory.duration).p[0], POINTS[-1], atol=1e-12)
 
 
-@pytest.mark.parametrize("law", LAWS[:2])
-def test_stops_are_at_the_targets_at_the_twins_times(law: RoboticLaw) -> None:
+@pytest.mark.parametrize("trajectory", TRAJECTORIES[:2])
+def test_stops_are_at_the_targets_at_the_twins_times(trajectory: RoboticTrajectory) -> None:
     edges = np.concatenate(([0.0], np.cumsum(DURATIONS)))
-    at = law.evaluate(edges)
+    at = trajectory.evaluate(edges)
     np.testing.assert_allclose(at.p, POINTS, atol=1e-12)
     np.testing.assert_allclose(at.v, 0.0, atol=1e-12)
-    assert law.path.length == pytest.approx(np.linalg.norm(np.diff(POINTS, axis=0), axis=1).sum(), abs=1e-15)
+    assert trajectory.path.length == pytest.approx(
+        np.linalg.norm(np.diff(POINTS, axis=0), axis=1).sum(), abs=1e-15
+    )
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_way_speed_and_acceleration_belong_together(law: RoboticLaw) -> None:
-    t = np.linspace(0.0, law.duration, 52_001)
-    way = law.wave.evaluate(t)
-    assert way.v.min() > -1e-12
-    np.testing.assert_allclose(cumulative_simpson(way.v, x=t, initial=0.0), way.s, atol=1e-8)
-    np.testing.assert_allclose(cumulative_simpson(way.a, x=t, initial=0.0), way.v, atol=2e-4)
+@pytest.mark.parametrize("trajectory", TRAJECTORIES)
+def test_length_speed_and_acceleration_belong_together(trajectory: RoboticTrajectory) -> None:
+    t = np.linspace(0.0, trajectory.duration, 52_001)
+    along = trajectory.wave.evaluate(t)
+    assert along.v.min() > -1e-12
+    np.testing.assert_allclose(cumulative_simpson(along.v, x=t, initial=0.0), along.s, atol=1e-8)
+    np.testing.assert_allclose(cumulative_simpson(along.a, x=t, initial=0.0), along.v, atol=2e-4)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_velocity_is_the_derivative_of_position(law: RoboticLaw) -> None:
-    t, h = np.linspace(0.0011, law.duration - 0.0011, 2000), 1e-6
-    before, at, after = (law.evaluate(t + shift) for shift in (-h, 0.0, h))
+@pytest.mark.parametrize("trajectory", TRAJECTORIES)
+def test_velocity_is_the_derivative_of_position(trajectory: RoboticTrajectory) -> None:
+    t, h = np.linspace(0.0011, trajectory.duration - 0.0011, 2000), 1e-6
+    before, at, after = (trajectory.evaluate(t + shift) for shift in (-h, 0.0, h))
     np.testing.assert_allclose((after.p - before.p) / (2 * h), at.v, atol=2e-6)
     smooth = np.linalg.norm(after.a - before.a, axis=1) < 1e-3  # away from the corners of single ramps
     assert smooth.mean() > 0.98
@@ -65,35 +67,35 @@ def test_velocity_is_the_derivative_of_position(law: RoboticLaw) -> None:
 
 def test_levels_and_ramps_of_a_trapezoid() -> None:
     wave = SmoothedSquareWave(np.array([[1.0, 3.0]]), np.array([0.5]), (0.4,))
-    way = wave.evaluate([0.7, 0.8, 0.9, 1.0, 1.2, 2.0, 2.8, 3.0, 3.2, 4.0])
-    np.testing.assert_allclose(way.v, [0.0, 0.0, 0.125, 0.25, 0.5, 0.5, 0.5, 0.25, 0.0, 0.0], atol=1e-15)
-    np.testing.assert_allclose(way.s[-1], 1.0, atol=1e-15)
-    assert np.abs(way.a).max() == pytest.approx(0.5 / 0.4)
+    along = wave.evaluate([0.7, 0.8, 0.9, 1.0, 1.2, 2.0, 2.8, 3.0, 3.2, 4.0])
+    np.testing.assert_allclose(along.v, [0.0, 0.0, 0.125, 0.25, 0.5, 0.5, 0.5, 0.25, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(along.s[-1], 1.0, atol=1e-15)
+    assert np.abs(along.a).max() == pytest.approx(0.5 / 0.4)
 
 
 def test_two_boxcars_bound_acceleration_and_jerk() -> None:
     wave = SmoothedSquareWave(np.array([[1.0, 3.0]]), np.array([0.5]), (0.4, 0.1))
     t = np.linspace(0.0, 4.0, 400_001)
-    way = wave.evaluate(t)
-    assert np.abs(way.a).max() == pytest.approx(0.5 / 0.4, rel=1e-9)
-    assert np.abs(np.diff(way.a)).max() / (t[1] - t[0]) == pytest.approx(0.5 / (0.4 * 0.1), rel=1e-3)
+    along = wave.evaluate(t)
+    assert np.abs(along.a).max() == pytest.approx(0.5 / 0.4, rel=1e-9)
+    assert np.abs(np.diff(along.a)).max() / (t[1] - t[0]) == pytest.approx(0.5 / (0.4 * 0.1), rel=1e-3)
     # the order of the two boxcars does not matter
     other = SmoothedSquareWave(np.array([[1.0, 3.0]]), np.array([0.5]), (0.1, 0.4)).evaluate(t)
-    np.testing.assert_allclose(other.s, way.s, atol=1e-14)
+    np.testing.assert_allclose(other.s, along.s, atol=1e-14)
 
 
 def test_smoothing_is_the_convolution_with_boxcars() -> None:
     """By brute force on a grid."""
-    law = LAWS[2]
+    trajectory = TRAJECTORIES[2]
     dt = 1e-4
-    t = np.arange(-1.0, law.duration + 1.0, dt)
+    t = np.arange(-1.0, trajectory.duration + 1.0, dt)
     square = np.zeros_like(t)
-    for (begin, end), level in zip(law.wave.windows, law.wave.levels, strict=True):
+    for (begin, end), level in zip(trajectory.wave.windows, trajectory.wave.levels, strict=True):
         square[(t >= begin) & (t < end)] = level
-    for width in law.ramps:
+    for width in trajectory.ramps:
         n = round(width / dt)
         square = np.convolve(square, np.ones(n) / n, mode="same")
-    np.testing.assert_allclose(law.wave.evaluate(t).v, square, atol=2e-4)
+    np.testing.assert_allclose(trajectory.wave.evaluate(t).v, square, atol=2e-4)
 
 
 point = st.tuples(*(st.floats(-0.5, 0.5) for _ in range(3)))
@@ -154,13 +156,13 @@ def test_straight_corner_needs_no_blend() -> None:
     np.testing.assert_allclose(path.targets_at, [0.0, 0.1, 0.3], atol=1e-15)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_similarities_and_time_stretch_commute_with_the_law(law: RoboticLaw) -> None:
+@pytest.mark.parametrize("trajectory", TRAJECTORIES)
+def test_similarities_and_time_stretch_commute_with_evaluation(trajectory: RoboticTrajectory) -> None:
     similarity = Similarity(
         0.4, Rotation.from_euler("xyz", [0.3, -1.0, 2.0]).as_matrix(), np.array([1.0, 2.0, 3.0])
     )
-    t = np.linspace(0.0, law.duration, 501)
-    at, moved = law.evaluate(t), law.transformed(similarity).stretched(1.7).evaluate(1.7 * t)
+    t = np.linspace(0.0, trajectory.duration, 501)
+    at, moved = trajectory.evaluate(t), trajectory.transformed(similarity).stretched(1.7).evaluate(1.7 * t)
     np.testing.assert_allclose(moved.p, similarity.points(at.p), atol=1e-12)
     np.testing.assert_allclose(moved.v, similarity.vectors(at.v) / 1.7, atol=1e-10)
 
@@ -168,14 +170,14 @@ def test_similarities_and_time_stretch_commute_with_the_law(law: RoboticLaw) -> 
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: RoboticLaw(POINTS, DURATIONS[:2], (0.2,)),
-        lambda: RoboticLaw(POINTS, DURATIONS, ()),
-        lambda: RoboticLaw(POINTS, DURATIONS, (0.2, 0.0)),
-        lambda: RoboticLaw(POINTS, DURATIONS, (1.0, 0.4)),
-        lambda: RoboticLaw(POINTS, DURATIONS, (0.2,), "stop", 0.01),
-        lambda: RoboticLaw(POINTS, DURATIONS, (0.2,), "blend"),
-        lambda: RoboticLaw(POINTS, DURATIONS, (0.2,), "round", 0.01),
-        lambda: RoboticLaw(POINTS, np.array([1.7, math.nan, 2.2]), (0.2,)),
+        lambda: RoboticTrajectory(POINTS, DURATIONS[:2], (0.2,)),
+        lambda: RoboticTrajectory(POINTS, DURATIONS, ()),
+        lambda: RoboticTrajectory(POINTS, DURATIONS, (0.2, 0.0)),
+        lambda: RoboticTrajectory(POINTS, DURATIONS, (1.0, 0.4)),
+        lambda: RoboticTrajectory(POINTS, DURATIONS, (0.2,), "stop", 0.01),
+        lambda: RoboticTrajectory(POINTS, DURATIONS, (0.2,), "blend"),
+        lambda: RoboticTrajectory(POINTS, DURATIONS, (0.2,), "round", 0.01),
+        lambda: RoboticTrajectory(POINTS, np.array([1.7, math.nan, 2.2]), (0.2,)),
         lambda: CornerPath(POINTS, -0.1),
         lambda: CornerPath(POINTS[:1]),
         lambda: CornerPath(POINTS[[0, 0, 1]]),

@@ -19,11 +19,11 @@ from pc_client.movements.stroke import PlanarStroke, Stroke, lift_strokes
 from pc_client.movements.timing import LiteralTiming, TwoSidedTiming
 
 A, B = (0.25, -0.1, 0.2), (0.35, 0.1, 0.3)
-BELL = Lognormal(0.1, -1.6, 0.25)
+LOGNORMAL = Lognormal(0.1, -1.6, 0.25)
 
 
 def test_case_e_planar_arc() -> None:
-    stroke = PlanarStroke(BELL, 0.2, 0.3, 1.5)
+    stroke = PlanarStroke(LOGNORMAL, 0.2, 0.3, 1.5)
     end = stroke.evaluate(50.0).p[0]
     assert end == pytest.approx([0.116996, 0.147433], abs=5e-7)
     assert float(np.hypot(*end)) == pytest.approx(0.188214, abs=5e-7)
@@ -32,7 +32,7 @@ def test_case_e_planar_arc() -> None:
 
 
 def test_case_e_arc_in_space() -> None:
-    stroke = Stroke(BELL, turn=0.9, tilt=0.7)
+    stroke = Stroke(LOGNORMAL, arc_angle=0.9, tilt=0.7)
     assert stroke.length(A, B) / math.dist(A, B) == pytest.approx(1.034564729179, abs=5e-13)
     movement = SigmaLognormal(np.array([A, B]), (stroke,), 60.0)
     np.testing.assert_allclose(movement.evaluate(60.0).p[0], B, atol=1e-14)
@@ -45,30 +45,33 @@ def test_case_e_arc_in_space() -> None:
 def test_planar_position_is_the_integral_of_velocity() -> None:
     """Simpson's rule with 1e-4 s, as in the notes: D = .2, sigma = .25, turn 1.2 rad."""
     t = np.arange(0.1, 1.2, 1e-4)
-    motion = PlanarStroke(BELL, 0.2, 0.3, 1.5).evaluate(t)
+    motion = PlanarStroke(LOGNORMAL, 0.2, 0.3, 1.5).evaluate(t)
     integral = cumulative_simpson(motion.v, x=t, axis=0, initial=0.0)
     np.testing.assert_allclose(motion.p, integral, atol=1e-11)
 
 
-@pytest.mark.parametrize("turn", [0.0, 1e-300, 1e-12, 1e-9, 1e-4, 1.2, -2.5, 6.0])
-def test_any_bending_is_stable(turn: float) -> None:
+@pytest.mark.parametrize("arc_angle", [0.0, 1e-300, 1e-12, 1e-9, 1e-4, 1.2, -2.5, 6.0])
+def test_any_bending_is_stable(arc_angle: float) -> None:
     """Against the textbook form where it is exact, against its Taylor series for small bending."""
-    stroke = PlanarStroke(BELL, 0.2, 0.3, 0.3 + turn)
-    done = BELL.evaluate(0.33).done
+    stroke = PlanarStroke(LOGNORMAL, 0.2, 0.3, 0.3 + arc_angle)
+    done = LOGNORMAL.evaluate(0.33).done
     p = stroke.evaluate(0.33).p[0]
-    if abs(turn) < 1e-3:
-        x, y = 1.0 - (turn * done) ** 2 / 6.0, turn * done / 2.0
+    if abs(arc_angle) < 1e-3:
+        x, y = 1.0 - (arc_angle * done) ** 2 / 6.0, arc_angle * done / 2.0
     else:
-        x, y = math.sin(turn * done) / (turn * done), (1.0 - math.cos(turn * done)) / (turn * done)
+        x, y = (
+            math.sin(arc_angle * done) / (arc_angle * done),
+            (1.0 - math.cos(arc_angle * done)) / (arc_angle * done),
+        )
     rotation = np.array([[math.cos(0.3), -math.sin(0.3)], [math.sin(0.3), math.cos(0.3)]])
     np.testing.assert_allclose(p, 0.2 * done * rotation @ np.array([x, y]), atol=2e-15)
 
 
-@pytest.mark.parametrize("turn", [0.0, 1e-12, 0.9, -1.7])
-def test_derivatives_in_space(turn: float) -> None:
+@pytest.mark.parametrize("arc_angle", [0.0, 1e-12, 0.9, -1.7])
+def test_derivatives_in_space(arc_angle: float) -> None:
     strokes = (
-        Stroke(TwoSidedTiming(0.1, 1.0, 0.15), turn, 0.4),
-        Stroke(TwoSidedTiming(0.6, 1.3, 0.22), -turn, 2.0),
+        Stroke(TwoSidedTiming(0.1, 1.0, 0.15), arc_angle, 0.4),
+        Stroke(TwoSidedTiming(0.6, 1.3, 0.22), -arc_angle, 2.0),
     )
     movement = SigmaLognormal(np.array([A, B, (0.3, 0.0, 0.15)]), strokes, 2.0)
     t, h = np.linspace(0.15, 1.9, 300), 1e-6
@@ -79,7 +82,7 @@ def test_derivatives_in_space(turn: float) -> None:
 
 def test_planar_derivatives() -> None:
     strokes = [
-        PlanarStroke.between((0.0, 0.0), (0.2, 0.1), BELL, 0.8),
+        PlanarStroke.between((0.0, 0.0), (0.2, 0.1), LOGNORMAL, 0.8),
         PlanarStroke(Lognormal(0.2, -1.2, 0.2), 0.1, 2.0, 0.5),
     ]
     t, h = np.linspace(0.12, 1.0, 300), 1e-6
@@ -92,13 +95,15 @@ def test_planar_arcs_are_arcs_in_space_that_lie_flat() -> None:
     """Two codes for one theory: a left turn in the plane z = 0 has its normal on the left."""
     points = np.array([[0.0, 0.0, 0.0], [0.2, 0.05, 0.0], [0.1, 0.2, 0.0]])
     timings = [TwoSidedTiming(0.1, 1.0, 0.15), TwoSidedTiming(0.7, 1.1, 0.2)]
-    turns = [0.8, -0.5]
+    arc_angles = [0.8, -0.5]
     planar = [
-        PlanarStroke.between(a[:2], b[:2], timing, turn)
-        for a, b, timing, turn in zip(points[:-1], points[1:], timings, turns, strict=True)
+        PlanarStroke.between(a[:2], b[:2], timing, arc_angle)
+        for a, b, timing, arc_angle in zip(points[:-1], points[1:], timings, arc_angles, strict=True)
     ]
     # The reference normal points up, c x up points to the right: the left is at -pi / 2.
-    spatial = tuple(Stroke(timing, turn, -math.pi / 2) for timing, turn in zip(timings, turns, strict=True))
+    spatial = tuple(
+        Stroke(timing, arc_angle, -math.pi / 2) for timing, arc_angle in zip(timings, arc_angles, strict=True)
+    )
     t = np.linspace(0.0, 2.0, 100)
     flat, lifted = planar_sum(planar, t), SigmaLognormal(points, spatial, 2.0).evaluate(t)
     for two, three in zip(flat, lifted, strict=True):
@@ -177,7 +182,7 @@ points_3d = st.tuples(*(st.floats(-1.0, 1.0) for _ in range(3)))
 
 @settings(max_examples=60)
 @given(
-    turn=st.floats(-5.0, 5.0),
+    arc_angle=st.floats(-5.0, 5.0),
     tilt=st.floats(-math.pi, math.pi),
     b=points_3d,
     scale=st.floats(0.05, 20.0),
@@ -187,8 +192,8 @@ points_3d = st.tuples(*(st.floats(-1.0, 1.0) for _ in range(3)))
     ),
     stretch=st.floats(0.1, 10.0),
 )
-def test_similarities_and_time_stretch_commute_with_the_law(
-    turn: float,
+def test_similarities_and_time_stretch_commute_with_evaluation(
+    arc_angle: float,
     tilt: float,
     b: tuple[float, float, float],
     scale: float,
@@ -199,8 +204,8 @@ def test_similarities_and_time_stretch_commute_with_the_law(
     first = np.array([1.5, 1.6, 1.7])
     points = np.array([first, b, [-1.5, 2.0, -1.4]])
     strokes = (
-        Stroke(TwoSidedTiming(0.1, 1.0, 0.2), turn, tilt),
-        Stroke(LiteralTiming(0.8, 1.0, 1.0), 0.3 * turn, 0.7),
+        Stroke(TwoSidedTiming(0.1, 1.0, 0.2), arc_angle, tilt),
+        Stroke(LiteralTiming(0.8, 1.0, 1.0), 0.3 * arc_angle, 0.7),
     )
     movement = SigmaLognormal(points, strokes, 2.0)
     similarity = Similarity(scale, Rotation.from_quat(quaternion).as_matrix(), np.array(shift))
@@ -214,27 +219,27 @@ def test_similarities_and_time_stretch_commute_with_the_law(
 
 
 @settings(max_examples=60)
-@given(turn=st.floats(-6.0, 6.0), tilt=st.floats(-7.0, 7.0), b=points_3d)
-def test_every_arc_ends_at_its_target(turn: float, tilt: float, b: tuple[float, float, float]) -> None:
+@given(arc_angle=st.floats(-6.0, 6.0), tilt=st.floats(-7.0, 7.0), b=points_3d)
+def test_every_arc_ends_at_its_target(arc_angle: float, tilt: float, b: tuple[float, float, float]) -> None:
     a = np.array([1.2, 1.3, 1.4])
-    movement = SigmaLognormal(np.array([a, b]), (Stroke(BELL, turn, tilt),), 50.0)
+    movement = SigmaLognormal(np.array([a, b]), (Stroke(LOGNORMAL, arc_angle, tilt),), 50.0)
     np.testing.assert_allclose(movement.evaluate(50.0).p[0], b, atol=1e-13)
 
 
 def test_vertical_chords_have_a_plane_too() -> None:
     for b in ((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1e-12, 0.0, 1.0)):
-        movement = SigmaLognormal(np.array([[0.0, 0.0, 0.0], b]), (Stroke(BELL, 1.0, 0.3),), 50.0)
+        movement = SigmaLognormal(np.array([[0.0, 0.0, 0.0], b]), (Stroke(LOGNORMAL, 1.0, 0.3),), 50.0)
         np.testing.assert_allclose(movement.evaluate(50.0).p[0], b, atol=1e-14)
 
 
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: Stroke(BELL, turn=2 * math.pi),
-        lambda: Stroke(BELL, tilt=math.nan),
-        lambda: SigmaLognormal(np.array([A, A]), (Stroke(BELL),), 1.0),
+        lambda: Stroke(LOGNORMAL, arc_angle=2 * math.pi),
+        lambda: Stroke(LOGNORMAL, tilt=math.nan),
+        lambda: SigmaLognormal(np.array([A, A]), (Stroke(LOGNORMAL),), 1.0),
         lambda: SigmaLognormal(np.array([A, B]), (), 1.0),
-        lambda: SigmaLognormal(np.array([A[:2], B[:2]]), (Stroke(BELL),), 1.0),
+        lambda: SigmaLognormal(np.array([A[:2], B[:2]]), (Stroke(LOGNORMAL),), 1.0),
         lambda: planar_sum([], 0.0),
         lambda: Similarity(0.0, np.eye(3), np.zeros(3)),
         lambda: Similarity(1.0, -np.eye(3), np.zeros(3)),

@@ -44,7 +44,7 @@ def test_every_combination(tmp_path):
         output = "out/here"
         [controller]
         gain_p = [1, 2.5]
-        looks_ahead = [true, false]
+        uses_preview = [true, false]
         path_tolerance = 0.02
     """
     config = read_config(write(tmp_path, text))
@@ -114,7 +114,7 @@ def test_examples_make_sense(path):
         ("MOVES\n[controller]\ngain_p = nan", "0 to 200 1/s"),
         ("MOVES\n[controller]\ngain_p = inf", "0 to 200 1/s"),
         ("MOVES\n[controller]\ngain_p = true", "give a number"),
-        ("MOVES\n[controller]\nlooks_ahead = 1", "true or false"),
+        ("MOVES\n[controller]\nuses_preview = 1", "true or false"),
         ("MOVES\n[controller]\nspeed_share = 1.2", "0.1 to 1"),
         ("MOVES\n[controller]\ngain_p = { from = 1, to = 2 }", "give random = N"),
         ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 2, to = 1 }", "must be the smaller"),
@@ -122,7 +122,7 @@ def test_examples_make_sense(path):
         ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 0, to = 1, scale = 'log' }", "above 0"),
         ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 0, to = 1, scale = 'sin' }", "linear"),
         ("MOVES\nrandom = 3\n[controller]\ngain_p = { form = 0, to = 1 }", "did you mean from?"),
-        ("MOVES\nrandom = 3\n[controller]\nlooks_ahead = { from = 0, to = 1 }", "a range is of numbers"),
+        ("MOVES\nrandom = 3\n[controller]\nuses_preview = { from = 0, to = 1 }", "a range is of numbers"),
         (f"MOVES\nseeds = {list(range(2000))}\n[controller]\ngain_p = {list(range(100))}", "at most 100000"),
     ],
 )

@@ -28,7 +28,7 @@ def test_identity_is_the_content():
     assert case().identity == case().identity
     others = [
         case(gain_p=5.5),
-        case(looks_ahead=False),
+        case(uses_preview=False),
         case(fidelity="poor"),
         case(seed=8),
         case(repeat=2),
@@ -151,7 +151,7 @@ def test_csv_holds_every_value(tmp_path):
     table = list(csv.DictReader(io.StringIO(table_content(some_rows(), "csv").decode())))
     assert list(table[0]) == [column.name for column in COLUMNS]
     assert float(table[0]["snr_db"]) == figures(case(), 1)["snr_db"]
-    assert table[0]["looks_ahead"] == "true"
+    assert table[0]["uses_preview"] == "true"
     assert table[3]["snr_db"] == ""
     assert table[3]["error"] == 'died, "badly", in two lines'
 

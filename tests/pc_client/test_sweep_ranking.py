@@ -73,8 +73,8 @@ def test_a_table_is_of_a_real_arm_only_if_every_row_is(own, states, simulated):
 
 
 def test_axes_are_what_varies():
-    rows = rows_of(case(gain_p=2.0, looks_ahead=True), case("lognorm_4_1", gain_p=3.0, looks_ahead=False))
-    assert varying(rows) == ["movement", "gain_p", "looks_ahead"]
+    rows = rows_of(case(gain_p=2.0, uses_preview=True), case("lognorm_4_1", gain_p=3.0, uses_preview=False))
+    assert varying(rows) == ["movement", "gain_p", "uses_preview"]
 
 
 def test_what_follows_from_the_name_of_a_controller_is_no_axis():

@@ -1,15 +1,15 @@
-"""What is preferred among strokes that explain a recording equally well.
+"""The regularizer: which of several chains that explain a recording equally well is preferred.
 
-The data leave two things open. For narrow bells sigma is hardly seen at all; and two neighbouring strokes may
-grow against each other without end, their difference alone being seen. So a fit has two weak wishes: that
-ln sigma is near the middle of what hands do, and that the peak speed of a stroke is not far above the top
-speed of the part:
+The data leave two things open. For narrow speed profiles sigma is hardly visible; and two neighbouring
+strokes may grow against each other without end, their difference alone being seen. So the cost of a fit has a
+weak regularizer of two terms: ln sigma is near the middle of the values of handwriting, and the peak speed of
+a stroke is not far above the top speed of the part:
 
-    wish = weight * sum over strokes of [ (ln(sigma / .2) / .5)^2 + (peak speed / top speed)^2 ]
+    regularizer = weight * sum over strokes of [ (ln(sigma / .2) / .5)^2 + (peak speed / top speed)^2 ]
 
-The weight is the residual per independent number of a 12 Hz signal. So one wish weighs as much as one number
-in noise, nothing against what is seen, and vanishes together with the residual: clean strokes come back
-unchanged.
+The weight is the residual per independent number of a 12 Hz signal. So one term weighs as much as one number
+in noise and little against what the data show, and it vanishes together with the residual: clean strokes are
+recovered unchanged.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from numpy.typing import NDArray
 
 from pc_client.extraction.chain import Chain
 
-__all__ = ["Preference", "Wishes", "wishes"]
+__all__ = ["Regularizer", "RegularizerTerms", "regularizer_terms"]
 
 #: Middle and spread (of the logarithm) of sigma in handwriting, section 2 of the theory notes.
 _SIGMA, _SPREAD = 0.2, 0.5
 _SQRT_TWO_PI = math.sqrt(2.0 * math.pi)
 
 
-class Preference(NamedTuple):
-    """How much is wished.
+class Regularizer(NamedTuple):
+    """How strongly a fit is regularized.
 
     Attributes:
-        weight: of the wishes in the cost.
+        weight: of the regularizer in the cost.
         top_speed: of the part, > 0.
     """
 
@@ -41,8 +41,8 @@ class Preference(NamedTuple):
     top_speed: float
 
 
-class Wishes(NamedTuple):
-    """The wishes at a chain: cost, and for every stroke its part of the normal equations.
+class RegularizerTerms(NamedTuple):
+    """The regularizer at a chain: cost, and for every stroke its part of the normal equations.
 
     Attributes:
         cost: of all strokes.
@@ -56,13 +56,13 @@ class Wishes(NamedTuple):
     matrix: NDArray[np.float64]
 
 
-def wishes(chain: Chain, preference: Preference) -> Wishes:
-    """Cost, gradient and (Gauss-Newton) matrix of the wishes."""
-    root = math.sqrt(preference.weight)
+def regularizer_terms(chain: Chain, regularizer: Regularizer) -> RegularizerTerms:
+    """Cost, gradient and (Gauss-Newton) matrix of the regularizer."""
+    root = math.sqrt(regularizer.weight)
     count, dim = len(chain), chain.targets.shape[1]
     size = 6 if dim == 2 else 8
-    half = 0.5 * chain.turn
-    per_chord = root / (np.sinc(half / math.pi) * chain.width * _SQRT_TWO_PI * preference.top_speed)
+    half = 0.5 * chain.arc_angle
+    per_chord = root / (np.sinc(half / math.pi) * chain.width * _SQRT_TWO_PI * regularizer.top_speed)
     peak = per_chord[:, None] * chain.chords
     skew = root * np.log(chain.sigma / _SIGMA) / _SPREAD
     jacobian = np.zeros((count, dim + 1, dim + size))
@@ -76,7 +76,7 @@ def wishes(chain: Chain, preference: Preference) -> Wishes:
     jacobian[:, :dim, dim + 3] = slope[:, None] * peak
     jacobian[:, dim, dim + 2] = root / (_SPREAD * chain.sigma)
     value = np.column_stack((peak, skew))
-    return Wishes(
+    return RegularizerTerms(
         float(np.sum(value**2)),
         -np.einsum("sri,sr->si", jacobian, value),
         jacobian.transpose(0, 2, 1) @ jacobian,

@@ -9,7 +9,7 @@ from pc_client.sweep.folder import SweepFolder, table_rows
 from pc_client.sweep.outcome import Outcome
 
 
-class Ledger:
+class ResultStore:
     """The cases of one sweep and what came of them, in memory and on disk.
 
     Args:
