@@ -96,14 +96,14 @@ def run_case(
         report = ExperimentRunner(driver, planned, COMPOSITIONS[name][0]).run()
     table = build_table([analyse_run(load_recording(path)) for path in report.paths])
     rows = {
-        row.name: {
-            "kind": row.kind,
-            "snr_db": [round(x, 2) for x in row.snr_db],
-            "noise_floor_db": row.noise_floor_db,
-            "unrepeatable_db": row.unrepeatable_db,
-            "budget_share": {part: fmean(run.budget.share(part) for run in row.runs[-1:]) for part in PARTS},
+        row["name"]: {
+            "kind": row["kind"],
+            "snr_db": [round(x, 2) for x in row["snr_db"]],
+            "noise_floor_db": row["noise_floor_db"],
+            "unrepeatable_db": row["unrepeatable_db"],
+            "budget_share": {part: table.runs[row["name"]][-1].budget.share(part) for part in PARTS},
         }
-        for row in table.rows
+        for row in table.frame.to_dicts()
     }
     means = {
         kind: [fmean(row["snr_db"][k] for row in rows.values() if row["kind"] == kind) for k in range(3)]

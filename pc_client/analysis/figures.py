@@ -9,7 +9,7 @@ data that are not known to be of a real arm says so.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -22,8 +22,8 @@ from matplotlib.ticker import MaxNLocator
 
 from pc_client.analysis.budget import PARTS
 from pc_client.analysis.metrics import joint_errors, position_errors
-from pc_client.analysis.run import MeasuredRun
-from pc_client.analysis.table import Row, Table
+from pc_client.analysis.run import MeasuredRun, budget_column
+from pc_client.analysis.table import Table
 from pc_client.analysis.track import speed
 from pc_client.recording.origin import origin_of
 from protocol.ur_types import JOINT_NAMES
@@ -108,24 +108,26 @@ def signals_figure(
     return figure
 
 
-def draw_movement(row: Row) -> str:
+def draw_movement(runs: Sequence[MeasuredRun]) -> str:
     """`movement_figure` as SVG text."""
-    return _svg_text(movement_figure(row.runs))
+    return _svg_text(movement_figure(runs))
 
 
 def draw_table(table: Table) -> str:
     """Draw Table I: our repetitions and mean beside the paper's figure, for each movement."""
     with svg_figure(11.0, 3.4, table.provenance.origin.mark) as (figure, page):
         axes = figure.add_axes((0.06, 0.2, 0.925, 0.68))
-        x = np.arange(len(table.rows))
-        paper = [np.nan if row.paper_snr_db is None else row.paper_snr_db for row in table.rows]
+        x = np.arange(len(table.frame))
+        names, paper, means, floors = (
+            table.frame[name].to_numpy() for name in ("name", "paper_snr_db", "mean_snr_db", "noise_floor_db")
+        )
         axes.bar(x - 0.2, paper, 0.36, color=PAPER_GREY, label="paper, real UR3")
-        axes.bar(x + 0.2, [row.mean_snr_db for row in table.rows], 0.36, color=BLUE, label="ours, mean")
-        for i, row in enumerate(table.rows):
+        axes.bar(x + 0.2, means, 0.36, color=BLUE, label="ours, mean")
+        for i, levels in enumerate(table.frame["snr_db"]):
             label = "ours, single runs" if i == 0 else None
             axes.plot(
-                [i + 0.2] * len(row.runs),
-                row.snr_db,
+                [i + 0.2] * len(levels),
+                levels,
                 "o",
                 ms=3.2,
                 mfc="white",
@@ -133,10 +135,9 @@ def draw_table(table: Table) -> str:
                 mew=0.8,
                 label=label,
             )
-        floors = [np.nan if row.noise_floor_db is None else row.noise_floor_db for row in table.rows]
         if not np.isnan(floors).all():
             axes.hlines(floors, x - 0.02, x + 0.42, color=RED, lw=1.4, label="noise floor of the encoders")
-        axes.set_xticks(x, [row.name for row in table.rows], rotation=20, ha="right")
+        axes.set_xticks(x, names, rotation=20, ha="right")
         axes.set_ylabel("SNR [dB]")
         axes.set_title("SNR of the TCP speed (Eq. 10)")
         axes.grid(axis="x", visible=False)
@@ -146,20 +147,20 @@ def draw_table(table: Table) -> str:
 
 def draw_definitions(table: Table) -> str:
     """Draw the four SNR definitions for each movement, means over the repetitions."""
-    series: tuple[tuple[str, str, str, Callable[[MeasuredRun], float]], ...] = (
-        ("speed, as in Eq. 10", "o", BLUE, lambda run: run.snr.speed_db),
-        ("speed, after best time shift", "^", SKY, lambda run: run.snr.speed_shifted_db),
-        ("velocity vector", "s", RED, lambda run: run.snr.velocity_db),
-        ("velocity vector, after best time shift", "D", ORANGE, lambda run: run.snr.velocity_shifted_db),
+    series = (
+        ("speed, as in Eq. 10", "o", BLUE, "snr_db"),
+        ("speed, after best time shift", "^", SKY, "snr_shifted_db"),
+        ("velocity vector", "s", RED, "vector_snr_db"),
+        ("velocity vector, after best time shift", "D", ORANGE, "vector_snr_shifted_db"),
     )
+    means = table.means
     with svg_figure(11.0, 3.1, table.provenance.origin.mark) as (figure, page):
         axes = figure.add_axes((0.06, 0.21, 0.925, 0.63))
-        for i, (label, marker, colour, value) in enumerate(series):
-            x = np.arange(len(table.rows)) + 0.16 * (i - 1.5)
-            means = [np.mean([value(run) for run in row.runs]) for row in table.rows]
-            axes.vlines(x, 0.0, means, color=colour, lw=1.2, alpha=0.5)
-            axes.plot(x, means, marker, color=colour, ms=5.5, label=label)
-        axes.set_xticks(range(len(table.rows)), [row.name for row in table.rows], rotation=20, ha="right")
+        for i, (label, marker, colour, name) in enumerate(series):
+            x = np.arange(len(means)) + 0.16 * (i - 1.5)
+            axes.vlines(x, 0.0, means[name], color=colour, lw=1.2, alpha=0.5)
+            axes.plot(x, means[name], marker, color=colour, ms=5.5, label=label)
+        axes.set_xticks(range(len(means)), means["name"].to_list(), rotation=20, ha="right")
         axes.set_ylim(bottom=0.0)
         axes.set_ylabel("SNR [dB]")
         axes.grid(axis="x", visible=False)
@@ -169,25 +170,24 @@ def draw_definitions(table: Table) -> str:
 
 def draw_budget(table: Table) -> str:
     """Draw where the error power of each movement lies: bars of shares, and the level of the whole."""
-    with svg_figure(11.0, 0.34 * len(table.rows) + 1.25, table.provenance.origin.mark) as (figure, page):
+    means = table.means
+    with svg_figure(11.0, 0.34 * len(means) + 1.25, table.provenance.origin.mark) as (figure, page):
         height = figure.get_figheight()
         axes = figure.add_axes((0.115, 0.55 / height, 0.755, 1.0 - 1.15 / height))
-        y = np.arange(len(table.rows))
-        left = np.zeros(len(table.rows))
+        y = np.arange(len(means))
+        left = np.zeros(len(means))
         for part, colour in zip(PARTS, PART_COLOURS, strict=True):
-            shares = np.array(
-                [100.0 * np.mean([run.budget.share(part) for run in row.runs]) for row in table.rows]
-            )
+            shares = 100.0 * means[budget_column(part)].to_numpy()
             axes.barh(y, shares, 0.72, left=left, color=colour, label=part)
             for i, share in enumerate(shares):
                 if share >= 6.0:
                     x = left[i] + share / 2
                     axes.text(x, i, f"{share:.0f}", ha="center", va="center", color="white", fontsize=8)
             left += shares
-        for i, row in enumerate(table.rows):
-            axes.text(101.0, i, f"{row.mean_snr_db:.1f} dB", va="center", fontsize=8.5)
-        axes.set_yticks(y, [row.name for row in table.rows])
-        axes.set_ylim(len(table.rows) - 0.5, -0.5)
+        for i, level in enumerate(means["snr_db"]):
+            axes.text(101.0, i, f"{level:.1f} dB", va="center", fontsize=8.5)
+        axes.set_yticks(y, means["name"].to_list())
+        axes.set_ylim(len(means) - 0.5, -0.5)
         axes.set_xlim(0.0, 100.0)
         axes.set_xlabel("share of the error power [%]; at the right the SNR that the whole error leaves")
         axes.grid(axis="y", visible=False)

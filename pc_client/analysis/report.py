@@ -6,28 +6,48 @@ same recordings give the same page. The plotting libraries are loaded only when 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
+import polars as pl
+import polars.selectors as cs
 from rich.console import Console
 from rich.progress import track as progress
 
 from pc_client.analysis.budget import PARTS, SPLIT_HZ
 from pc_client.analysis.page import data_uri, render, report_libraries
-from pc_client.analysis.run import MeasuredRun, analyse_run
-from pc_client.analysis.table import KINDS, Row, Table, build_table
+from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column
+from pc_client.analysis.table import LAG, MOVEMENT, Table, build_table
 from pc_client.errors import CellError, RecordingError, one_line
 from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.cell_file import parse_cell
 from pc_client.recording.loader import Recording, load_recording
+from pc_client.results.files import write_files
+from pc_client.results.tables import Column, to_html, to_json
 from protocol.ur_types import JOINT_NAMES
 
 TABLE_JSON, TABLE_MARKDOWN, REPORT_HTML = "table1.json", "table1.md", "report.html"
 _TEMPLATE = "analysis/report.html.j2"
 _T = TypeVar("_T")
+
+_LEVEL = Column("snr_db", "speed, Eq. 10", "dB", ".1f", missing="–")
+_DEFINITIONS = (
+    replace(MOVEMENT, header="means over the repetitions"),
+    _LEVEL,
+    replace(_LEVEL, name="snr_shifted_db", header="speed, shifted"),
+    replace(LAG, header="shift"),
+    replace(_LEVEL, name="vector_snr_db", header="vector"),
+    replace(_LEVEL, name="vector_snr_shifted_db", header="vector, shifted"),
+    replace(LAG, name="vector_lag_ms", header="shift"),
+)
+_BUDGET = (
+    replace(MOVEMENT, header="SNR if this part were the only error", unit="dB"),
+    *(Column(f"{budget_column(part)}_alone_db", part, format=".1f", missing="–") for part in PARTS),
+    replace(_LEVEL, header="all", unit=""),
+)
+_PATH_ERROR = Column("max_path_error_mm", "path error", "mm", ".2f")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +76,8 @@ def build_report(run_dir: Path | str, console: Console | None = None) -> Report:
         RecordingError: as `build_tables`, or matplotlib or jinja2 is missing.
     """
     report = build_tables(run_dir, console)
-    page = Path(run_dir) / REPORT_HTML
-    write_text(page, render_page(report.table, report.left_out, console))
-    return replace(report, paths=(*report.paths, page))
+    page = write_files(Path(run_dir), {REPORT_HTML: render_page(report.table, report.left_out, console)})
+    return replace(report, paths=(*report.paths, *page))
 
 
 def build_tables(run_dir: Path | str, console: Console | None = None) -> Report:
@@ -93,22 +112,8 @@ def build_tables(run_dir: Path | str, console: Console | None = None) -> Report:
     if not runs:
         raise RecordingError(f"{run_dir} holds no usable recording; {left_out[0]}")
     table = build_table(runs)
-    paths = (run_dir / TABLE_JSON, run_dir / TABLE_MARKDOWN)
-    write_text(paths[0], json.dumps(table.to_json(), indent=2, allow_nan=False) + "\n")
-    write_text(paths[1], table.to_markdown())
+    paths = write_files(run_dir, {TABLE_JSON: to_json(table.to_json()), TABLE_MARKDOWN: table.to_markdown()})
     return Report(table, paths, tuple(left_out))
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file of the report.
-
-    Raises:
-        RecordingError: it cannot be written.
-    """
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error.strerror or error}") from error
 
 
 def render_page(table: Table, left_out: Iterable[str] = (), console: Console | None = None) -> str:
@@ -120,22 +125,31 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
     with report_libraries():
         from pc_client.analysis import figures
     movements = [
-        {"row": row, "figure": data_uri(figures.draw_movement(row)), "parts": _parts(row)}
-        for row in _shown(table.rows, "drawing", console)
+        {
+            "row": row,
+            "errors": table.runs[row["name"]][0].errors,
+            "figure": data_uri(figures.draw_movement(table.runs[row["name"]])),
+        }
+        for row in _shown(table.frame.to_dicts(), "drawing", console)
     ]
+    level = cs.ends_with("_db")  # one that is beyond all measure (no error at all) is a dash
+    means = table.means.with_columns(pl.when(level.abs() < 200.0).then(level))
+    rows, (*columns, floor, error, lag) = table.shown()
+    columns += [replace(floor, header="noise floor"), replace(error, header="position error")]
+    rows = rows.with_columns(pl.col(_PATH_ERROR.name).list.max())
     return render(
         _TEMPLATE,
         table=table,
-        groups=[(kind, rows) for kind in _kinds(table) if (rows := table.rows_of(kind))],
-        n_runs=max(len(row.runs) for row in table.rows),
+        levels=to_html(rows, [*columns, _PATH_ERROR, lag], bold="is_mean", links=True),
+        definitions=to_html(means, _DEFINITIONS),
+        budget=to_html(means, _BUDGET),
         movements=movements,
-        part_names=PARTS,
         split_hz=SPLIT_HZ,
         joint_names=JOINT_NAMES,
         table_figure=data_uri(figures.draw_table(table)),
         definitions_figure=data_uri(figures.draw_definitions(table)),
         budget_figure=data_uri(figures.draw_budget(table)),
-        provenance=provenance_facts(table),
+        provenance=provenance_facts(table.all_runs),
         learned=_learned(table),
         left_out=list(left_out),
     )
@@ -154,28 +168,8 @@ def _whole(recording: Recording) -> Recording:
     return recording
 
 
-def _kinds(table: Table) -> list[str]:
-    """Return the kinds of movement in the table, the paper's first."""
-    others = sorted({row.kind for row in table.rows} - set(KINDS))
-    return [*KINDS, *others]
-
-
-def _parts(row: Row) -> list[tuple[str, float, float]]:
-    """Return for each part of the error budget its mean share in % and the SNR that it alone would leave."""
-    n = len(row.runs)
-    return [
-        (
-            part,
-            sum(100.0 * run.budget.share(part) for run in row.runs) / n,
-            sum(run.budget.alone_db(part) for run in row.runs) / n,
-        )
-        for part in PARTS
-    ]
-
-
-def provenance_facts(table: Table) -> Mapping[str, Any]:
+def provenance_facts(runs: Sequence[MeasuredRun]) -> dict[str, str]:
     """Return what all runs have in common, and what differs, as texts by name."""
-    runs = [run for row in table.rows for run in row.runs]
     first = runs[0].provenance
     delays = sorted(
         {p.identified_delay_s for run in runs if (p := run.provenance).identified_delay_s is not None}
@@ -195,10 +189,10 @@ def provenance_facts(table: Table) -> Mapping[str, Any]:
         "controller": first.controller,
         "controller settings": ", ".join(f"{k} = {v}" for k, v in sorted(first.controller_config.items())),
         "loop delay identified by the client": delay,
-        **_loop_facts(table.loop),
+        **_loop_facts(first.loop),
         "cell": _cell_summary(first.cell_text),
         "client version": ", ".join(sorted({run.provenance.client_version for run in runs})),
-        "runs": f"{len(runs)}, of {len(table.rows)} movements",
+        "runs": f"{len(runs)}, of {len({run.provenance.movement for run in runs})} movements",
     }
 
 
@@ -239,9 +233,8 @@ def _loop_facts(loop: Mapping[str, float | str]) -> Mapping[str, str]:
 
 def _learned(table: Table) -> str:
     """Return which runs used what an earlier one had taught, as "3 of 9"; empty when none could."""
-    runs = [run for row in table.rows for run in row.runs]
-    learned = sum(bool(run.recording.summary.get("learned_from")) for run in runs)
-    return f"{learned} of {len(runs)}" if learned else ""
+    learned = sum(bool(run.recording.summary.get("learned_from")) for run in table.all_runs)
+    return f"{learned} of {len(table.all_runs)}" if learned else ""
 
 
 def _shown(items: Iterable[_T], what: str, console: Console | None) -> Iterable[_T]:

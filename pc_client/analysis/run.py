@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from pc_client.analysis.budget import Budget, error_budget
+from pc_client.analysis.budget import PARTS, Budget, error_budget
 from pc_client.analysis.metrics import Errors, measure_errors
 from pc_client.analysis.snr import Snr, measure_snr
 from pc_client.analysis.track import TcpTrack, track_of
 from pc_client.recording.loader import Recording
 from pc_client.recording.provenance import Provenance
+
+
+def budget_column(part: str) -> str:
+    """Name of the column with the share of one part of the error budget."""
+    return f"budget_{part.replace(' ', '_')}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +32,28 @@ class MeasuredRun:
     def provenance(self) -> Provenance:
         """Where the recording comes from."""
         return self.recording.provenance
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """The run as a row of a table: levels in dB, lags in ms, parts of the error budget as shares."""
+        whose, snr, errors, budget = self.provenance, self.snr, self.errors, self.budget
+        return {
+            "name": whose.movement,
+            "kind": whose.kind,
+            "n_targets": len(whose.target_points),
+            "repetition": whose.repetition,
+            "snr_db": snr.speed_db,
+            "snr_shifted_db": snr.speed_shifted_db,
+            "lag_ms": 1e3 * snr.speed_lag_s,
+            "vector_snr_db": snr.velocity_db,
+            "vector_snr_shifted_db": snr.velocity_shifted_db,
+            "vector_lag_ms": 1e3 * snr.velocity_lag_s,
+            "max_position_error_mm": errors.max_position_error_mm,
+            "rms_position_error_mm": errors.rms_position_error_mm,
+            "max_path_error_mm": errors.max_path_error_mm,
+            **{budget_column(part): budget.share(part) for part in PARTS},
+            **{f"{budget_column(part)}_alone_db": budget.alone_db(part) for part in PARTS},
+        }
 
 
 def analyse_run(recording: Recording) -> MeasuredRun:

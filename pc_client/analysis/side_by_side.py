@@ -7,28 +7,23 @@ arm: it is a row of the table that shows how the means move with these numbers.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table as RichTable
-from rich.text import Text
+import polars as pl
 
-from pc_client.analysis.table import KINDS, SHARED, Row, Table
+from pc_client.analysis.table import ERROR, KINDS, LAG, LEVEL, MOVEMENT, PAPER, SHARED, Table, with_means
 from pc_client.errors import RecordingError
+from pc_client.results.tables import Column, to_rich
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
 
 PUBLISHED = "paper"
 """Name of the controller with the published law."""
 
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """One movement: the paper's figure and a row of each experiment; None where it has none."""
-
-    name: str
-    kind: str
-    n_targets: int
-    paper_snr_db: float | None
-    rows: tuple[Row | None, ...]
+_FIGURES = (LEVEL, LAG, ERROR)
+"""What is shown of each experiment; in the frame with the number of the experiment behind the name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,23 +39,32 @@ class SideBySide:
     changed: tuple[Table, ...]
 
     @property
-    def lines(self) -> list[Line]:
-        """All movements that any column has, in the order of the tables."""
-        found: dict[str, list[Row | None]] = {}
-        for kind in dict.fromkeys((*KINDS, *(row.kind for table in self.columns for row in table.rows))):
-            for i, table in enumerate(self.columns):
-                for row in table.rows_of(kind):
-                    found.setdefault(row.name, [None] * len(self.columns))[i] = row
-        return [_line(rows) for rows in found.values()]
+    def frame(self) -> pl.DataFrame:
+        """A row for each movement that any experiment has, with figures of all; null where one lacks it."""
+        tables = [table.frame.with_columns(experiment=i) for i, table in enumerate(self.columns)]
+        together = pl.concat(tables, how="vertical_relaxed")
+        kinds = together["kind"].unique(maintain_order=True).to_list()
+        kinds = [*(kind for kind in KINDS if kind in kinds), *(kind for kind in kinds if kind not in KINDS)]
+        figures = [
+            pl.col(figure.name).filter(experiment=i).first().alias(f"{figure.name}_{i}")
+            for i in range(len(tables))
+            for figure in _FIGURES
+        ]
+        rows = together.group_by("name", maintain_order=True).agg(
+            pl.col("kind", PAPER.name, "n_targets").first(), *figures
+        )
+        return rows.sort(pl.col("kind").cast(pl.Enum(kinds)), maintain_order=True)
 
-    @property
-    def kinds(self) -> list[str]:
-        """The kinds of movement, in the order of the lines."""
-        return list(dict.fromkeys(line.kind for line in self.lines))
-
-    def paper_mean_of(self, kind: str) -> float | None:
-        """The mean of the paper's figures for the lines of one kind, dB; None without any."""
-        return next((mean for table in self.columns if (mean := table.paper_mean_of(kind)) is not None), None)
+    def shown(self) -> tuple[pl.DataFrame, list[Column]]:
+        """The rows with the means of the levels of each kind, as people read them, and their columns."""
+        columns = [MOVEMENT, replace(PAPER, header="paper, real UR3", unit="dB", narrow="paper,\nreal UR3")]
+        for i, table in enumerate(self.columns):
+            label = label_of(table)
+            narrow = label.removesuffix(" controller")
+            level, *others = (replace(figure, name=f"{figure.name}_{i}") for figure in _FIGURES)
+            columns += [replace(level, header=label, unit="dB", narrow=narrow), *others]
+        levels = [column.name for column in columns if column.unit == "dB"]
+        return with_means(self.frame, *levels), columns
 
     @property
     def arms(self) -> list[str]:
@@ -77,28 +81,8 @@ class SideBySide:
 
     def to_rich(self) -> RichTable:
         """Return the table for the terminal."""
-        rich = RichTable(
-            title="\n".join(["The paper's experiment: SNR of the TCP speed, Eq. 10, in dB", *self.arms]),
-            caption=SHARED,
-            box=SIMPLE_HEAD,
-            padding=(0, 1, 0, 0),
-        )
-        rich.add_column("movement", no_wrap=True)
-        heads = ["paper,\nreal UR3"]
-        for table in self.columns:
-            heads += [label_of(table).removesuffix(" controller"), "lag\n[ms]", "error\n[mm]"]
-        for head in heads:
-            rich.add_column(Text(head), justify="right")
-        for kind in self.kinds:
-            lines = [line for line in self.lines if line.kind == kind]
-            for line in lines:
-                cells = [cell for row in line.rows for cell in _cells(row)]
-                rich.add_row(line.name, _level(line.paper_snr_db), *cells)
-            means = [cell for table in self.columns for cell in (_level(table.mean_of(kind)), "", "")]
-            rich.add_row(
-                f"mean {kind}", _level(self.paper_mean_of(kind)), *means, style="bold", end_section=True
-            )
-        return rich
+        title = "\n".join(["The paper's experiment: SNR of the TCP speed, Eq. 10, in dB", *self.arms])
+        return to_rich(*self.shown(), bold="is_mean", section="kind", title=title, caption=SHARED)
 
 
 def side_by_side(tables: Sequence[Table]) -> SideBySide:
@@ -109,33 +93,18 @@ def side_by_side(tables: Sequence[Table]) -> SideBySide:
     """
     if not tables:
         raise RecordingError("there is no experiment to show; give at least one folder")
-    unchanged = {_base(table) for table in tables if table.controller == _base(table)[1]}
-    changed = [t for t in tables if t.controller != _base(t)[1] and _base(t) in unchanged]
+    unchanged = {_base(table) for table in tables if table.provenance.controller == _base(table)[1]}
+    changed = [t for t in tables if t.provenance.controller != _base(t)[1] and _base(t) in unchanged]
     return SideBySide(tuple(t for t in tables if t not in changed), tuple(changed))
 
 
 def label_of(table: Table) -> str:
     """What the column of an experiment is called."""
-    return "published controller" if table.controller == PUBLISHED else table.controller
+    controller = table.provenance.controller
+    return "published controller" if controller == PUBLISHED else controller
 
 
 def _base(table: Table) -> tuple[str, str]:
     """The arm, and the name of the controller that the numbers of this one started from."""
     p = table.provenance
-    return f"{p.arm} {p.pace}", str(p.controller_config.get("name", table.controller))
-
-
-def _line(rows: Sequence[Row | None]) -> Line:
-    row = next(row for row in rows if row is not None)
-    n_targets = len(row.runs[0].provenance.target_points)
-    return Line(row.name, row.kind, n_targets, row.paper_snr_db, tuple(rows))
-
-
-def _cells(row: Row | None) -> list[str]:
-    if row is None:
-        return ["", "", ""]
-    return [_level(row.mean_snr_db), f"{row.lag_ms:.1f}", f"{row.max_position_error_mm:.2f}"]
-
-
-def _level(value: float | None) -> str:
-    return "" if value is None else f"{value:.2f}"
+    return f"{p.arm} {p.pace}", str(p.controller_config.get("name", p.controller))

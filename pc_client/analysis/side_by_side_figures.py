@@ -26,24 +26,28 @@ _PANEL_HEIGHT = 1.55
 
 def draw_levels(shown: SideBySide) -> str:
     """Draw the SNR of each movement: the paper's figure, the mean of each experiment and its single runs."""
-    lines = shown.lines
-    x = np.arange(len(lines))
+    frame = shown.frame
+    x = np.arange(len(frame))
     width = 0.84 / (1 + len(shown.columns))
     places = [x + width * (i - len(shown.columns) / 2) for i in range(1 + len(shown.columns))]
     with svg_figure(11.0, 3.4, _mark(shown)) as (figure, page):
         axes = figure.add_axes((0.06, 0.2, 0.925, 0.66))
-        paper = [np.nan if line.paper_snr_db is None else line.paper_snr_db for line in lines]
-        axes.bar(places[0], paper, 0.92 * width, color=PAPER_GREY, label="paper, real UR3, its own points")
+        axes.bar(
+            places[0],
+            frame["paper_snr_db"].to_numpy(),
+            0.92 * width,
+            color=PAPER_GREY,
+            label="paper, real UR3, its own points",
+        )
         for i, table in enumerate(shown.columns):
-            rows = [line.rows[i] for line in lines]
-            means = [np.nan if row is None else row.mean_snr_db for row in rows]
+            means = frame[f"mean_snr_db_{i}"].to_numpy()
             axes.bar(
                 places[i + 1], means, 0.92 * width, color=_colour(i), label=f"{label_of(table)}, mean of runs"
             )
-            for place, row in zip(places[i + 1], rows, strict=True):
-                levels = [] if row is None else row.snr_db
+            for place, name in zip(places[i + 1], frame["name"], strict=True):
+                levels = [run.snr.speed_db for run in table.runs.get(name, ())]
                 axes.plot([place] * len(levels), levels, "o", ms=3.0, mfc="white", mec="black", mew=0.8)
-        axes.set_xticks(x, [line.name for line in lines], rotation=20, ha="right")
+        axes.set_xticks(x, frame["name"].to_list(), rotation=20, ha="right")
         axes.set_ylabel("SNR [dB]")
         axes.set_title("SNR of the TCP speed (Eq. 10)")
         axes.grid(axis="x", visible=False)
@@ -53,8 +57,8 @@ def draw_levels(shown: SideBySide) -> str:
 
 def draw_speeds(shown: SideBySide) -> str:
     """Draw TCP speeds over time, one panel a movement: desired, and the first run of each experiment."""
-    lines = shown.lines
-    n_rows = -(-len(lines) // _COLUMNS)
+    names = shown.frame["name"].to_list()
+    n_rows = -(-len(names) // _COLUMNS)
     height = _PANEL_HEIGHT * n_rows + 0.75
     with svg_figure(11.0, height, _mark(shown)) as (figure, page):
         grid = figure.add_gridspec(
@@ -68,9 +72,9 @@ def draw_speeds(shown: SideBySide) -> str:
             wspace=0.11,
         )
         # Down the first column, then down the second: the kinds stand beside each other.
-        for k, line in enumerate(lines):
+        for k, name in enumerate(names):
             axes = figure.add_subplot(grid[k % n_rows, k // n_rows])
-            runs = [(i, row.runs[0]) for i, row in enumerate(line.rows) if row is not None]
+            runs = [(i, table.runs[name][0]) for i, table in enumerate(shown.columns) if name in table.runs]
             first = runs[0][1].track
             t = 0.5 * (first.t[1:] + first.t[:-1]) - first.t_start
             axes.plot(t, 1e3 * speed(first.t, first.p_ref), color=REFERENCE_GREY, lw=3.6, label="desired")
@@ -81,8 +85,8 @@ def draw_speeds(shown: SideBySide) -> str:
                 axes.plot(t, v, color=_colour(i), lw=1.0, label=label_of(shown.columns[i]))
             axes.set_xlim(-0.1, first.t_end - first.t_start + 0.3)
             axes.set_ylim(bottom=0.0)
-            axes.set_title(line.name)
-            if k % n_rows == n_rows - 1 or k == len(lines) - 1:
+            axes.set_title(name)
+            if k % n_rows == n_rows - 1 or k == len(names) - 1:
                 axes.set_xlabel("time since the movement began [s]")
             if k < n_rows:
                 axes.set_ylabel("speed [mm/s]")

@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+
+import polars as pl
 
 from pc_client.analysis.page import data_uri, render, report_libraries
-from pc_client.analysis.report import REPORT_HTML, Report, provenance_facts, write_text
+from pc_client.analysis.report import REPORT_HTML, Report, provenance_facts
 from pc_client.analysis.side_by_side import PUBLISHED, SideBySide, label_of, side_by_side
-from pc_client.analysis.table import Table
+from pc_client.analysis.table import LAG, Table
 from pc_client.control.controller_fields import FIELDS
+from pc_client.results.files import write_files
+from pc_client.results.tables import Column, to_html
 
 _TEMPLATE = "analysis/side_by_side.html.j2"
 
@@ -34,40 +37,59 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
     with report_libraries():
         from pc_client.analysis import side_by_side_figures as figures
     folder = {id(report.table): report.paths[0].parent for report in reports}
+    rows, columns = shown.shown()
     text = render(
         _TEMPLATE,
         shown=shown,
-        heads=[_head(table, folder[id(table)], out) for table in shown.columns],
+        n_movements=len(shown.frame),
+        cards=[
+            (column.header, rows.filter("is_mean").select("kind", column.name).drop_nulls().rows())
+            for column in columns
+            if column.unit == "dB"
+        ],
+        links=[_link(table, folder[id(table)], out) for table in shown.columns],
+        labels=[label_of(table) for table in shown.columns],
+        levels=to_html(rows, [columns[0], Column("n_targets", "targets"), *columns[1:]], bold="is_mean"),
         levels_figure=data_uri(figures.draw_levels(shown)),
         speeds_figure=data_uri(figures.draw_speeds(shown)),
-        published=next((t for t in shown.columns if t.controller == PUBLISHED), None),
-        settings=[_settings(tables) for t in shown.columns if (tables := shown.changes_of(t))],
-        provenance=_common([provenance_facts(table) for table in shown.columns]),
+        published=next((t for t in shown.columns if t.provenance.controller == PUBLISHED), None),
+        settings=[
+            (label_of(tables[0]), _settings(tables))
+            for table in shown.columns
+            if (tables := shown.changes_of(table))
+        ],
+        provenance=_common([provenance_facts(table.all_runs) for table in shown.columns]),
         left_out=[f"{report.paths[0].parent.name}/{line}" for report in reports for line in report.left_out],
     )
-    write_text(out, text)
+    write_files(out.parent, {out.name: text})
     return shown
 
 
-def _head(table: Table, folder: Path, out: Path) -> Mapping[str, Any]:
-    """What the page says of a column."""
+def _link(table: Table, folder: Path, out: Path) -> tuple[str, str] | None:
+    """The page of one experiment and its label; None where it has no page."""
     page = folder / REPORT_HTML
-    link = Path(os.path.relpath(page, out.parent)).as_posix() if page.exists() else None
-    return {"table": table, "label": label_of(table), "origin": table.provenance.origin, "page": link}
+    return (Path(os.path.relpath(page, out.parent)).as_posix(), label_of(table)) if page.exists() else None
 
 
-def _settings(tables: Sequence[Table]) -> Mapping[str, Any]:
+def _settings(tables: Sequence[Table]) -> str:
     """One controller with its own and other numbers: the fields that differ, and for each what came of it."""
     configs = [table.provenance.controller_config for table in tables]
     fields = [name for name in FIELDS if len({config.get(name) for config in configs}) > 1]
-    return {
-        "label": label_of(tables[0]),
-        "fields": [(name, getattr(FIELDS.get(name), "unit", "")) for name in fields],
-        "rows": [
-            {"table": table, "values": [_value(config.get(name)) for name in fields]}
-            for table, config in zip(tables, configs, strict=True)
-        ],
-    }
+    kinds = tables[0].kinds
+    rows = [
+        {name: _value(config.get(name)) for name in fields}
+        | {kind: table.mean_of(kind) for kind in kinds}
+        | {"n_runs": len(next(iter(table.runs.values()))), "is_own": table is tables[0]}
+        | {LAG.name: table.frame[LAG.name].mean()}
+        for table, config in zip(tables, configs, strict=True)
+    ]
+    columns = [
+        *(Column(name, unit=getattr(FIELDS.get(name), "unit", "")) for name in fields),
+        Column("n_runs", "runs of each movement"),
+        *(Column(kind, f"mean {kind}", "dB", ".2f") for kind in kinds),
+        LAG,
+    ]
+    return to_html(pl.DataFrame(rows, infer_schema_length=None), columns, bold="is_own")
 
 
 def _value(value: object) -> str:

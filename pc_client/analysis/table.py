@@ -1,6 +1,6 @@
 """Table I: the signal-to-noise ratio of every movement, ours beside the paper's.
 
-One table, three forms: `table1.json` for programs, `table1.md` for documents, a rich table for the terminal.
+One frame, a row a movement, in three forms: `table1.json`, `table1.md` and a table for the terminal.
 """
 
 from __future__ import annotations
@@ -9,17 +9,18 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from statistics import fmean
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table as RichTable
-from rich.text import Text
+import polars as pl
 
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
 from pc_client.analysis.run import MeasuredRun
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance
+from pc_client.results.tables import Column, finite, to_markdown, to_rich
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
 
 # Source: A. Wolniakowski et al., "Towards human-like kinematics in industrial robotic arms: a case study on a
 # UR3 robot", Table I, in its order. One figure a movement, over three repetitions on a real UR3.
@@ -40,155 +41,102 @@ KINDS = ("uniform", "lognormal")
 SHARED = "Paper: own points, not published; name, kind, number of targets agree"
 """Why no differences are given."""
 
+MOVEMENT = Column("name", "movement", align="left")
+LEVEL, PAPER = Column("mean_snr_db", "mean", format=".2f"), Column("paper_snr_db", "paper", format=".2f")
+ERROR, LAG = Column("max_position_error_mm", "error", "mm", ".2f"), Column("lag_ms", "lag", "ms", ".1f")
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One movement: one figure a repetition, in the order of the repetitions.
+_FIGURES = (
+    pl.col("kind", "n_targets").first(),
+    pl.col("snr_db"),
+    pl.col("snr_db").mean().alias("mean_snr_db"),
+    pl.col("name").first().replace_strict(PAPER_SNR_DB, default=None).alias("paper_snr_db"),
+    pl.col("max_position_error_mm").max(),
+    pl.col("lag_ms").mean(),
+    pl.col("snr_shifted_db").alias("shifted_snr_db"),
+    pl.col("vector_snr_db"),
+    pl.col("vector_snr_shifted_db").alias("shifted_vector_snr_db"),
+    pl.col("rms_position_error_mm"),
+    pl.col("max_path_error_mm"),
+)
+"""What is made of the runs of one movement: one figure, or a list with one of each run."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """The movements of one experiment, in the paper's order.
 
     Attributes:
-        name: of the movement.
-        kind: of the movement.
-        runs: its repetitions.
-        noise_floor_db: SNR that the noise of the arm's encoders alone would leave (`noise_floor`).
+        frame: a row a movement, as in `table1.json`, and the number of its target points.
+        runs: by name of the movement, in the order of the repetitions.
     """
 
-    name: str
-    kind: str
-    runs: tuple[MeasuredRun, ...]
-    noise_floor_db: float | None = None
+    frame: pl.DataFrame
+    runs: Mapping[str, tuple[MeasuredRun, ...]]
 
     @property
-    def snr_db(self) -> list[float]:
-        """Eq. 10 of each repetition, dB."""
-        return [run.snr.speed_db for run in self.runs]
+    def means(self) -> pl.DataFrame:
+        """A row a movement: the mean of each of `MeasuredRun.figures` over its runs."""
+        return frame_of_runs(self.all_runs).group_by("name", "kind", maintain_order=True).mean()
 
     @property
-    def mean_snr_db(self) -> float:
-        """Mean of Eq. 10 over the repetitions, dB."""
-        return fmean(self.snr_db)
+    def all_runs(self) -> list[MeasuredRun]:
+        """Movement by movement."""
+        return [run for runs in self.runs.values() for run in runs]
 
     @property
-    def paper_snr_db(self) -> float | None:
-        """The paper's figure, or None when the paper did not run this movement."""
-        return PAPER_SNR_DB.get(self.name)
+    def kinds(self) -> list[str]:
+        """The kinds of movement, in their order."""
+        return self.frame["kind"].unique(maintain_order=True).to_list()
 
-    @property
-    def unrepeatable_db(self) -> float | None:
-        """SNR that what does not repeat from run to run would leave; None when it is not known."""
-        power = unrepeatable_power(self.runs)
-        return 10.0 * math.log10(self.runs[0].budget.signal_power / power) if power else None
-
-    @property
-    def max_position_error_mm(self) -> float:
-        """Largest TCP position error of all repetitions."""
-        return max(run.errors.max_position_error_mm for run in self.runs)
-
-    @property
-    def lag_ms(self) -> float:
-        """Mean of the best time shift of the scalar speed over the repetitions."""
-        return 1e3 * fmean(run.snr.speed_lag_s for run in self.runs)
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """The rows of one experiment, in the paper's order, and what they have in common."""
-
-    controller: str
-    robot: str
-    seed: int | None
-    pace: str
-    simulated: bool | None
-    rows: tuple[Row, ...]
-
-    def rows_of(self, kind: str) -> list[Row]:
-        """Return the rows of one kind of movement."""
-        return [row for row in self.rows if row.kind == kind]
-
-    def mean_of(self, kind: str) -> float | None:
-        """Return the mean of the rows' means of one kind, dB; None without such rows."""
-        rows = self.rows_of(kind)
-        return fmean(row.mean_snr_db for row in rows) if rows else None
-
-    def paper_mean_of(self, kind: str) -> float | None:
-        """Return the mean of the paper's figures for the rows of one kind, dB; None without any."""
-        figures = [row.paper_snr_db for row in self.rows_of(kind) if row.paper_snr_db is not None]
-        return fmean(figures) if figures else None
+    def mean_of(self, kind: str, figure: str = "mean_snr_db") -> float | None:
+        """The mean of a figure over the movements of one kind; None where no movement has it."""
+        mean: Any = self.frame.filter(kind=kind)[figure].mean()
+        return mean if mean is None else float(mean)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `table1.json`; figures that are not finite become null."""
-        rows = [
-            {
-                "name": row.name,
-                "kind": row.kind,
-                "snr_db": [_number(v) for v in row.snr_db],
-                "mean_snr_db": _number(row.mean_snr_db),
-                "paper_snr_db": row.paper_snr_db,
-                "max_position_error_mm": _number(row.max_position_error_mm),
-                "lag_ms": _number(row.lag_ms),
-                "shifted_snr_db": [_number(run.snr.speed_shifted_db) for run in row.runs],
-                "vector_snr_db": [_number(run.snr.velocity_db) for run in row.runs],
-                "shifted_vector_snr_db": [_number(run.snr.velocity_shifted_db) for run in row.runs],
-                "rms_position_error_mm": [_number(run.errors.rms_position_error_mm) for run in row.runs],
-                "max_path_error_mm": [_number(run.errors.max_path_error_mm) for run in row.runs],
-                "noise_floor_db": None if row.noise_floor_db is None else _number(row.noise_floor_db),
-                "unrepeatable_db": None if row.unrepeatable_db is None else _number(row.unrepeatable_db),
-            }
-            for row in self.rows
-        ]
-        means = {kind: self.mean_of(kind) for kind in KINDS}
+        p = self.provenance
         return {
-            "controller": self.controller,
-            "robot": self.robot,
-            "seed": self.seed,
-            "pace": self.pace,
-            "simulated": self.simulated,
-            "rows": rows,
-            "mean_snr_db": {kind: None if mean is None else _number(mean) for kind, mean in means.items()},
-            "paper_mean_snr_db": {kind: self.paper_mean_of(kind) for kind in KINDS},
-            "loop": {k: _number(v) if isinstance(v, float) else v for k, v in self.loop.items()},
+            "controller": p.controller,
+            "robot": p.robot,
+            "seed": p.seed,
+            "pace": p.pace,
+            "simulated": p.simulated,
+            "rows": finite(self.frame.drop("n_targets").to_dicts(), 6),
+            "mean_snr_db": finite({kind: self.mean_of(kind) for kind in KINDS}, 6),
+            "paper_mean_snr_db": {kind: self.mean_of(kind, PAPER.name) for kind in KINDS},
+            "loop": finite(dict(self.loop), 6),
         }
 
     def to_markdown(self) -> str:
         """Return the content of `table1.md`."""
-        columns, rows = self._cells()
-        shared = ["", SHARED] if self.has_paper_rows else []
         lines = [
             f"# {self.title}",
             "",
             "SNR of the TCP speed as in Eq. 10 of the paper, in dB: unshifted, unsmoothed.",
             "",
-            "| " + " | ".join(columns) + " |",
-            "|" + "|".join(["---", *["---:"] * (len(columns) - 1)]) + "|",
-            *["| " + " | ".join(row) + " |" for row in rows],
+            to_markdown(*self.shown()),
             "",
             "floor: SNR that the noise of the arm's encoders at rest alone would leave a perfect arm.",
-            *shared,
+            *(["", SHARED] if self.has_paper_rows else []),
         ]
         return "\n".join(lines) + "\n"
 
     def to_rich(self) -> RichTable:
         """Return the table for the terminal."""
-        columns, rows = self._cells()
         caption = "SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed"
         caption += f"\n{SHARED}" if self.has_paper_rows else ""
-        table = RichTable(title=self.title, caption=caption, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-        for i, column in enumerate(columns):
-            heading = Text(column.replace(" [", "\n["))
-            table.add_column(heading, justify="left" if i == 0 else "right", no_wrap=True)
-        for i, row in enumerate(rows):
-            is_mean = row[0].startswith("mean")
-            table.add_row(*row, style="bold" if is_mean else None, end_section=is_mean and i < len(rows) - 1)
-        return table
+        return to_rich(*self.shown(), bold="is_mean", section="kind", title=self.title, caption=caption)
 
     @property
     def provenance(self) -> Provenance:
         """Where the first run comes from; arm and controller are the same for all."""
-        return self.rows[0].runs[0].provenance
+        return self.all_runs[0].provenance
 
     @property
     def has_paper_rows(self) -> bool:
         """Whether a movement has the name of one in the paper's Table I."""
-        return any(row.paper_snr_db is not None for row in self.rows)
+        return not PAPER_SNR_DB.keys().isdisjoint(self.runs)
 
     @property
     def loop(self) -> Mapping[str, float | str]:
@@ -198,24 +146,35 @@ class Table:
     @property
     def title(self) -> str:
         """One line that says what the table shows, and whether the arm was a real one."""
-        return f"Table I: {self.provenance.arm}, controller {self.controller}"
+        return f"Table I: {self.provenance.arm}, controller {self.provenance.controller}"
 
-    def _cells(self) -> tuple[list[str], list[list[str]]]:
-        """Return headings and texts; the mean of a kind follows its rows."""
-        n_runs = max((len(row.runs) for row in self.rows), default=0)
-        repetitions = [f"r{k}" for k in range(1, n_runs + 1)]
-        paper = ["paper"] if self.has_paper_rows else []
-        columns = ["movement", *repetitions, "mean", *paper, "floor", "error [mm]", "lag [ms]"]
-        rows = []
-        for kind, group in groupby(self.rows, key=lambda row: row.kind):
-            for row in group:
-                figures = [f"{v:.2f}" for v in row.snr_db] + [""] * (n_runs - len(row.runs))
-                levels = (row.mean_snr_db, *[row.paper_snr_db for _ in paper], row.noise_floor_db)
-                errors = [f"{row.max_position_error_mm:.2f}", f"{row.lag_ms:.1f}"]
-                rows.append([row.name, *figures, *map(_decibels, levels), *errors])
-            means = (self.mean_of(kind), *[self.paper_mean_of(kind) for _ in paper])
-            rows.append([f"mean {kind}", *[""] * n_runs, *map(_decibels, means), "", "", ""])
-        return columns, rows
+    def shown(self) -> tuple[pl.DataFrame, tuple[Column, ...]]:
+        """The rows with the means, as people read them, and their columns."""
+        runs = [f"r{k}" for k in range(1, max(map(len, self.runs.values())) + 1)]
+        frame = with_means(self.frame, LEVEL.name, PAPER.name)
+        frame = frame.with_columns(pl.col("snr_db").list.to_struct(fields=runs)).unnest("snr_db")
+        return frame, (
+            MOVEMENT,
+            *(Column(run, format=".2f") for run in runs),
+            LEVEL,
+            *([PAPER] if self.has_paper_rows else []),
+            Column("noise_floor_db", "floor", format=".2f"),
+            ERROR,
+            LAG,
+        )
+
+
+def with_means(frame: pl.DataFrame, *figures: str) -> pl.DataFrame:
+    """Rows by kind, and after those of each kind a row `mean KIND` (`is_mean`) of some figures."""
+    means = frame.group_by("kind", maintain_order=True).agg(pl.col(figures).mean())
+    means = means.with_columns(pl.format("mean {}", "kind").alias("name"), is_mean=True)
+    both = pl.concat([frame.with_columns(is_mean=False), means], how="diagonal")
+    return both.sort(pl.col("kind").cast(pl.Enum(means["kind"])), "is_mean", maintain_order=True)
+
+
+def frame_of_runs(runs: Sequence[MeasuredRun]) -> pl.DataFrame:
+    """A row a run: `MeasuredRun.figures`."""
+    return pl.DataFrame([run.figures for run in runs], infer_schema_length=None)
 
 
 def build_table(runs: Sequence[MeasuredRun]) -> Table:
@@ -229,23 +188,31 @@ def build_table(runs: Sequence[MeasuredRun]) -> Table:
     """
     if not runs:
         raise RecordingError("there is no run to put into a table; record at least one movement")
-    first = runs[0].provenance
-    common = (first.controller, first.robot, first.seed, first.pace, first.simulated)
-    for run in runs:
-        p = run.provenance
-        if (p.controller, p.robot, p.seed, p.pace, p.simulated) != common:
+    experiments = [
+        (p.controller, p.robot, p.seed, p.pace, p.simulated) for p in (run.provenance for run in runs)
+    ]
+    for run, experiment in zip(runs, experiments, strict=True):
+        if experiment != experiments[0]:
             raise RecordingError(
                 f"{run.recording.path.name} is of another experiment than {runs[0].recording.path.name} "
                 "(robot, seed, pace or controller differ); keep one experiment a folder"
             )
     ordered = sorted(runs, key=lambda run: (*_rank(run), run.provenance.repetition))
+    by_name = {name: tuple(group) for name, group in groupby(ordered, lambda run: run.provenance.movement)}
     # The encoders are the same in all runs; the more of them are at rest, the better their noise is known.
     covariance = step_covariance(runs)
-    rows = [
-        Row(name, group[0].provenance.kind, group, floor_db(group[0], covariance))
-        for name, group in ((n, tuple(g)) for n, g in groupby(ordered, key=lambda r: r.provenance.movement))
-    ]
-    return Table(*common, rows=tuple(rows))
+    frame = frame_of_runs(ordered).group_by("name", maintain_order=True).agg(_FIGURES)
+    levels = {
+        "noise_floor_db": [floor_db(group[0], covariance) for group in by_name.values()],
+        "unrepeatable_db": [_unrepeatable_db(group) for group in by_name.values()],
+    }
+    return Table(frame.with_columns(pl.DataFrame(levels, dict.fromkeys(levels, pl.Float64))), by_name)
+
+
+def _unrepeatable_db(runs: Sequence[MeasuredRun]) -> float | None:
+    """SNR that what does not repeat from run to run would leave; None when it is not known."""
+    power = unrepeatable_power(runs)
+    return 10.0 * math.log10(runs[0].budget.signal_power / power) if power else None
 
 
 def _rank(run: MeasuredRun) -> tuple[int, str, int, str]:
@@ -258,13 +225,3 @@ def _rank(run: MeasuredRun) -> tuple[int, str, int, str]:
         paper.index(name) if name in PAPER_SNR_DB else len(paper),
         name,
     )
-
-
-def _decibels(value: float | None) -> str:
-    """Return a cell; empty where there is no figure."""
-    return "" if value is None else f"{value:.2f}"
-
-
-def _number(value: float) -> float | None:
-    """Round to what is worth writing down; JSON knows no infinity."""
-    return round(value, 6) if math.isfinite(value) else None

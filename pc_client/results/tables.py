@@ -3,8 +3,8 @@
     COLUMNS = (Column("name", "movement", align="left"), Column("lag_ms", "lag", "ms", ".1f"))
     console.print(to_rich(frame, COLUMNS, title="Table I"))
 
-A value that is missing or not finite is an empty cell (or what the column names), an empty field of a CSV
-file and null in JSON.
+A missing value (null in the frame) is an empty cell or what its column names; one that is not finite (nothing
+to fit, no error at all) is a dash. Both are null in JSON.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
 import polars as pl
@@ -24,7 +25,7 @@ from pc_client.errors import printable
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
-__all__ = ["Column", "cells", "finite", "frame_of", "to_csv", "to_json", "to_markdown", "to_rich"]
+__all__ = ["Column", "cells", "finite", "frame_of", "to_csv", "to_html", "to_json", "to_markdown", "to_rich"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ class Column:
         unit: stands in brackets behind the heading.
         format: of its values, as Python's `format` takes it; empty: as `str` writes them.
         align: of heading and cells.
-        missing: the cell of a value that is missing or not finite.
+        missing: the cell of a missing value.
         narrow: the heading on a terminal, with line breaks; empty: the unit stands below the heading.
         kind: type of its values; any of them may be missing.
         text: what it is, in one phrase.
@@ -60,9 +61,9 @@ class Column:
 
     def cell(self, value: Any) -> str:
         """One value as people read it."""
-        if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        if value is None:
             return self.missing
-        return format(value, self.format)
+        return "–" if isinstance(value, float) and not math.isfinite(value) else format(value, self.format)
 
 
 def frame_of(rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]) -> pl.DataFrame:
@@ -106,12 +107,12 @@ def to_rich(
         caption: below it.
     """
     from rich.box import SIMPLE_HEAD
-    from rich.markup import escape
+    from rich.markup import escape as as_it_is
     from rich.table import Table as RichTable
     from rich.text import Text
 
     # Brackets in a name are no style: texts are escaped, headings and cells are no markup.
-    table = RichTable(title=escape(title), caption=escape(caption), box=SIMPLE_HEAD, padding=padding)
+    table = RichTable(title=as_it_is(title), caption=as_it_is(caption), box=SIMPLE_HEAD, padding=padding)
     for column in columns:
         heading = column.narrow or column.heading.replace(" [", "\n[")
         is_number = column.align == "right"
@@ -125,6 +126,27 @@ def to_rich(
             *(Text(printable(c)) for c in row), style="bold" if is_bold[i] else None, end_section=ends
         )
     return table
+
+
+def to_html(frame: pl.DataFrame, columns: Sequence[Column], *, bold: str = "", links: bool = False) -> str:
+    """A table for a page, escaped.
+
+    Args:
+        frame: the values.
+        columns: those that are shown.
+        bold: a column of truth values: these rows are bold (class `mean`).
+        links: the first cell of each row that is not bold is a link to the section that it names.
+    """
+    heads = "".join(f"<th>{escape(column.heading).replace(' [', '<br>[')}</th>" for column in columns)
+    lines = []
+    is_bold = frame[bold].to_list() if bold else [False] * len(frame)
+    for row, strong in zip(cells(frame, columns), is_bold, strict=True):
+        texts = [escape(cell) for cell in row]
+        if links and not strong:
+            texts[0] = f'<a href="#{texts[0]}" style="color:inherit">{texts[0]}</a>'
+        tag = '<tr class="mean">' if strong else "<tr>"
+        lines.append(tag + "".join(f"<td>{text}</td>" for text in texts) + "</tr>")
+    return f"<table>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n" + "\n".join(lines) + "\n</tbody></table>"
 
 
 def to_csv(frame: pl.DataFrame) -> str:

@@ -180,7 +180,7 @@ def test_one_bad_file_does_not_end_the_report_of_the_others(
     for number, data in enumerate(CRAFTED.values()):
         (tmp_path / f"bad_{number:02}.mcap").write_bytes(data)
     report = build_tables(tmp_path)
-    assert len(report.table.rows) == 1
+    assert len(report.table.runs) == 1
     assert [line.split(":")[0] for line in report.left_out] == [
         f"bad_{k:02}.mcap" for k in range(len(CRAFTED))
     ]

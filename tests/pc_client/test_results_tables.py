@@ -17,8 +17,8 @@ from pc_client.results.tables import Column, cells, finite, frame_of, to_csv, to
 
 COLUMNS = (
     Column("name", "movement", align="left", kind=str),
-    Column("level", "level", "dB", ".2f", missing="–"),
-    Column("n", kind=int),
+    Column("level", "level", "dB", ".2f"),
+    Column("n", kind=int, missing="none"),
 )
 
 
@@ -41,8 +41,8 @@ def test_a_frame_has_exactly_its_columns_also_without_rows(frame: pl.DataFrame) 
     assert frame["n"].to_list() == [3, None]
 
 
-def test_what_is_missing_or_not_finite_stands_as_the_column_says(frame: pl.DataFrame) -> None:
-    assert cells(frame, COLUMNS) == [["[red]a", "1.00", "3"], ["b", "–", ""]]
+def test_missing_values_are_as_the_column_says_and_those_not_finite_a_dash(frame: pl.DataFrame) -> None:
+    assert cells(frame, COLUMNS) == [["[red]a", "1.00", "3"], ["b", "–", "none"]]
 
 
 def test_markdown(frame: pl.DataFrame) -> None:
@@ -50,7 +50,7 @@ def test_markdown(frame: pl.DataFrame) -> None:
         "| movement | level [dB] | n |",
         "|---|---:|---:|",
         "| [red]a | 1.00 | 3 |",
-        "| b | – |  |",
+        "| b | – | none |",
     ]
 
 
