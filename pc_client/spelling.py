@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 from pc_client.errors import ClientError
+from ur_hil.records import nearest
 
 
 def check_keys(given: Iterable[str], known: Iterable[str], prefix: str, error: type[ClientError]) -> None:
@@ -24,10 +24,3 @@ def check_keys(given: Iterable[str], known: Iterable[str], prefix: str, error: t
     for key in given:
         if key not in known:
             raise error(f"{prefix}{key}: no such key; {nearest(key, known)}")
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """A hint for someone who wrote a word that is not among the known ones."""
-    known = list(known)
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-OURS = {"protocol", "urscript", "ur_emulator", "pc_client"}
+OURS = {"ur_hil", "protocol", "urscript", "ur_emulator", "pc_client"}
 MAY_IMPORT = {
+    "ur_hil": {"pydantic", "pydantic_core"},
     "protocol": {"numpy"},
     "urscript": {"ur_hil", "protocol", "lark", "numpy", "typer", "rich"},
     "ur_emulator": {"ur_hil", "urscript", "protocol", "mujoco", "numpy", "h11", "typer", "rich", "pytest"},
@@ -196,6 +197,7 @@ def test_effects_stay_at_the_rim(package):
                 "matplotlib",
                 "mcap",
                 "asyncio",
+                "pydantic",
                 "ur_emulator.control.http_port",
             },
         ),

@@ -12,7 +12,7 @@ from pc_client.analysis.page import data_uri, render, report_libraries
 from pc_client.analysis.report import REPORT_HTML, Report, provenance_facts
 from pc_client.analysis.side_by_side import PUBLISHED, SideBySide, label_of, side_by_side
 from pc_client.analysis.table import LAG, Table
-from pc_client.control.controller_fields import FIELDS
+from pc_client.control.controller import FIELDS
 from pc_client.results.files import write_files
 from pc_client.results.tables import Column, to_html
 

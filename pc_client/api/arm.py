@@ -18,13 +18,12 @@ from typing import Self
 import numpy as np
 
 from pc_client.api.signals import Run, Signals
-from pc_client.control.controller import CONTROLLERS, DEFAULT, Controller
-from pc_client.control.controller_fields import checked
+from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller
 from pc_client.driver.condition import conditions_text
 from pc_client.driver.robot_report import RobotReport, read_report
 from pc_client.driver.transport import TcpNetwork
 from pc_client.driver.ur_driver import UrDriver
-from pc_client.errors import ClientError
+from pc_client.errors import ClientError, ControllerError
 from pc_client.experiment.approach_run import run_approach
 from pc_client.experiment.experiment_text import experiment_text
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
@@ -39,6 +38,7 @@ from pc_client.planning.approach import plan_approach
 from pc_client.planning.plan_text import approach_text
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
+from ur_hil.records import checked
 
 __all__ = ["Arm", "Confirm", "connect", "plan"]
 
@@ -251,7 +251,7 @@ class Arm:
             ClientError: the acceleration is out of its range, the law gave what cannot be sent, or the robot
                 stopped; the arm rests.
         """
-        value = float(checked("speedj_acceleration", acceleration, "acceleration"))
+        value = checked(FIELDS["speedj_acceleration"], acceleration, "acceleration", ControllerError)
         source = LawStream(law, self.model)
         top = np.degrees(max(source.qd_max))
         self._ask(lambda: f"a velocity law drives the arm at {self._host}, joints up to {top:.0f} deg/s")

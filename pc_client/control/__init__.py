@@ -1,7 +1,6 @@
 """The feedback loop, without a robot: pure functions and small state, no sockets, no clock.
 
 controller         the named controllers and their numbers, and those of a user's file
-controller_fields  what each number may be
 reference          what the arm should do at any time, prepared for the loop
 pi_feedforward     PI + velocity feed-forward for six joints (the paper's Fig. 3)
 tracker            one frame in, one command out

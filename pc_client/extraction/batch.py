@@ -19,7 +19,7 @@ from pc_client.extraction.extract import ExtractOptions, extract
 from pc_client.extraction.files import parse_pen
 from pc_client.extraction.results import Row, StrokeRow, row_of, stroke_rows
 from pc_client.extraction.sources import PenSource, contents, pen_sources
-from pc_client.input_files import MIB
+from ur_hil.input_files import MIB
 
 __all__ = ["Job", "Outcome", "extract_many", "extract_sources", "run_job"]
 

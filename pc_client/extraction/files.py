@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from pc_client.errors import RecordingError
 from pc_client.extraction.recording import PenPart, PenRecording, on_one_axis, ordered_part
-from pc_client.input_files import read_bytes
+from pc_client.input_files import FILE_KINDS
 
 __all__ = ["TIME_UNITS", "parse_pen", "read_pen"]
 
@@ -88,7 +88,7 @@ def read_pen(path: str | Path, time_unit: str | None = None) -> PenRecording:
     Raises:
         RecordingError: the file cannot be read or makes no sense; the message names file and line.
     """
-    return parse_pen(read_bytes(Path(path), "pen"), str(path), time_unit)
+    return parse_pen(FILE_KINDS["pen"].read_bytes(Path(path)), str(path), time_unit)
 
 
 def parse_pen(content: bytes, name: str, time_unit: str | None = None) -> PenRecording:

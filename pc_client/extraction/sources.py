@@ -12,7 +12,8 @@ from pathlib import Path, PurePosixPath
 from pc_client.errors import RecordingError
 from pc_client.extraction.files import parse_pen
 from pc_client.extraction.recording import PenRecording
-from pc_client.input_files import FILE_KINDS, MIB, read_bytes
+from pc_client.input_files import FILE_KINDS
+from ur_hil.input_files import MIB
 
 __all__ = ["PenSource", "contents", "pen_sources", "read_recording"]
 
@@ -66,7 +67,7 @@ def contents(sources: Iterable[PenSource]) -> Iterator[tuple[PenSource, bytes | 
         for source in sources:
             try:
                 if source.member is None:
-                    yield source, read_bytes(source.path, "pen")
+                    yield source, FILE_KINDS["pen"].read_bytes(source.path)
                     continue
                 if archive is None or archive.filename != str(source.path):
                     opened.close()

@@ -6,29 +6,11 @@ The TCP stays at the flange: the tool is a shape that must not touch anything, a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 Three = tuple[float, float, float]
 
 
-class Shape(NamedTuple):
-    """A kind of solid.
-
-    Attributes:
-        noun: what one is called.
-        sizes: its lengths by name, all > 0 [m]; a length of 3 counts x, y, z.
-    """
-
-    noun: str
-    sizes: tuple[tuple[str, int], ...]
-
-
-SHAPES = {
-    "boxes": Shape("box", (("size", 3),)),
-    "cylinders": Shape("cylinder", (("radius", 1), ("length", 1))),
-    "spheres": Shape("sphere", (("radius", 1),)),
-    "capsules": Shape("capsule", (("radius", 1), ("length", 1))),
-}
+NOUNS = {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere", "capsules": "capsule"}
 """The kinds of solids by the name of their table in a cell file.
 
 Cylinders and capsules lie along their own z axis; the length of a capsule is that of its straight part,
@@ -42,8 +24,8 @@ class Solid:
 
     Attributes:
         name: for messages.
-        kind: a key of SHAPES.
-        sizes: its lengths, in the order of SHAPES [m].
+        kind: a key of NOUNS.
+        sizes: x, y, z of a box; the radius, and the length of a cylinder or capsule [m].
         centre: in `base`, or in the flange's frame for a part of a tool [m].
         rpy: roll, pitch, yaw: turns about the fixed x, y and z axis, in this order [rad].
     """
@@ -57,7 +39,7 @@ class Solid:
     @property
     def title(self) -> str:
         """What it is and how it is called, e.g. `box 'press'`."""
-        return f"{SHAPES[self.kind].noun} '{self.name}'"
+        return f"{NOUNS[self.kind]} '{self.name}'"
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pc_client.errors import MovementError
-from pc_client.input_files import parse_toml, read_text
+from pc_client.input_files import FILE_KINDS
 from pc_client.movements.columns import parse_rows
 from pc_client.movements.joint_trajectory import JOINT_COLUMNS, JointTrajectory
 from pc_client.movements.movement import Movement, check_duration, check_name
@@ -171,10 +171,9 @@ def _read(path: Path) -> Movement | JointTrajectory:
     suffix = path.suffix.lower()
     if suffix not in (".toml", ".csv"):
         raise MovementError(f"{path}: movement files are .toml (parameters) or .csv (samples)")
-    text = read_text(path, "movement")
     if suffix == ".csv":
-        return _parse_samples(text, path)
-    return _parse_movement(TableReader(parse_toml(text, str(path), "movement"), str(path)), str(path))
+        return _parse_samples(FILE_KINDS["samples"].read_text(path), path)
+    return _parse_movement(TableReader(FILE_KINDS["movement"].read_toml(path), str(path)), str(path))
 
 
 def _parse_samples(text: str, path: Path) -> Movement | JointTrajectory:

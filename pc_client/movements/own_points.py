@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import MovementError
-from pc_client.input_files import read_text
+from pc_client.input_files import FILE_KINDS
 from pc_client.movements.columns import parse_rows
 from pc_client.movements.durations import Isochrony, leg_lengths
 from pc_client.movements.geometry import read_only
@@ -111,7 +111,7 @@ def load_targets(path: str | Path) -> TargetTable:
         MovementError: unreachable file, or content that makes no sense, naming file and line.
     """
     rows = parse_rows(
-        read_text(Path(path), "movement"),
+        FILE_KINDS["samples"].read_text(Path(path)),
         str(path),
         [("x", "y", "z"), ("x", "y", "z", "t")],
         "x, y, z in m, and optionally t in s",

@@ -25,7 +25,7 @@ from mcap.records import Chunk as ChunkRecord
 from numpy.typing import NDArray
 
 from pc_client.errors import RecordingError
-from pc_client.input_files import read_bytes
+from pc_client.input_files import FILE_KINDS
 from pc_client.recording.layout import (
     COMMAND_SIGNALS,
     MESSAGE_HEAD_BYTES,
@@ -104,7 +104,7 @@ def load_recording(path: Path | str) -> Recording:
         RecordingError: the file cannot be read, is no recording, or was cut before its first row's layout.
     """
     path = Path(path)
-    data = read_bytes(path, "recording")
+    data = FILE_KINDS["recording"].read_bytes(path)
     if not data.startswith(MAGIC):
         raise RecordingError(f"{path} is not a recording: an MCAP file begins with {MAGIC!r}")
     scan = _Scan()

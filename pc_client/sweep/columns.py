@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pc_client.analysis.budget import PARTS
-from pc_client.control.controller_fields import FIELDS
+from pc_client.control.controller import FIELDS
 from pc_client.recording.origin import Origin, origin_of
 
 

@@ -11,17 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pc_client.control.controller import CONTROLLERS, Controller
-from pc_client.control.controller_fields import FIELDS
+from pc_client.control.controller import CONTROLLERS, FIELDS, Controller
 from pc_client.errors import MovementError, SweepError
-from pc_client.input_files import parse_toml, read_text
+from pc_client.input_files import FILE_KINDS
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.kinematics.robot_model import ROBOTS
 from pc_client.movements.files import library_names, library_path, load_movement
-from pc_client.spelling import check_keys, nearest
+from pc_client.spelling import check_keys
 from pc_client.sweep.case import MovementFile, SimulatedArm
 from pc_client.sweep.controller_axes import check_distinct, grid, read_axes, samples
+from ur_hil.records import nearest
 
 FIDELITIES = ("exact", "ideal", "typical", "poor")
 """What `ur-emulator serve --fidelity` knows."""
@@ -90,7 +90,7 @@ def read_config(path: Path) -> SweepConfig:
         ControllerError: a field of the controller cannot hold a value.
         MovementError: a movement file makes no sense.
     """
-    return _parse(_Reader(parse_toml(read_text(path, "sweep"), str(path), "sweep"), str(path)), path)
+    return _parse(_Reader(FILE_KINDS["sweep"].read_toml(path), str(path)), path)
 
 
 def _parse(reader: _Reader, path: Path) -> SweepConfig:
@@ -164,7 +164,7 @@ def _movements(reader: _Reader, folder: Path) -> tuple[MovementFile, ...]:
             )
         try:
             name = load_movement(path).name
-            files.append(MovementFile(name, path.name, read_text(path, "movement")))
+            files.append(MovementFile(name, path.name, FILE_KINDS["samples"].read_text(path)))
         except MovementError as error:
             raise MovementError(f"{reader.source}: movements: {error}") from error
     check_distinct([file.name for file in files], f"{reader.source}: movements")

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from pc_client.control.controller import Controller
-from pc_client.control.controller_fields import FIELDS, Value, checked
-from pc_client.errors import SweepError
+from pc_client.control.controller import FIELDS, Controller, Value
+from pc_client.errors import ControllerError, SweepError
 from pc_client.spelling import check_keys
+from ur_hil.records import checked
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ def _read_axis(value: Any, name: str, where: str) -> Axis:
     values = value if isinstance(value, list) else [value]
     if not values:
         raise SweepError(f"{where}: an empty list; give at least one value")
-    read = tuple(checked(name, item, where) for item in values)
+    read = tuple(checked(FIELDS[name], item, where, ControllerError) for item in values)
     check_distinct(read, where)
     return read
 
@@ -111,7 +111,9 @@ def _read_range(table: Mapping[str, Any], name: str, where: str) -> Range:
     for key in ("from", "to"):
         if key not in table:
             raise SweepError(f"{where}: a range without {key!r}; give {{ from = A, to = B }}")
-    low, high = (checked(name, table[key], f"{where}.{key}") for key in ("from", "to"))
+    low, high = (
+        checked(FIELDS[name], table[key], f"{where}.{key}", ControllerError) for key in ("from", "to")
+    )
     scale = table.get("scale", "linear")
     if scale not in ("linear", "log"):
         raise SweepError(f'{where}.scale: {scale!r}; give "linear" or "log"')

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pc_client.errors import SweepError
-from pc_client.input_files import read_bytes
+from pc_client.input_files import FILE_KINDS
 from pc_client.sweep.case import Case
 from pc_client.sweep.outcome import Outcome
 
@@ -56,7 +56,7 @@ class SweepFolder:
         A failed case is tried again: the robot may answer now. So is one whose recordings shall stay now.
         """
         try:
-            stored = json.loads(read_bytes(self.path / _case_file(case), "outcome"))
+            stored = json.loads(FILE_KINDS["outcome"].read_bytes(self.path / _case_file(case)))
             outcome = Outcome(stored["status"], stored["error"], tuple(stored["rows"]))
         except (SweepError, ValueError, KeyError, TypeError, RecursionError):  # not there, or not ours
             return None

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pc_client.analysis.page import data_uri, render
-from pc_client.control.controller_fields import FIELDS
+from pc_client.control.controller import FIELDS
 from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.ranking import rank_settings, spans_grid, varying
 

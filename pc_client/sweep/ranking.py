@@ -12,7 +12,7 @@ from math import prod
 from statistics import fmean
 from typing import Any
 
-from pc_client.control.controller_fields import FIELDS
+from pc_client.control.controller import FIELDS
 from pc_client.sweep.columns import FACTORS
 
 Rows = Sequence[Mapping[str, Any]]

@@ -31,13 +31,14 @@ from pc_client.experiment.prepare import _refuse_to_lose
 from pc_client.extraction.files import MOST_SAMPLES, parse_pen
 from pc_client.extraction.sources import contents, pen_sources
 from pc_client.file_names import MOST_BYTES, as_file_name, is_file_name
-from pc_client.input_files import FILE_KINDS, MIB, read_bytes
+from pc_client.input_files import FILE_KINDS
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.movements.files import LIBRARY_FOLDER, load_movement
 from pc_client.recording.layout import row_layout, schema_text
 from pc_client.recording.loader import load_recording
 from pc_client.recording.mcap_file import MAGIC
 from pc_client.sweep.config import read_config
+from ur_hil.input_files import MIB
 
 QUIET = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 ROOT = Path(__file__).parents[2]
@@ -214,11 +215,11 @@ def test_a_file_beyond_its_limit_is_refused_before_it_is_in_memory(tmp_path: Pat
     path = tmp_path / "a.mcap"
     with path.open("wb") as file:
         file.truncate(8 << 30)  # of holes
-    for kind, limit in FILE_KINDS.items():
+    for limit in FILE_KINDS.values():
         if limit.most_bytes <= 16 * MIB:
             tracemalloc.start()
             with pytest.raises(limit.error, match="longer than"):
-                read_bytes(path, kind)
+                limit.read_bytes(path)
             assert tracemalloc.get_traced_memory()[1] < 3 * limit.most_bytes
             tracemalloc.stop()
 
