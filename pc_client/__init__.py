@@ -7,7 +7,7 @@
     run = arm.run(plan, ur.Controller.preview())
     print(run.snr, run.t, run.q)
 
-Nothing in here can tell an emulator from a robot; only the address differs. What is public is in `__all__`.
+The client treats an emulator and a robot alike; only the address differs. What is public is in `__all__`.
 Names are loaded when they are first asked for, so that importing the package costs nothing.
 """
 

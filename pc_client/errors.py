@@ -94,7 +94,7 @@ def printable(text: str) -> str:
 
 
 def full_message(error: BaseException) -> str:
-    """The message of an error and what was added to it on its way; a note that says it again replaces it."""
+    """The message of an error and what was added to it later; a note that says it again replaces it."""
     text = str(error)
     for note in getattr(error, "__notes__", ()):
         text = note if note.startswith(text) else f"{text}; {note}"

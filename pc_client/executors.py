@@ -36,7 +36,7 @@ _DASK_TIMEOUT = "10s"
 def open_executor(workers: int | None = None, dask: str | None = None) -> Iterator[Executor]:
     """Open a place to run jobs; it is closed on leaving.
 
-    Left in the regular way, jobs that were submitted are finished first. Left by an exception (Ctrl-C, an
+    Left regularly, jobs that were submitted are finished first. Left by an exception (Ctrl-C, an
     error of the caller) they are given up: waiting ones never begin, running processes are ended at once.
 
     Args:

@@ -1,7 +1,7 @@
 """The plots of the report, as SVG text.
 
 The only module that loads matplotlib; import it where a plot is drawn, never from what the control loop
-imports. Colours are those of Okabe and Ito, which colour-blind readers can tell apart; the reference is
+imports. Colours are those of Okabe and Ito, which colour-blind readers can distinguish; the reference is
 always the thick grey line, so that a plot can be read without its legend. Every plot of
 data that are not known to be of a real arm says so.
 """

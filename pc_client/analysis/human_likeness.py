@@ -1,4 +1,4 @@
-"""How human-like a movement is, in four figures that need no model of it.
+"""How human-like a movement is: four figures that need no model of the movement.
 
     sparc                    smoothness, from the spectrum of the speed: about -1.4 for one speed peak,
                              lower for a less smooth speed
@@ -7,11 +7,11 @@
     speed_peaks              number of speed peaks: one a stroke in human movements
     power_law_exponent       beta in speed = k curvature^-beta: one third for drawing hands
 
-Pure functions on samples at equal steps of time. None of them filters: noise that is differentiated twice
-is all that is left, so measured signals are smoothed before (`comparison.filtering`).
+Pure functions on samples at equal steps of time. None of them filters. Differentiation amplifies noise, so
+measured signals are low-passed before (`comparison.filtering`).
 
 Source: S. Balasubramanian et al., "On the analysis of movement smoothness", JNER 12:112 (2015), for the
-    first two; P. Viviani and F. Lacquaniti et al. for the two-thirds power law.
+first two; P. Viviani and F. Lacquaniti et al. for the two-thirds power law.
 """
 
 from __future__ import annotations
@@ -55,8 +55,12 @@ def sparc(
         threshold: amplitude below which the spectrum is taken to be over, 0 to 1.
         padding: the transform is 2^padding times as long as the signal, for a smooth curve.
 
-    Returns: Below -1; the nearer to 0, the smoother. Figures compare only among movements of the same
-        number of strokes.
+    Returns:
+        Below -1; the nearer to 0, the smoother. Figures compare only among movements of the same number of
+        strokes.
+
+    Raises:
+        ClientError: the speed or the rate is not as above, or the spectrum has only one line.
     """
     values = _checked(speed, rate)
     size = 2 ** (math.ceil(math.log2(len(values))) + padding)
@@ -77,14 +81,19 @@ def sparc(
 def log_dimensionless_jerk(speed: ArrayLike, rate: float) -> float:
     """LDJ = -ln(T^3 / v_peak^2 * integral of (d2v/dt2)^2 dt), T = n / rate, by second differences.
 
-    A profile with corners has infinite jerk there: its figure falls with the rate, so compare at equal
+    A speed profile with corners has infinite jerk there. Its figure falls with the rate, so compare at equal
     rates only.
 
-    Args: speed: (n,), any unit, n >= 8, not all zero: the movement from rest to rest, for dead time at its
-        ends counts in T. rate: samples a second, Hz.
+    Args:
+        speed: (n,), any unit, n >= 8, not all zero: the movement from rest to rest. Rest before and after
+            it counts in T.
+        rate: samples a second, Hz.
 
     Returns:
         -ln 204.8 = -5.322 for one minimum-jerk stroke; inf for a constant speed.
+
+    Raises:
+        ClientError: the speed or the rate is not as above.
     """
     values = _checked(speed, rate)
     jerk = np.diff(values, 2) * rate**2
@@ -157,7 +166,7 @@ class PowerLawFit(NamedTuple):
 
     Attributes:
         exponent: beta; nan when the path has no bend to fit.
-        r_squared: share of the variance of ln speed that the law explains, 0 to 1; nan likewise.
+        r_squared: share of the variance of ln speed that the power law explains, 0 to 1; nan likewise.
         n_samples: samples that were used.
     """
 
@@ -171,13 +180,16 @@ def fit_power_law(
 ) -> PowerLawFit:
     """Fit ln speed = ln k - beta ln curvature by least squares over the samples.
 
-    Noise alone makes curvature high where speed is low and so feigns a law: judge r_squared too, and smooth
-    measured signals first.
+    Noise alone makes the curvature high where the speed is low, which looks like a power law. So look at
+    r_squared too, and low-pass measured signals first.
 
-    Args: v: velocities, (n, 3), m/s, at equal steps of time. a: accelerations, (n, 3), m/s^2. min_speed:
-        samples slower than this share of the top speed are left out: starts and stops follow no law.
-        max_radius: samples on a path straighter than this radius (m) are left out: a line has no curvature
-        to speak of.
+    Args:
+        v: velocities, (n, 3), m/s, at equal steps of time.
+        a: accelerations, (n, 3), m/s^2.
+        min_speed: samples slower than this share of the top speed are left out: starts and stops do not
+            follow the power law.
+        max_radius: samples on a path straighter than this radius (m) are left out: the curvature of a line
+            is nearly zero.
     """
     speed = np.linalg.norm(np.asarray(v, dtype=np.float64), axis=1)
     curvature = curvature_of(v, a)

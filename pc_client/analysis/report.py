@@ -211,7 +211,7 @@ def _loop_facts(loop: Mapping[str, float | str]) -> Mapping[str, str]:
         "dead_time_s",
         "lag_s",
         "joint_spread_s",
-    }:  # by a controller that tells dead time and lag apart
+    }:  # by a controller that identifies dead time and lag separately
         facts["identified loop"] = (
             f"dead time {1e3 * float(loop['dead_time_s']):.1f} ms, "
             f"lag {1e3 * float(loop['lag_s']):.1f} ms, "

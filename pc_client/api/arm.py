@@ -1,6 +1,6 @@
 """`connect` and `Arm`: a robot, real or emulated, that runs plans and velocity laws.
 
-Nothing here can tell an emulator from a robot; only the address differs. Each motion opens a session, holds
+An emulator and a robot are treated alike; only the address differs. Each motion opens a session, holds
 the robot against its model, streams under the watchdog and leaves the arm at rest; between motions no
 connection is open.
 """
@@ -85,7 +85,7 @@ def connect(
         confirm: is asked before a motion of an arm that is not known to be simulated.
 
     Raises:
-        ClientError: it does not answer, does not tell which arm it is, or is not as it must be.
+        ClientError: it does not answer, does not report which arm it is, or is not as it must be.
     """
     surroundings = load_cell(cell) if isinstance(cell, str | Path) else cell or NO_CELL
     numbers = ports or Ports.standard()
@@ -93,7 +93,7 @@ def connect(
     model = model_of(report, surroundings)
     require(preflight(report, model))
     if model is None:
-        raise ClientError(f"{host} does not tell which arm it is: there is no plan for it")
+        raise ClientError(f"{host} does not report which arm it is: there is no plan for it")
     return Arm(host, numbers, report, model, reverse_port, confirm)
 
 
@@ -148,7 +148,7 @@ class Arm:
 
     @property
     def simulated(self) -> bool | None:
-        """True, False, or None where the robot does not tell."""
+        """True, False, or None where the robot does not report it."""
         return self.report.info.simulated
 
     def frame(self) -> RealtimeFrame:
@@ -210,7 +210,7 @@ class Arm:
             repeat: runs of each, at least 1.
             controller: the same for all runs.
             out: folder of the recordings.
-            observer: is told what goes on.
+            observer: gets the progress.
 
         Raises:
             ClientError: a check failed, the robot stopped or the answer was no; the arm rests, recordings
@@ -222,13 +222,13 @@ class Arm:
             return ExperimentRunner(driver, wanted, controller, observer).run()
 
     def approach(self, plan: Plan) -> Plan:
-        """Move slowly to where a plan begins, on a checked way.
+        """Move slowly to where a plan begins, on a checked path.
 
         Returns:
             The plan in the turns of the joints in which the arm stands now.
 
         Raises:
-            ClientError: there is no clear way, a check failed or the robot stopped; the arm rests.
+            ClientError: there is no clear path, a check failed or the robot stopped; the arm rests.
         """
         self.confirm(Experiment(self.model, (plan,), 1, Path()))
         with self._session() as driver:
@@ -273,7 +273,7 @@ class Arm:
         """Ask whether an arm that is not known to be simulated may do an experiment; nothing moves.
 
         Raises:
-            ClientError: the answer was no, nobody can be asked, or there is no clear way to the start.
+            ClientError: the answer was no, nobody can be asked, or there is no clear path to the start.
         """
         self._ask(lambda: self._text_of(wanted))
 

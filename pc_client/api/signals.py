@@ -35,7 +35,7 @@ class Signals:
         qd: (n, 6) reported joint velocities [rad/s].
         tcp_pose: (n, 6) reported TCP pose: position [m] and rotation vector [rad], base frame.
         qd_cmd: (n, 6) commanded joint velocities [rad/s].
-        simulated: True, False, or None where the robot does not tell.
+        simulated: True, False, or None where the robot does not report it.
     """
 
     t: Array

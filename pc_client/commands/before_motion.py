@@ -26,7 +26,7 @@ def reach(robot: str, ports: Ports, cell: Cell, reverse_port: int | None = None,
         yes: do not ask before a real arm moves.
 
     Raises:
-        ClientError: it does not answer, does not tell which arm it is, or is not as it must be.
+        ClientError: it does not answer, does not report which arm it is, or is not as it must be.
     """
     from pc_client.api.arm import connect
 

@@ -36,16 +36,19 @@ def doctor(
         say(f"robot       {found.info}")
     if found.rhythm is not None:
         _show_rhythm(found.rhythm)
-    obstacle, untold = found.obstacle, []
+    obstacle, unreported = found.obstacle, []
     if found.report is not None:
         conditions = preflight(found.report, model_of(found.report, surroundings))
         say(conditions_text(conditions))
         obstacle = refusal(conditions) or obstacle
-        untold = [condition.name for condition in conditions if condition.holds is None]
+        unreported = [condition.name for condition in conditions if condition.holds is None]
     if obstacle:
         say(f"streaming   NOT NOW: {obstacle}")
         raise typer.Exit(1)
-    say("streaming   ready" + (f"; not told by this software: {', '.join(untold)}" if untold else ""))
+    say(
+        "streaming   ready"
+        + (f"; not reported by this software: {', '.join(unreported)}" if unreported else "")
+    )
 
 
 def _show_rhythm(rhythm: FrameRhythm) -> None:

@@ -51,7 +51,7 @@ def extract(
             "--strokes-per-peak",
             min=0.1,
             max=10.0,
-            help="Most strokes per peak of the speed; 1.2 by default, more where that tells too little.",
+            help="Most strokes per peak of the speed; 1.2 by default, more where these are too few.",
         ),
     ] = None,
     figures: Annotated[
@@ -63,7 +63,7 @@ def extract(
     workers: WorkersOption = None,
     dask: DaskOption = None,
 ) -> None:
-    """Find the strokes of recorded movements, and say how well they tell them."""
+    """Find the strokes of recorded movements, and say how well they reconstruct them."""
     from pc_client.extraction.extract import ExtractOptions
     from pc_client.extraction.files import TIME_UNITS
     from pc_client.extraction.results import to_csv, to_json

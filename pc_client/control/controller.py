@@ -173,9 +173,10 @@ _PREVIEW = Controller(
 # it has little left to do.
 _BEST = replace(_PREVIEW, name="best", compensates_lag=True, compensates_gear=True, uses_ilc=True)
 
-# Of the way to a start, before anything is known of the loop: feedback that is stable with a delay of up to
-# 300 ms (pi/2T), and slow. It overshoots the end of its way by what the delay is worth (3 mm with 45 ms, 9 mm
-# with 100 ms): its tolerances leave room for that. Not for movements, so it has no place in the table.
+# For the approach to a start, before anything is known of the loop: feedback that is stable with a delay of
+# up to 300 ms (pi/2T), and slow. It overshoots the end of the approach in proportion to the delay (3 mm with
+# 45 ms, 9 mm with 100 ms): its tolerances leave room for that. Not for movements, so it has no place in the
+# table.
 APPROACH = Controller(
     name="approach",
     gain_p=5.0,

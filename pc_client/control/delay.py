@@ -58,7 +58,7 @@ def estimate_delay(
         The estimate; sub-sample, as the integral is a continuous function of time.
 
     Raises:
-        DriverError: too little motion, or the arm did not do what it was told.
+        DriverError: too little motion, or the arm did not follow the commands.
     """
     # Command k acts from its frame to the next one: the integral is piecewise linear, knots at the stamps.
     steps = np.append(np.diff(t), period)
@@ -70,8 +70,8 @@ def estimate_delay(
     displacement, q = displacement[:, moved], q[:, moved]
 
     def mean_square(delay: float) -> float:
-        told = [np.interp(t - delay, knots, joint) for joint in displacement.T]
-        return float(np.var(q.T - told, axis=1).mean())
+        commanded = [np.interp(t - delay, knots, joint) for joint in displacement.T]
+        return float(np.var(q.T - commanded, axis=1).mean())
 
     coarse = np.arange(0.0, LONGEST_DELAY + _COARSE_STEP, _COARSE_STEP)
     best: float = coarse[int(np.argmin([mean_square(delay) for delay in coarse]))]

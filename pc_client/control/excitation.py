@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from math import cos, pi, sin
 
 DISPLACEMENT = 0.0168
-"""Way of one pulse [rad]: 0.96 deg."""
+"""Displacement of one pulse [rad]: 0.96 deg."""
 
 PULSE = 0.28
 """Length of one pulse [s]: peak speed 0.12 rad/s, far above encoder noise and far below any limit."""
 
 BRISK_PULSE = 0.12
-"""The same way in less time: 0.28 rad/s, 7 rad/s2. Tells a lag from a delay, which slow pulses hardly do: in
-them friction, which makes a joint set out late, looks like a lag."""
+"""The same displacement in less time: 0.28 rad/s, 7 rad/s2. It separates lag from delay; with
+slow pulses friction, which delays the start of a joint, looks like a lag."""
 
 N_PAIRS = 2
 """Pairs of a pulse out and a pulse back."""
@@ -53,7 +53,7 @@ class Excitation:
         mean = DISPLACEMENT / self._pulse
         speed = mean * (1.0 - cos(w * tau))
         displacement = mean * (tau - sin(w * tau) / w)
-        if int(n) % 2:  # the way back
+        if int(n) % 2:  # back to the start
             speed, displacement = -speed, DISPLACEMENT - displacement
         q = tuple(q0 + sign * displacement for q0, sign in zip(self._q_start, _SIGNS, strict=True))
         return q, tuple(sign * speed for sign in _SIGNS)

@@ -108,8 +108,8 @@ class GearObserver:
         """
         n = len(q)
         for j in range(q.shape[1]):
-            told = np.convolve(qd_cmd[:, j], self._response)[1:n]  # the steps up to frames 1, 2, ...
-            surprise = np.diff(q[:, j]) - told
+            commanded = np.convolve(qd_cmd[:, j], self._response)[1:n]  # the steps up to frames 1, 2, ...
+            surprise = np.diff(q[:, j]) - commanded
             waves = np.diff(_waves(q[:, j]), axis=0)
             self._normal[j] += waves.T @ waves
             self._moments[j] += waves.T @ surprise

@@ -2,7 +2,7 @@
 
 A delay moves a motion, a lag also rounds it: two parameters, found together by least squares over all joints.
 The gear of a joint is no part of the loop; over the small excitation its error is a smooth function of the
-position, so a cubic in the way of each joint takes it up, and with it any error of scale.
+position, so a cubic in the displacement of each joint takes it up, and with it any error of scale.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def identify_loop(t: Array, qd_cmd: Array, q: Array, period: float) -> LoopModel
         The model, and by how much single joints differ from it.
 
     Raises:
-        DriverError: too little motion, or the arm did not do what it was told.
+        DriverError: too little motion, or the arm did not follow the commands.
     """
     total = estimate_delay(t, qd_cmd, q, period).delay
     moved = np.ptp(np.cumsum(qd_cmd, axis=0) * period, axis=0) > _LEAST_DISPLACEMENT
@@ -66,7 +66,7 @@ def identify_loop(t: Array, qd_cmd: Array, q: Array, period: float) -> LoopModel
     motion = float(np.sqrt(np.mean(np.var(displacement, axis=0))))
     if residual > _WORST_RESIDUAL * motion:
         raise DriverError(
-            f"dead time and lag cannot be told apart: {residual:.1e} rad rms of the arm's motion stay "
+            f"dead time and lag cannot be separated: {residual:.1e} rad rms of the arm's motion stay "
             f"unexplained, allowed is {_WORST_RESIDUAL:.0%} of {motion:.1e} rad"
         )
     # What a joint is later than the model: its rest against its own velocity.
@@ -91,7 +91,7 @@ def _delayed(t: Array, knots: Array, commands: Array, dead_time: float, lag: flo
 
 
 def _beside(displacement: Array, signal: Array) -> Array:
-    """What of a signal (n,) is no cubic function of the way (n,)."""
+    """The part of a signal (n,) that is no cubic function of the displacement (n,)."""
     centred = displacement - displacement.mean()
     scaled = centred / max(float(np.abs(centred).max()), 1e-12)
     basis, _ = np.linalg.qr(np.vander(scaled, 4))

@@ -33,7 +33,7 @@ class LoopModel:
         dead_time: from a command to the first effect in a reported position [s].
         lag: time constant of the first-order lag behind it [s].
         spread: largest difference of a single joint's delay from the common one [s]; what the model leaves
-            open. None when dead time and lag were not told apart: all of the delay is `dead_time` then, and
+            open. None when dead time and lag were not separated: all of the delay is `dead_time` then, and
             `lag` is no measurement.
         residual: rms of what the model does not explain [rad].
     """
@@ -65,7 +65,7 @@ class LoopModel:
     def corners(self) -> Iterator[LoopModel]:
         """The loops at the edges of what `spread` leaves open: later or earlier, more or less lag.
 
-        None for a loop whose dead time and lag were not told apart.
+        None for a loop whose dead time and lag were not separated.
         """
         if self.spread is None:
             return

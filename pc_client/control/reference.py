@@ -57,7 +57,7 @@ class ReferencePoint(NamedTuple):
     v: NDArray[np.float64]
 
 
-# Time stamps are multiples of the cycle up to rounding; one microsecond tells neighbours apart and is
+# Time stamps are multiples of the cycle up to rounding; one microsecond separates neighbours and is
 # 1e-4 of a cycle.
 _TICKS_PER_SECOND = 1_000_000
 

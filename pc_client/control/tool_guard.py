@@ -114,7 +114,7 @@ class ToolGuard:
             )
 
     def _nearest(self, point: Array, now: float) -> tuple[Array, int]:
-        """The way (12,) to a point from the nearest one of the path around a time [cycles], and its cycle."""
+        """A point less the nearest path point around a time [cycles], (12,), and the cycle of the latter."""
         last = len(self._points) - 1
         first = min(max(floor(now - BEHIND / self._period), 0), last)
         window = slice(first, min(max(ceil(now + AHEAD / self._period), 0), last) + 1)

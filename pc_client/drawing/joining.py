@@ -10,8 +10,8 @@ The sum of strokes does not care who made them, so marks and lifts stand in one 
 
 Each mark keeps its strokes, shape and timing. Only the gaps between marks may become longer: where a tail
 of a mark's strokes would reach into its neighbour, or where a pen-up move needs more time. Strokes of lifts
-lie in the gaps but for `TAIL` of their way at either end; `TAIL` of the drawing's size is also what a mark
-may do of its way while its neighbour is drawn.
+lie in the gaps but for `TAIL` of their length at either end; `TAIL` of the drawing's size is also what a mark
+may move while its neighbour is drawn.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ from pc_client.movements.timing import TwoSidedTiming
 
 __all__ = ["TAIL", "Joined", "join", "least_gaps"]
 
-#: Share of a lift's way outside its gap, and of the drawing's size that a mark moves beside its neighbours.
+#: Share of a lift's length outside its gap, and of the drawing's size that a mark moves beside its
+#: neighbours.
 TAIL = 1e-3
 #: Share of the drawing's size that may be left to do before the movement begins and after it ends.
 _REST = 1e-4

@@ -32,7 +32,7 @@ _MIN_SAMPLES = 16
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """How well one signal tells another, dB."""
+    """How well one signal agrees with another, dB."""
 
     snr_v_db: float
     snr_t_db: float

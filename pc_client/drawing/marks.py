@@ -21,7 +21,7 @@ from pc_client.movements.sigma_lognormal import SigmaLognormal
 
 __all__ = ["Mark", "marks_of"]
 
-#: Deviation at which a speed profile is over for every purpose: 1e-9 of its way is left.
+#: Deviation at which a speed profile is over for every purpose: 1e-9 of its length is left.
 _OVER = 6.0
 #: Accuracy of times of tails, s.
 _TIME_ACCURACY = 1e-6
@@ -52,15 +52,15 @@ class Mark:
         return Mark(self.begin, self.end, read_only(first), read_only(last), trajectory)
 
     def length_before(self, lead: float) -> float:
-        """Length of way that the strokes have done `lead` s before the pen comes down."""
+        """Path length that the strokes have done `lead` s before the pen comes down."""
         return self._length(self.begin - lead, done=True)
 
     def length_after(self, lag: float) -> float:
-        """Length of way that the strokes have still to do `lag` s after the pen went up."""
+        """Path length that the strokes have still to do `lag` s after the pen went up."""
         return self._length(self.end + lag, done=False)
 
     def lead(self, tolerance: float) -> float:
-        """How long (s) before the pen comes down the strokes have done no more than a length of way."""
+        """How long (s) before the pen comes down the strokes have done no more than a path length."""
         if self.trajectory is None or self.length_before(0.0) <= tolerance:
             return 0.0
         begin = min(s.timing.lognormal.time_at_deviation(-_OVER) for s in self.trajectory.strokes)
@@ -70,7 +70,7 @@ class Mark:
         return float(bisect(lambda u: self.length_before(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
 
     def lag(self, tolerance: float) -> float:
-        """How long (s) after the pen went up the strokes have still to do more than a length of way."""
+        """How long (s) after the pen went up the strokes have still to do more than a path length."""
         if self.trajectory is None or self.length_after(0.0) <= tolerance:
             return 0.0
         end = max(s.timing.lognormal.time_at_deviation(_OVER) for s in self.trajectory.strokes)
@@ -80,7 +80,7 @@ class Mark:
         return float(bisect(lambda u: self.length_after(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
 
     def path(self, tolerance: float, n: int = 801) -> NDArray[np.float64]:
-        """The whole path of the strokes, up to a length of way at both ends, and its end points; (m, 3)."""
+        """The whole path of the strokes, up to a path length at both ends, and its end points; (m, 3)."""
         ends = np.vstack((self.first, self.last))
         if self.trajectory is None:
             return ends

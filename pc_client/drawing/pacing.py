@@ -1,7 +1,7 @@
 """How slow a drawing must be for an arm: one factor for all of it; only pen-up moves may become longer.
 
 Slowed down by a factor a, on the same path, joint speeds fall by a and joint accelerations by a^2; so one
-plan tells for every moment which factor it needs. Marks come first: they are what is drawn. A pen-up move
+plan gives the factor that each moment needs. Marks come first: they are what is drawn. A pen-up move
 that would need a larger factor than they do gets more time instead, and the marks behind it come later. The
 factor itself is then found by bisection, with planning's own checks as the judge.
 """

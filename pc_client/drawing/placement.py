@@ -1,10 +1,11 @@
 """Where in the workspace a drawing is done: a sheet, an angle and a scale.
 
-The sheet stands before the robot as a board before a person who looks the same way: right of the drawing is
--y of the base frame. A recording's own axes are x to the right and y down the sheet, as pixels are counted,
-or up, as everywhere else; its third axis then points into the sheet, or out of it, so that the map is a
-proper rotation and no drawing is mirrored. Pixels are never below 0: where a y is, y is taken to point up
-(Omniglot writes the rows of its screen as 0, -1, -2 ...). A pen goes up against the direction into the sheet.
+The sheet stands before the robot as a board before a person who looks in the same direction: right of the
+drawing is -y of the base frame. A recording's own axes are x to the right and y down the sheet, as pixels are
+counted, or up, as everywhere else; its third axis then points into the sheet, or out of it, so that the map
+is a proper rotation and no drawing is mirrored. Pixels are never below 0: where a y is, y is taken to point
+up (Omniglot writes the rows of its screen as 0, -1, -2 ...). A pen goes up against the direction into the
+sheet.
 
 Recordings in space keep their axes: x, y, z are those of the base frame, and the pen goes up along +z.
 """

@@ -12,10 +12,10 @@ class Condition:
 
     Attributes:
         name: of the quantity, as on the pendant or in UR's manuals.
-        reported: what it is; empty when the robot does not tell.
+        reported: what it is; empty when the robot does not report it.
         needed: what it must be.
         remedy: what to do when it is not.
-        holds: whether it is; None when the robot does not tell.
+        holds: whether it is; None when the robot does not report it.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Condition:
     @property
     def verdict(self) -> str:
         """In a word or two."""
-        return {True: "ok", False: "NOT OK", None: "not told"}[self.holds]
+        return {True: "ok", False: "NOT OK", None: "not reported"}[self.holds]
 
 
 def conditions_text(conditions: Iterable[Condition]) -> str:

@@ -1,8 +1,8 @@
 """Ports 30001 and 30002: the robot's messages come in, our programs go out.
 
-Of the robot states the newest sub-package of each type is kept, for what the realtime port does not tell: the
-speed slider, the TCP offset, the type of the arm. Both connections must be read now and then, or the robot
-has to hold back what it wants to tell.
+Of the robot states the newest sub-package of each type is kept, for what the realtime port does not report:
+the speed slider, the TCP offset, the type of the arm. Both connections must be read now and then, or the
+robot has to hold back its packages.
 """
 
 from __future__ import annotations

@@ -53,8 +53,8 @@ class Diagnosis:
         closed_ports: the others.
         info: which robot; None when its primary port does not answer.
         rhythm: of the frames; None when none come.
-        report: what `experiment.preflight` judges; None when the robot does not tell enough.
-        obstacle: which connection stands in the way of a session, or "".
+        report: what `experiment.preflight` judges; None when the robot does not report enough.
+        obstacle: which connection prevents a session, or "".
     """
 
     open_ports: dict[str, int]

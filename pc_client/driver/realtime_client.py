@@ -163,7 +163,7 @@ class RealtimeClient:
                     return self._sort(first)
 
     def _sort(self, first: bytes) -> Arrival:
-        """Decode this frame and all that follow in the buffer; tell new ones from heartbeats."""
+        """Decode this frame and all that follow in the buffer; separate new ones from heartbeats."""
         layout = self._layout
         if layout is None:
             layout = self._layout = layout_for_size(len(first))

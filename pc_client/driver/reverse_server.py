@@ -11,7 +11,7 @@ from protocol.patience import Patience
 from protocol.velocity_stream import HELLO_SIZE, check_hello
 
 REVERSE_PORT = 31000
-"""The port unless told otherwise: always the same, so that a firewall can be told.
+"""The default port: always the same, so that a firewall can be opened for it.
 
 No port of a control box (502, 29999 to 30020), and below those that systems give to clients, where another
 program could hold it by chance (Linux from 32768 on, Windows and macOS from 49152 on).

@@ -24,7 +24,7 @@ _MODEL_NAME = re.compile(r"UR[0-9]{1,3}[a-zA-Z]{0,10}")
 _SERIAL, _MODEL = "get serial number", "get robot model"
 
 UNKNOWN = "unknown"
-"""Stands for what a robot does not tell."""
+"""Stands for what a robot does not report."""
 
 _CB3_PERIOD = 0.008
 _E_SERIES_PERIOD = 0.002
@@ -36,11 +36,11 @@ class RobotInfo:
 
     Attributes:
         version: controller software.
-        model: e.g. `UR3`, or "unknown" when the robot does not tell.
-        serial: serial number, or "unknown" when the dashboard server does not tell.
+        model: e.g. `UR3`, or "unknown" when the robot does not report it.
+        serial: serial number, or "unknown" when the dashboard server does not report it.
         simulated: True when the robot says so; False when its serial number is that of a real arm and it has
-            no mark of a simulator; None when it does not tell.
-        seed: of an emulated arm; None for another, and when the robot does not tell.
+            no mark of a simulator; None when it does not report this.
+        seed: of an emulated arm; None for another, and when the robot does not report it.
     """
 
     version: SoftwareVersion
@@ -66,11 +66,11 @@ def read_robot_info(network: Network, host: str, dashboard_port: int, primary: P
         network: makes the connection.
         host: the robot.
         dashboard_port: its dashboard port.
-        primary: a fresh connection to the primary port: its greeting tells the software; its first state the
+        primary: a fresh connection to the primary port: its greeting names the software; its first state the
             marks of a simulator, and the arm when the dashboard server, before 3.12, does not.
 
     Raises:
-        DriverError: the primary port does not tell its version.
+        DriverError: the primary port does not report its version.
     """
     version = primary.wait_for_version()
     answers = ask_dashboard(network, host, dashboard_port, (_SERIAL, _MODEL))

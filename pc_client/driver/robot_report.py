@@ -20,7 +20,7 @@ _CONNECT_TIMEOUT = 2.0
 
 @dataclass(frozen=True, slots=True)
 class RobotReport:
-    """What a robot reports. None stands for what it does not tell.
+    """What a robot reports. None stands for what it does not report.
 
     Attributes:
         info: which robot it is.
@@ -61,7 +61,7 @@ def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
 def make_report(
     info: RobotInfo, frame: RealtimeFrame, primary: PackageStream, payload: float | None
 ) -> RobotReport:
-    """Put together what open connections have told.
+    """Put together what open connections have reported.
 
     Args:
         info: which robot it is.
@@ -100,15 +100,15 @@ def check_arm(info: RobotInfo, primary: PackageStream) -> None:
 
 
 def reported_slider(primary: PackageStream) -> float | None:
-    """The speed slider, 0 to 1, as the port was last polled; None when it has not told."""
+    """The speed slider, 0 to 1, as the port was last polled; None when it was not reported."""
     mode = primary.newest(RobotModeData)
     return None if mode is None else mode.target_speed_fraction
 
 
 def read_payload(network: Network, host: str, ports: Ports) -> float | None:
-    """Ask for the mass of the payload [kg]; None when the robot does not tell.
+    """Ask for the mass of the payload [kg]; None when the robot does not report it.
 
-    Only RTDE tells it on a CB3: frames of port 30003 have it from 5.10 on.
+    Only RTDE reports it on a CB3: frames of port 30003 have it from 5.10 on.
     """
     value = ask_rtde(network, host, ports.rtde, "payload")
     return value if isinstance(value, float) else None

@@ -1,4 +1,4 @@
-"""One value from the RTDE port, for what no other port of a CB3 tells. An absent port is no error."""
+"""One value from the RTDE port, for what no other port of a CB3 reports. An absent port is no error."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class Listener(Protocol):
 
 
 class Network(Protocol):
-    """Makes connections and tells the time that passes while waiting for them."""
+    """Makes connections and measures the time that passes while waiting for them."""
 
     def connect(self, host: str, port: int, timeout: float) -> Transport:
         """Connect. Raises DriverError."""

@@ -1,7 +1,7 @@
 """A session with one robot: connect, stream, and always leave the arm stopped.
 
 Works by the real protocol only. Whatever moves the arm is streamed, so that the program on the robot stops it
-when we fall silent. Every way out of a motion (done, refused, Ctrl-C, lost robot) goes through
+when we fall silent. Every end of a motion (done, refused, Ctrl-C, lost robot) goes through
 `stop`: first the stop word to the program, then a program of our own that stops the arm.
 """
 
@@ -217,7 +217,7 @@ class UrDriver:
         raise DriverError("the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves")
 
     def _attempt(self, act: Callable[[], object]) -> bool:
-        """Try one way to stop; True when the arm then rests and no program runs."""
+        """Try one method to stop; True when the arm then rests and no program runs."""
         try:
             act()
             wait_until(has_ended, self._frames, self._network, REST_TIMEOUT, "the robot's program goes on")
@@ -297,7 +297,7 @@ class UrDriver:
         check_slider(reported_slider(self._primary))
 
     def _explain(self, error: ProgramEndedError) -> DriverError:
-        """Say why our program has ended, as far as the robot tells."""
+        """Say why our program has ended, as far as the robot reports it."""
         try:
             self._raise_robot_errors()
         except DriverError as reason:

@@ -1,7 +1,7 @@
 """The control loop of one run: a new frame comes, a command goes out, a row is logged.
 
 Paced by frames alone. A heartbeat (repeated time stamp) is neither answered nor logged; when several new
-frames wait, we were late: all are logged, the newest is answered. So at most one command is on its way.
+frames wait, we were late: all are logged, the newest is answered. So at most one command is in flight.
 Where we were silent for so long that the robot's program has given us up, the run is over: what the arm does
 next is not decided on frames from before.
 """
@@ -165,7 +165,7 @@ class VelocityStream:
             try:
                 send(encode_velocity(VelocityMode.VELOCITY, step.qd_cmd))
             except DriverError:
-                self._check_waiting(stamp)  # what the robot says tells more than that the connection is gone
+                self._check_waiting(stamp)  # what the robot reports is more precise than a lost connection
                 raise
             on_row(frame, step)
             report.n_commands += 1

@@ -16,7 +16,7 @@ from protocol.patience import Patience
 from protocol.realtime.layout import RealtimeFrame
 
 REST_TIMEOUT = 5.0
-"""An arm that is told to stop rests within this [s]; UR's safety stops take 0.4 s."""
+"""An arm that gets a stop command rests within this [s]; UR's safety stops take 0.4 s."""
 
 _REST_TIME = 0.5
 """The arm rests after this [s] of frames without motion, or at once when time itself stands still."""

@@ -18,7 +18,7 @@ REST_SPEED = 0.01
 """Below this joint speed [rad/s] the arm rests: 0.6 deg/s, above the noise of a standing joint."""
 
 _OLDEST = SoftwareVersion(3, 2)
-"""The first software whose frames tell the program state."""
+"""The first software whose frames report the program state."""
 
 _FULL_SPEED = 0.999
 """Speed slider and speed scaling count as 1 from here on; the pendant shows whole percents."""
@@ -85,7 +85,7 @@ def program_state(frame: RealtimeFrame) -> Condition:
 
 
 def speed_slider(fraction: float | None) -> Condition:
-    """The speed slider stands at its end; `fraction` of full speed, None when the robot does not tell."""
+    """The speed slider stands at its end; `fraction` of full speed, None when it is not reported."""
     return Condition(
         "speed slider",
         "" if fraction is None else _percent(fraction),
@@ -132,7 +132,7 @@ def check_slider(fraction: float | None) -> None:
     """Refuse a robot that is slowed down by its speed slider.
 
     Args:
-        fraction: of full speed; None when the robot does not tell.
+        fraction: of full speed; None when the robot does not report it.
 
     Raises:
         DriverError: it does not stand at 100 %.

@@ -3,12 +3,12 @@
     prepare         plan all movements and look at the folder, before anything moves
     preflight       the robot compared with the model, before anything moves
     experiment_text what a bystander must know and agree to, before a real arm moves
-    approach_run    the slow way to a start, streamed like everything that moves the arm
+    approach_run    the slow approach to a start, streamed like everything that moves the arm
     identification  the loop of this session, and the margins on it
     repetitions     what runs of one movement hand on, and when it may be used
     command_check   the last look at a whole run of commands, before it is sent
     runner          approach, stream, record, for every movement and repetition
-    observer        what the runner tells while it works
+    observer        what the runner reports while it works
     progress        shows it on the terminal
 
 Knows the driver only as a session; opens no socket and reads no clock itself.

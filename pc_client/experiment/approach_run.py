@@ -1,4 +1,4 @@
-"""The way to a start: streamed like a run, so that the arm stops when we fall silent; checked on arrival."""
+"""The approach to a start: streamed like a run, so the arm stops when commands stop; checked at its end."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ _ARRIVAL_TOLERANCE = 5e-3
 """Largest distance of a joint from the posture after an approach [rad]; a blocked arm is far off."""
 
 _NO_MOVE = 1e-4
-"""A way shorter than this [rad] is no way."""
+"""An approach shorter than this [rad] is not run."""
 
 
 def run_approach(driver: UrDriver, approach: Approach, model: RobotModel) -> None:
-    """Move the arm along a checked way and wait until it rests at its end.
+    """Move the arm along a checked path and wait until it rests at its end.
 
     Args:
-        driver: a session; the arm rests where the way begins.
-        approach: the way.
+        driver: a session; the arm rests where the approach begins.
+        approach: the checked path.
         model: the nominal arm.
 
     Raises:

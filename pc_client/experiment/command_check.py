@@ -51,7 +51,7 @@ def broken_limit(
     motion = {
         "joint speed": np.abs(commands) / (config.speed_share * np.array(model.limits.qd_max)),
         "joint acceleration": acceleration / np.minimum(limits.qdd_max, config.slew_limit),
-        "learned way": learned_displacement / _LEARNED_DISPLACEMENT,
+        "learned displacement": learned_displacement / _LEARNED_DISPLACEMENT,
         "joint range": np.array(measure_joint_range(q_sent, model.limits, limits).share),
     }
     for what, share in motion.items():

@@ -1,4 +1,4 @@
-"""What the runner tells while it works; the terminal shows it, tests and programs may ignore it."""
+"""What the runner reports while it works; the terminal shows it, tests and programs may ignore it."""
 
 from __future__ import annotations
 

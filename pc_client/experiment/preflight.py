@@ -2,7 +2,7 @@
 
 `CONDITIONS` is the table; each row is a pure function of what the robot reports and what the plan expects.
 The same rows are shown by `ur-client doctor`, before the question to the user, and asked by the runner.
-What a robot does not tell is shown as "not told": it never counts as passed, and it refuses nothing.
+What a robot does not report is shown as "not reported": it never counts as passed, and it refuses nothing.
 """
 
 from __future__ import annotations
@@ -70,23 +70,23 @@ def require(conditions: Sequence[Condition]) -> None:
 
 
 def model_of(report: RobotReport, cell: Cell) -> RobotModel | None:
-    """The nominal model of the arm that answers; None when it does not tell, or there is no model of it."""
+    """The nominal model of the arm that answers; None when its type is not known or has no model."""
     name = report.info.model.lower()
     return robot_model(name, cell) if name in ROBOTS else None
 
 
 def arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
     """Dashboard server and configuration data name the arm that the plan was made for."""
-    told, configured = report.info.model, report.configured
-    differ = configured is not None and told not in (UNKNOWN, configured)
+    name, configured = report.info.model, report.configured
+    differ = configured is not None and name not in (UNKNOWN, configured)
     return Condition(
         "arm",
-        f"{told} (dashboard), {configured} (port 30001)" if differ else "" if told == UNKNOWN else told,
-        " or ".join(name.upper() for name in ROBOTS) if model is None else model.name.upper(),
+        f"{name} (dashboard), {configured} (port 30001)" if differ else "" if name == UNKNOWN else name,
+        " or ".join(known.upper() for known in ROBOTS) if model is None else model.name.upper(),
         "look which arm it is, and set it so in the installation"
         if differ
         else "plan for the arm that answers",
-        None if told == UNKNOWN else not differ and model is not None and told == model.name.upper(),
+        None if name == UNKNOWN else not differ and model is not None and name == model.name.upper(),
     )
 
 

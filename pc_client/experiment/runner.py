@@ -59,7 +59,7 @@ class ExperimentRunner:
         driver: a session with the robot; it stays open.
         experiment: what to do.
         config: the controller, the same for all runs.
-        observer: is told what goes on.
+        observer: gets the progress.
     """
 
     def __init__(

@@ -5,8 +5,8 @@
     closed_forms, initial        first strokes from the shape of the speed profiles
     chain, model, refine         strokes as arrays, their derivatives, joint least squares in space and time
     addition, fitting            further strokes while they pay; the order of it all
-    extract                      the result: strokes and how well they tell the recording
+    extract                      the result: strokes and how well they reconstruct the recording
     batch, results, figures      many files, their table and their pictures
 
-Nothing here knows a robot or a unit of length. How it works is told in docs/extraction.md.
+Nothing here knows a robot or a unit of length. docs/extraction.md explains how it works.
 """

@@ -101,7 +101,7 @@ class Chain:
         return lengths
 
     def time_at_deviation(self, z: float) -> NDArray[np.float64]:
-        """Times (s,) at which each lognormal has done Phi(z) of its way."""
+        """Times (s,) at which each stroke has done Phi(z) of its length."""
         times: NDArray[np.float64] = self.median + self.width * np.expm1(self.sigma * z) / self.sigma
         return times
 

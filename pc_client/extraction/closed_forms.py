@@ -1,7 +1,7 @@
 """A lognormal from characteristic points of one speed profile, in closed form.
 
 Of a lognormal three points are used: the inflection before the peak (2), the peak (3) and the inflection
-behind it (4). Their heights give sigma, each in its own way, and with sigma any two of their times give mu:
+behind it (4). Their heights give sigma, by one formula each, and with sigma any two of their times give mu:
 
     sigma^2 = -2 - 2 b - 1 / (2 b),   b = ln(v_i / v_3), i = 2 or 4
     sigma^2 = 2 sqrt(1 + b^2) - 2,    b = ln(v_4 / v_2)

@@ -1,4 +1,4 @@
-"""From a recording to Sigma-Lognormal strokes, and how well they tell the recording.
+"""From a recording to Sigma-Lognormal strokes, and how well they reconstruct the recording.
 
     extraction = extract(read_pen(path))
     extraction.snr_v_db, extraction.n_strokes, extraction.parts[0].trajectory
@@ -39,7 +39,7 @@ class ExtractOptions:
 
     Attributes:
         strokes_per_peak: most strokes per speed peak of a recording. Every moving part gets one stroke in any
-            case, and a recording as many as it takes to be told with `fit.least_db`.
+            case, and a recording as many as `fit.least_db` takes.
         fit: effort of the fit.
     """
 
@@ -128,7 +128,9 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
     snr_v, snr_t = _db(powers[0], powers[1]), _db(powers[2], powers[3])
     n_strokes = sum(len(chain) for chain in chains)
     if n_strokes > budget:
-        remarks.append(f"{n_strokes} strokes, {n_strokes - budget} more than asked: fewer told too little")
+        remarks.append(
+            f"{n_strokes} strokes, {n_strokes - budget} more than asked: fewer reconstruct too little"
+        )
     return Extraction(
         recording.name,
         tuple(part for part, _ in judged),

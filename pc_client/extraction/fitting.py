@@ -49,7 +49,7 @@ class FitOptions:
         last_iterations: of the last refinement.
         enough_db: SNR of the velocity, dB, above which no stroke is added.
         least_db: SNR of the velocity, dB, below which strokes are added beyond the budget, as long as they
-            pay: what is told so badly is not told at all. Below it others refit too (section 3.4 of the
+            pay: so poor a reconstruction is of no use. Below it others refit too (section 3.4 of the
             theory notes).
     """
 
@@ -99,8 +99,8 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
 
     Args:
         parts: at least one; all move.
-        budget: most strokes of all parts together, unless these would tell too little, see `FitOptions`.
-            Every part gets one for each of its speed peaks in any case.
+        budget: most strokes of all parts together, unless these would reconstruct too little, see
+            `FitOptions`. Every part gets one for each of its speed peaks in any case.
         options: effort.
     """
     scales = Scales.of(parts)
@@ -217,7 +217,7 @@ def _given_back(fit: Fit, part: SmoothPart, scales: Scales, options: FitOptions)
 
 
 def _passed_cost(fits: Sequence[Fit], parts: Sequence[SmoothPart], scales: Scales) -> float:
-    """Share of the velocity that the strokes do not tell when they are seen through the same low-pass."""
+    """Share of the velocity that low-passed strokes do not explain."""
     energy = 0.0
     for fit, part in zip(fits, parts, strict=True):
         energy += float(np.sum(left_over(fit.chain, part, through=True)[1] ** 2))

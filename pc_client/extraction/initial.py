@@ -129,7 +129,7 @@ def _arc_angle(part: SmoothPart, path_length: NDArray[np.float64], a: int, b: in
     length = float(path_length[b] - path_length[a])
     if length <= 0.0:
         return np.zeros(3)
-    # A quarter and three quarters of the way stand for the inflections: they are always there.
+    # A quarter and three quarters of the length stand for the inflections: they always exist.
     i, k = np.searchsorted(path_length, (path_length[a] + 0.25 * length, path_length[a] + 0.75 * length))
     v = np.zeros((2, 3))
     v[:, : part.v.shape[1]] = part.v[[i, min(k, len(part.v) - 1)]]

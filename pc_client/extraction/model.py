@@ -29,7 +29,7 @@ from pc_client.extraction.chain import Chain
 __all__ = ["Linearisation", "linearise", "variables_per_stroke"]
 
 _INV_SQRT_TWO_PI = 1.0 / math.sqrt(2.0 * math.pi)
-#: |turn| below which differences of nearly equal numbers give way to the first terms of a series.
+#: |arc_angle| below which the first terms of a series replace differences of nearly equal numbers.
 _STRAIGHT = 1e-3
 
 

@@ -31,7 +31,7 @@ from pc_client.extraction.regularizer import Regularizer, regularizer_terms
 
 __all__ = ["Fit", "FitTarget", "moved", "refine", "residuals"]
 
-#: A stroke counts as begun and as done at this deviation: Phi(-4.5) = 3.4e-6 of its way.
+#: A stroke counts as begun and as done at this deviation: Phi(-4.5) = 3.4e-6 of its length.
 _TAIL = 4.5
 #: Samples a piece of the time axis.
 _PIECE = 48

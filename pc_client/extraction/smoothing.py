@@ -46,7 +46,7 @@ RATE_HZ = 200.0
 CUTOFF_HZ = 12.0
 #: A local maximum of the speed is a peak when it stands out by this share of the part's top speed.
 PROMINENCE = 0.01
-#: A part shorter than this, s, holds no movement that a 12 Hz signal could tell from a touch.
+#: A part shorter than this, s, holds no movement that a 12 Hz signal could distinguish from a touch.
 MIN_DURATION_S = 0.02
 
 #: A part smaller than this stands still, even if its unit is the metre.
@@ -61,7 +61,7 @@ _STEADY_RATIO = 2.0
 _STEADY_SHARE = 0.9
 _LEAST_STEPS = 3
 #: A curve that leaves the straight lines by more than this share of the run's size is not drawn: it swings
-#: between samples that are too few, or too far from even, to tell where the pen was.
+#: between samples that are too few, or too far from even, to show where the pen was.
 _MOST_SWING = 0.5
 _ROUNDING = 1e-9
 _MAX_OVERSAMPLING = 16

@@ -109,7 +109,7 @@ def _unpack(archive: zipfile.ZipFile, member: str) -> bytes:
     """One file of an archive, unpacked no further than its limit, whatever the archive says of its size.
 
     Raises:
-        RecordingError: it is longer, or packed in a way that cannot be unpacked piece by piece.
+        RecordingError: it is longer, or packed by a method that cannot be unpacked piece by piece.
     """
     info = archive.getinfo(member)
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):

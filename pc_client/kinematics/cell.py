@@ -63,7 +63,7 @@ class Tool:
 
     Attributes:
         solids: its shape, in the flange's frame.
-        mass: [kg]; the payload that PolyScope must be told.
+        mass: [kg]; the payload that must be set in PolyScope.
         centre_of_gravity: in the flange's frame [m].
     """
 

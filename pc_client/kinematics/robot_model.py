@@ -45,7 +45,7 @@ class JointLimits:
 
 @dataclass(frozen=True, slots=True)
 class RobotDescription:
-    """What tells one arm of the family from another.
+    """The data in which the arms of the family differ.
 
     Attributes:
         name: short name, e.g. `ur3`.

@@ -3,15 +3,15 @@
 A `Movement` gives position and velocity at any time in closed form. This package knows no robot: no joints,
 no limits, no sockets.
 
-    lognormal, timing, stroke, sigma_lognormal   the human-like model, from one lognormal to a whole movement
-    path, robotic                                the robot-like model: geometry, and the speed profile
-    minimum_jerk; smooth_path, power_law         two other models of human movement
-    durations, variability                       how long strokes last; the same movement another time
-    columns, samples                             tables of numbers as text; (x, y, z, t) files
-    movement, files, trajectory_tables, description     the `Movement`, its files and its figures
-    targets, fit, geometry                       random target points; movements into a workspace
-    recipe, arcs, twins, generate                new movements by a seed, and the library's
-    own_points                                   new movements through one's own points
+    lognormal, timing, stroke, sigma_lognormal       the human-like model, from lognormal to movement
+    path, robotic                                    the robot-like model: geometry, and the speed profile
+    minimum_jerk; smooth_path, power_law             two other models of human movement
+    durations, variability                           how long strokes last; the same movement another time
+    columns, samples                                 tables of numbers as text; (x, y, z, t) files
+    movement, files, trajectory_tables, description  the `Movement`, its files and its figures
+    targets, fit, geometry                           random target points; movements into a workspace
+    recipe, arcs, twins, generate                    new movements by a seed, and the library's
+    own_points                                       new movements through one's own points
 
 Names are loaded when they are first asked for, so that importing the package costs nothing.
 """

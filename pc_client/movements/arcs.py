@@ -37,7 +37,7 @@ class ArcRules:
             between two speed minima is shorter by the overlap. Such a slow hand keeps a UR3 far from its
             joint limits.
         isochrony: window = reference_window (leg / reference_leg)^isochrony: people hardly need longer for
-            longer ways.
+            longer strokes.
         variability: factors on the window from stroke to stroke.
         sigma: of the lognormals.
         overlap: share of the shorter of two windows in which both strokes move.

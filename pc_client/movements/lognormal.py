@@ -1,14 +1,12 @@
 """The lognormal speed profile: its values at any time, and everything about it that has a closed form.
 
-This is the mathematics of one lognormal of unit length (D = 1). It knows nothing of space; `stroke.py` gives
-it a place and a direction.
+One lognormal of unit length (D = 1), a function of time only; `stroke.py` gives it a place and a direction.
 
-    Lambda(t; t0, mu, sigma) = exp(-z^2 / 2) / (sigma sqrt(2 pi) (t - t0)),   z = (ln(t - t0) - mu) / sigma,
-    t > t0 F(t)                     = integral of Lambda from t0 to t = Phi(z)
+    Lambda(t; t0, mu, sigma) = exp(-z^2 / 2) / (sigma sqrt(2 pi) (t - t0)),   z = (ln(t - t0) - mu) / sigma
+    F(t)                     = integral of Lambda from t0 to t = Phi(z),      t > t0
 
 Source: Plamondon's kinematic theory; Eq. 2 and 4 of Wolniakowski et al., "Towards human-like kinematics in
-    industrial
-robotic arms", with one amplitude D only (the printed Eq. 1 and 2 carry three).
+industrial robotic arms", with one amplitude D only (the printed Eq. 1 and 2 have three).
 """
 
 from __future__ import annotations
@@ -74,7 +72,7 @@ class Lognormal:
 
     Attributes:
         t0: time at which the command is given, s; the visible motion begins later.
-        mu: logarithm of the time from command to half the way, ln s.
+        mu: logarithm of the time from command to half the length, ln s.
         sigma: width of the lognormal on the logarithmic time axis, > 0.
     """
 
@@ -114,7 +112,7 @@ class Lognormal:
 
     @property
     def median(self) -> float:
-        """Time at which half the way is done, s."""
+        """Time at which half the length is done, s."""
         return self.time_at_deviation(0.0)
 
     @property
@@ -145,7 +143,7 @@ class Lognormal:
 
     @property
     def done_at_mode(self) -> float:
-        """Share of the way done at the mode, Phi(-sigma): below one half always."""
+        """Share of the length done at the mode, Phi(-sigma): below one half always."""
         return float(ndtr(-self.sigma))
 
     @property

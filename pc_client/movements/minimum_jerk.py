@@ -1,7 +1,7 @@
-"""Minimum jerk: the movements whose third derivative, squared and added up over time, is least.
+"""Minimum jerk: the movements with the least integral of the squared third derivative over time.
 
 Between two rests this is one polynomial, x = A (10 u^3 - 15 u^4 + 6 u^5) with u = t / T, along a straight
-line: a symmetric speed profile with the peak 1.875 A / T. With points to pass on the way at given times it
+line: a symmetric speed profile with the peak 1.875 A / T. With inner points to pass at given times it
 is the quintic spline through them, continuous up to the fourth derivative: the path is rounded, and the
 speed does not fall to zero at the points.
 
@@ -30,7 +30,7 @@ Passing = Literal["stop", "via"]
 
 
 class StrokeShape(NamedTuple):
-    """The unit stroke, each (n,): way done, 0 to 1, and its first and second derivative in u = t / T."""
+    """The unit stroke, each (n,): share of the length done, 0 to 1, and two derivatives in u = t / T."""
 
     done: NDArray[np.float64]
     rate: NDArray[np.float64]
@@ -51,9 +51,11 @@ def stroke_shape(u: ArrayLike) -> StrokeShape:
 class MinimumJerk:
     """The minimum-jerk movement along target points.
 
-    Attributes: target_points: (n, 3), m; all of them are reached exactly. stroke_durations: (n - 1,), s:
-        times from one target point to the next. passing: "stop": every stroke runs from rest to rest on a
-        straight line. "via": one movement that passes the inner points.
+    Attributes:
+        target_points: (n, 3), m, robot base frame; all of them are reached exactly.
+        stroke_durations: (n - 1,), s: times from one target point to the next.
+        passing: "stop": every stroke runs from rest to rest on a straight line. "via": one movement that
+            passes the inner points.
     """
 
     target_points: NDArray[np.float64]

@@ -26,7 +26,7 @@ __all__ = ["Style", "TargetTable", "default_durations", "load_targets", "through
 #: "human": straight strokes by the paper's recipe; "robot": a smoothed square wave on the same lines.
 Style = Literal["human", "robot"]
 
-#: Least default duration of a stroke, s: very short ways would need more acceleration than speed.
+#: Least default duration of a stroke, s: very short strokes would need more acceleration than speed.
 _SHORTEST = 1.0
 #: Longest duration of a stroke, s, and farthest coordinate, m, that are taken for meant.
 _LONGEST, _FARTHEST = 600.0, 10.0

@@ -1,7 +1,7 @@
 """Geometric paths by arc length: straight lines between target points, corners sharp or blended.
 
-A blend is a pair of clothoids: the curvature grows in proportion to the way from 0 to its top in the middle
-of the corner and falls to 0 again, so that a robot that passes it at a steady speed meets no jump of
+A blend is a pair of clothoids: the curvature grows in proportion to the path length from 0 to its top in the
+middle of the corner and falls to 0 again, so that a robot that passes it at a steady speed meets no jump of
 acceleration. Positions are Fresnel integrals of the arc length: exact, and no table to interpolate. This
 module knows no time.
 """

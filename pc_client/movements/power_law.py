@@ -47,11 +47,19 @@ _INTERVALS = 256
 class PowerLaw:
     """The movement along a smooth path through target points, by the power law.
 
-    Attributes: target_points: (n, 3), m; all of them are passed exactly, when is up to the law. duration:
-        total time, s. ramps: widths (s) of the two boxcars that smooth start and stop: the speed rises over
-        their sum; or of one. largest_radius: R, m: a path straighter than this is run at one speed.
-        exponent: beta, 0 to 1; 1/3 is the two-thirds power law, 0 a constant speed. torsion_exponent:
-        gamma, 0 to 1; 0 is the law in the plane, 1/6 that in space.
+    Attributes:
+        target_points: (n, 3), m, robot base frame; all of them are passed exactly. The power law sets the
+            times at which they are passed.
+        duration: total time, s.
+        ramps: widths (s) of the two boxcars that smooth start and stop: the speed rises over their sum; or
+            of one.
+        largest_radius: R, m: a path straighter than this is run at one speed.
+        exponent: beta, 0 to 1; 1/3 is the two-thirds power law, 0 a constant speed.
+        torsion_exponent: gamma, 0 to 1; 0 is the power law in the plane, 1/6 that in space.
+        path: the smooth path through the target points.
+
+    Raises:
+        MovementError: a number is outside its range, or the target points make no smooth path.
     """
 
     target_points: NDArray[np.float64]
@@ -137,7 +145,7 @@ class PowerLaw:
         )
 
     def _cost(self, path: SmoothPath, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """dw/du at the parameters u, m: the way, longer where the law is slower."""
+        """dw/du at the parameters u, m: the path length, scaled up where the power law is slower."""
         bend = path.bend(u)
         radius = self.largest_radius
         torsion = bend.triple / (bend.curvature**2 + radius**-2)

@@ -52,7 +52,8 @@ class HandRules:
         targets: what the points must keep to: legs of a quarter to a half of the box's length.
         stroke: duration of a stroke of `leg`, s. Source: section II.B, "duration 0.1 sec".
         leg: m.
-        isochrony: a stroke lasts stroke (length / leg)^isochrony: people hardly need longer for longer ways.
+        isochrony: a stroke lasts stroke (length / leg)^isochrony: people need hardly more time for longer
+            strokes.
         variability: factors on the duration from stroke to stroke, low and high.
     """
 
@@ -78,7 +79,7 @@ def literal_strokes(target_points: ArrayLike, durations: ArrayLike) -> SigmaLogn
     """Straight strokes by Eq. 6 to 9 between target points, one after the other.
 
     The window of a stroke begins where the one before ends, the first at 0; its peak is in the middle, and
-    all of its way is run at its end. So the movement all but rests at every target point and reaches it.
+    all of its length is done at its end. So the movement all but rests at every target point and reaches it.
 
     Args:
         target_points: (n, 3), m.

@@ -3,7 +3,7 @@
 The quintic spline through the points, natural at its ends (third and fourth derivative zero), over the
 centripetal parameter: a step of the parameter is the square root of the distance of two points, which keeps
 the curve from swinging out at sharp turns. It is continuous up to the fourth derivative, so curvature and
-torsion are smooth functions of the way. Two points give the straight line. This module knows no time.
+torsion are smooth along the path. Two points give the straight line. This module knows no time.
 """
 
 from __future__ import annotations
@@ -27,8 +27,11 @@ _CUSP = 1e-3
 class PathBend(NamedTuple):
     """How a path bends, each (n,).
 
-    Attributes: stretch: |p'|, m. curvature: |p' x p''| / |p'|^3, 1/m. triple: (p' x p'') . p''' / |p'|^6,
-        1/m^3: curvature squared times torsion, finite on straight pieces, where torsion is not.
+    Attributes:
+        stretch: |p'|, m.
+        curvature: |p' x p''| / |p'|^3, 1/m.
+        triple: (p' x p'') . p''' / |p'|^6, 1/m^3: curvature squared times torsion, finite on straight
+            pieces, where torsion is not.
     """
 
     stretch: NDArray[np.float64]
@@ -41,8 +44,11 @@ class SmoothPath:
     """The path.
 
     Attributes:
-        target_points: (n, 3), m, consecutive ones apart.
+        target_points: (n, 3), m, robot base frame, consecutive ones apart.
         knots: (n,) parameters u of the target points, 0 to 1.
+
+    Raises:
+        MovementError: target points of another shape, coinciding ones, or a path that turns on the spot.
     """
 
     target_points: NDArray[np.float64]

@@ -1,8 +1,8 @@
-"""Where a stroke goes: circular arcs in the plane and in space, run with a lognormal speed.
+"""The path of a stroke: circular arcs in the plane and in space, run with a lognormal speed.
 
-The direction of the velocity turns in proportion to the way already done (Eq. 3), so an isolated stroke is an
-exact circular arc, and its position has a closed form. All forms used here hold for every bending, the
-straight line included. How several strokes add up is the business of `sigma_lognormal.py`.
+The direction of the velocity turns in proportion to the length already done (Eq. 3), so an isolated stroke is
+an exact circular arc, and its position has a closed form. All forms used here hold for every bending, the
+straight line included. `sigma_lognormal.py` adds several strokes up.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class PlanarStroke:
     def between(
         cls, a: Sequence[float], b: Sequence[float], timing: Timing, arc_angle: float = 0.0
     ) -> PlanarStroke:
-        """The stroke from a to b, each (2,), m, that turns by `arc_angle` rad on its way (positive: left)."""
+        """The stroke from a to b, each (2,), m, that turns by `arc_angle` rad (positive: left)."""
         dx, dy = float(b[0]) - float(a[0]), float(b[1]) - float(a[1])
         chord_direction = math.atan2(dy, dx)
         length = math.hypot(dx, dy) / _chord_ratio(arc_angle)

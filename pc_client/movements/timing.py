@@ -74,7 +74,7 @@ def lead_from_k(k: float, duration: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class LiteralTiming:
-    """The paper's construction: all of the way run at the end of the window, the peak in its middle.
+    """The paper's construction: all of the length done at the end of the window, the peak in its middle.
 
     Attributes:
         start: begin of the window, s (the paper's t_min of the stroke before).
@@ -121,11 +121,10 @@ class TwoSidedTiming:
         start: begin of the window, s.
         duration: length of the window, s, > 0.
         sigma: width and, with it, asymmetry of the lognormal, > 0: people show .1 to .35 in reaches.
-        coverage: c; 3 sqrt 2 leaves 2.2e-5 of the way outside the window, 3 leaves .27 %.
+        coverage: c; 3 sqrt 2 leaves 2.2e-5 of the length outside the window, 3 leaves .27 %.
 
     Source: mu = ln(T / (2 sinh(c sigma))), t0 = start - exp(mu - c sigma), from the two conditions; the same
-        idea, with c = 3,
-    is in Berio et al.'s handwriting synthesis.
+    idea, with c = 3, is in Berio et al.'s handwriting synthesis.
     """
 
     start: float

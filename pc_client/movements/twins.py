@@ -134,7 +134,7 @@ def retimed_twin(movement: Movement, name: str, rule: DurationRule) -> Movement:
 
 @dataclass(frozen=True, slots=True)
 class Generator:
-    """One way to make a movement.
+    """One method to make a movement.
 
     Attributes:
         make: from the movement of the paper's recipe, a seed and the new movement's name.

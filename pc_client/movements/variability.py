@@ -20,8 +20,8 @@ Rhythm and pace are drawn once a movement because they are properties of it: dra
 alone would move strokes by half of their time against each other and put them out of order.
 
 Source: ranges attributed to M. Diaz et al., "Dynamic signature verification system based on one real
-    signature", as an open implementation of the kinematic theory states them (it, too, draws one change of t0
-    for all strokes, and finds angles relative to themselves unfit).
+signature", as an open implementation of the kinematic theory states them (it, too, draws one change of t0
+for all strokes, and finds angles relative to themselves unfit).
 """
 
 from __future__ import annotations

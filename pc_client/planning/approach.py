@@ -1,9 +1,9 @@
-"""The slow way from where the arm is to where a plan begins.
+"""The slow approach from where the arm is to where a plan begins.
 
 All joints move together on a straight line in joint space, whatever stands there; so the line is checked
 here, posture by posture, before the arm moves. Two rules keep it short and harmless: of the
 start postures that differ by whole turns the nearest is taken (the plan is shifted to match), and when the
-direct line is not clear, ways by raised postures are tried: up, turn, and down.
+direct line is not clear, routes over raised postures are tried: up, turn, and down.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from protocol.ur_types import JOINT_NAMES
 Array = NDArray[np.float64]
 
 _CHECK_STEP = 0.01
-"""Largest way of the stretched arm's flange between checked postures [m]."""
+"""Largest distance of the stretched arm's flange between checked postures [m]."""
 
 _TURN = 2.0 * pi
 _FOLDING_JOINTS = (1, 2)
@@ -38,17 +38,17 @@ _RAISED = MappingProxyType({1: -pi / 2, 2: 0.0, 3: -pi / 2, 4: 0.0})
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """A checked way to the begin of a plan.
+    """A checked path to the begin of a plan.
 
     Attributes:
-        plan: the plan to run afterwards, shifted by whole turns to begin where the way ends.
-        q_from: (6,) joint angles where the way begins [rad].
+        plan: the plan to run afterwards, shifted by whole turns to begin where the approach ends.
+        q_from: (6,) joint angles where the approach begins [rad].
         waypoints: a straight joint line to each, resting in between; the last is `plan.start_q` [rad].
         v: speed of the leading joint [rad/s].
         a: acceleration of the leading joint [rad/s²].
-        floor_clearance: least distance from the floor on the way [m].
-        own_clearance: least distance of the arm and its tool from themselves on the way [m].
-        cell_clearance: least distance from walls and solids of the cell on the way [m]; infinite without any.
+        floor_clearance: least distance from the floor along the approach [m].
+        own_clearance: least distance of the arm and its tool from themselves along the approach [m].
+        cell_clearance: least distance from walls and solids of the cell along it [m]; infinite without any.
     """
 
     plan: JointPlan
@@ -62,12 +62,12 @@ class Approach:
 
     @property
     def motion(self) -> JointLines:
-        """The way over time."""
+        """The joint angles over time."""
         return JointLines((self.q_from, *self.waypoints), self.v, self.a)
 
     @property
     def duration(self) -> float:
-        """How long the way takes [s]."""
+        """How long the approach takes [s]."""
         return self.motion.duration
 
 
@@ -83,7 +83,7 @@ def plan_approach(plan: JointPlan, q_now: ArrayLike, *, model: RobotModel) -> Ap
         One waypoint, up to three if the direct line is not clear. Use `.plan` instead of `plan` from then on.
 
     Raises:
-        PlanningError: the present posture or every tried way is not clear; names posture and joint.
+        PlanningError: the present posture or every tried route is not clear; names posture and joint.
     """
     q_from = np.array(q_now, dtype=np.float64)
     _refuse_posture(plan, model, q_from)
@@ -100,7 +100,7 @@ def plan_approach(plan: JointPlan, q_now: ArrayLike, *, model: RobotModel) -> Ap
                 refusals.append(clearance)
                 continue
             return Approach(start, q_from, waypoints, v, a, *clearance)
-    # The direct way tells best what is wrong.
+    # The error of the direct route is the most useful one.
     raise refusals[0]
 
 
@@ -122,7 +122,7 @@ def _refuse_posture(plan: JointPlan, arm: RobotModel, q_from: Array) -> None:
 
 
 def _starts(plan: JointPlan, q_from: Array) -> list[JointPlan]:
-    """Return the plan in every sensible turn, the one with the shortest way from q_from first.
+    """Return the plan in every sensible turn, the one nearest to q_from first.
 
     Base and wrists take the nearest turn that keeps the range margin of the whole plan. Shoulder and elbow
     are offered in all their turns: the nearest one may lead through the plane or the folded elbow.
@@ -180,7 +180,7 @@ def _check_route(
             where = (
                 "the present posture"
                 if k == 0
-                else f"the way to the start, {100 * k / (len(q) - 1):.0f} % along"
+                else f"the approach to the start, {100 * k / (len(q) - 1):.0f} % along"
             )
             return PlanningError(
                 f"{name}: {where} is not clear: {nearest.says(float(distances.least[k]), least)};"
@@ -197,5 +197,5 @@ _ROUTES: tuple[Callable[[Array, Array], tuple[Array, ...]], ...] = (
     lambda q_from, q_to: (_raised(q_to),),
     lambda q_from, q_to: (_raised(q_from), _raised(q_to)),
 )
-"""What stands between begin and end of a way, shortest first: nothing; or postures with the arm straight up,
+"""Postures between begin and end of a route, shortest first: none; or postures with the arm straight up,
 turning the base while folding down, while rising, or in between."""

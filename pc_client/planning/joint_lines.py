@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 class JointLines:
     """A joint reference along straight joint lines; on each the speed is a trapezoid, from rest to rest.
 
-    All joints begin and end a line together. The joint with the longest way leads.
+    All joints begin and end a line together. The joint with the largest distance leads.
 
     Args:
         postures: at least one, (6,) each [rad].

@@ -107,7 +107,7 @@ def _lead_in(
 ) -> Array:
     """Carry the branch of `q_branch` along a straight line to the first sample; return the posture there.
 
-    The TCP begins in the orientation that belongs to the arm's branch and turns about one axis on the way.
+    The TCP begins in the orientation that belongs to the arm's branch and turns about one axis meanwhile.
     """
     p_branch = tcp_pose(model, q_branch)[:3, 3]
     R_branch = fixed_tcp_rotation()

@@ -29,7 +29,7 @@ class PlanLimits:
         floor_clearance_min: distance of forearm, wrists and tool from the floor [m].
         own_clearance_min: distance between links that are not neighbours, and of the tool from links [m].
         cell_clearance_min: distance of moving links and tool from walls and solids of the cell [m].
-        approach_speed: speed of the leading joint on the way to the start [rad/s].
+        approach_speed: speed of the leading joint during the approach to the start [rad/s].
         approach_acceleration: its acceleration [rad/s²].
     """
 
@@ -57,7 +57,7 @@ _APPROACH_ACCELERATION = 0.4
 
 
 def limits_of(arm: RobotModel) -> PlanLimits:
-    """Return what plans for an arm hold unless told otherwise."""
+    """Return the default limits of plans for an arm."""
     description = arm.description
     return PlanLimits(
         speed_fraction=0.9,
@@ -65,7 +65,7 @@ def limits_of(arm: RobotModel) -> PlanLimits:
         qdd_max=description.limits.qdd_max,
         tcp_speed_max=description.tcp_speed_max,
         rest_speed_max=0.01,
-        # 25 rad/s at 4 ms: four times what any joint can do, and far less than the way between two branches.
+        # 25 rad/s at 4 ms: four times what any joint can do, and far less than the distance of two branches.
         joint_step_max=0.1,
         # At .03 a TCP speed of .1 m/s in the worst direction needs about 3.3 rad/s, the limit of a big joint.
         # The box recommended for movements keeps .08 on a UR3; larger arms have larger values.

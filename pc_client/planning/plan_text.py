@@ -18,7 +18,7 @@ def plan_text(plan: JointPlan) -> str:
 
 
 def approach_text(approach: Approach) -> str:
-    """Return the way to the start as a few lines."""
+    """Return the approach to the start as a few lines."""
     names = ", ".join(JOINT_NAMES)
     title = (
         f"first, slowly (at most {np.degrees(approach.v):.0f} deg/s, about {approach.duration:.1f} s,"

@@ -33,7 +33,7 @@ _ORIGINS = {
         _UNKNOWN,
         _UNKNOWN,
         f"{_UNKNOWN}: ",
-        f"{_UNKNOWN}: the robot told neither a serial number nor that it is simulated",
+        f"{_UNKNOWN}: the robot reported neither a serial number nor that it is simulated",
     ),
 }
 

@@ -30,8 +30,8 @@ class Provenance:
         firmware: controller software as it reports itself, e.g. "3.15.8".
         serial: serial number of the arm, or "unknown".
         simulated: True for an emulated arm, False for one that is known to be real, None where the robot did
-            not tell.
-        seed: seed of the emulated arm; None for a real arm, and where the robot did not tell.
+            not report it.
+        seed: seed of the emulated arm; None for a real arm, and where the robot did not report it.
         pace: "realtime" or "lockstep".
         cycle_time_s: control cycle of the robot in s.
         identified_delay_s: loop delay that the client measured, in s; None when it did not.

@@ -50,7 +50,7 @@ class GivenRobot:
     Attributes:
         host: its name or address.
         port_base: offset of its ports.
-        robot: "ur3", "ur5" or "ur10", as it told.
+        robot: "ur3", "ur5" or "ur10", as it reported.
         serial: its serial number: this is who it is, wherever it answers.
         cell: what stands around it and what it carries.
         reverse_port: where its programs dial back; see `ReverseServer`.

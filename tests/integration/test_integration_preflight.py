@@ -73,13 +73,13 @@ def test_an_arm_with_its_own_calibration_is_ready(ur_client, robot, seed):
 
 
 @pytest.mark.parametrize(
-    ("version", "untold"), [("3.2.0", "; not told by this software: payload"), ("3.11.0", "")]
+    ("version", "unreported"), [("3.2.0", "; not reported by this software: payload"), ("3.11.0", "")]
 )
-def test_software_that_does_not_tell_the_payload_is_not_refused(ur_client, version, untold):
+def test_software_that_does_not_tell_the_payload_is_not_refused(ur_client, version, unreported):
     with ControlBox(pace="lockstep", port_base=free_port_base(), version=version) as box:
         doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
     assert doctor.code == 0, doctor.out
-    assert f"streaming   ready{untold}\n" in doctor.out
+    assert f"streaming   ready{unreported}\n" in doctor.out
 
 
 def test_a_slider_that_is_moved_in_a_run_ends_it_and_the_recording_is_kept(standard_box, tmp_path):

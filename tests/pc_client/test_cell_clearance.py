@@ -198,7 +198,7 @@ def test_an_approach_without_a_free_way_is_refused_with_both_bodies():
     ceiling = Wall("ceiling", (0, 0, -1), -0.6)
     model = robot_model("ur3", Cell("c", walls=(ceiling,), solids=(post,)))
     plan = plan_movement(STROKES, model=model)
-    with pytest.raises(PlanningError, match=r"the way to the start, \d+ % along is not clear.*'post'"):
+    with pytest.raises(PlanningError, match=r"the approach to the start, \d+ % along is not clear.*'post'"):
         plan_approach(plan, q_now, model=model)
 
 

@@ -145,7 +145,7 @@ def test_a_box_in_the_way_refuses_the_run_before_anything_moves(robot, tmp_path,
 
 
 @pytest.mark.parametrize(("given", "port"), [((), 31000), (("--reverse-port", "4321"), 4321)])
-def test_the_robot_is_told_the_reverse_port(robot, given, port, tmp_path):
+def test_the_robot_gets_the_reverse_port(robot, given, port, tmp_path):
     assert cli.run([*RUN[:-1], str(tmp_path / "o"), *given]) == 0
     assert robot.listener.port == port
     receivers = [program for program in robot.programs if "socket_open" in program]
@@ -293,7 +293,7 @@ def test_doctor_shows_every_condition_and_only_reads(robot, capsys):
         "0.05",
         "kg",
         "not",
-        "told",
+        "reported",
     ]
     assert rows["TCP offset"].endswith("  ok")
     assert lines[-1].startswith(
@@ -302,10 +302,10 @@ def test_doctor_shows_every_condition_and_only_reads(robot, capsys):
     assert robot.programs == []
 
 
-def test_doctor_says_what_was_not_told_beside_ready(robot, capsys):
+def test_doctor_says_what_was_not_reported_beside_ready(robot, capsys):
     robot.payload = None
     assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"]) == 0
-    assert "streaming   ready; not told by this software: payload" in capsys.readouterr().out
+    assert "streaming   ready; not reported by this software: payload" in capsys.readouterr().out
 
 
 def test_doctor_refuses_another_generation_by_name(robot, capsys):

@@ -82,7 +82,7 @@ def test_an_arm_that_does_something_else_is_refused():
     t, qd_cmd = excitation()
     random = np.random.default_rng(0)
     q = reported(t, qd_cmd, 0.02, 0.01) + np.cumsum(random.normal(0.0, 2e-4, (len(t), 6)), axis=0)
-    with pytest.raises(DriverError, match="told apart"):
+    with pytest.raises(DriverError, match="cannot be separated"):
         identify_loop(t, qd_cmd, q, PERIOD)
 
 

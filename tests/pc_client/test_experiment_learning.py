@@ -159,7 +159,7 @@ def test_commands_that_break_a_limit_are_named(two, plan, spoil, words):
 def test_a_learned_displacement_is_limited(two, plan):
     _, commands = commands_of(plan)
     learned = np.full_like(commands, 0.06 / (len(commands) * PERIOD))
-    assert "learned way" in broken_limit(plan, commands, learned, two.model, BEST, PERIOD)
+    assert "learned displacement" in broken_limit(plan, commands, learned, two.model, BEST, PERIOD)
     assert broken_limit(plan, commands, 0.5 * learned, two.model, BEST, PERIOD) == ""
 
 
@@ -173,7 +173,7 @@ def test_what_breaks_a_limit_is_forgotten_before_anything_is_sent(two, plan):
     memory.learned_from = 1
     assert not memory.may_use(plan, table)
     assert (memory.learned, memory.learned_from, memory.gear) == (None, 0, None)
-    assert "learned way" in memory.remarks[0]
+    assert "learned displacement" in memory.remarks[0]
     memory.renew(gear)
     assert memory.gear is None  # refused for the rest of this movement
 

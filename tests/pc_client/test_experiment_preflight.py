@@ -1,4 +1,4 @@
-"""The robot against the model before anything moves: each condition, told and not told, and what the commands say."""
+"""The robot against the model before anything moves: each condition, reported and not reported, and what the commands say."""
 
 from __future__ import annotations
 
@@ -185,17 +185,17 @@ def test_what_a_robot_does_not_tell_is_neither_passed_nor_refused():
     fake = robot(payload=None)
     fake.state = encode_state([ConfigurationData(robot_type=RobotType.UR3)], fake.version)
     conditions = preflight(report(fake), UR3)
-    untold = {condition.name for condition in conditions if condition.holds is None}
-    assert untold == {"speed slider", "TCP offset", "payload"}
+    unreported = {condition.name for condition in conditions if condition.holds is None}
+    assert unreported == {"speed slider", "TCP offset", "payload"}
     assert refusal(conditions) == ""
-    assert conditions_text(conditions).count("not told") == 3
+    assert conditions_text(conditions).count("not reported") == 3
 
 
 def test_an_arm_that_is_not_told_cannot_be_compared():
     fake = robot(has_dashboard=False)
     fake.state = encode_state([ConfigurationData(robot_type=99)], fake.version)
     conditions = {condition.name: condition.verdict for condition in preflight(report(fake), None)}
-    assert [conditions[name] for name in ("arm", "flange pose", "joint angles")] == ["not told"] * 3
+    assert [conditions[name] for name in ("arm", "flange pose", "joint angles")] == ["not reported"] * 3
 
 
 def test_speed_scaling_of_0_without_a_program_is_no_speed():

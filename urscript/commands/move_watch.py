@@ -68,7 +68,14 @@ class MoveWatch:
         clock: Callable[[], float],
         on_move: Callable[[WatchedMove], None],
     ) -> None:
-        """Args: the program; length of a cycle (s); robot time (s); called with each move that has ended."""
+        """Watch a program.
+
+        Args:
+            program: the compiled program.
+            step_time: length of a cycle [s].
+            clock: returns the robot time [s].
+            on_move: called with each move that has ended.
+        """
         inherited = {item.name: getattr(program, item.name) for item in fields(program)}
         self.program: CompiledProgram = _WatchedProgram(**inherited, watch=self)
         self._clock = clock

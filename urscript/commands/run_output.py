@@ -55,7 +55,12 @@ class TextOutput:
     """Prints lines at once: what the program does to standard output, errors and the result to the other."""
 
     def __init__(self, source: Source, *, quiet: bool) -> None:
-        """Args: the program; quiet: print texts of textmsg and errors only."""
+        """Print what a program reports.
+
+        Args:
+            source: the program.
+            quiet: print texts of textmsg and errors only.
+        """
         self._source = source
         self._quiet = quiet
 
@@ -112,7 +117,12 @@ class JsonOutput:
     """Collects everything and prints it at the end, as one JSON document."""
 
     def __init__(self, source: Source, file: str) -> None:
-        """Args: the program; name of its file."""
+        """Collect what a program reports.
+
+        Args:
+            source: the program.
+            file: name of its file.
+        """
         self._source = source
         self._file = file
         self._events: list[dict[str, Any]] = []
