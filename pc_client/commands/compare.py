@@ -11,7 +11,6 @@ import typer
 from pc_client.commands.experiment import execute
 from pc_client.commands.options import OutOption, console, say
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
-from pc_client.errors import ClientError
 
 if TYPE_CHECKING:
     from pc_client.analysis.run import MeasuredRun
@@ -73,20 +72,15 @@ def _read_runs(out: Path) -> dict[str, MeasuredRun]:
 
 def _write(
     table: Comparison, one: MovementSet, runs: Mapping[str, MeasuredRun] | None, out: Path
-) -> list[Path]:
+) -> tuple[Path, ...]:
     """Write table and pictures; returns the files."""
-    import json
-
     from pc_client.comparison.figure import draw_comparison
+    from pc_client.results.files import write_files
+    from pc_client.results.tables import to_json
 
     texts = {
-        "compare.json": json.dumps(table.to_json(), indent=2, allow_nan=False) + "\n",
+        "compare.json": to_json(table.to_json()),
         "compare.md": table.to_markdown(),
         "compare.svg": draw_comparison(one, runs),
     }
-    for name, text in texts.items():
-        try:
-            (out / name).write_text(text, encoding="utf-8", newline="\n")
-        except OSError as error:
-            raise ClientError(f"cannot write {out / name}: {error.strerror or error}") from error
-    return [out / name for name in texts]
+    return write_files(out, texts)

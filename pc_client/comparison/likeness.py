@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +15,7 @@ from pc_client.analysis.human_likeness import (
 )
 from pc_client.movements.stroke import Motion
 
-__all__ = ["Likeness", "mean_likeness", "measure_likeness"]
+__all__ = ["Likeness", "measure_likeness"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +61,3 @@ def measure_likeness(motion: Motion, rate: float) -> Likeness:
         peak_speed=float(speed.max()),
         peak_acceleration=float(np.linalg.norm(motion.a, axis=1).max()),
     )
-
-
-def mean_likeness(figures: Sequence[Likeness]) -> Likeness:
-    """The mean of each figure over movements, at least one; of the power law over those that have one."""
-    means = {}
-    for field in dataclasses.fields(Likeness):
-        values = [value for one in figures if math.isfinite(value := getattr(one, field.name))]
-        means[field.name] = math.fsum(values) / len(values) if values else math.nan
-    return Likeness(**means)

@@ -91,7 +91,7 @@ def to_rich(
     *,
     bold: str = "",
     section: str = "",
-    padding: tuple[int, int, int, int] = (0, 1, 0, 0),
+    padding: int | tuple[int, int, int, int] = (0, 1, 0, 0),
     title: str = "",
     caption: str = "",
 ) -> RichTable:
