@@ -34,7 +34,7 @@ SENTENCES = " ".join(PAGE.split())
 def table(first_heading: str, second_heading: str = "") -> list[list[str]]:
     """The cells of the one table on the page that begins with these headings."""
     found = re.findall(
-        rf"^\| {re.escape(first_heading)} \| {re.escape(second_heading)}.*\n\|[-:|]+\n((?:\|.*\n)+)",
+        rf"^\| {re.escape(first_heading)} \| {re.escape(second_heading)}.*\n\|[-:| ]+\n((?:\|.*\n)+)",
         PAGE,
         re.MULTILINE,
     )
@@ -158,9 +158,9 @@ def check_figures() -> dict[tuple[str, str], float]:
             (case, "speed at the first inflection"): length * float(lognormal.evaluate(first).rate),
             (case, "top speed"): length * lognormal.peak,
             (case, "speed at the second inflection"): length * float(lognormal.evaluate(second).rate),
-            (case, "way done at the first inflection"): float(lognormal.evaluate(first).done),
-            (case, "way done at the top speed"): lognormal.done_at_mode,
-            (case, "way done at the second inflection"): float(lognormal.evaluate(second).done),
+            (case, "share of D at the first inflection"): float(lognormal.evaluate(first).done),
+            (case, "share of D at the top speed"): lognormal.done_at_mode,
+            (case, "share of D at the second inflection"): float(lognormal.evaluate(second).done),
             (case, "mean"): lognormal.mean,
             (case, "median"): lognormal.median,
             (case, "std"): lognormal.std,
@@ -187,7 +187,7 @@ def test_check_figures(cells: list[str]) -> None:
 
 
 def test_inflections_of_the_page() -> None:
-    """The formulas as they stand there, against the code: times, way done, and ratios of speeds (theory notes, section 3)."""
+    """The formulas as they stand there, against the code: times, shares of D, and ratios of speeds (theory notes, section 3)."""
     s = 0.25
     lognormal = Lognormal(0.0, -1.6, s)
     root = s * math.sqrt(0.25 * s * s + 1.0)
@@ -228,8 +228,8 @@ HUMAN_PACE = [math.exp(-2.0 * change) for change in (0.395, -0.3775)]
 
 # What stands in a sentence, and the figures in it, computed; each is compared to the digits printed there.
 SAID: list[tuple[str, list[float]]] = [
-    ("is missing of D is `(1 - erf 3) / 2 = {1.1045e-5}`", [0.5 * (1.0 - float(erf(3.0)))]),
-    ("{2.2e-5} of the way lie outside", [2.0 * float(ndtr(-FULL_COVERAGE))]),
+    ("The missing part of D is `(1 - erf 3) / 2 = {1.1045e-5}`", [0.5 * (1.0 - float(erf(3.0)))]),
+    ("{2.2e-5} of the length lie outside", [2.0 * float(ndtr(-FULL_COVERAGE))]),
     ("leaves {.27} % outside", [200.0 * float(ndtr(-3.0))]),
     ("a top speed of {3.51} L / T", [LOGNORMAL.peak]),
     ("an acceleration of {20.8} L / T^2", [float(np.abs(LOGNORMAL.evaluate(T).rate_change).max())]),
@@ -248,7 +248,7 @@ SAID: list[tuple[str, list[float]]] = [
     ("b of .1 to .5; both sets of the library draw with {.3}", [HAND.isochrony]),
     ("both sets of the library draw with {.3}", [ARC_RULES.isochrony]),
     (
-        "a stroke of .1 s have a mu, {-1.89}, within the -2.2 to -1.6 of hands",
+        "a stroke of .1 s has a mu, {-1.89}, within the -2.2 to -1.6 of hands",
         [LiteralTiming(0.0, HAND.stroke, LEAD * HAND.stroke).lognormal.mu],
     ),
     (
