@@ -67,6 +67,8 @@ class UrDriver:
     Attributes:
         info: which robot answered.
         layout: columns of its realtime frames.
+        time_waits: the robot's time stood still at the begin of every stream so far, as in lockstep; a robot
+            in real time that repeats a frame now and then does not do so each time.
     """
 
     info: RobotInfo
@@ -90,6 +92,7 @@ class UrDriver:
         self._network: Network = network or TcpNetwork()
         self._open: list[RealtimeClient | PackageStream | ReverseServer] = []
         self._in_motion = False
+        self.time_waits = True
         self._program = self._last_text = ""
         try:
             self._connect()
@@ -197,6 +200,7 @@ class UrDriver:
         finally:
             if reverse is not None:
                 reverse.close()
+        self.time_waits &= report.time_waits
         return report
 
     def stop(self, reverse: Transport | None) -> None:

@@ -93,7 +93,7 @@ class StreamReport:
         late_frames: new frames that got no command of their own because a newer one was already there.
         lost_frames: cycles whose frame never came.
         heartbeats: frames that repeated a time stamp.
-        time_waits: the robot's time stood still until its program had a command, as in lockstep.
+        time_waits: the robot repeated a frame before its program had a command, as in lockstep.
         robot_time: [s] from the first to the last frame, by the robot's stamps.
         wall_time: [s] of the same by our clock.
     """

@@ -87,10 +87,10 @@ class ExperimentRunner:
         self._observer.connected(driver.info)
         # The loop is identified where the first run begins; that run needs no further approach.
         there: JointPlan | None = self._approach(experiment.planned[0].joints)
-        found, stream = identify(driver, self._config, experiment.model)
+        found, _ = identify(driver, self._config, experiment.model)
         self._observer.identified(found)
         report = ExperimentReport(found)
-        pace = "lockstep" if stream.time_waits else "realtime"
+        pace = "lockstep" if driver.time_waits else "realtime"
         gears = GearObserver(found.loop, driver.info.period)
         for planned in experiment.planned:
             name = planned.movement.name

@@ -124,6 +124,23 @@ def test_heartbeats_do_not_count(tmp_path: Path) -> None:
     np.testing.assert_allclose(speed(track.t, track.p_actual), 0.25)
 
 
+@pytest.mark.parametrize("late", [0.0, 0.3, 0.9])
+def test_a_movement_begins_where_its_reference_does_not_at_its_first_sample(
+    tmp_path: Path, late: float
+) -> None:
+    """Frames fall anywhere in a cycle of the reference; `late` is the part of a cycle after its begin."""
+    with Recorder(tmp_path / "a.mcap", provenance(), SIGNALS) as recorder:
+        for i in range(-20, 60):
+            frame = np.zeros(14)
+            frame[0] = 50.0 + PERIOD * (i + late)
+            phase = Phase.MOVEMENT if i >= 0 else Phase.SETTLE_BEFORE
+            p = (0.01 * i, 0.0, 0.0)
+            recorder.append(frame, PERIOD * (i + late), frame[1:7], frame[1:7], p, p, frame[1:7], phase)
+    track = track_of(load_recording(tmp_path / "a.mcap"))
+    assert track.t_begin == pytest.approx(50.0, abs=1e-9)
+    assert track.t_start == pytest.approx(50.0 + late * PERIOD, abs=1e-9)
+
+
 def test_a_recording_without_movement_is_refused(tmp_path: Path) -> None:
     with Recorder(tmp_path / "a.mcap", provenance(), SIGNALS) as recorder:
         append_rows(recorder, 12)

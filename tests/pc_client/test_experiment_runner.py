@@ -90,6 +90,24 @@ def test_an_identification_that_fails_says_how_many_commands_came_late(two, held
     )
 
 
+@pytest.mark.parametrize("receiver_ticks", [{1}, {2}, {60}, {300, 301}])
+def test_a_robot_in_real_time_that_repeats_frames_is_not_in_lockstep(tmp_path, receiver_ticks):
+    """Also where the repeated frame is the first that comes after a program's hello: of one stream of several."""
+    n_ticks, n_streams = 0, 0
+
+    def repeat(robot):
+        nonlocal n_ticks, n_streams
+        n_streams += robot.program == "receiver" and n_ticks == 0
+        n_ticks = n_ticks + 1 if robot.program == "receiver" else 0
+        if n_streams >= 2 and n_ticks in receiver_ticks:
+            robot.pipes["realtime"].incoming.append(robot.frame())
+
+    one = prepare_experiment(load_movements(["uniform_4_1"]), repeat=1, out=tmp_path)
+    report = run(FakeRobot(lockstep=False, delay=4, on_tick=repeat), one)
+    assert n_streams == 3  # approach, identification, run
+    assert load_recording(report.paths[0]).provenance.pace == "realtime"
+
+
 def test_two_movements_twice(two, tmp_path):
     notes = Notes()
     robot = FakeRobot(delay=4)
