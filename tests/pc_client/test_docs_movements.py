@@ -107,6 +107,6 @@ def test_what_the_page_says_of_the_strokes_in_the_hands_time() -> None:
     assert f"mu does: {min(mu):.2f} to {max(mu):.2f} in the hand's time" in SENTENCES
     assert f"at random: {min(strokes):.3f} to {max(strokes):.3f} s".replace("0.", ".") in SENTENCES
     assert (
-        f"{min(strokes) / 2:.3f} to {max(strokes) / 2:.3f} s after its begin".replace("0.", ".") in SENTENCES
+        f"{min(strokes) / 2:.3f} to {max(strokes) / 2:.3f} s after its start".replace("0.", ".") in SENTENCES
     )
     assert f"{min(gaps):.1f} to {max(gaps):.2f} s on the robot".replace("0.", ".") in SENTENCES
