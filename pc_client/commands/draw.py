@@ -14,7 +14,7 @@ from pc_client.commands.before_motion import reach
 from pc_client.commands.experiment import execute
 from pc_client.commands.options import OutOption, RepeatOption, RobotOption, TimeUnitOption, console, say
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
-from pc_client.errors import ClientError, MovementError
+from pc_client.errors import MovementError
 from pc_client.file_names import as_file_name
 
 if TYPE_CHECKING:
@@ -220,33 +220,27 @@ def _judge(drawings: Sequence[Drawing], out: Path) -> list[Entry]:
 
 def _report(entries: Sequence[Entry], out: Path) -> None:
     """Write page, tables and pictures, and show the tables."""
-    import json
-
     from rich.progress import track
 
     from pc_client.drawing.figures import draw as draw_pictures
     from pc_client.drawing.page import render_page
     from pc_client.drawing.shown import Shown
-    from pc_client.drawing.table import to_json, to_markdown, to_rich
+    from pc_client.drawing.table import drawing_rich, drawings_json, drawings_markdown
+    from pc_client.results.files import write_files
+    from pc_client.results.tables import to_json
 
     pictures = {
         entry.name: draw_pictures(Shown.of(entry.drawing, entry.executions[-1], entry.verdict))
         for entry in track(entries, description="drawing", console=console, transient=True)
     }
     texts = {
-        "draw.json": json.dumps(to_json(entries), indent=2, allow_nan=False) + "\n",
-        "draw.md": to_markdown(entries),
+        "draw.json": to_json(drawings_json(entries)),
+        "draw.md": drawings_markdown(entries),
         "report.html": render_page(entries, pictures),
     }
     for name, own in pictures.items():
         texts |= {f"figures/{name}_{kind}.svg": text for kind, text in own.items()}
-    for name, text in texts.items():
-        path = out / name
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8", newline="\n")
-        except OSError as error:
-            raise ClientError(f"cannot write {path}: {error.strerror or error}") from error
+    write_files(out, texts)
     for entry in entries:
-        console.print(to_rich(entry))
+        console.print(drawing_rich(entry))
     say(f"report: {out / 'report.html'}")

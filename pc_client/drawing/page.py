@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from pc_client.analysis.page import data_uri, render
 from pc_client.drawing.figures import FIGURES
 from pc_client.drawing.shown import COLOURS
-from pc_client.drawing.table import COLUMNS, Entry, facts_of, provenance_facts, rows_of
+from pc_client.drawing.table import COLUMNS, Entry, facts_of, provenance_facts, table_of
+from pc_client.results.tables import to_html
 
 __all__ = ["render_page"]
 
@@ -29,7 +30,7 @@ def render_page(entries: Sequence[Entry], pictures: Mapping[str, Mapping[str, st
             "name": entry.name,
             "verdict": entry.verdict,
             "factor": entry.drawing.factor,
-            "rows": rows_of(entry.verdict),
+            "table": to_html(table_of(entry.verdict), COLUMNS),
             "facts": facts_of(entry),
             "pictures": [(alt, data_uri(pictures[entry.name][name]), name) for name, _, _, alt in FIGURES],
         }
@@ -38,7 +39,6 @@ def render_page(entries: Sequence[Entry], pictures: Mapping[str, Mapping[str, st
     return render(
         _TEMPLATE,
         sections=sections,
-        columns=COLUMNS,
         colours=COLOURS,
         provenance=provenance_facts(entries),
         origin=entries[0].executions[0].run.provenance.origin,

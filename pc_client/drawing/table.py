@@ -3,40 +3,64 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import PurePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
-from rich.box import SIMPLE_HEAD
-from rich.table import Table as RichTable
-from rich.text import Text
 
+from pc_client.analysis.report import provenance_facts as facts_of_runs
 from pc_client.drawing.drawing import Drawing
 from pc_client.drawing.execution import Execution
-from pc_client.drawing.judgement import Agreement, Fluency, Verdict
+from pc_client.drawing.judgement import Agreement, Verdict
 from pc_client.recording.provenance import Provenance
+from pc_client.results.tables import Column, finite, frame_of, to_markdown, to_rich
 
-__all__ = ["COLUMNS", "Entry", "facts_of", "provenance_facts", "rows_of", "to_json", "to_markdown", "to_rich"]
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
 
-#: Headings of the table of one drawing.
+__all__ = [
+    "COLUMNS",
+    "Entry",
+    "drawing_rich",
+    "drawings_json",
+    "drawings_markdown",
+    "facts_of",
+    "provenance_facts",
+    "table_of",
+]
+
 COLUMNS = (
-    "signal",
-    "SNR_v to human [dB]",
-    "SNR_t to human [dB]",
-    "SNR_v to plan [dB]",
-    "SNR_t to plan [dB]",
-    "speed peaks",
-    "SPARC",
-    "LDJ",
-    "beta",
-    "R²",
+    Column("signal", align="left", kind=str),
+    Column("human_v", "SNR_v to human", "dB", ".2f", narrow="SNR_v\nhuman"),
+    Column("human_t", "SNR_t to human", "dB", ".2f", narrow="SNR_t\nhuman"),
+    Column("plan_v", "SNR_v to plan", "dB", ".2f", narrow="SNR_v\nplan"),
+    Column("plan_t", "SNR_t to plan", "dB", ".2f", narrow="SNR_t\nplan"),
+    Column("peaks", "speed peaks", narrow="speed\npeaks", kind=int),
+    Column("sparc", "SPARC", format=".3f"),
+    Column("log_jerk", "LDJ", format=".2f"),
+    Column("exponent", "beta", format=".3f"),
+    Column("r_squared", "R²", format=".2f"),
 )
+"""The table of one drawing."""
 
-#: So many of them have room on a terminal.
 _ON_TERMINAL = 8
+"""So many of them have room there."""
+
+_COMMON_FACTS = (
+    "data",
+    "seed of the emulated arm",
+    "serial number",
+    "pace",
+    "control cycle",
+    "controller",
+    "loop delay identified by the client",
+    "client version",
+)
+"""What `analysis.report` says of runs that is said of drawings, too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,26 +83,25 @@ class Entry:
         return self.drawing.movement.name
 
 
-def rows_of(verdict: Verdict) -> list[tuple[str, ...]]:
-    """The rows of one drawing as texts, in the order of `COLUMNS`: one for each signal."""
-    none = ("", "")
+def table_of(verdict: Verdict) -> pl.DataFrame:
+    """A row for each signal of one drawing, with `COLUMNS`."""
     rows = [
-        ("human", *none, *none, *_fluency(verdict.human)),
-        ("reconstructed", *_agreement(verdict.reconstruction), *none, *_fluency(verdict.reconstructed)),
-        ("planned", *_agreement(verdict.plan), *none, *[""] * 5),
+        {"signal": "human", **asdict(verdict.human)},
+        {
+            "signal": "reconstructed",
+            **_agreement(human=verdict.reconstruction),
+            **asdict(verdict.reconstructed),
+        },
+        {"signal": "planned", **_agreement(human=verdict.plan)},
     ]
     for run in verdict.runs:
         who = f"executed r{run.repetition}" if len(verdict.runs) > 1 else "executed"
+        aligned = _agreement(human=run.human_aligned, plan=run.planned_aligned)
         rows += [
-            (who, *_agreement(run.human), *_agreement(run.planned), *_fluency(run.fluency)),
-            (
-                f"{who}, aligned",
-                *_agreement(run.human_aligned),
-                *_agreement(run.planned_aligned),
-                *[""] * 5,
-            ),
+            {"signal": who, **_agreement(human=run.human, plan=run.planned), **asdict(run.fluency)},
+            {"signal": f"{who}, aligned", **aligned},
         ]
-    return rows
+    return frame_of(rows, COLUMNS)
 
 
 def facts_of(entry: Entry) -> dict[str, str]:
@@ -117,27 +140,20 @@ def facts_of(entry: Entry) -> dict[str, str]:
 
 def provenance_facts(entries: Sequence[Entry]) -> dict[str, str]:
     """What all runs have in common."""
-    first = _provenance(entries[0])
-    delay = first.identified_delay_s
+    runs = [execution.run for entry in entries for execution in entry.executions]
+    facts = facts_of_runs(runs)
     return {
-        "robot": first.robot,
-        "data": first.origin.says,
-        **({} if first.seed is None else {"seed of the emulated arm": str(first.seed)}),
-        "serial number": first.serial,
-        "pace": first.pace,
-        "control cycle": f"{1e3 * first.cycle_time_s:g} ms",
-        "controller": first.controller,
-        "loop delay identified by the client": "not identified" if delay is None else f"{1e3 * delay:.1f} ms",
-        "client version": first.client_version,
-        "runs": f"{sum(len(entry.executions) for entry in entries)}, of {len(entries)} drawings",
+        "robot": runs[0].provenance.robot,
+        **{name: facts[name] for name in _COMMON_FACTS if name in facts},
+        "runs": f"{len(runs)}, of {len(entries)} drawings",
         "recordings": "belong to those who made them; see the licence beside the data (Omniglot: MIT)",
     }
 
 
-def to_json(entries: Sequence[Entry]) -> dict[str, Any]:
+def drawings_json(entries: Sequence[Entry]) -> dict[str, Any]:
     """The content of `draw.json`; figures that are not finite become null."""
     first = _provenance(entries[0])
-    found: dict[str, Any] = _finite(
+    found: dict[str, Any] = finite(
         {
             "robot": first.robot,
             "simulated": first.simulated,
@@ -149,32 +165,20 @@ def to_json(entries: Sequence[Entry]) -> dict[str, Any]:
     return found
 
 
-def to_markdown(entries: Sequence[Entry]) -> str:
+def drawings_markdown(entries: Sequence[Entry]) -> str:
     """The text of `draw.md`."""
-    lines = ["# Human movements on the arm", ""]
-    lines += [f"- {name}: {text}" for name, text in provenance_facts(entries).items()]
+    lines = ["# Human movements on the arm", "", *_list(provenance_facts(entries))]
     for entry in entries:
-        lines += ["", f"## {entry.name}", "", "| " + " | ".join(COLUMNS) + " |"]
-        lines += ["|---|" + "---:|" * (len(COLUMNS) - 1)]
-        lines += ["| " + " | ".join(row) + " |" for row in rows_of(entry.verdict)]
-        lines += ["", *(f"- {name}: {text}" for name, text in facts_of(entry).items())]
+        lines += ["", f"## {entry.name}", "", to_markdown(table_of(entry.verdict), COLUMNS)]
+        lines += ["", *_list(facts_of(entry))]
     return "\n".join(lines) + "\n"
 
 
-def to_rich(entry: Entry) -> RichTable:
+def drawing_rich(entry: Entry) -> RichTable:
     """The table of one drawing for the terminal."""
     first = _provenance(entry)
-    table = RichTable(
-        title=Text(f"{entry.name}: {first.arm}, controller {first.controller}; SNR in dB"),
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-    )
-    for column in COLUMNS[:_ON_TERMINAL]:
-        narrow = column.replace(" [dB]", "").replace(" to", "").replace(" ", "\n")
-        table.add_column(Text(narrow), justify="left" if column == "signal" else "right", no_wrap=True)
-    for row in rows_of(entry.verdict):
-        table.add_row(*map(Text, row[:_ON_TERMINAL]))
-    return table
+    title = f"{entry.name}: {first.arm}, controller {first.controller}; SNR in dB"
+    return to_rich(table_of(entry.verdict), COLUMNS[:_ON_TERMINAL], title=title)
 
 
 def _drawing_json(entry: Entry) -> dict[str, Any]:
@@ -217,27 +221,14 @@ def _sizes(drawn: NDArray[np.float64]) -> str:
     return " x ".join(f"{value:.0f}" for value in drawn)
 
 
-def _agreement(agreement: Agreement) -> tuple[str, str]:
-    return _number(agreement.snr_v_db, 2), _number(agreement.snr_t_db, 2)
+def _agreement(**agreements: Agreement) -> dict[str, Any]:
+    """Cells of SNR_v and SNR_t by what is agreed with: human, plan."""
+    return {
+        f"{what}_{letter}": level
+        for what, agreement in agreements.items()
+        for letter, level in (("v", agreement.snr_v_db), ("t", agreement.snr_t_db))
+    }
 
 
-def _fluency(fluency: Fluency) -> tuple[str, ...]:
-    return (
-        str(fluency.peaks),
-        _number(fluency.sparc, 3),
-        _number(fluency.log_jerk, 2),
-        _number(fluency.exponent, 3),
-        _number(fluency.r_squared, 2),
-    )
-
-
-def _number(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def _list(facts: Mapping[str, str]) -> list[str]:
+    return [f"- {name}: {text}" for name, text in facts.items()]

@@ -19,10 +19,11 @@ from pc_client.drawing.judgement import judge, signals
 from pc_client.drawing.page import render_page
 from pc_client.drawing.placement import PlacementOptions
 from pc_client.drawing.shown import Shown
-from pc_client.drawing.table import COLUMNS, Entry, rows_of, to_json, to_markdown
+from pc_client.drawing.table import COLUMNS, Entry, drawings_json, drawings_markdown, table_of
 from pc_client.errors import RecordingError
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.recording.provenance import Provenance
+from pc_client.results.tables import cells
 
 CYCLE = 0.008
 
@@ -142,18 +143,17 @@ def test_the_page_needs_no_network_and_holds_every_figure(entry):
     assert "http" not in page
     assert "SIMULATED" in page
     assert "seed 7" in page
-    for row in rows_of(entry.verdict):
-        assert len(row) == len(COLUMNS)
+    for row in cells(table_of(entry.verdict), COLUMNS):
         for cell in row:
             assert cell in page
 
 
 def test_the_tables_agree(entry):
-    written = json.loads(json.dumps(to_json([entry]), allow_nan=False))
+    written = json.loads(json.dumps(drawings_json([entry]), allow_nan=False))
     one = written["drawings"][0]
     assert written["simulated"] is True
     assert one["slower_than_the_hand"] == entry.drawing.factor
     assert one["runs"][0]["planned"]["snr_v_db"] == entry.verdict.runs[0].planned.snr_v_db
-    markdown = to_markdown([entry])
+    markdown = drawings_markdown([entry])
     assert f"{entry.verdict.runs[0].human.snr_v_db:.2f}" in markdown
     assert f"{entry.drawing.factor:.3f} times" in markdown
