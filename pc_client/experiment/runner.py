@@ -5,6 +5,7 @@ Whatever ends it early, what is recorded until then stays readable.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -22,6 +23,7 @@ from pc_client.experiment.observer import Observer, Silent
 from pc_client.experiment.preflight import preflight, require
 from pc_client.experiment.prepare import Experiment, Plan, clear_folder
 from pc_client.experiment.repetitions import Repetitions, RunLog
+from pc_client.kinematics.arm_tree import arm_tree
 from pc_client.planning.approach import plan_approach
 from pc_client.planning.plan import JointPlan
 from pc_client.recording.provenance import Provenance
@@ -73,6 +75,7 @@ class ExperimentRunner:
         self._experiment = experiment
         self._config = config
         self._observer = Silent() if observer is None else observer
+        self._arm = arm_tree(experiment.model.description)
         self._signals = [(column.name, column.count, column.unit) for column in driver.layout.columns]
 
     def run(self) -> ExperimentReport:
@@ -156,7 +159,8 @@ class ExperimentRunner:
         if not repetitions.may_use(plan, table):
             table = self._table(planned, plan, found, repetitions)
         log = RunLog() if config.uses_ilc or config.compensates_gear else None
-        with Recorder(path, provenance, self._signals) as recorder:
+        now = time.time_ns if provenance.pace == "realtime" else None
+        with Recorder(path, provenance, self._signals, arm=self._arm, now=now) as recorder:
             stream = self._driver.stream(
                 Tracker(table, config, self._experiment.model),
                 _row_sink(recorder, log),

@@ -1,12 +1,14 @@
 """The rows of a recording as CSV or Parquet, for tools that do not read MCAP.
 
-Vectors become one column a component, `actual_q_0` .. `actual_q_5`; names and units stay RTDE's.
+Vectors become one column a component, `actual_q_0` .. `actual_q_5`, under the names of RTDE. In CSV the unit
+stands behind the name, `actual_q_0 [rad]`; in Parquet, as JSON under the key "units", beside the provenance.
 """
 
 from __future__ import annotations
 
-import io
+import json
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -25,23 +27,27 @@ def export(recording: Recording, path: Path | str, format: ExportFormat = "csv")
     Args:
         recording: what to export.
         path: file to write; an existing one is replaced.
-        format: "csv" (full float precision) or "parquet" (needs pyarrow; carries the provenance too).
+        format: "csv" (full float precision) or "parquet" (carries the provenance too).
 
     Returns:
         The path written.
 
     Raises:
-        RecordingError: unknown format, pyarrow missing, or the file cannot be written.
+        RecordingError: unknown format, or the file cannot be written.
     """
+    import polars
+
     path = Path(path)
     if format not in get_args(ExportFormat):
         raise RecordingError(f"cannot export to {format!r}; use one of {', '.join(get_args(ExportFormat))}")
-    columns = flat_columns(recording)
+    table, units, content = polars.DataFrame(flat_columns(recording)), column_units(recording), BytesIO()
+    if format == "csv":
+        table.rename({name: f"{name} [{unit}]" for name, unit in units.items()}).write_csv(content)
+    else:
+        facts = {**recording.provenance.to_metadata(), "units": json.dumps(units)}
+        table.write_parquet(content, metadata=facts)
     try:
-        if format == "csv":
-            _write_csv(columns, path)
-        else:
-            _write_parquet(columns, recording.provenance.to_metadata(), path)
+        path.write_bytes(content.getbuffer())
     except OSError as error:
         raise RecordingError(f"cannot write {path}: {error.strerror or error}") from error
     return path
@@ -50,6 +56,13 @@ def export(recording: Recording, path: Path | str, format: ExportFormat = "csv")
 def flat_columns(recording: Recording) -> dict[str, NDArray[np.float64]]:
     """Return every number of the rows as its own column (n,), in file order."""
     return split_columns({signal.name: recording.column(signal.name) for signal in recording.signals})
+
+
+def column_units(recording: Recording) -> dict[str, str]:
+    """Return the unit of every column of `flat_columns` that has one."""
+    names = iter(flat_columns(recording))
+    units = (unit for signal in recording.signals for unit in signal.units)
+    return {name: unit for name, unit in zip(names, units, strict=True) if unit}
 
 
 def split_columns(signals: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
@@ -61,23 +74,3 @@ def split_columns(signals: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArr
         else:
             columns.update({f"{name}_{i}": values[:, i] for i in range(values.shape[1])})
     return columns
-
-
-def _write_csv(columns: dict[str, NDArray[np.float64]], path: Path) -> None:
-    text = io.StringIO()
-    text.write(",".join(columns) + "\n")
-    for row in np.column_stack(list(columns.values())).tolist():
-        text.write(",".join(map(repr, row)) + "\n")  # repr: the shortest text that gives the same number
-    path.write_text(text.getvalue(), encoding="utf-8", newline="\n")
-
-
-def _write_parquet(columns: dict[str, NDArray[np.float64]], provenance: dict[str, str], path: Path) -> None:
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError as error:
-        raise RecordingError(
-            "export to parquet needs pyarrow; install it with: pip install 'ur-hil[export]'"
-        ) from error
-    table = pyarrow.table({name: np.ascontiguousarray(values) for name, values in columns.items()})
-    parquet.write_table(table.replace_schema_metadata(provenance), path)

@@ -1,15 +1,13 @@
-"""Which signals one row of a recording holds, and how the row lies in the file.
+"""Which signals one row of a recording holds, and how they lie in its messages.
 
 A row is three ROS 2 messages (`/robot_state`, `/reference`, `/command`) that share one time stamp. Their
 fields are flat float64 numbers and arrays, so in CDR every message is a constant head followed by packed
-little-endian doubles, and a whole row is one element of a numpy record type: no per-message encoding.
-
-This module must not open files.
+little-endian doubles.
 
 ROS 2 allows only lower-case field names, and Foxglove and the `mcap-ros2-support` decoder refuse a whole
 topic with any other name. The schemas therefore say `actual_tcp_pose`, with the RTDE spelling beside it as a
 comment; `Signal.name`, the loader and the exports keep RTDE's `actual_TCP_pose`.
-Source: ROS 2 interface definition, "field names"; https://mcap.dev/spec; OMG CDR (XCDR1) alignment rules.
+Source: ROS 2 interface definition, "field names"; OMG CDR (XCDR1) alignment rules.
 """
 
 from __future__ import annotations
@@ -21,7 +19,6 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pc_client.errors import RecordingError
 from protocol.realtime.columns import COLUMNS
@@ -56,29 +53,33 @@ class Signal:
         """The name that ROS 2 allows: lower case."""
         return self.name.lower()
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The unit of each of its numbers, "" without one; "m, rad" of six is m of three and rad of three."""
+        parts = ("",) if self.unit in ("-", "enum", "bits") else self.unit.split(", ")
+        return tuple(parts[k * len(parts) // self.count] for k in range(self.count))
+
 
 # What callers may hand in for a signal: itself, (name, count) or (name, count, unit).
 SignalLike = Signal | tuple[str, int] | tuple[str, int, str]
 
 REFERENCE_SIGNALS = (
-    Signal("ref_t", 1, "s, since the movement began"),
+    Signal("ref_t", 1, "s"),
     Signal("ref_q", 6, "rad"),
     Signal("ref_qd", 6, "rad/s"),
-    Signal("ref_tcp_position", 3, "m, base frame"),
-    Signal("ref_tcp_velocity", 3, "m/s, base frame"),
+    Signal("ref_tcp_position", 3, "m"),
+    Signal("ref_tcp_velocity", 3, "m/s"),
 )
+"""The reference: `ref_t` since the movement began, positions and velocities in UR's `base` frame."""
+
 # `phase` is the one byte of a row; it stands last so that the doubles before it need no padding.
-COMMAND_SIGNALS = (
-    Signal("cmd_qd", 6, "rad/s"),
-    Signal("phase", 1, "0 settle before, 1 movement, 2 settle after", "uint8"),
-)
+COMMAND_SIGNALS = (Signal("cmd_qd", 6, "rad/s"), Signal("phase", 1, "enum", "uint8"))
+"""The velocities that were sent in answer, and the `Phase`."""
 
-STATE_TOPIC, REFERENCE_TOPIC, COMMAND_TOPIC = "/robot_state", "/reference", "/command"
+ROW_TOPICS = STATE_TOPIC, REFERENCE_TOPIC, COMMAND_TOPIC = "/robot_state", "/reference", "/command"
+PROVENANCE_RECORD, UNITS_RECORD, SUMMARY_RECORD = "provenance", "units", "summary"
 
-CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
-MESSAGE_OPCODE = 0x05
-# What a Message record carries before its data: channel id u16, sequence u32, log and publish time u64.
-MESSAGE_HEAD_BYTES = 22
+CDR_HEAD_BYTES = 4
 
 MOST_NUMBERS = 2000
 """Most numbers in a row: ten times those of the largest frame."""
@@ -92,44 +93,21 @@ _SCHEMA_LINE = re.compile(
 
 
 class Topic(NamedTuple):
-    """One ROS 2 topic of a recording; its index + 1 is channel and schema id."""
+    """One ROS 2 topic of a recording."""
 
     name: str
     schema_name: str
     signals: tuple[Signal, ...]
 
     @property
-    def body_dtype(self) -> np.dtype[np.void]:
-        """Numpy record of the CDR body: packed, as no field needs padding."""
-        return np.dtype([(s.name, _NUMPY_TYPES[s.type], (s.count,)) for s in self.signals])
+    def dtype(self) -> np.dtype[np.void]:
+        """Numpy record of the CDR message: packed, as no field needs padding."""
+        head = [("cdr", "u1", (CDR_HEAD_BYTES,))]
+        return np.dtype([*head, *((s.name, _NUMPY_TYPES[s.type], (s.count,)) for s in self.signals)])
 
 
-@dataclass(frozen=True, slots=True)
-class RowLayout:
-    """How one row lies in a chunk.
-
-    Attributes:
-        topics: the topics in the order of their messages.
-        dtype: numpy record of the row: one `MESSAGE`-record a topic, named by the topic.
-    """
-
-    topics: tuple[Topic, ...]
-    dtype: np.dtype[np.void]
-
-    def blank_rows(self, n: int) -> NDArray[np.void]:
-        """Return n rows with every constant byte (opcode, length, channel, CDR head) filled in."""
-        rows = np.zeros(n, self.dtype)
-        for channel, topic in enumerate(self.topics, start=1):
-            message = rows[topic.name]
-            message["opcode"] = MESSAGE_OPCODE
-            message["length"] = self.dtype[topic.name].itemsize - 9
-            message["channel"] = channel
-            message["cdr"] = np.frombuffer(CDR_LITTLE_ENDIAN, np.uint8)
-        return rows
-
-
-def row_layout(state_signals: Iterable[SignalLike]) -> RowLayout:
-    """Build the layout of a recording whose robot state has these signals.
+def row_topics(state_signals: Iterable[SignalLike]) -> tuple[Topic, Topic, Topic]:
+    """The topics of a recording whose robot state has these signals: state, reference, command.
 
     Args:
         state_signals: every column of the realtime frame, in frame order; `timestamp`, the controller's
@@ -156,17 +134,7 @@ def row_layout(state_signals: Iterable[SignalLike]) -> RowLayout:
         raise RecordingError(
             "the robot state has no scalar 'timestamp'; a recording needs the controller's time"
         )
-    head = [
-        ("opcode", "u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time", "<u8"),
-        ("publish_time", "<u8"),
-        ("cdr", "u1", (4,)),
-    ]
-    dtype = np.dtype([(t.name, np.dtype([*head, ("body", t.body_dtype)])) for t in topics])
-    return RowLayout(topics, dtype)
+    return topics
 
 
 def schema_text(signals: Iterable[Signal]) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -20,29 +20,29 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, Schema
-from mcap.records import Chunk as ChunkRecord
+from mcap.records import Channel, Chunk, Message, Metadata, Schema
+from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from pc_client.errors import RecordingError
 from pc_client.input_files import FILE_KINDS
 from pc_client.recording.layout import (
     COMMAND_SIGNALS,
-    MESSAGE_HEAD_BYTES,
+    PROVENANCE_RECORD,
     REFERENCE_SIGNALS,
+    ROW_TOPICS,
+    SUMMARY_RECORD,
     Phase,
     Signal,
     Topic,
     check_row,
     parse_schema_text,
 )
-from pc_client.recording.mcap_file import CHUNK_HEAD_BYTES, MAGIC, PROVENANCE_RECORD, SUMMARY_RECORD
 from pc_client.recording.provenance import Provenance
 
 _RECORD_HEAD = struct.Struct("<BQ")
-_CHANNEL_ID = struct.Struct("<H")
 _CRC = struct.Struct("<I")
-_CDR_HEAD_BYTES = 4
+_NEEDED = (Signal("timestamp", 1, "s"), *REFERENCE_SIGNALS, *COMMAND_SIGNALS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,11 +105,13 @@ def load_recording(path: Path | str) -> Recording:
     """
     path = Path(path)
     data = FILE_KINDS["recording"].read_bytes(path)
-    if not data.startswith(MAGIC):
-        raise RecordingError(f"{path} is not a recording: an MCAP file begins with {MAGIC!r}")
+    if not data.startswith(MCAP0_MAGIC):
+        raise RecordingError(f"{path} is not a recording: an MCAP file begins with {MCAP0_MAGIC!r}")
     scan = _Scan()
     damage = scan.read(data)
     signals = tuple(signal for topic in scan.topics.values() for signal in topic.signals)
+    if not scan.has_begun:  # killed before the first chunk: no rows, but it is known of what run
+        signals = _NEEDED
     missing = _missing_signal(signals)
     if PROVENANCE_RECORD not in scan.metadata or missing:
         reason = damage or (f"no signal {missing!r}" if missing else "no provenance")
@@ -129,15 +131,14 @@ def load_recording(path: Path | str) -> Recording:
         summary=summary,
         complete=not damage,
         damage=damage,
-        _columns=scan.columns(),
+        _columns=scan.columns() or {s.name: np.empty((0, s.count)[: 1 + (s.count > 1)]) for s in signals},
     )
 
 
 def _missing_signal(signals: Iterable[Signal]) -> str | None:
     """The first signal that every recording has and this one has not, or not with as many numbers."""
     counts = {signal.name: signal.count for signal in signals}
-    needed = {"timestamp": 1} | {signal.name: signal.count for signal in REFERENCE_SIGNALS + COMMAND_SIGNALS}
-    return next((name for name, count in needed.items() if counts.get(name) != count), None)
+    return next((need.name for need in _NEEDED if counts.get(need.name) != need.count), None)
 
 
 class _Scan:
@@ -146,23 +147,21 @@ class _Scan:
     def __init__(self) -> None:
         self.schemas: dict[int, Schema] = {}
         self.topics: dict[int, Topic] = {}
+        self.others: set[int] = set()  # channels for viewers, which repeat what the rows say
         self.metadata: dict[str, dict[str, str]] = {}
-        self.rows: dict[int, _Rows] = {}
+        self.rows: dict[int, bytearray] = {}
+        self.has_begun = False  # schemas, channels or rows have been seen
 
     def read(self, data: bytes) -> str:
         """Take in all whole records; return what is missing or damaged, "" when nothing is."""
-        position = len(MAGIC)
         in_rows = True  # behind DataEnd there is only the index, which repeats what is known
         damage = ""
-        while position + _RECORD_HEAD.size <= len(data):
-            opcode, length = _RECORD_HEAD.unpack_from(data, position)
-            start = position + _RECORD_HEAD.size
-            end = start + length
+        for opcode, start, end in _records(data, len(MCAP0_MAGIC)):
+            position = start - _RECORD_HEAD.size
             try:
                 if end > len(data):
                     if in_rows and opcode == Opcode.CHUNK:
-                        # Only the rows stand behind a chunk's head, and they are not compressed.
-                        self._take_messages(data[position + CHUNK_HEAD_BYTES :])
+                        self._take_chunk(data[start:], is_cut=True)
                     return f"cut off inside a record at byte {position} of {len(data)}"
                 if opcode == Opcode.DATA_END:
                     in_rows = False
@@ -172,18 +171,18 @@ class _Scan:
                     self._take(opcode, data[start:end])
             except (McapError, RecordingError, ValueError, OverflowError, struct.error) as error:
                 return f"damaged: record at byte {position} cannot be read ({error})"
-            position = end
             if opcode == Opcode.FOOTER:
-                whole = not in_rows and data[position : position + len(MAGIC)] == MAGIC
+                whole = not in_rows and data[end : end + len(MCAP0_MAGIC)] == MCAP0_MAGIC
                 return damage if whole else "cut off inside the end mark"
         return f"cut off at byte {len(data)}: the end mark is missing"
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """Return one array a signal; a row counts when all its messages are there."""
-        n_rows = min(rows.count for rows in self.rows.values())
+        dtypes = {channel: topic.dtype for channel, topic in self.topics.items()}
+        n_rows = min((len(self.rows[channel]) // dtypes[channel].itemsize for channel in dtypes), default=0)
         columns: dict[str, NDArray[np.float64]] = {}
         for channel, topic in self.topics.items():
-            rows = np.frombuffer(self.rows[channel].data, topic.body_dtype, n_rows)
+            rows = np.frombuffer(self.rows[channel], dtypes[channel], n_rows)
             for signal in topic.signals:
                 values = rows[signal.name].astype(np.float64)
                 columns[signal.name] = values[:, 0] if signal.count == 1 else values
@@ -191,69 +190,64 @@ class _Scan:
 
     def _take(self, opcode: int, body: bytes) -> None:
         stream = ReadDataStream(BytesIO(body))
+        self.has_begun |= opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK, Opcode.MESSAGE)
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
             self.schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(stream)
-            if channel.schema_id not in self.schemas:
-                raise ValueError(f"topic {channel.topic} names the unknown schema {channel.schema_id}")
-            schema = self.schemas[channel.schema_id]
-            topic = Topic(channel.topic, schema.name, parse_schema_text(schema.data.decode()))
-            if self.topics.get(channel.id, topic) != topic:
-                raise ValueError(f"channel {channel.id} is defined twice")
-            others = [known for number, known in self.topics.items() if number != channel.id]
-            check_row([signal for known in (*others, topic) for signal in known.signals])
-            self.topics[channel.id] = topic
-            self.rows.setdefault(channel.id, _Rows(topic.body_dtype.itemsize))
+            self._take_channel(Channel.read(stream))
         elif opcode == Opcode.METADATA:
             metadata = Metadata.read(stream)
             self.metadata[metadata.name] = metadata.metadata
         elif opcode == Opcode.CHUNK:
-            chunk = ChunkRecord.read(stream)
-            if chunk.compression:
-                raise ValueError(f"packed by {chunk.compression[:20]!r}; this package does not pack rows")
-            if chunk.uncompressed_crc not in (0, crc32(chunk.data)):
-                raise ValueError("its checksum is wrong")
-            self._take_messages(chunk.data)
+            self._take_chunk(body)
         elif opcode == Opcode.MESSAGE:
-            self._take_message(body)
+            self._take_message(Message.read(stream, len(body)))
 
-    def _take_messages(self, rows: bytes) -> None:
-        """Take the whole messages at the beginning of these bytes."""
-        position = 0
-        while position + _RECORD_HEAD.size <= len(rows):
-            opcode, length = _RECORD_HEAD.unpack_from(rows, position)
-            start, position = position + _RECORD_HEAD.size, position + _RECORD_HEAD.size + length
-            if position > len(rows):
-                return
-            if opcode == Opcode.MESSAGE:
-                self._take_message(rows[start:position])
-
-    def _take_message(self, body: bytes) -> None:
-        (channel,) = _CHANNEL_ID.unpack_from(body)
+    def _take_message(self, message: Message) -> None:
+        channel = message.channel_id
+        if channel in self.others:
+            return
         if channel not in self.rows:
             raise ValueError(f"a message names the unknown channel {channel}")
-        row, rows = body[MESSAGE_HEAD_BYTES + _CDR_HEAD_BYTES :], self.rows[channel]
-        if len(row) != rows.size:
-            raise ValueError(f"a message has {len(row)} bytes, its topic needs {rows.size}")
-        rows.data += row
+        size = self.topics[channel].dtype.itemsize
+        if len(message.data) != size:
+            raise ValueError(f"a message has {len(message.data)} bytes, its topic needs {size}")
+        self.rows[channel] += message.data
+
+    def _take_channel(self, channel: Channel) -> None:
+        if channel.topic not in ROW_TOPICS:
+            if channel.id in self.topics:
+                raise ValueError(f"channel {channel.id} is defined twice")
+            self.others.add(channel.id)
+            return
+        if channel.schema_id not in self.schemas:
+            raise ValueError(f"topic {channel.topic} names the unknown schema {channel.schema_id}")
+        schema = self.schemas[channel.schema_id]
+        topic = Topic(channel.topic, schema.name, parse_schema_text(schema.data.decode()))
+        if channel.id in self.others or self.topics.get(channel.id, topic) != topic:
+            raise ValueError(f"channel {channel.id} is defined twice")
+        others = [known for number, known in self.topics.items() if number != channel.id]
+        check_row([signal for known in (*others, topic) for signal in known.signals])
+        self.topics[channel.id] = topic
+        self.rows.setdefault(channel.id, bytearray())
+
+    def _take_chunk(self, body: bytes, *, is_cut: bool = False) -> None:
+        """Take the records of a chunk; of one that is cut off those that are whole."""
+        chunk = Chunk.read(ReadDataStream(BytesIO(body)))
+        if chunk.compression:
+            raise ValueError(f"packed by {chunk.compression[:20]!r}; this package does not pack rows")
+        if not is_cut and chunk.uncompressed_crc not in (0, crc32(chunk.data)):
+            raise ValueError("its checksum is wrong")
+        for opcode, start, end in _records(chunk.data, 0):
+            if opcode != Opcode.CHUNK and end <= len(chunk.data):
+                self._take(opcode, chunk.data[start:end])
 
 
-class _Rows:
-    """The rows of one topic, one behind the other.
-
-    Args:
-        size: bytes of a row, at least 1.
-    """
-
-    __slots__ = ("data", "size")
-
-    def __init__(self, size: int) -> None:
-        self.size = size
-        self.data = bytearray()
-
-    @property
-    def count(self) -> int:
-        """Whole rows."""
-        return len(self.data) // self.size
+def _records(data: bytes, position: int) -> Iterator[tuple[int, int, int]]:
+    """Opcode, begin and end of the content of each record from a position on; the last may end outside."""
+    while position + _RECORD_HEAD.size <= len(data):
+        opcode, length = _RECORD_HEAD.unpack_from(data, position)
+        start = position + _RECORD_HEAD.size
+        position = start + length
+        yield opcode, start, position

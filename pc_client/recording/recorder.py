@@ -1,56 +1,53 @@
 """The recorder: takes one row a control cycle and appends them to a file, a chunk at a time.
 
-It runs inside the control loop, so `append` costs a few microseconds and never raises for the disk's sake:
+It runs inside the control loop, so `append` costs some microseconds and never raises for the disk's sake:
 the first I/O error is kept in `error` for the loop to see, rows go on into memory, and `close` reports what
 was saved. Truth about time is the controller's stamp in the row; nothing here reads a clock.
 
 A killed process loses at most the rows of the chunk it was filling (half a second); a machine that loses
-power may lose what the operating system had not yet written.
+power may lose what the operating system had not yet written. Chunks are not compressed: one that was cut off
+is readable up to its last whole row, and the bytes depend on no compressor's version.
 """
 
 from __future__ import annotations
 
-import errno
 import json
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from struct import Struct
 from types import TracebackType
-from typing import Protocol, Self
-from zlib import crc32
+from typing import IO, Self, cast
 
 import numpy as np
-from mcap.records import ChunkIndex
-from numpy.typing import ArrayLike, NDArray
+from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
 
 from pc_client.errors import RecordingError
-from pc_client.recording.layout import COMMAND_TOPIC, REFERENCE_TOPIC, STATE_TOPIC, SignalLike, row_layout
-from pc_client.recording.mcap_file import CHUNK_HEAD_BYTES, Chunk, encode_chunk, encode_head, encode_tail
+from pc_client.kinematics.arm_tree import ArmTree
+from pc_client.recording.arm_view import ArmView
+from pc_client.recording.layout import (
+    PROVENANCE_RECORD,
+    SUMMARY_RECORD,
+    UNITS_RECORD,
+    SignalLike,
+    Topic,
+    row_topics,
+    schema_text,
+)
+from pc_client.recording.loader import load_recording
+from pc_client.recording.outbox import Opener, Outbox, open_unbuffered
 from pc_client.recording.provenance import Provenance
+from pc_client.recording.ros_messages import CDR_LITTLE_ENDIAN
 
 ROWS_PER_CHUNK = 64  # half a second at 125 Hz
-# Rows that are kept in memory after the disk failed: two minutes at 125 Hz, 24 MB.
-MAX_HELD_CHUNKS = 240
+# Rows that are kept in memory after the disk failed: two minutes at 125 Hz, 30 MB.
+MAX_HELD_ROWS = 240 * ROWS_PER_CHUNK
 
+LATEST = 2.0**31
+"""No controller has run this long [s]; seconds of ROS time are 32-bit numbers."""
 
-class RawFile(Protocol):
-    """The part of an unbuffered binary file that the recorder uses."""
-
-    def write(self, data: memoryview, /) -> int | None:
-        """Write some of the data and return how many bytes."""
-
-    def seek(self, offset: int, /) -> int:
-        """Go to this offset."""
-
-    def truncate(self, size: int, /) -> int:
-        """Cut the file to this size."""
-
-    def close(self) -> None:
-        """Close the file."""
-
-
-def _open_unbuffered(path: Path) -> RawFile:
-    """Open for writing without Python's own buffer: what `write` returned is out of this process."""
-    return open(path, "wb", buffering=0)
+_REFERENCE = Struct("<4sd6d6d3d3d")
+_COMMAND = Struct("<4s6dB")
 
 
 class Recorder:
@@ -74,7 +71,9 @@ class Recorder:
         provenance: Provenance,
         state_signals: Iterable[SignalLike],
         *,
-        opener: Callable[[Path], RawFile] = _open_unbuffered,
+        arm: ArmTree | None = None,
+        now: Callable[[], int] | None = None,
+        opener: Opener = open_unbuffered,
     ) -> None:
         """Create the file and write its head.
 
@@ -82,6 +81,10 @@ class Recorder:
             path: file to create; an existing one is replaced.
             provenance: written at the beginning, so that also a cut file says where it comes from.
             state_signals: each column of the realtime frame in its order, as (name, count) or `Signal`.
+            arm: links and joints, for the topics by which viewers show a moving arm; None: no such topics.
+            now: reads the clock of the PC, ns since 1970 (UTC), at the first row; the log times of all rows
+                are counted from there by the controller's stamps. None: they are the controller's time, so
+                that equal runs give equal bytes.
             opener: opens the file; tests hand in failing disks here.
 
         Raises:
@@ -90,27 +93,29 @@ class Recorder:
         self.path = Path(path)
         self.error: RecordingError | None = None
         self.n_rows = 0
-        self._layout = row_layout(state_signals)
+        topics = row_topics(state_signals)
+        names = [signal.name for signal in topics[0].signals for _ in range(signal.count)]
+        self._stamp_at = names.index("timestamp")
+        self._now = now
+        self._epoch = 0  # log time of the controller's time 0
         self._closed = False
-        self._rows = self._layout.blank_rows(ROWS_PER_CHUNK)
-        self._fill = 0
-        self._held: list[Chunk] = []
-        self._n_dropped = 0
-        self._chunks: list[tuple[ChunkIndex, int]] = []  # index and rows of each chunk in the file
-        self._cut_views()
-
-        head, self._provenance_index = encode_head(self._layout, provenance.to_metadata())
-        self._position = 0  # end of the last record that is wholly in the file
-        self._crc = 0  # of everything up to there
-        self._partial = 0  # bytes behind it, of a write that failed half-way
+        self._n_written = 0  # rows that were given to the disk before it failed
         try:
-            self._file = opener(self.path)
+            self._outbox = Outbox(opener(self.path))
         except OSError as error:
             raise RecordingError(
                 f"cannot create the recording {self.path}: {error.strerror or error}; choose another --out"
             ) from error
-        if not self._write(head):
-            self._file.close()
+        self._writer = Writer(
+            cast(IO[bytes], self._outbox), compression=CompressionType.NONE, enable_data_crcs=True
+        )
+        self._writer.start(profile="ros2", library="ur-hil")
+        self._writer.add_metadata(UNITS_RECORD, _units(topics, is_absolute=now is not None))
+        self._writer.add_metadata(PROVENANCE_RECORD, provenance.to_metadata())
+        self._channels = [self._register(topic) for topic in topics]
+        self._view = None if arm is None else ArmView(arm, self._writer, names, provenance.cycle_time_s)
+        if not self._drain():
+            self._outbox.close()
             assert self.error is not None
             raise self.error
 
@@ -118,11 +123,11 @@ class Recorder:
         self,
         frame_values: NDArray[np.float64],
         t_ref: float,
-        ref_q: ArrayLike,
-        ref_qd: ArrayLike,
-        ref_p: ArrayLike,
-        ref_v: ArrayLike,
-        cmd_qd: ArrayLike,
+        ref_q: Iterable[float],
+        ref_qd: Iterable[float],
+        ref_p: Iterable[float],
+        ref_v: Iterable[float],
+        cmd_qd: Iterable[float],
         phase: int,
     ) -> None:
         """Add one row. Never raises for I/O: look at `error`.
@@ -137,20 +142,23 @@ class Recorder:
             cmd_qd: (6,) joint velocities sent in answer to this frame, rad/s.
             phase: a `Phase`.
         """
-        i = self._fill
-        self._state[i] = frame_values
-        self._ref_t[i] = t_ref
-        self._ref_q[i] = ref_q
-        self._ref_qd[i] = ref_qd
-        self._ref_p[i] = ref_p
-        self._ref_v[i] = ref_v
-        self._cmd_qd[i] = cmd_qd
-        self._phase[i] = phase
+        n, log_time = self.n_rows, self._log_time(float(frame_values[self._stamp_at]))
         self.n_rows += 1
-        i += 1
-        self._fill = i
-        if i == ROWS_PER_CHUNK:
-            self._finish_chunk()
+        if self.error is not None and n - self._n_written >= MAX_HELD_ROWS:
+            return
+        row = (
+            CDR_LITTLE_ENDIAN + frame_values.tobytes(),
+            _REFERENCE.pack(CDR_LITTLE_ENDIAN, t_ref, *ref_q, *ref_qd, *ref_p, *ref_v),
+            _COMMAND.pack(CDR_LITTLE_ENDIAN, *cmd_qd, phase),
+        )
+        for channel, message in zip(self._channels, row, strict=True):
+            self._writer.add_message(channel, log_time, message, log_time, n)
+        if self._view is not None:
+            self._view.show(n, log_time, frame_values, ref_q, ref_p)
+        if self.n_rows % ROWS_PER_CHUNK == 0:
+            self._writer.flush()
+            if self.error is None:
+                self._drain()
 
     def close(self, summary: Mapping[str, object] | None = None) -> None:
         """Write the rest of the rows, the summary and the index, and close the file. Idempotent.
@@ -164,18 +172,14 @@ class Recorder:
         if self._closed:
             return
         self._closed = True
-        self._finish_chunk()
-        if self._held and self._rewind():
-            while self._held and self._write_chunk(self._held[0]):
-                del self._held[0]
-        if not self._held:
-            texts = {key: json.dumps(value) for key, value in (summary or {}).items()}
-            tail = encode_tail(
-                self._layout, self._position, self._crc, texts, self._provenance_index, self._chunks
-            )
-            self._write(tail)
+        self._writer.flush()
+        self._writer.add_metadata(
+            SUMMARY_RECORD, {key: json.dumps(value) for key, value in (summary or {}).items()}
+        )
+        self._writer.finish()
+        self._drain()  # also after an error: a disk may have been cleared
         try:
-            self._file.close()
+            self._outbox.close()
         except OSError as error:
             self._latch(error)
         if self.error is not None:
@@ -195,68 +199,27 @@ class Recorder:
         except RecordingError as lost:
             error.add_note(str(lost))  # the error that ended the run stays the one that is raised
 
-    def _cut_views(self) -> None:
-        """Cut the row buffer into one array a value group, so that `append` is a few plain assignments."""
-        state = self._rows[STATE_TOPIC]["body"]
-        n_values = state.dtype.itemsize // 8
-        self._state: NDArray[np.float64] = state.view(np.dtype(("<f8", (n_values,))))
-        reference = self._rows[REFERENCE_TOPIC]["body"]
-        self._ref_t: NDArray[np.float64] = reference["ref_t"][:, 0]
-        self._ref_q: NDArray[np.float64] = reference["ref_q"]
-        self._ref_qd: NDArray[np.float64] = reference["ref_qd"]
-        self._ref_p: NDArray[np.float64] = reference["ref_tcp_position"]
-        self._ref_v: NDArray[np.float64] = reference["ref_tcp_velocity"]
-        command = self._rows[COMMAND_TOPIC]["body"]
-        self._cmd_qd: NDArray[np.float64] = command["cmd_qd"]
-        self._phase: NDArray[np.uint8] = command["phase"][:, 0]
+    def _register(self, topic: Topic) -> int:
+        schema = self._writer.register_schema(
+            topic.schema_name, "ros2msg", schema_text(topic.signals).encode()
+        )
+        return int(self._writer.register_channel(topic.name, "cdr", schema))
 
-    def _finish_chunk(self) -> None:
-        """Encode the filled rows as a chunk, and write it or hold it."""
-        n = self._fill
-        if n == 0:
-            return
-        self._fill = 0
-        chunk = encode_chunk(self._layout, self._rows[:n], self.n_rows - n)
-        if self.error is None and self._write_chunk(chunk):
-            return
-        if len(self._held) < MAX_HELD_CHUNKS:
-            self._held.append(chunk)
-        else:
-            self._n_dropped += n
+    def _log_time(self, stamp: float) -> int:
+        """The log time [ns] of the controller's time [s]; 0 for one that no controller has."""
+        since_start = round(stamp * 1e9) if 0.0 <= stamp < LATEST else 0
+        if self._now is not None and self.n_rows == 0:
+            self._epoch = self._now() - since_start
+        return self._epoch + since_start
 
-    def _write_chunk(self, chunk: Chunk) -> bool:
-        at = self._position
-        if not self._write(chunk.data):
-            return False
-        self._chunks.append((chunk.index_at(at), chunk.n_rows))
-        return True
-
-    def _write(self, data: bytes) -> bool:
-        """Append all bytes; on an I/O error latch it and return False."""
-        view = memoryview(data)
-        done = 0
+    def _drain(self) -> bool:
+        """Write what waits; on an I/O error latch it and return False."""
         try:
-            while done < len(view):
-                n_written = self._file.write(view[done:])
-                if not n_written:
-                    raise OSError(errno.EIO, "the file takes no more bytes")
-                done += n_written
+            self._outbox.drain()
         except OSError as error:
-            self._partial = done
             self._latch(error)
             return False
-        self._position += done
-        self._crc = crc32(data, self._crc)
-        return True
-
-    def _rewind(self) -> bool:
-        """Go back to the end of the last whole record, to try again; a disk may have been cleared."""
-        try:
-            self._file.seek(self._position)
-            self._file.truncate(self._position)
-        except OSError:
-            return False
-        self._partial = 0
+        self._n_written = self.n_rows
         return True
 
     def _latch(self, error: OSError) -> None:
@@ -265,9 +228,18 @@ class Recorder:
             self.error.__cause__ = error
 
     def _saved(self) -> str:
-        """Say in one phrase what is in the file."""
-        whole = sum(n_rows for _, n_rows in self._chunks)
-        partial = max(0, self._partial - CHUNK_HEAD_BYTES) // self._layout.dtype.itemsize if self._held else 0
-        if whole == self.n_rows:
-            return f"all {whole} rows are saved; make room before the next run"
-        return f"{whole + partial} of {self.n_rows} rows are saved and readable; make room and repeat the run"
+        """Say in one phrase what can be read of the file."""
+        try:
+            n_saved = load_recording(self.path).n_rows
+        except RecordingError:
+            n_saved = 0
+        if n_saved == self.n_rows:
+            return f"all {n_saved} rows are saved; make room before the next run"
+        return f"{n_saved} of {self.n_rows} rows are saved and readable; make room and repeat the run"
+
+
+def _units(topics: Iterable[Topic], *, is_absolute: bool) -> dict[str, str]:
+    """What the numbers of a recording are: the unit of each signal, and what log times count."""
+    units = {signal.name: signal.unit for topic in topics for signal in topic.signals}
+    start = "1970-01-01T00:00:00Z, clock of the PC" if is_absolute else "the controller started"
+    return {"log_time": f"ns since {start}", **units}

@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Chunk, Header, Metadata, Schema
+from mcap.writer import MCAP0_MAGIC as MAGIC
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "pc_client"))
 from recording_samples import SIGNALS, provenance, record_movement
@@ -34,9 +35,8 @@ from pc_client.file_names import MOST_BYTES, as_file_name, is_file_name
 from pc_client.input_files import FILE_KINDS
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.movements.files import LIBRARY_FOLDER, load_movement
-from pc_client.recording.layout import row_layout, schema_text
+from pc_client.recording.layout import row_topics, schema_text
 from pc_client.recording.loader import load_recording
-from pc_client.recording.mcap_file import MAGIC
 from pc_client.sweep.config import read_config
 from ur_hil.input_files import MIB
 
@@ -70,7 +70,7 @@ def crafted(
     builder = RecordBuilder()
     builder.write(MAGIC)
     Header(profile="ros2", library="x").write(builder)
-    for number, topic in enumerate(topics or row_layout(SIGNALS).topics, start=1):
+    for number, topic in enumerate(topics or row_topics(SIGNALS), start=1):
         text = schema_text(topic.signals) if schema is None or number > 1 else schema
         Schema(id=number, data=text.encode(), encoding="ros2msg", name="x").write(builder)
         for _ in range(1 + twice):
@@ -105,7 +105,7 @@ CRAFTED = {
         schema="float64 timestamp  # timestamp\nfloat64 actual_tcp_pose  # actual_TCP_pose\n"
     ),
     "topic defined twice": crafted(twice=True),
-    "no topics": crafted(topics=row_layout(SIGNALS).topics[:1]),
+    "no topics": crafted(topics=row_topics(SIGNALS)[:1]),
     "packed": crafted(compression="lz4", rows=b"\x04\x22\x4d\x18", size=1 << 40),
     "unknown packing": crafted(compression="\x1b[2J", rows=b"x"),
     "wrong type of a number": crafted(facts={"repetition": '"one"'}),

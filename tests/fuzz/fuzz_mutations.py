@@ -13,8 +13,7 @@ from itertools import pairwise
 from xml.etree import ElementTree
 
 from mcap.opcode import Opcode
-
-from pc_client.recording.mcap_file import CHUNK_HEAD_BYTES, MAGIC
+from mcap.writer import MCAP0_MAGIC as MAGIC
 
 _LENGTHS = (
     0,
@@ -41,6 +40,7 @@ _NUMBERS = (float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, 0.
 _MEMBERS = ("../../evil", "/evil", "a/" * 200 + "b", "é\x01")
 _DEPTHS = (3, 40, 300, 3000)
 _RECORD = struct.Struct("<BQ")
+_CHUNK_HEAD = 9 + 40  # of a chunk that is not compressed
 _CRC_PLACE = 9 + 24  # in a chunk record: opcode, length, two times, size
 
 
@@ -259,13 +259,13 @@ def _change_text(rng, record):
 
 def _change_rows(rng, record):
     """Change numbers in the rows of a chunk; the checksum follows, or is switched off."""
-    if record[0] != Opcode.CHUNK or len(record) < CHUNK_HEAD_BYTES + 16:
+    if record[0] != Opcode.CHUNK or len(record) < _CHUNK_HEAD + 16:
         return
     for _ in range(rng.choice((1, 3, 20))):
-        place = rng.randrange(CHUNK_HEAD_BYTES, len(record) - 8)
+        place = rng.randrange(_CHUNK_HEAD, len(record) - 8)
         value = struct.pack("<d", rng.choice(_NUMBERS)) if rng.random() < 0.8 else rng.randbytes(8)
         record[place : place + 8] = value
-    crc = zlib.crc32(record[CHUNK_HEAD_BYTES:]) if rng.random() < 0.8 else 0
+    crc = zlib.crc32(record[_CHUNK_HEAD:]) if rng.random() < 0.8 else 0
     record[_CRC_PLACE : _CRC_PLACE + 4] = crc.to_bytes(4, "little")
 
 

@@ -12,7 +12,12 @@ from pc_client.recording.layout import Phase
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recorder import Recorder
 
-SIGNALS = (("timestamp", 1), ("actual_q", 6), ("actual_TCP_pose", 6), ("robot_mode", 1))
+SIGNALS = (
+    ("timestamp", 1, "s"),
+    ("actual_q", 6, "rad"),
+    ("actual_TCP_pose", 6, "m, rad"),
+    ("robot_mode", 1, "enum"),
+)
 N_VALUES = 14
 PERIOD = 0.008
 

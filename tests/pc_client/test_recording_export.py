@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import sys
+import json
 from pathlib import Path
 
 import numpy as np
+import polars
 import pytest
 from recording_samples import SIGNALS, append_rows, provenance
 
@@ -22,30 +23,30 @@ def recording(tmp_path: Path) -> Recording:
     return load_recording(tmp_path / "a.mcap")
 
 
-def test_csv_keeps_every_bit(recording: Recording, tmp_path: Path) -> None:
+def test_csv_keeps_every_bit_and_says_the_units(recording: Recording, tmp_path: Path) -> None:
     path = export(recording, tmp_path / "a.csv", "csv")
     header = path.read_text().splitlines()[0].split(",")
-    assert header[:3] == ["timestamp", "actual_q_0", "actual_q_1"]
-    assert "actual_TCP_pose_5" in header
+    assert header[:3] == ["timestamp [s]", "actual_q_0 [rad]", "actual_q_1 [rad]"]
+    assert "actual_TCP_pose_2 [m]" in header
+    assert "actual_TCP_pose_3 [rad]" in header
+    assert "robot_mode" in header
+    assert "ref_tcp_velocity_0 [m/s]" in header
     assert header[-1] == "phase"
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     np.testing.assert_array_equal(table[:, 0], recording.t)
-    np.testing.assert_array_equal(table[:, header.index("cmd_qd_3")], recording.column("cmd_qd")[:, 3])
+    np.testing.assert_array_equal(
+        table[:, header.index("cmd_qd_3 [rad/s]")], recording.column("cmd_qd")[:, 3]
+    )
 
 
-def test_parquet(recording: Recording, tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
-    table = parquet.read_table(export(recording, tmp_path / "a.parquet", "parquet"))
-    np.testing.assert_array_equal(table["actual_q_5"].to_numpy(), recording.column("actual_q")[:, 5])
-    assert table.schema.metadata[b"movement"] == b"lognorm_4_1"
-
-
-def test_parquet_without_pyarrow_says_what_to_install(
-    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(RecordingError, match=r"pip install 'ur-hil\[export\]'"):
-        export(recording, tmp_path / "a.parquet", "parquet")
+def test_parquet_has_names_units_and_provenance(recording: Recording, tmp_path: Path) -> None:
+    path = export(recording, tmp_path / "a.parquet", "parquet")
+    np.testing.assert_array_equal(
+        polars.read_parquet(path)["actual_q_5"].to_numpy(), recording.column("actual_q")[:, 5]
+    )
+    facts = polars.read_parquet_metadata(path)
+    assert facts["movement"] == "lognorm_4_1"
+    assert json.loads(facts["units"])["actual_TCP_pose_3"] == "rad"
 
 
 def test_unknown_format_and_unwritable_path(recording: Recording, tmp_path: Path) -> None:

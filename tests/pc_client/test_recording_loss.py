@@ -14,13 +14,12 @@ from recording_samples import SIGNALS, append_rows, provenance
 
 from pc_client.errors import RecordingError
 from pc_client.recording import recorder as recorder_module
-from pc_client.recording.layout import row_layout
+from pc_client.recording.layout import row_topics
 from pc_client.recording.loader import Recording, load_recording
-from pc_client.recording.mcap_file import encode_head
 from pc_client.recording.recorder import ROWS_PER_CHUNK, Recorder
 
 N_ROWS = 3 * ROWS_PER_CHUNK + 10
-HEAD_BYTES = len(encode_head(row_layout(SIGNALS), provenance().to_metadata())[0])
+ROW_BYTES = sum(topic.dtype.itemsize + 9 + 22 for topic in row_topics(SIGNALS))  # with the heads of messages
 
 
 class FullDisk:
@@ -44,6 +43,15 @@ class FullDisk:
 
     def close(self) -> None:
         self.file.close()
+
+
+@pytest.fixture
+def head(tmp_path: Path) -> int:
+    """Bytes of the head, which is written before the first row."""
+    recorder = Recorder(tmp_path / "head.mcap", provenance(), SIGNALS)
+    size = (tmp_path / "head.mcap").stat().st_size
+    recorder.close()
+    return size
 
 
 @pytest.fixture
@@ -84,9 +92,9 @@ def test_cut_at_every_chunk_boundary(tmp_path: Path) -> None:
         assert recording.provenance == provenance()
 
 
-def test_cut_at_random_bytes_keeps_every_whole_row(tmp_path: Path, whole: bytes) -> None:
-    row = row_layout(SIGNALS).dtype.itemsize
-    cuts = random.Random(3).sample(range(HEAD_BYTES, len(whole)), 150)
+def test_cut_at_random_bytes_keeps_every_whole_row(tmp_path: Path, head: int, whole: bytes) -> None:
+    row = ROW_BYTES
+    cuts = random.Random(3).sample(range(head, len(whole)), 150)
     previous = 0
     for cut in sorted(cuts):
         recording = load_bytes(tmp_path, whole[:cut])
@@ -94,22 +102,22 @@ def test_cut_at_random_bytes_keeps_every_whole_row(tmp_path: Path, whole: bytes)
         assert is_prefix(recording)
         assert recording.n_rows >= previous
         # Chunk heads and indexes take less than two rows' bytes a chunk more than this.
-        share = (cut - HEAD_BYTES) / row * ROWS_PER_CHUNK / (ROWS_PER_CHUNK + 12)
+        share = (cut - head) / row * ROWS_PER_CHUNK / (ROWS_PER_CHUNK + 12)
         assert recording.n_rows >= min(N_ROWS, int(share) - 4)
         previous = recording.n_rows
     assert load_bytes(tmp_path, whole).complete
 
 
-def test_cut_inside_the_head_is_refused_in_one_line(tmp_path: Path, whole: bytes) -> None:
-    for cut in range(0, HEAD_BYTES, 7):
+def test_cut_inside_the_head_is_refused_in_one_line(tmp_path: Path, head: int, whole: bytes) -> None:
+    for cut in range(0, head, 7):
         with pytest.raises(RecordingError) as caught:
             load_bytes(tmp_path, whole[:cut])
         assert "\n" not in str(caught.value)
 
 
-def test_a_flipped_bit_ends_the_reading_there(tmp_path: Path, whole: bytes) -> None:
+def test_a_flipped_bit_ends_the_reading_there(tmp_path: Path, head: int, whole: bytes) -> None:
     middle = bytearray(whole)
-    middle[HEAD_BYTES + int(1.5 * (len(whole) - HEAD_BYTES) / (N_ROWS / ROWS_PER_CHUNK))] ^= 0x10
+    middle[head + int(1.5 * (len(whole) - head) / (N_ROWS / ROWS_PER_CHUNK))] ^= 0x10
     recording = load_bytes(tmp_path, bytes(middle))
     assert not recording.complete
     assert recording.n_rows == ROWS_PER_CHUNK
@@ -157,9 +165,11 @@ def test_missing_file_and_missing_folder(tmp_path: Path) -> None:
         Recorder(tmp_path / "none" / "a.mcap", provenance(), SIGNALS)
 
 
-def test_a_full_disk_never_raises_inside_the_loop_and_loses_nothing_written(tmp_path: Path) -> None:
-    chunk_bytes = ROWS_PER_CHUNK * row_layout(SIGNALS).dtype.itemsize
-    room = HEAD_BYTES + int(2.4 * chunk_bytes)
+def test_a_full_disk_never_raises_inside_the_loop_and_loses_nothing_written(
+    tmp_path: Path, head: int
+) -> None:
+    chunk_bytes = ROWS_PER_CHUNK * ROW_BYTES
+    room = head + int(2.4 * chunk_bytes)
     path = tmp_path / "a.mcap"
     recorder = Recorder(path, provenance(), SIGNALS, opener=lambda p: FullDisk(p, room))
     append_rows(recorder, N_ROWS)
@@ -177,8 +187,8 @@ def test_a_full_disk_never_raises_inside_the_loop_and_loses_nothing_written(tmp_
     recorder.close()  # idempotent: reported once
 
 
-def test_every_size_of_disk(tmp_path: Path, whole: bytes) -> None:
-    for room in range(HEAD_BYTES, len(whole) + 5000, 4999):
+def test_every_size_of_disk(tmp_path: Path, head: int, whole: bytes) -> None:
+    for room in range(head, len(whole) + 5000, 4999):
         path = tmp_path / "a.mcap"
         recorder = Recorder(path, provenance(), SIGNALS, opener=lambda p, room=room: FullDisk(p, room))
         append_rows(recorder, N_ROWS)
@@ -193,8 +203,10 @@ def test_every_size_of_disk(tmp_path: Path, whole: bytes) -> None:
         assert whole.startswith(path.read_bytes())
 
 
-def test_rows_held_in_memory_are_written_when_there_is_room_again(tmp_path: Path, whole: bytes) -> None:
-    disk = FullDisk(tmp_path / "a.mcap", HEAD_BYTES + 20_000)
+def test_rows_held_in_memory_are_written_when_there_is_room_again(
+    tmp_path: Path, head: int, whole: bytes
+) -> None:
+    disk = FullDisk(tmp_path / "a.mcap", head + 20_000)
     recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk)
     append_rows(recorder, N_ROWS)
     assert recorder.error is not None
@@ -204,9 +216,9 @@ def test_rows_held_in_memory_are_written_when_there_is_room_again(tmp_path: Path
     assert (tmp_path / "a.mcap").read_bytes() == whole
 
 
-def test_memory_for_held_rows_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recorder_module, "MAX_HELD_CHUNKS", 2)
-    disk = FullDisk(tmp_path / "a.mcap", HEAD_BYTES)
+def test_memory_for_held_rows_is_bounded(tmp_path: Path, head: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recorder_module, "MAX_HELD_ROWS", 2 * ROWS_PER_CHUNK)
+    disk = FullDisk(tmp_path / "a.mcap", head)
     recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk)
     append_rows(recorder, 5 * ROWS_PER_CHUNK)
     disk.room = 10**9
@@ -226,9 +238,9 @@ def test_dev_full() -> None:
         Recorder("/dev/full", provenance(), SIGNALS)
 
 
-def test_the_error_that_ended_a_run_is_not_hidden_by_the_disk(tmp_path: Path) -> None:
+def test_the_error_that_ended_a_run_is_not_hidden_by_the_disk(tmp_path: Path, head: int) -> None:
     def run() -> None:
-        disk = FullDisk(tmp_path / "a.mcap", HEAD_BYTES)
+        disk = FullDisk(tmp_path / "a.mcap", head)
         with Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk) as recorder:
             append_rows(recorder, 1)
             raise KeyError("the robot stopped")

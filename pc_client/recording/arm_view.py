@@ -1,0 +1,177 @@
+"""The topics that make a recording a moving arm in Foxglove, Rerun and ROS, beside the measured signals.
+
+They are for eyes: 25 times a second, whatever the control cycle, so that a file grows little by them. Every
+cycle is in `/robot_state`. The transforms move the arm also in viewers that read no URDF.
+
+    /robot_description   the URDF                             once
+    /tf_static           base_link -> base, wrist_3_link -> tool0   once
+    /tf                  the six links; in `base`: `actual_tcp` as reported, `desired_tcp` as the reference
+    /joint_states        actual_q, actual_qd under the names of the URDF
+    /tcp_pose            reported TCP pose in `base`
+    /desired_tcp_pose    the reference's position, with the orientation of ref_q, in `base`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import cos, hypot, isfinite, sin
+from struct import Struct
+
+import numpy as np
+from mcap.writer import Writer
+from numpy.typing import NDArray
+
+from pc_client.kinematics.arm_tree import ArmTree, Joint, Quaternion
+from pc_client.recording.ros_messages import (
+    CDR_LITTLE_ENDIAN,
+    JOINT_STATE,
+    POSE,
+    TEXT,
+    TRANSFORMS,
+    Value,
+    cdr_layout,
+    definition,
+    text,
+)
+
+PERIOD = 0.04
+"""Time between two views of the arm [s]."""
+
+# `ros2 bag play` publishes such a topic so that a node that starts later gets its last message, too.
+_LATCHED = """\
+- history: 1
+  depth: 1
+  reliability: 1
+  durability: 1
+  deadline: {sec: 2147483647, nsec: 4294967295}
+  lifespan: {sec: 2147483647, nsec: 4294967295}
+  liveliness: 1
+  liveliness_lease_duration: {sec: 2147483647, nsec: 4294967295}
+  avoid_ros_namespace_conventions: false
+"""
+
+
+_BASE, _ACTUAL_TCP, _DESIRED_TCP = text("base"), text("actual_tcp"), text("desired_tcp")
+
+
+class _Publisher:
+    """Writes the messages of one topic; the texts in them and their counts stay the same.
+
+    Args:
+        writer: of the file.
+        topic: name.
+        message: type.
+        schema_id: of the type.
+        is_latched: the topic has one message only.
+    """
+
+    def __init__(
+        self, writer: Writer, topic: str, message: str, schema_id: int, *, is_latched: bool = False
+    ) -> None:
+        self._writer = writer
+        self._layout: Struct | None = None
+        self._n_written = 0
+        metadata = {"offered_qos_profiles": _LATCHED} if is_latched else {}
+        self._channel = writer.register_channel(topic, "cdr", schema_id, metadata)
+
+    def write(self, log_time: int, values: Sequence[Value]) -> None:
+        """Write a message."""
+        if self._layout is None:
+            self._layout = cdr_layout(values)
+        data = self._layout.pack(CDR_LITTLE_ENDIAN, *values)
+        self._writer.add_message(self._channel, log_time, data, log_time, self._n_written)
+        self._n_written += 1
+
+
+class ArmView:
+    """Writes the view of one recording.
+
+    Args:
+        arm: links and joints.
+        writer: of the file, begun.
+        columns: names of the numbers of a frame, in order.
+        cycle_time: control cycle [s].
+    """
+
+    def __init__(self, arm: ArmTree, writer: Writer, columns: Sequence[str], cycle_time: float) -> None:
+        self._arm = arm
+        self._writer = writer
+        self._every = max(1, round(PERIOD / cycle_time))
+        self._names = [part for joint in arm.moving for part in text(joint.name)]
+        self._ends = [_ends(joint) for joint in arm.moving]
+        self._q, self._qd, self._pose = (
+            slice(columns.index(name), columns.index(name) + 6)
+            for name in ("actual_q", "actual_qd", "actual_TCP_pose")
+        )
+        schemas = {
+            message: writer.register_schema(message, "ros2msg", definition(message).encode())
+            for message in (TEXT, TRANSFORMS, JOINT_STATE, POSE)
+        }
+
+        def publisher(topic: str, message: str, *, is_latched: bool = False) -> _Publisher:
+            return _Publisher(writer, topic, message, schemas[message], is_latched=is_latched)
+
+        self._description = publisher("/robot_description", TEXT, is_latched=True)
+        self._static = publisher("/tf_static", TRANSFORMS, is_latched=True)
+        self._transforms = publisher("/tf", TRANSFORMS)
+        self._joints = publisher("/joint_states", JOINT_STATE)
+        self._tcp = publisher("/tcp_pose", POSE)
+        self._desired_tcp = publisher("/desired_tcp_pose", POSE)
+
+    def show(
+        self,
+        row: int,
+        log_time: int,
+        frame: NDArray[np.float64],
+        ref_q: Iterable[float],
+        ref_p: Iterable[float],
+    ) -> None:
+        """Write what shows the arm in one row, if its turn has come.
+
+        Args:
+            row: counts from 0.
+            log_time: of the row [ns].
+            frame: (n,) all columns of the frame.
+            ref_q: (6,) desired joint angles [rad].
+            ref_p: (3,) desired TCP position in `base` [m].
+        """
+        if row == 0:
+            self._begin(log_time)
+        if row % self._every:
+            return
+        q, qd, pose = (frame[part].tolist() for part in (self._q, self._qd, self._pose))
+        if not all(map(isfinite, (*q, *pose))):
+            return
+        stamp = divmod(log_time, 10**9)
+        tcp = (*pose[:3], *_quaternion(*pose[3:]))
+        desired = (*ref_p, *self._arm.flange_rotation(ref_q))
+        values: list[Value] = [len(self._arm.moving) + 2]
+        for joint, ends, angle in zip(self._arm.moving, self._ends, q, strict=True):
+            values += [*stamp, *ends, *joint.origin, *joint.rotation_at(angle)]
+        values += [*stamp, *_BASE, *_ACTUAL_TCP, *tcp, *stamp, *_BASE, *_DESIRED_TCP, *desired]
+        self._transforms.write(log_time, values)
+        self._joints.write(log_time, [*stamp, *text(""), 6, *self._names, 6, *q, 6, *qd, 0])
+        self._tcp.write(log_time, [*stamp, *_BASE, *tcp])
+        self._desired_tcp.write(log_time, [*stamp, *_BASE, *desired])
+
+    def _begin(self, log_time: int) -> None:
+        """Write what is written once."""
+        urdf = self._arm.urdf
+        self._writer.add_attachment(
+            log_time, log_time, f"{self._arm.name}.urdf", "application/xml", urdf.encode()
+        )
+        self._description.write(log_time, text(urdf))
+        values: list[Value] = [len(self._arm.fixed)]
+        for joint in self._arm.fixed:
+            values += [*divmod(log_time, 10**9), *_ends(joint), *joint.origin, *joint.rotation]
+        self._static.write(log_time, values)
+
+
+def _ends(joint: Joint) -> tuple[Value, ...]:
+    return (*text(joint.parent), *text(joint.child))
+
+
+def _quaternion(x: float, y: float, z: float) -> Quaternion:
+    angle = hypot(x, y, z)
+    scale = sin(angle / 2.0) / angle if angle else 0.5
+    return (x * scale, y * scale, z * scale, cos(angle / 2.0))
