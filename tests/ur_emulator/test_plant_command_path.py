@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -28,44 +30,44 @@ def smooth(t):
     return np.array([np.sin(2 * t + phase), 2 * np.cos(2 * t + phase), 0.0 * phase])
 
 
-@pytest.mark.parametrize("dead_substeps", [0, 1, 4, 5, 11])
-def test_the_matrix_is_the_sub_step_definition(dead_substeps):
+@pytest.mark.parametrize("damping", [None, 0.5])
+@pytest.mark.parametrize("dead", [0, 1, 4, 5, 11, 6.3, [4.5, 9.25]])
+def test_the_matrix_is_the_sub_step_definition(dead, damping):
     lag = 0.01
-    path = CommandPath(N, DT, dead_substeps, lag, LEAD, TRIM_GAIN)
-    rng = np.random.default_rng(dead_substeps)
+    path = CommandPath(N, DT, dead, lag, damping, LEAD, TRIM_GAIN)
+    rng = np.random.default_rng(5)
     start = rng.standard_normal((3, 6))
     start[1] = 0.0
+    turns = itertools.cycle(dead if isinstance(dead, list) else [dead])
     trim = rng.standard_normal(6)
     path.reset(start[0], start[2], start[0] + trim)
     knots = [start] * 6
-    filtered = start
-    for _ in range(8):
+    filtered = start if damping is None else np.vstack([start, np.zeros((3, 6))])
+    for dead_substeps in itertools.islice(turns, 8):
         newest = rng.standard_normal((3, 6))
         knots = [newest, *knots[:5]]
         error = rng.standard_normal(6)
         advance(path, newest, error)
         assert path.trim == pytest.approx(trim, abs=1e-12)
+        following = []
         for joint in range(6):
-            rows = trace_cycle(filtered[:, joint], np.array(knots)[:, :, joint], N, DT, dead_substeps, lag)
+            old = np.array(knots)[:, :, joint]
+            rows = trace_cycle(filtered[:, joint], old, N, DT, dead_substeps, lag, damping)
             control = rows[:-1, 0] + LEAD * rows[:-1, 1] + rows[:-1, 2] + trim[joint]
             assert path.control[:, joint] == pytest.approx(control, abs=1e-12)
             assert path.speeds[1:, joint] == pytest.approx([newest[1, joint], rows[-2, 1]], abs=1e-12)
             assert path.q_final[joint] == pytest.approx(rows[-1, 0], abs=1e-12)
+            following.append(rows[-1])
         trim = trim + TRIM_GAIN * error
-        filtered = np.array(
-            [
-                [
-                    trace_cycle(filtered[:, j], np.array(knots)[:, :, j], N, DT, dead_substeps, lag)[-1, s]
-                    for j in range(6)
-                ]
-                for s in range(3)
-            ]
-        )
+        filtered = np.array(following).T
 
 
-@pytest.mark.parametrize(("dead_substeps", "lag"), [(0, 0.0), (3, 0.0), (0, 0.01), (5, 0.014)])
-def test_a_ramp_comes_late_by_dead_time_plus_lag(dead_substeps, lag):
-    path = CommandPath(N, DT, dead_substeps, lag)
+@pytest.mark.parametrize(
+    ("dead_substeps", "lag", "damping"),
+    [(0, 0.0, None), (3, 0.0, None), (0, 0.01, None), (5, 0.014, None), (5, 0.014, 0.5), (2.5, 0.01, 1.2)],
+)
+def test_a_ramp_comes_late_by_dead_time_plus_lag(dead_substeps, lag, damping):
+    path = CommandPath(N, DT, dead_substeps, lag, damping)
     speed = 0.7
     path.reset(np.zeros(6), np.zeros(6), np.zeros(6))
     for k in range(1, 60):

@@ -87,8 +87,9 @@ def test_ripple_has_the_periods_of_the_gear():
     lines = np.abs(np.fft.rfft(np.interp(grid, q, errors))) / 1024
     assert sorted(np.argsort(lines[5:400])[-2:] + 5) == [101, 202]
     # Amplitude of the angle error from the rms share of speed; the outer loop takes a little off.
-    assert lines[101] == pytest.approx(np.sqrt(2) * TYPICAL.ripple_first / 101, rel=0.2)
-    assert lines[202] == pytest.approx(np.sqrt(2) * TYPICAL.ripple_second / 202, rel=0.2)
+    for ripple in TYPICAL.ripples:
+        size = np.sqrt(2) * ripple.rms / ripple.cycles
+        assert lines[round(ripple.cycles)] == pytest.approx(size, rel=0.2)
 
 
 def test_reported_speed_is_the_derivative_of_reported_position():

@@ -125,7 +125,7 @@ def test_a_typical_controller_is_wrong_about_friction_as_much_as_stated():
 
 
 def test_gear_slope_is_the_derivative_of_its_error():
-    gear = GearRipple(UR3, TYPICAL, 9)
+    gear = GearRipple(TYPICAL, 9)
     h = 1e-7
     gear.evaluate(Q)
     slope = gear.slope.copy()
@@ -136,7 +136,7 @@ def test_gear_slope_is_the_derivative_of_its_error():
 
 
 def test_gear_inverts_exactly():
-    gear = GearRipple(UR3, TYPICAL, 9)
+    gear = GearRipple(TYPICAL, 9)
     motor = gear.motor_position(Q)
     gear.evaluate(motor)
     assert motor + gear.error == pytest.approx(Q, abs=1e-15)
@@ -147,13 +147,13 @@ def test_gear_phases_come_from_the_seed_and_sizes_do_not():
     q = np.linspace(0, 2 * np.pi, 5000)
     tables = []
     for seed in (1, 2):
-        gear = GearRipple(UR3, TYPICAL, seed)
+        gear = GearRipple(TYPICAL, seed)
         rows = []
         for angle in q:
             gear.evaluate(np.full(6, angle))
             rows.append(gear.slope.copy())
         tables.append(np.array(rows))
-    expected = np.hypot(TYPICAL.ripple_first, TYPICAL.ripple_second)
+    expected = np.hypot(*(ripple.rms for ripple in TYPICAL.ripples))
     for table in tables:
         assert table.std(axis=0) == pytest.approx([expected] * 6, rel=0.01)
     assert np.abs(tables[0] - tables[1]).max() > expected

@@ -7,7 +7,8 @@ users report. Every imperfection is here; every number of the arm itself is in `
 
 Sources, cited by letter below:
  A  Logs of a real UR3e at rest and moving, 500 Hz (kevinhpham/DalESelfEBot): encoder noise, steps, the filter
-    of the reported speed, speed ripple at 101 and 202 cycles a joint turn, current noise.
+    of the reported speed, speed ripple at 101 and 202 cycles a joint turn, current noise. UR's strain wave
+    gears have the ratio 101 in all sizes, so that is once and twice a motor turn.
  B  Delays reported for streamed motion: Universal_Robots_ROS_Driver pull 1 (aim of two cycles for speedj),
     Universal_Robots_ROS2_Driver issue 1311 (UR5 CB3 about 35 ms), ur_modern_driver (a gain of 50 1/s is
     stable on a UR3, so the whole loop stays below 31 ms there).
@@ -19,6 +20,25 @@ Sources, cited by letter below:
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+
+ALL_JOINTS = (0, 1, 2, 3, 4, 5)
+
+
+@dataclass(frozen=True, slots=True)
+class Ripple:
+    """One wave of the gears' transmission error.
+
+    Attributes:
+        cycles: of the wave in one turn of the joint [1].
+        rms: speed ripple, as a share of the joint's speed [1].
+        phase: of the wave at joint angle 0 [rad]; None: of each joint by the seed.
+        joints: which joints have it, 0 is the base.
+    """
+
+    cycles: float
+    rms: float
+    phase: float | None = None
+    joints: tuple[int, ...] = ALL_JOINTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +52,10 @@ class Fidelity:
         name: as on the command line.
         dead_time: from the start of a cycle until the drives act on its target [s].
         dead_time_spread: a part uniform in [0, spread) is added, drawn once a box [s].
-        drive_lag: time constant of the drive's set-point filter [s].
+        dead_time_wander: the dead time becomes longer by up to this and shorter again, along a cosine [s].
+        dead_time_period: of that cosine [s]; where it begins is drawn by the seed.
+        drive_lag: of the drive's set-point filter: by how much a ramp trails [s].
+        drive_damping: damping ratio of the filter, which is of second order then; None: of first order.
         feedback_age: age of the measurements when they are reported [s]; at least one physics step.
         sample_jitter: sd of the moment at which all joints are sampled [s].
         encoder_sigma: sd of the white noise of each reported angle, (6,) [rad].
@@ -41,8 +64,10 @@ class Fidelity:
         speed_dead_band: below this joint speed the filter's input is gated to zero [rad/s].
         speed_sigma: sd of the white noise of the reported speed while moving [rad/s].
         current_sigma: sd of the reported current, (6,) [A].
-        ripple_first: rms speed ripple of the gear at one cycle per motor turn, as a share of joint speed [1].
-        ripple_second: the same at two cycles per motor turn.
+        ripples: waves of the gears.
+        backlash: play of each gear [rad]; within it the joint stands still while the motor turns.
+        friction_presliding: angle over which the friction of a joint follows a reversal [rad]: it depends on
+            the path then, with hysteresis (`presliding.py`). 0: it depends on the speed alone.
         friction_error: sd of the relative error of the controller's friction model, per joint [1].
         mass_error: sd of the relative error of each link's mass in the controller's model [1].
         calibration_length: sd of each length of the factory calibration [m].
@@ -58,7 +83,10 @@ class Fidelity:
     name: str
     dead_time: float
     dead_time_spread: float
+    dead_time_wander: float
+    dead_time_period: float
     drive_lag: float
+    drive_damping: float | None
     feedback_age: float
     sample_jitter: float
     encoder_sigma: tuple[float, ...]
@@ -67,8 +95,9 @@ class Fidelity:
     speed_dead_band: float
     speed_sigma: float
     current_sigma: tuple[float, ...]
-    ripple_first: float
-    ripple_second: float
+    ripples: tuple[Ripple, ...]
+    backlash: float
+    friction_presliding: float
     friction_error: float
     mass_error: float
     calibration_length: float
@@ -85,7 +114,10 @@ TYPICAL = Fidelity(
     name="typical",
     dead_time=0.008,  # B
     dead_time_spread=0.008,  # B
+    dead_time_wander=0.0,
+    dead_time_period=5.0,
     drive_lag=0.010,  # B: drives follow within 5-15 ms
+    drive_damping=None,
     feedback_age=0.008,  # B: the packet carries the state of one cycle before
     sample_jitter=1e-5,  # A: more would show in the differences of reported angles
     encoder_sigma=(1.1e-5, 1.1e-5, 1.45e-5, 1.45e-5, 1.75e-5, 1.75e-5),  # A
@@ -94,8 +126,9 @@ TYPICAL = Fidelity(
     speed_dead_band=1e-3,  # E
     speed_sigma=1e-3,  # A: what is left of 2-6 mrad/s after the ripple
     current_sigma=(0.015, 0.015, 0.012, 0.010, 0.010, 0.010),  # A: 7-20 mA
-    ripple_first=0.008,  # A: .5-1.5 % rms, both harmonics together
-    ripple_second=0.006,  # A
+    ripples=(Ripple(101.0, 0.008), Ripple(202.0, 0.006)),  # A: .5-1.5 % rms, both together
+    backlash=0.0,  # of strain wave gears; E
+    friction_presliding=0.0,
     friction_error=0.15,  # E: friction changes with temperature by more than that
     mass_error=0.02,  # E
     calibration_length=0.00015,  # C: with the angles gives the observed pose errors
@@ -119,8 +152,7 @@ IDEAL = replace(
     encoder_step=1e-7,
     speed_sigma=1e-5,
     current_sigma=(0.001,) * 6,
-    ripple_first=0.0002,
-    ripple_second=0.0002,
+    ripples=(Ripple(101.0, 0.0002), Ripple(202.0, 0.0002)),
     friction_error=0.0,
     mass_error=0.0,
     calibration_length=0.0,  # like the vendor's simulator: the nominal table itself
@@ -132,7 +164,7 @@ IDEAL = replace(
     voltage_sigma=0.001,
 )
 
-EXACT = replace(IDEAL, name="exact", has_physics=False, ripple_first=0.0, ripple_second=0.0)
+EXACT = replace(IDEAL, name="exact", has_physics=False, ripples=())
 
 POOR = replace(
     TYPICAL,
@@ -141,8 +173,7 @@ POOR = replace(
     drive_lag=0.014,
     feedback_age=0.010,
     sample_jitter=5e-5,
-    ripple_first=0.016,
-    ripple_second=0.012,
+    ripples=(Ripple(101.0, 0.016), Ripple(202.0, 0.012)),
     friction_error=0.30,
     mass_error=0.04,
     force_bias=10.0,

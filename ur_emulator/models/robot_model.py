@@ -94,7 +94,6 @@ class RobotModel:
         coulomb_standstill: share of the Coulomb friction that is left at standstill [1].
         coulomb_speed: speed over which friction rises from that share to the full value [rad/s].
         torque_constant: joint torque per motor current, gear included [Nm/A].
-        gear_ratio: motor turns per joint turn.
         stop_deceleration: of the leading axis when the safety system or the end of a program stops the arm
             [rad/s²].
         servo_frequency: natural frequency of the joint position loop [Hz].
@@ -123,7 +122,6 @@ class RobotModel:
     coulomb_standstill: float
     coulomb_speed: float
     torque_constant: Vector6
-    gear_ratio: float
     stop_deceleration: float
     servo_frequency: float
     servo_damping: float

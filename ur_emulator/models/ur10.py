@@ -83,7 +83,6 @@ UR10 = RobotModel(
     coulomb_standstill=0.33,  # as for the UR5
     coulomb_speed=0.08,
     torque_constant=(12.8, 12.8, 12.8, 12.0, 12.0, 12.0),  # F
-    gear_ratio=101.0,  # strain wave gears 1:101 in all sizes, as in the UR3
     stop_deceleration=6.0,  # assumed: the UR5's scaled by reach and load; its manual's table was not at hand
     servo_frequency=12.0,  # assumed, as for the UR3
     servo_damping=0.9,

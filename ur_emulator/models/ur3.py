@@ -89,7 +89,6 @@ UR3 = RobotModel(
         3.0,
         3.0,
     ),  # D; elbow: moving fit 6.4, static 9-11
-    gear_ratio=101.0,  # strain wave gears 1:101 in all sizes; seen as 101 and 202 cycles a joint turn in D
     stop_deceleration=20.0,  # E: base, 183 deg/s in 159 ms; shoulder and elbow stop no slower
     servo_frequency=12.0,  # assumed: a position loop of 10-30 Hz fits the delays that drivers report
     servo_damping=0.9,

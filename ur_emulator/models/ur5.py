@@ -84,7 +84,6 @@ UR5 = RobotModel(
     coulomb_standstill=0.33,  # D: a sixth to a third of the full value at rest
     coulomb_speed=0.08,  # D: full value reached within .05-.15 rad/s
     torque_constant=(12.8, 12.8, 12.8, 9.95, 9.95, 9.95),  # F
-    gear_ratio=101.0,  # strain wave gears 1:101 in all sizes, as in the UR3
     stop_deceleration=13.0,  # E: base, 183 deg/s in 244 ms
     servo_frequency=12.0,  # assumed, as for the UR3
     servo_damping=0.9,

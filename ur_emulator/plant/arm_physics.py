@@ -18,6 +18,7 @@ from ur_emulator.plant.drives import Drives
 from ur_emulator.plant.loads import Loads
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.physics import JointServos, ServoGains, build_physics
+from ur_emulator.plant.presliding import Presliding
 
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 
@@ -31,6 +32,8 @@ class ArmPhysics:
         mass_scale: six factors on the link masses.
         gains: of the joint servos.
         substep: physics time step [s].
+        presliding: angle over which friction follows a reversal [rad]; 0: friction is MuJoCo's, without a
+            memory of the path.
 
     Attributes:
         model: of MuJoCo.
@@ -52,6 +55,7 @@ class ArmPhysics:
         mass_scale: Sequence[float],
         gains: ServoGains,
         substep: float,
+        presliding: float,
     ) -> None:
         self.model = model = build_physics(robot, dh, mass_scale, gains, substep)
         self.data = data = mujoco.MjData(model)
@@ -63,6 +67,10 @@ class ArmPhysics:
         self._ctrl: NDArray[np.float64] = data.ctrl
         self._raw: NDArray[np.float64] = data.sensordata
         self._frictionloss: NDArray[np.float64] = model.dof_frictionloss
+        self._presliding: Presliding | None = None
+        if presliding:
+            self._presliding = Presliding(presliding, self.q, data.qfrc_applied)
+            self._frictionloss[:] = 0.0
         site: int = model.site(FLANGE).id
         self.flange_position: NDArray[np.float64] = data.site_xpos[site]
         self.flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
@@ -89,6 +97,8 @@ class ArmPhysics:
         """Put the motors at q (6,) [rad], at rest."""
         mujoco.mj_resetData(self.model, self.data)
         self.q[:] = q
+        if self._presliding is not None:
+            self._presliding.reset()
 
     def stop(self) -> None:
         """Stand still at once, wherever the arm is."""
@@ -112,12 +122,16 @@ class ArmPhysics:
             captured: takes them, see `sensors.REC_SIMULATED`.
         """
         model, data, ctrl, step = self.model, self.data, self._ctrl, mujoco.mj_step
-        self._frictionloss[:] = drives.coulomb
+        friction = self._presliding
+        if friction is None:
+            self._frictionloss[:] = drives.coulomb
         self.servos.bias[:] = drives.bias
         if self.loads.is_unexpected:
             self.loads.apply()
         for row in drives.control:
             ctrl[:] = row
+            if friction is not None:
+                friction.apply(drives.coulomb)
             step(model, data)
             if not capture_at:
                 captured[:] = self._raw
@@ -126,7 +140,11 @@ class ArmPhysics:
     def store_state(self) -> None:
         """Store the present state for `restore_state`."""
         mujoco.mj_copyData(self._before, self.model, self.data)
+        if self._presliding is not None:
+            self._presliding.store()
 
     def restore_state(self) -> None:
         """Return to the stored state."""
         mujoco.mj_copyData(self.data, self.model, self._before)
+        if self._presliding is not None:
+            self._presliding.restore()

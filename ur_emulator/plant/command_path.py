@@ -10,6 +10,7 @@ definition below, does a whole cycle of all joints in one product:
 | rows of the inputs         | what they are                                                         |
 |----------------------------|-----------------------------------------------------------------------|
 | q, qd, deflection          | the filter, at the end of the last cycle                              |
+| their changes              | those of a filter of second order; else these rows are missing [1/s]  |
 | trim                       | shift of the servos in the last cycle                                 |
 | error                      | of the joints at the end of the last cycle, trimmed from now on       |
 | q, qd, deflection, n times | targets, the newest first                                             |
@@ -18,7 +19,9 @@ definition below, does a whole cycle of all joints in one product:
 |----------------------------|-----------------------------------------------------------------------|
 | set-point speed            | at the start of the last sub-step                                     |
 | control, n times           | q + lead qd + deflection + trim at the start of each sub-step         |
-| q, qd, deflection, trim, 0 | the first rows of the inputs of the next cycle                        |
+| q, qd, ... trim, 0         | the first rows of the inputs of the next cycle                        |
+
+Where the dead time wanders there is one matrix for each of its values, and each cycle has its own.
 
 A torque passes the path as the deflection of the servo that gives it: torque / kp. This module does not
 know the arm.
@@ -26,6 +29,9 @@ know the arm.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import cycle
+from math import ceil
 from struct import Struct
 
 import numpy as np
@@ -34,8 +40,7 @@ from numpy.typing import NDArray
 from ur_emulator.plant.plant_state import Target
 
 N_SIGNALS = 3  # position, speed, deflection
-_TRIM, _ERROR = N_SIGNALS, N_SIGNALS + 1
-_N_KEPT = N_SIGNALS + 2  # rows that go from a cycle to the next
+_TRIM, _ERROR = -2, -1  # of the rows that go from a cycle to the next
 
 
 class CommandPath:
@@ -47,8 +52,9 @@ class CommandPath:
     Args:
         n_substeps: sub-steps in a control cycle.
         substep: length of a sub-step [s].
-        dead_substeps: dead time in sub-steps.
-        lag: time constant of the set-point filter [s].
+        dead_substeps: dead time in sub-steps; several values take turns, one a cycle.
+        lag: of the set-point filter: by how much a ramp trails [s].
+        damping: damping ratio of a filter of second order; None: of first order.
         lead: gain in speed over gain in position of the servos, the same for all joints [s].
         trim_gain: part of the error that is trimmed away in a cycle.
 
@@ -66,21 +72,34 @@ class CommandPath:
         self,
         n_substeps: int,
         substep: float,
-        dead_substeps: int,
+        dead_substeps: float | Sequence[float],
         lag: float,
+        damping: float | None = None,
         lead: float = 0.0,
         trim_gain: float = 0.0,
     ) -> None:
         self._period = n_substeps * substep
-        self._delay = dead_substeps * substep + lag
-        responses = path_responses(n_substeps, substep, dead_substeps, lag)
-        self._matrix = _cycle_matrix(responses, lead, trim_gain)
-        self.newest_acts_later = not self._matrix[:, _N_KEPT : _N_KEPT + N_SIGNALS].any()
+        dead_times = [dead_substeps] if isinstance(dead_substeps, float | int) else dead_substeps
+        self._delay = max(dead_times) * substep + lag
+        n_filter = N_SIGNALS if damping is None else 2 * N_SIGNALS
+        n_kept = n_filter + 2
+        n_knots = 2 + ceil(max(dead_times) / n_substeps)
+        matrices = {
+            dead: _cycle_matrix(
+                path_responses(n_substeps, substep, dead, lag, damping, n_knots), lead, trim_gain
+            )
+            for dead in set(dead_times)
+        }
+        self._matrix = matrices[dead_times[0]]
+        self._turns = cycle([matrices[dead] for dead in dead_times]) if len(matrices) > 1 else None
+        self.newest_acts_later = not any(
+            matrix[:, n_kept : n_kept + N_SIGNALS].any() for matrix in matrices.values()
+        )
         n_outputs, n_inputs = self._matrix.shape
         self._inputs = np.zeros((n_inputs, 6))
-        self._kept = self._inputs[:_N_KEPT]
-        self._error: NDArray[np.float64] = self._inputs[_ERROR]
-        self._targets = self._inputs[_N_KEPT:]
+        self._kept = self._inputs[:n_kept]
+        self._error: NDArray[np.float64] = self._kept[_ERROR]
+        self._targets = self._inputs[n_kept:]
         self.newest: NDArray[np.float64] = self._targets[:N_SIGNALS]
         self._newest_speed = self.newest[1]
         self._newest_memory = self.newest.data.cast("B")
@@ -92,7 +111,8 @@ class CommandPath:
         self.speeds: NDArray[np.float64] = memory[:3]
         self._target_speed = self.speeds[1]
         self.control: NDArray[np.float64] = memory[3 : 3 + n_substeps]
-        self._final = memory[-_N_KEPT:]
+        self._final = memory[-n_kept:]
+        self._changes = self._final[N_SIGNALS:_TRIM]
         self.q_final: NDArray[np.float64] = self._final[0]
         self.trim: NDArray[np.float64] = self._final[_TRIM]
 
@@ -117,7 +137,10 @@ class CommandPath:
             [[q - k * self._period * speed, speed, deflection] for k in range(n_knots)]
         )
         set_point = q - self._delay * speed
-        self._final[:] = set_point, speed, deflection, q_motor - set_point, np.zeros(6)
+        self._final[:N_SIGNALS] = set_point, speed, deflection
+        self._changes[:] = 0.0
+        self._changes[:1] = speed
+        self._final[_TRIM:] = q_motor - set_point, np.zeros(6)
         self.keep()
 
     def take(self, target: Target) -> None:
@@ -138,6 +161,8 @@ class CommandPath:
         """
         self._kept[:] = self._final
         self._older[:] = self._younger
+        if self._turns is not None:
+            self._matrix = next(self._turns)
         if error is not None:
             self._error[:] = error
 
@@ -145,33 +170,37 @@ class CommandPath:
 _PACK = Struct("18d").pack_into
 
 
-def path_responses(n_substeps: int, substep: float, dead_substeps: int, lag: float) -> NDArray[np.float64]:
+def path_responses(
+    n_substeps: int, substep: float, dead_substeps: float, lag: float, damping: float | None, n_knots: int
+) -> NDArray[np.float64]:
     """Return the response of one joint's set-point to each input of its path; arguments as `trace_cycle`.
 
     Returns:
-        (3, n_substeps + 1, n): q, qd, deflection at the start of each sub-step and at the end of the cycle by
-        input: the filter's q, qd, deflection, then those of each target, newest first.
+        (m, n_substeps + 1, n): the filter's rows at the start of each sub-step and at the end of the cycle,
+        by input: the filter's rows, then q, qd, deflection of each of the targets, newest first.
     """
-    # A delayed cycle lies between targets that are up to this many cycles old.
-    n_knots = 2 + -(-dead_substeps // n_substeps)
-    n_inputs = N_SIGNALS * (1 + n_knots)
-    responses = np.empty((N_SIGNALS, n_substeps + 1, n_inputs))
+    n_filter = N_SIGNALS if damping is None else 2 * N_SIGNALS
+    n_inputs = n_filter + N_SIGNALS * n_knots
+    responses = np.empty((n_filter, n_substeps + 1, n_inputs))
     # Column by column: the response to a unit in one input while all others are zero.
     for column in range(n_inputs):
         unit = np.zeros(n_inputs)
         unit[column] = 1.0
-        filtered, knots = unit[:N_SIGNALS], unit[N_SIGNALS:].reshape(n_knots, N_SIGNALS)
-        responses[:, :, column] = trace_cycle(filtered, knots, n_substeps, substep, dead_substeps, lag).T
+        filtered, knots = unit[:n_filter], unit[n_filter:].reshape(n_knots, N_SIGNALS)
+        rows = trace_cycle(filtered, knots, n_substeps, substep, dead_substeps, lag, damping)
+        responses[:, :, column] = rows.T
     return responses
 
 
 def _cycle_matrix(responses: NDArray[np.float64], lead: float, trim_gain: float) -> NDArray[np.float64]:
     """Return the matrix of the tables above."""
-    q, qd, deflection = np.insert(responses, [_TRIM, _TRIM], 0.0, axis=2)
+    n_filter = len(responses)
+    rows = np.insert(responses, [n_filter, n_filter], 0.0, axis=2)
+    q, qd, deflection = rows[:N_SIGNALS]
     trim = np.zeros(q.shape[1])
-    trim[[_TRIM, _ERROR]] = 1.0, trim_gain
+    trim[[n_filter, n_filter + 1]] = 1.0, trim_gain
     control = q[:-1] + lead * qd[:-1] + deflection[:-1] + trim
-    return np.array([qd[-2], *control, q[-1], qd[-1], deflection[-1], trim, 0.0 * trim])
+    return np.array([qd[-2], *control, *rows[:, -1], trim, 0.0 * trim])
 
 
 def trace_cycle(
@@ -179,35 +208,55 @@ def trace_cycle(
     knots: NDArray[np.float64],
     n_substeps: int,
     substep: float,
-    dead_substeps: int,
+    dead_substeps: float,
     lag: float,
+    damping: float | None = None,
 ) -> NDArray[np.float64]:
     """Follow one cycle of the command path of one joint, sub-step by sub-step: the definition.
 
     Args:
-        filtered: filter state at the start of the cycle (3,): q, qd, deflection.
+        filtered: filter state at the start of the cycle: q, qd, deflection, then of a filter of second order
+            their changes [1/s].
         knots: targets (n, 3), newest first; the newest is for the end of this cycle.
         n_substeps: sub-steps in a cycle.
         substep: [s].
         dead_substeps: dead time in sub-steps.
-        lag: time constant of the filter [s].
+        lag: of the filter [s].
+        damping: of a filter of second order; None: of first order.
 
     Returns:
-        (n_substeps + 1, 3): the set-point at the start of each sub-step and at the end of the cycle.
+        (n_substeps + 1, m): the filter state at the start of each sub-step and at the end of the cycle.
     """
     period = n_substeps * substep
-    # Backward Euler: the output lags a ramp by exactly the time constant.
-    gain = substep / (lag + substep)
     rows = [filtered]
     for i in range(1, n_substeps + 1):
-        cycles_back, offset = divmod(i - dead_substeps - n_substeps, n_substeps)
+        back, offset = divmod(i - dead_substeps - n_substeps, n_substeps)
+        cycles_back = int(back)
         newer = -cycles_back - 1 if offset else -cycles_back
         share = offset / n_substeps
         arrived = knots[newer]
         if offset:
             arrived = _interpolate(knots[newer + 1], knots[newer], share, period)
-        rows.append(rows[-1] + gain * (arrived - rows[-1]))
+        rows.append(_filter(rows[-1], arrived, substep, lag, damping))
     return np.array(rows)
+
+
+def _filter(
+    state: NDArray[np.float64],
+    arrived: NDArray[np.float64],
+    substep: float,
+    lag: float,
+    damping: float | None,
+) -> NDArray[np.float64]:
+    """Advance the set-point filter by a sub-step; by backward Euler, so a ramp comes late by just the lag."""
+    if damping is None:
+        return state + substep / (lag + substep) * (arrived - state)
+    value, change = state[:N_SIGNALS], state[N_SIGNALS:]
+    # y'' + 2 damping omega y' + omega² (y - u) = 0 trails a ramp by 2 damping / omega.
+    omega = 2.0 * damping / lag
+    step = omega * substep
+    change = (change + omega * step * (arrived - value)) / (1.0 + 2.0 * damping * step + step**2)
+    return np.concatenate([value + substep * change, change])
 
 
 def _interpolate(

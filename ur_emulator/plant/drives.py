@@ -47,7 +47,7 @@ class Drives:
         fidelity: its imperfections.
         seed: of the box.
         gains: of the servos, as in the actuators.
-        dead_substeps: dead time of the command path in sub-steps.
+        dead_substeps: dead time of the command path in sub-steps, or its values cycle by cycle.
         substep: [s].
         period: control cycle [s].
 
@@ -70,7 +70,7 @@ class Drives:
         fidelity: Fidelity,
         seed: int,
         gains: ServoGains,
-        dead_substeps: int,
+        dead_substeps: float | Sequence[float],
         substep: float,
         period: float,
     ) -> None:
@@ -78,7 +78,13 @@ class Drives:
         self._guiding = Freedrive(robot)
         n_substeps = round(period / substep)
         self._path = path = CommandPath(
-            n_substeps, substep, dead_substeps, fidelity.drive_lag, gains.lead, period / _INTEGRAL_TIME
+            n_substeps,
+            substep,
+            dead_substeps,
+            fidelity.drive_lag,
+            fidelity.drive_damping,
+            gains.lead,
+            period / _INTEGRAL_TIME,
         )
         self._friction = Friction(robot, fidelity, seed)
         self.target_acts_later = path.newest_acts_later

@@ -33,12 +33,15 @@ from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, six
 from ur_emulator.plant.arm_physics import ArmPhysics
 from ur_emulator.plant.drives import TARGET_MAX, Drives
-from ur_emulator.plant.gear import GearRipple
+from ur_emulator.plant.gear import GearRipple, GearWithPlay
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.physics import ServoGains
 from ur_emulator.plant.plant_state import PlantState, Target
 from ur_emulator.plant.sensors import REC_ACCELERATION, Record, Sensors
 from ur_emulator.plant.thermometers import Thermometers
+
+_WANDER_LEVELS = 64
+"""A dead time that wanders goes through so many values: steps of 30 us for 2 ms."""
 
 
 class Plant:
@@ -53,7 +56,8 @@ class Plant:
 
     Attributes:
         calibration: the factory calibration of this arm, for the controller's kinematics.
-        dead_time: the delay drawn for this box, from the start of a cycle to the drives acting on it [s].
+        dead_time: the delay drawn for this box, from the start of a cycle to the drives acting on it [s];
+            where it wanders, its least value.
     """
 
     def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
@@ -72,12 +76,24 @@ class Plant:
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
         gains = ServoGains.of(robot)
         self._physics = ArmPhysics(
-            robot, calibrated_dh(robot, self.calibration), mass_scale.tolist(), gains, substep
+            robot,
+            calibrated_dh(robot, self.calibration),
+            mass_scale.tolist(),
+            gains,
+            substep,
+            fidelity.friction_presliding,
         )
         self._drives = Drives(
-            robot, self.calibration, fidelity, seed, gains, dead_substeps, substep, self.period_s
+            robot,
+            self.calibration,
+            fidelity,
+            seed,
+            gains,
+            _dead_times(fidelity, seed, dead_substeps, substep, self.period_s),
+            substep,
+            self.period_s,
         )
-        self._gear = GearRipple(robot, fidelity, seed)
+        self._gear = (GearWithPlay if fidelity.backlash else GearRipple)(fidelity, seed)
         self._sensors = Sensors(robot, fidelity, seed, self.period_s)
         self._thermometers = Thermometers(self.period_s)
 
@@ -274,6 +290,7 @@ class Plant:
         if self._is_ahead:
             self._is_ahead = False
             self._physics.restore_state()
+            self._gear.undo()
 
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
@@ -380,3 +397,17 @@ class Plant:
         """Let the drives hold the arm, at the pose in which the brakes hold it."""
         self._braked = False
         self._drives.hold(self._rest.q, self._physics.q)
+
+
+def _dead_times(
+    fidelity: Fidelity, seed: int, dead_substeps: int, substep: float, period: float
+) -> int | list[float]:
+    """Dead time in sub-steps: one value, or those of successive cycles, over and over."""
+    if not fidelity.dead_time_wander:
+        return dead_substeps
+    n = round(fidelity.dead_time_period / period)
+    begin = random_stream(seed, "wander").uniform()
+    share = 0.5 - 0.5 * np.cos(2.0 * np.pi * (begin + np.arange(n) / n))
+    levels = np.rint(share * _WANDER_LEVELS) / _WANDER_LEVELS
+    longer: list[float] = (dead_substeps + fidelity.dead_time_wander / substep * levels).tolist()
+    return longer
