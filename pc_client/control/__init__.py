@@ -10,7 +10,8 @@ delay              the loop delay from a logged stream
 loop_model         dead time, lag, integrator: what the client knows of the loop, and its exact response
 lag                dead time and lag apart, from a logged stream
 stability          how much gain a loop with delay bears; margins
-gear               the waves of the gears from finished runs, and how to drive against them
+gear               the error of the gears from finished runs, and how to drive against it
+gear_waves         the waves of one gear: their orders and sizes, found from the data
 learning_filter    what part of an error is learned, and the proof that it converges
 learning           what one run of a movement teaches the next
 """

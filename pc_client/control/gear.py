@@ -1,62 +1,58 @@
 """The error of the gears, found from the streams of finished runs, and how to drive a joint against it.
 
-A strain wave gear runs ahead of and behind its motor by up to a tenth of a milliradian, once and twice per
-motor turn. The error hangs on the position alone, so what one movement shows holds for every other one:
+A strain wave gear runs ahead of and behind its motor by up to a tenth of a milliradian, in waves along the
+angle of its joint. The error depends on the position alone, so what one movement shows holds for every other:
 
-    q_joint = q_motor + e(q_motor),    e(q) = sum over n = 1, 2 of  a_n sin(n G q) + b_n cos(n G q)
+    q_joint = q_motor + e(q_motor),    e(q) = sum over the waves of  a sin(order q) + b cos(order q)
 
-A joint follows its reference when the motor is sent to q_ref - e(q_ref).
-
-Source: gear ratio G = 101 of UR's joints; speed error of a real UR3e's joints at 97-101 and 195-207 cycles a
-joint turn (public logs, kevinhpham/DalESelfEBot).
+Orders and sizes are found from the data, joint by joint (`gear_waves`). A joint follows its reference when
+the motor is sent to q_ref - e(q_ref).
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pc_client.control.gear_waves import find_waves
 from pc_client.control.loop_model import LoopModel, velocity_response
 from pc_client.control.reference import JointReference
 
 Array = NDArray[np.float64]
 
-GEAR_RATIO = 101.0
-_CYCLES = np.array([GEAR_RATIO, 2.0 * GEAR_RATIO])
-
-LARGEST_SLOPE = 0.08
-"""A wave that would change the speed by more than this share is no gear's error and is left out."""
-
-_LEAST_SIGNIFICANCE = 3.0
-"""A wave counts when it is this many times its standard error."""
+_MOST_STEPS = 60_000
+"""Older runs are forgotten beyond so many steps: 8 minutes at 125 Hz, twice what ten movements take."""
 
 
 @dataclass(frozen=True, slots=True)
 class GearModel:
-    """Waves of six gears.
+    """Waves of six gears; a joint with fewer than another has zeros.
 
     Attributes:
-        sines: (2, 6) a_n [rad].
-        cosines: (2, 6) b_n [rad].
+        orders: (n, 6) waves in a turn of the joint.
+        sines: (n, 6) a [rad].
+        cosines: (n, 6) b [rad].
     """
 
+    orders: Array
     sines: Array
     cosines: Array
 
     @property
     def n_waves(self) -> int:
-        """How many of the twelve waves are known."""
+        """How many waves are known."""
         return int(np.count_nonzero(np.hypot(self.sines, self.cosines)))
 
     def error(self, q: Array) -> tuple[Array, Array]:
         """Error e [rad] and its slope de/dq [1] at joint angles q (6,), (6,) each."""
-        angles = _CYCLES[:, None] * q
+        angles = self.orders * q
         sin, cos = np.sin(angles), np.cos(angles)
         error: Array = (self.sines * sin + self.cosines * cos).sum(axis=0)
-        slope: Array = (_CYCLES[:, None] * (self.sines * cos - self.cosines * sin)).sum(axis=0)
+        slope: Array = (self.orders * (self.sines * cos - self.cosines * sin)).sum(axis=0)
         return error, slope
 
 
@@ -90,14 +86,11 @@ class GearObserver:
         period: control cycle [s].
     """
 
-    __slots__ = ("_moments", "_n", "_normal", "_power", "_response")
+    __slots__ = ("_response", "_runs")
 
     def __init__(self, loop: LoopModel, period: float) -> None:
         self._response = velocity_response(loop, period) * period
-        self._normal = np.zeros((6, 4, 4))
-        self._moments = np.zeros((6, 4))
-        self._power = np.zeros(6)
-        self._n = 0
+        self._runs: deque[tuple[Array, Array]] = deque()
 
     def take(self, qd_cmd: Array, q: Array) -> None:
         """Take a run without gaps.
@@ -107,33 +100,22 @@ class GearObserver:
             q: (n, 6) reported positions [rad].
         """
         n = len(q)
-        for j in range(q.shape[1]):
-            commanded = np.convolve(qd_cmd[:, j], self._response)[1:n]  # the steps up to frames 1, 2, ...
-            surprise = np.diff(q[:, j]) - commanded
-            waves = np.diff(_waves(q[:, j]), axis=0)
-            self._normal[j] += waves.T @ waves
-            self._moments[j] += waves.T @ surprise
-            self._power[j] += float(surprise @ surprise)
-        self._n += n - 1
+        commanded = [np.convolve(joint, self._response)[1:n] for joint in qd_cmd.T]  # up to frames 1, 2, ...
+        self._runs.append((q, np.diff(q, axis=0) - np.transpose(commanded)))
+        while sum(len(surprise) for _, surprise in self._runs) > _MOST_STEPS and len(self._runs) > 1:
+            self._runs.popleft()
 
     def model(self) -> GearModel | None:
         """The waves that are known by now; None when there are none."""
-        sines, cosines = np.zeros((2, 6)), np.zeros((2, 6))
-        for j in range(6):
-            if not self._n or np.linalg.cond(self._normal[j]) > 1e6:
-                continue  # the joint has hardly moved
-            inverse = np.linalg.inv(self._normal[j])
-            weights = inverse @ self._moments[j]
-            left = max(self._power[j] - float(weights @ self._moments[j]), 0.0) / self._n
-            for n in range(2):
-                pair = weights[2 * n : 2 * n + 2]
-                size = float(np.hypot(*pair))
-                spread = np.sqrt(left * float(np.trace(inverse[2 * n : 2 * n + 2, 2 * n : 2 * n + 2])))
-                if _LEAST_SIGNIFICANCE * spread < size < LARGEST_SLOPE / _CYCLES[n]:
-                    sines[n, j], cosines[n, j] = pair
-        return GearModel(sines, cosines) if sines.any() or cosines.any() else None
-
-
-def _waves(q: Array) -> Array:
-    """Sine and cosine, first and second wave, at the angles q (n,): (n, 4)."""
-    return np.column_stack([wave(cycles * q) for cycles in _CYCLES for wave in (np.sin, np.cos)])
+        if not self._runs:
+            return None
+        before, after, surprise = (
+            np.concatenate(parts)
+            for parts in zip(*((q[:-1], q[1:], rest) for q, rest in self._runs), strict=True)
+        )
+        joints = [find_waves(before[:, j], after[:, j], surprise[:, j]) for j in range(6)]
+        table = np.zeros((3, max(map(len, joints)), 6))
+        for j, waves in enumerate(joints):
+            for n, wave in enumerate(waves):
+                table[:, n, j] = wave
+        return GearModel(*table) if table.any() else None

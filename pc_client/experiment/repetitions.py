@@ -8,7 +8,7 @@ be sent is held against the limits that the plan itself was held against.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,14 +115,14 @@ class Repetitions:
         self.learned_from = 0
         self.remarks: list[str] = []
 
-    def renew(self, gear: GearModel | None) -> None:
+    def renew(self, gear: Callable[[], GearModel | None]) -> None:
         """Take what is known of the gears by now.
 
         Not while something is learned, which goes with the gears that it was learned with, and not after a
         limit has refused them.
         """
         if self.learned is None and not self._refused:
-            self.gear = gear
+            self.gear = gear()
 
     def forget(self, remark: str) -> None:
         """Begin the next run without anything learned from the one before."""

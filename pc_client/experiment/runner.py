@@ -102,7 +102,7 @@ class ExperimentRunner:
                 plan = self._approach(planned.joints) if there is None else there
                 there = None
                 if self._config.compensates_gear:
-                    repetitions.renew(gears.model())
+                    repetitions.renew(gears.model)
                 self._observer.running(name, repetition)
                 path = experiment.recording_path(planned, repetition)
                 provenance = self._provenance(planned, repetition, found, pace)

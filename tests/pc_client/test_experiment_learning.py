@@ -32,7 +32,7 @@ LOOP = LoopModel(0.024, 0.010, 0.001, 0.0)
 class WavyRobot(FakeRobot):
     """An arm whose gears are as uneven as real ones."""
 
-    gear = GearModel(np.full((2, 6), 1e-4) * [[1.0], [0.4]], np.zeros((2, 6)))
+    gear = GearModel(np.full((2, 6), [[80.0], [160.0]]), np.full((2, 6), [[1e-4], [4e-5]]), np.zeros((2, 6)))
 
     def follow(self):
         motor = np.array(self.q)
@@ -166,7 +166,7 @@ def test_a_learned_displacement_is_limited(two, plan):
 def test_what_breaks_a_limit_is_forgotten_before_anything_is_sent(two, plan):
     gear = WavyRobot.gear
     memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), two.model, PERIOD)
-    memory.renew(gear)
+    memory.renew(lambda: gear)
     table, commands = commands_of(plan)
     assert memory.may_use(plan, table)
     memory.learned = np.full_like(commands, 0.19)
@@ -174,20 +174,20 @@ def test_what_breaks_a_limit_is_forgotten_before_anything_is_sent(two, plan):
     assert not memory.may_use(plan, table)
     assert (memory.learned, memory.learned_from, memory.gear) == (None, 0, None)
     assert "learned displacement" in memory.remarks[0]
-    memory.renew(gear)
+    memory.renew(lambda: gear)
     assert memory.gear is None  # refused for the rest of this movement
 
 
 def test_gears_are_renewed_unless_something_was_learned_with_them(two):
     memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), two.model, PERIOD)
-    memory.renew(None)
+    memory.renew(lambda: None)
     assert memory.gear is None
-    memory.renew(WavyRobot.gear)
+    memory.renew(lambda: WavyRobot.gear)
     memory.learned = np.zeros((10, 6))
-    memory.renew(None)
+    memory.renew(lambda: None)
     assert memory.gear is WavyRobot.gear
     memory.forget("run 2 had a late frame")
-    memory.renew(None)
+    memory.renew(lambda: None)
     assert memory.gear is None
 
 
