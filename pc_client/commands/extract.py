@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,12 +17,10 @@ from pc_client.commands.options import (
     console,
     say,
 )
-from pc_client.errors import ClientError, RecordingError, one_line, printable
+from pc_client.errors import RecordingError, one_line
 from pc_client.file_names import as_file_name
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from pc_client.extraction.batch import Outcome
     from pc_client.extraction.extract import ExtractOptions
     from pc_client.extraction.results import Row
@@ -66,7 +63,9 @@ def extract(
     """Find the strokes of recorded movements, and say how well they reconstruct them."""
     from pc_client.extraction.extract import ExtractOptions
     from pc_client.extraction.files import TIME_UNITS
-    from pc_client.extraction.results import to_csv, to_json
+    from pc_client.extraction.results import STROKE_COLUMNS, to_json
+    from pc_client.results.files import write_files
+    from pc_client.results.tables import frame_of, to_csv
 
     if time_unit != "auto" and time_unit not in TIME_UNITS:
         raise typer.BadParameter(f"no time unit {time_unit!r}: give auto or one of {', '.join(TIME_UNITS)}")
@@ -81,16 +80,17 @@ def extract(
     unit = None if time_unit == "auto" else time_unit
     outcomes = _run(sources, options, unit, n_pictures, workers, dask)
     rows = [outcome.row for outcome in outcomes if outcome.row is not None]
-    contents = {
-        "extraction.json": to_json(rows).encode(),
-        "strokes.csv": to_csv(stroke for outcome in outcomes for stroke in outcome.strokes).encode(),
+    strokes = (stroke._asdict() for outcome in outcomes for stroke in outcome.strokes)
+    contents: dict[str, str | bytes] = {
+        "extraction.json": to_json(rows),
+        "strokes.csv": to_csv(frame_of(strokes, STROKE_COLUMNS)),
     }
     if figures != "none" and rows:
         from pc_client.extraction.figures import draw_overview
 
         contents |= _pictures(outcomes)
         contents["overview.png"] = draw_overview(rows)
-    _write(out, contents)
+    write_files(out, contents)
     _show(outcomes, rows)
     errors = [*unusable, *(outcome.error for outcome in outcomes if outcome.error is not None)]
     for error in errors:
@@ -156,53 +156,33 @@ def _pictures(outcomes: Sequence[Outcome]) -> dict[str, bytes]:
     }
 
 
-def _write(out: Path, contents: dict[str, bytes]) -> None:
-    for name, content in contents.items():
-        path = out / name
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-        except OSError as error:
-            raise ClientError(f"{path}: cannot be written ({error.strerror or error})") from error
-
-
 def _show(outcomes: Sequence[Outcome], rows: Sequence[Row]) -> None:
     if not rows:
         return
-    if len(rows) <= _MOST_ROWS:
-        console.print(_table(rows))
+    import polars as pl
+
+    from pc_client.extraction.results import COLUMNS
+    from pc_client.results.tables import to_rich
+
+    frame = pl.DataFrame(rows).with_columns(lognormality=pl.col("snr_v_db") / pl.col("n_strokes"))
+    if len(frame) <= _MOST_ROWS:
+        console.print(to_rich(frame, COLUMNS))
         for outcome in outcomes:
             for remark in outcome.remarks:
                 say(f"{outcome.name}: {remark}")
-    v = [row.snr_v_db for row in rows if row.snr_v_db is not None]
-    t = [row.snr_t_db for row in rows if row.snr_t_db is not None]
-    if len(v) > 1:
-        peaks = sum(row.n_speed_peaks for row in rows)
-        ratio = f"{sum(row.n_strokes for row in rows) / peaks:.2f}" if peaks else "-"
-        above = 100.0 * sum(value > 15.0 for value in v) / len(v)
-        say(
-            f"mean SNR_v {statistics.mean(v):.2f} dB (least {min(v):.1f}, above 15 dB: {above:.1f} %), "
-            f"mean SNR_t {statistics.mean(t):.2f} dB (least {min(t):.1f}), {ratio} strokes per speed peak"
+    moving = frame.drop_nulls("snr_v_db")
+    if len(moving) > 1:
+        v, t = pl.col("snr_v_db"), pl.col("snr_t_db")
+        figures = moving.select(
+            v=v.mean(),
+            least_v=v.min(),
+            above=100.0 * (v > 15.0).mean(),
+            t=t.mean(),
+            least_t=t.min(),
+            ratio=pl.col("n_strokes").sum() / pl.col("n_speed_peaks").sum(),
         )
-
-
-def _table(rows: Sequence[Row]) -> Table:
-    from rich.markup import escape
-    from rich.table import Table
-
-    headings = ("file", "SNR_v [dB]", "SNR_t [dB]", "strokes", "speed peaks", "lognormality [dB]")
-    table = Table(*map(escape, headings))  # rich would take a unit in brackets for a style
-    for row in rows:
-        table.add_row(
-            escape(printable(row.file)),
-            _decibels(row.snr_v_db),
-            _decibels(row.snr_t_db),
-            str(row.n_strokes),
-            str(row.n_speed_peaks),
-            _decibels(row.lognormality),
+        text = (
+            "mean SNR_v {v:.2f} dB (least {least_v:.1f}, above 15 dB: {above:.1f} %), "
+            "mean SNR_t {t:.2f} dB (least {least_t:.1f}), {ratio:.2f} strokes per speed peak"
         )
-    return table
-
-
-def _decibels(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
+        say(text.format(**figures.row(0, named=True)))

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
-from rich.table import Column, Table
 
 from pc_client.commands.options import SetOption, console, say
 
@@ -38,22 +36,20 @@ def list_movements(set_name: SetOption = None) -> None:
     """List the movements that come with the package."""
     from pc_client.movements.description import describe
     from pc_client.movements.files import LIBRARY_SETS, library_names, load_movement
+    from pc_client.results.tables import Column, frame_of, to_rich
 
-    headings = ("kind", "points", "duration [s]", "path [m]", "top speed [m/s]")
-    # rich would take a unit in brackets for a style
-    table = Table(Column("name", no_wrap=True), *map(escape, headings))
+    columns = (
+        Column("name", align="left", kind=str),
+        Column("kind", align="left", kind=str),
+        Column("n_target_points", "points", kind=int),
+        Column("duration_s", "duration", "s", ".2f"),
+        Column("path_length_m", "path", "m", ".3f"),
+        Column("peak_speed_m_s", "top speed", "m/s", ".3f"),
+    )
     sets = [set_name] if set_name is not None else LIBRARY_SETS
-    for name in (name for chosen in sets for name in library_names(chosen)):
-        figures = describe(load_movement(name))
-        table.add_row(
-            name,
-            figures["kind"],
-            str(figures["n_target_points"]),
-            f"{figures['duration_s']:.2f}",
-            f"{figures['path_length_m']:.3f}",
-            f"{figures['peak_speed_m_s']:.3f}",
-        )
-    console.print(table)
+    names = [name for chosen in sets for name in library_names(chosen)]
+    rows = [{**describe(load_movement(name)), "name": name} for name in names]
+    console.print(to_rich(frame_of(rows, columns), columns))
 
 
 @app.command("show")
@@ -82,17 +78,23 @@ def show(
 def kinds() -> None:
     """List the generators of movements."""
     from pc_client.movements.twins import GENERATORS
+    from pc_client.results.tables import Column, frame_of, to_rich
 
-    columns = ("kind", "movement", "target points", "stroke durations")
-    table = Table(*columns, title="beside the lognormal movement of the same seed")
-    for name, generator in GENERATORS.items():
-        table.add_row(
-            name,
-            generator.says,
-            "the same" if generator.same_targets else "own, but the first",
-            "the same" if generator.same_strokes else "only their sum",
-        )
-    console.print(table)
+    columns = [
+        Column(name, align="left", kind=str)
+        for name in ("kind", "movement", "target points", "stroke durations")
+    ]
+    rows = [
+        {
+            "kind": name,
+            "movement": generator.says,
+            "target points": "the same" if generator.same_targets else "own, but the first",
+            "stroke durations": "the same" if generator.same_strokes else "only their sum",
+        }
+        for name, generator in GENERATORS.items()
+    ]
+    title = "beside the lognormal movement of the same seed"
+    console.print(to_rich(frame_of(rows, columns), columns, title=title))
 
 
 @app.command("generate")

@@ -8,16 +8,25 @@ plane that `tilt` chooses (see `pc_client.movements.stroke.arc_frame`); length i
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
-from typing import NamedTuple
+from typing import NamedTuple, get_type_hints
 
 from pc_client.extraction.extract import Extraction
+from pc_client.results.tables import Column
 
-__all__ = ["Row", "StrokeRow", "row_of", "stroke_rows", "to_csv", "to_json"]
+__all__ = ["COLUMNS", "STROKE_COLUMNS", "Row", "StrokeRow", "row_of", "stroke_rows", "to_json"]
+
+COLUMNS = (
+    Column("file", align="left", kind=str),
+    Column("snr_v_db", "SNR_v", "dB", ".2f", missing="-"),
+    Column("snr_t_db", "SNR_t", "dB", ".2f", missing="-"),
+    Column("n_strokes", "strokes", kind=int),
+    Column("n_speed_peaks", "speed peaks", kind=int),
+    Column("lognormality", "lognormality", "dB", ".2f", missing="-"),
+)
+"""The table for the terminal; lognormality is SNR_v per stroke."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +38,6 @@ class Row:
     snr_t_db: float | None
     n_strokes: int
     n_speed_peaks: int
-
-    @property
-    def lognormality(self) -> float | None:
-        """SNR_v per stroke, dB."""
-        return None if self.snr_v_db is None else self.snr_v_db / self.n_strokes
 
     @property
     def strokes_per_peak(self) -> float | None:
@@ -59,6 +63,10 @@ class StrokeRow(NamedTuple):
     x1: float
     y1: float
     z1: float
+
+
+STROKE_COLUMNS = tuple(Column(name, kind=kind) for name, kind in get_type_hints(StrokeRow).items())
+"""The columns of strokes.csv."""
 
 
 def row_of(extraction: Extraction) -> Row:
@@ -103,12 +111,3 @@ def to_json(rows: Iterable[Row]) -> str:
     """The text of extraction.json: one line for each recording."""
     lines = (json.dumps(asdict(row), allow_nan=False, ensure_ascii=False) for row in rows)
     return "[\n" + ",\n".join(lines) + "\n]\n"
-
-
-def to_csv(rows: Iterable[StrokeRow]) -> str:
-    """The text of strokes.csv, to the last digit."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(StrokeRow._fields)
-    writer.writerows(rows)
-    return text.getvalue()

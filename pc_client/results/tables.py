@@ -18,11 +18,10 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
-import polars as pl
-
 from pc_client.errors import printable
 
 if TYPE_CHECKING:
+    import polars as pl
     from rich.table import Table as RichTable
 
 __all__ = ["Column", "cells", "finite", "frame_of", "to_csv", "to_html", "to_json", "to_markdown", "to_rich"]
@@ -68,6 +67,8 @@ class Column:
 
 def frame_of(rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]) -> pl.DataFrame:
     """Values by column name, in rows, as a frame with exactly these columns; what is not there is null."""
+    import polars as pl  # here: columns are declared also where no table is made, as in worker processes
+
     return pl.DataFrame(list(rows), {column.name: column.kind for column in columns})
 
 

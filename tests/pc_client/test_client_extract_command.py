@@ -149,7 +149,7 @@ def test_wrong_usage_is_one_line_and_exit_2(here, capsys, words, message):
 
 def test_a_folder_that_cannot_be_written(here, capsys):
     assert cli.run(["extract", "one.csv", "--out", "one.csv/out", "--figures", "none"]) == 1
-    assert "cannot be written" in capsys.readouterr().err
+    assert "cannot write" in capsys.readouterr().err
 
 
 def test_help(capsys):

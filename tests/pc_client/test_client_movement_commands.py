@@ -41,7 +41,7 @@ def test_kinds_says_that_a_duplicate_has_its_own_target_points(capsys):
 def test_list_shows_all_sets_or_one(options, sets, capsys):
     assert cli.run(["movements", "list", *options]) == 0
     rows = [
-        line.split()[1] for line in capsys.readouterr().out.splitlines() if "_5_" in line or "_4_" in line
+        line.split()[0] for line in capsys.readouterr().out.splitlines() if "_5_" in line or "_4_" in line
     ]
     assert rows == [name for chosen in sets for name in library_names(chosen)]
 

@@ -6,6 +6,8 @@ import csv
 import io
 import json
 import math
+import subprocess
+import sys
 
 import polars as pl
 import pytest
@@ -13,7 +15,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from pc_client.results.tables import Column, cells, finite, frame_of, to_csv, to_json, to_markdown, to_rich
+from pc_client import cli
+from pc_client.results.tables import (
+    Column,
+    cells,
+    finite,
+    frame_of,
+    to_csv,
+    to_html,
+    to_json,
+    to_markdown,
+    to_rich,
+)
 
 COLUMNS = (
     Column("name", "movement", align="left", kind=str),
@@ -107,3 +120,30 @@ def test_json_rounds_and_knows_no_infinity() -> None:
     assert finite(data, 6) == {"a": [1.234568, None, None, "x"], "b": {"c": [None, 2, True]}}
     assert finite(data)["a"][0] == 1.23456789
     assert json.loads(to_json(data, 3)) == finite(data, 3)
+
+
+def test_polars_is_loaded_only_for_a_table() -> None:
+    """Not by what moves an arm, nor by what worker processes run."""
+    code = (
+        "import sys, pc_client.api.arm, pc_client.api.signals, pc_client.extraction.batch\n"
+        "import pc_client.sweep.run_case, pc_client.commands.movements, pc_client.results.tables\n"
+        "sys.exit('polars' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_without_polars_one_line_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "polars", None)
+    assert cli.run(["movements", "list"]) == 1
+    error = capsys.readouterr().err
+    assert error == "ur-client: this needs polars: run `pip install 'ur-hil[client]'`\n"
+
+
+def test_a_page_escapes_names_and_links_to_their_sections() -> None:
+    frame = pl.DataFrame({"name": ["<a>", "mean"], "level": [1.0, None], "is_mean": [False, True]})
+    page = to_html(frame, COLUMNS[:2], bold="is_mean", links=True)
+    assert "<th>level<br>[dB]</th>" in page
+    assert '<td><a href="#&lt;a&gt;" style="color:inherit">&lt;a&gt;</a></td><td>1.00</td>' in page
+    assert '<tr class="mean"><td>mean</td><td></td></tr>' in page
