@@ -65,7 +65,7 @@ docs: $(STAMP) ## rewrite the generated pages, build the documentation site into
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 pictures: $(STAMP) ## draw the pictures of docs/contact.md (needs off-screen OpenGL, e.g. libegl1)
-	$(BIN)/python docs/make_contact_pictures.py
+	$(BIN)/python -m docs.make_contact_pictures
 
 clean: ## remove what the targets made
 	rm -rf $(VENV) out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

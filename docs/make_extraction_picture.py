@@ -1,6 +1,6 @@
 """Draws docs/img/extraction.png: a movement of the library, recorded badly, and the strokes found in it.
 
-`python docs/make_extraction_picture.py` from the root of the checkout. Needs the extra `report`.
+`python -m docs.make_extraction_picture` from the root of the checkout. Needs the extra `report`.
 """
 
 from pathlib import Path

@@ -1,6 +1,6 @@
 """The picture of docs/theory.md: a lognormal stroke with its points, and one stroke by several models.
 
-`python docs/make_theory_pictures.py` writes docs/img/theory.svg. docs/img/compare.svg is made by the
+`python -m docs.make_theory_pictures` writes docs/img/theory.svg. docs/img/compare.svg is made by the
 command in theory.md.
 """
 

@@ -20,6 +20,7 @@ from docs.generate import (
     security_policy,
     states_page,
 )
+from docs.generate.sessions import with_sessions
 
 DOCS = Path(__file__).parents[1]
 _LAYOUT = tomllib.loads((DOCS.parent / ".mdformat.toml").read_text(encoding="utf-8"))
@@ -48,3 +49,6 @@ def page(path: str) -> str:
 if __name__ == "__main__":
     for path in PAGES:
         (DOCS / path).write_text(page(path), encoding="utf-8")
+    for place in DOCS.rglob("*.md"):
+        text = place.read_text(encoding="utf-8")
+        place.write_text(with_sessions(text), encoding="utf-8")

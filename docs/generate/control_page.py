@@ -68,9 +68,10 @@ address a control port requires a token.
   were tried.
 
 ```sh
-curl http://127.0.0.1:{DEFAULT_PORT}/v1/state curl -H 'Content-Type: application/json' -d
-'{{"group": "standard", "n": 3, "level": true}}'
-http://127.0.0.1:{DEFAULT_PORT}/v1/set_digital_input
+curl http://127.0.0.1:{DEFAULT_PORT}/v1/state
+curl -H 'Content-Type: application/json' -d '{{"group": "standard", "n": 3, "level": true}}' http://127.0.0.1:{
+    DEFAULT_PORT
+}/v1/set_digital_input
 ```
 
 ## Command line

@@ -38,4 +38,5 @@ def _line(cells: Iterable[object]) -> str:
 
 def example(command: str, lines: Iterable[str]) -> str:
     """A command and what it prints, as a block of code."""
-    return "\n".join(("```", f"$ {command}", *lines, "```"))
+    why = "<!-- not run: values differ each time; tests/protocol/test_wire_pages.py compares the form -->"
+    return "\n".join((why, "", "```console", f"$ {command}", *lines, "```"))

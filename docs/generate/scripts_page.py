@@ -19,6 +19,8 @@ plain text without framing, the same on all three ports. CB3 has no switch betwe
 control: every script is run. The read-only ports 30011 to 30013 run nothing.
 
 ```python
+import socket
+
 with socket.create_connection(("127.0.0.1", 30002)) as robot:
     robot.sendall(b"movej([0.6, -1.2, -1.9, -0.5, 1.0, 1.2], a=1.4, v=1.05)\\n")
 ```

@@ -1,0 +1,256 @@
+"""The blocks of code of a page of documentation, and a reader who does what they say.
+
+A page is read from the top in an empty folder:
+
+    `name`: before a block     the block is a file of that name; another block uses it
+    python                     runs, all blocks of a page in one namespace; tests in it run under pytest
+    sh                         each line runs; `ur-emulator serve` starts the box of the page
+    console                    each line after `$` runs and prints what stands below it
+    urscript, toml, yaml       are compiled or parsed; the steps of a workflow run
+    mermaid                    is drawn when the site is built
+    text                       is no code: a formula, a picture in letters, an output seen once
+
+A block that cannot run has the line `<!-- not run: reason -->` before it. In `sh`, commands of this project
+are then parsed all the same: programs, options and values exist.
+"""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import typer
+import yaml
+from typer.testing import CliRunner
+
+import pc_client.cli
+import ur_emulator.cli
+import urscript.cli
+from docs.generate.sessions import played
+from ur_emulator.control import command_line
+from urscript import compile_program
+
+ROOT = Path(__file__).parents[1]
+LANGUAGES = {"python", "sh", "console", "urscript", "toml", "yaml", "text", "mermaid"}
+CODE = re.compile(r"^(?:\$|ur-\w+|urscript|make|pip|import|from|def|git) ", re.MULTILINE)
+REASON = re.compile(r"<!-- not run: (.+) -->")
+NAME = re.compile(r"`([\w./-]+\.\w+)`:$")
+MAKE_TARGETS = set(re.findall(r"^(\w[\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block: where it stands, its language, its text, the file that it is, why it does not run."""
+
+    page: str
+    line: int
+    language: str
+    text: str
+    name: str | None
+    reason: str | None
+
+    def __str__(self):
+        return f"{self.page}:{self.line}"
+
+
+def blocks_of(path):
+    """All blocks of a page, from the top."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    found, begin = [], None
+    for number, line in enumerate(lines):
+        if not line.startswith("```"):
+            continue
+        if begin is None:
+            begin = number
+        elif line == "```":
+            before = [text for text in lines[:begin] if text.strip()]
+            reason = REASON.fullmatch(before[-1]) if before else None
+            name = NAME.search(before[-2 if reason else -1]) if before else None
+            found.append(
+                Block(
+                    path.relative_to(ROOT).as_posix(),
+                    begin + 1,
+                    lines[begin].removeprefix("```"),
+                    "\n".join(lines[begin + 1 : number]) + "\n",
+                    name and name[1],
+                    reason and reason[1],
+                )
+            )
+            begin = None
+    assert begin is None, f"{path}:{begin}: this block does not end"
+    return found
+
+
+class PageReader:
+    """Does what the blocks of a page say, in the current folder, with boxes on loopback addresses of its own."""
+
+    def __init__(self, make_box, stock):
+        self._make_box, self._stock = make_box, stock
+        self._box = None
+        self._names = {"__name__": "page"}
+
+    def read(self, blocks):
+        """Write the files of the page, then run its blocks."""
+        for block in blocks:
+            assert block.language in LANGUAGES, f"{block}: its language is not one of {sorted(LANGUAGES)}"
+            if block.name:
+                Path(block.name).parent.mkdir(parents=True, exist_ok=True)
+                Path(block.name).write_text(self._here(block.text), encoding="utf-8")
+        text = "".join(block.text for block in blocks)
+        for name, write in self._stock.items():
+            if name in text and not Path(name).exists():
+                if not Path(name).suffix:
+                    Path(name).mkdir()
+                write(Path(name))
+        for block in blocks:
+            if block.language == "yaml" and "steps:" in block.text:
+                self._workflow(block)
+            elif block.name:
+                others = [other for other in blocks if other is not block]
+                used = any(Path(block.name).stem in other.text for other in others)
+                assert used or block.name.startswith("test_"), f"{block}: no other block uses {block.name}"
+            else:
+                self._run(block)
+
+    def _run(self, block):
+        if block.language == "text":
+            assert not CODE.search(block.text), f"{block}: this is code, and `text` is never run"
+        match block.language:
+            case "python" if block.reason is None:
+                self._python(block)
+            case "python":
+                compile(block.text, str(block), "exec")
+            case "sh":
+                for command in commands_of(block.text):
+                    self._command(command, block, parse_only=block.reason is not None)
+            case "console" if block.reason is None:
+                assert played(block.text) == block.text, f"{block}: run: make docs"
+            case "urscript":
+                compile_program(block.text)
+            case "toml":
+                tomllib.loads(block.text)
+
+    def _python(self, block):
+        if re.search(r"^def test_", block.text, re.MULTILINE):
+            Path(f"test_line_{block.line}.py").write_text(block.text, encoding="utf-8")
+            self._process([sys.executable, "-m", "pytest", f"test_line_{block.line}.py"], block)
+        else:
+            exec(compile(self._here(block.text), str(block), "exec"), self._names)
+
+    def _command(self, line, block, parse_only=False):
+        words = shlex.split(line, comments=True)
+        match words:
+            case []:
+                return
+            case ["make", *targets]:
+                assert set(targets) <= MAKE_TARGETS, f"{block}: {line}"
+            case ["pip", "install", *names]:
+                for name in names:
+                    base, _, extras = name.rstrip("]").partition("[")
+                    if base == PROJECT["name"]:
+                        assert {e for e in extras.split(",") if e} <= set(PROJECT["optional-dependencies"]), (
+                            line
+                        )
+            case ["ur-emulator", "serve", *rest] if not parse_only:
+                self._serve(rest)
+            case ["ur-emulator", "ctl", *rest] if not parse_only:
+                box = self._the_box()
+                at = ["--host", box.host, "--control-port", str(box.control_port)]
+                assert command_line.main([*rest, *at]) == 0, f"{block}: {line}"
+            case ["ur-client", *rest]:
+                if parse_only:
+                    parsed(pc_client.cli.app, rest)
+                else:
+                    assert pc_client.cli.run([self._here(word) for word in rest]) == 0, f"{block}: {line}"
+            case ["urscript", *rest]:
+                if parse_only:
+                    parsed(urscript.cli.app, rest)
+                else:
+                    done = CliRunner().invoke(urscript.cli.app, rest)
+                    assert done.exit_code == 0, f"{block}: {line}\n{done.output}"
+            case ["ur-emulator", "ctl", *rest]:
+                command_line.make_parser().parse_args(rest)
+            case ["ur-emulator", *rest]:
+                parsed(ur_emulator.cli.app, rest)
+            case ["python", *rest] if not parse_only:
+                self._process([sys.executable, *map(self._here, rest)], block)
+            case [program, *_] if not parse_only and shutil.which(program):
+                self._process(["bash", "-ec", self._here(line)], block)
+
+    def _workflow(self, block):
+        """Run the steps of a workflow of GitHub Actions; those that `use` somebody else's need a version."""
+        for job in yaml.safe_load(block.text)["jobs"].values():
+            assert job["runs-on"]
+            matrix = job.get("strategy", {}).get("matrix", {})
+            for values in product(*matrix.values()):
+                for step in job["steps"]:
+                    assert ("uses" in step) != ("run" in step), f"{block}: {step}"
+                    if "uses" in step:
+                        assert re.fullmatch(r"[\w-]+/[\w-]+@v\d+", step["uses"]), f"{block}: {step}"
+                    command = step.get("run", "")
+                    for name, value in zip(matrix, values, strict=True):
+                        command = command.replace(f"${{{{ matrix.{name} }}}}", value)
+                    for line in commands_of(command):
+                        self._command(line, block)
+
+    def _serve(self, words):
+        given = parsed(ur_emulator.cli.app, ["serve", *words])
+        options = {
+            name: given[name] for name in ("robot", "version", "seed", "fidelity", "programs", "control_port")
+        }
+        options["programs"] = given["programs"] and given["programs"].absolute()
+        if given["boxes"] == 1:
+            self._box = self._make_box(
+                **{name: value for name, value in options.items() if value is not None}
+            )
+
+    def _the_box(self):
+        if self._box is None:
+            self._box = self._make_box()
+        return self._box
+
+    def _here(self, text):
+        """The text with the addresses of the page's box in place of those that the page names."""
+        if not re.search(r"127\.0\.0\.\d|192\.168\.0\.10\b", text):
+            return text
+        network, _, last = self._the_box().host.rpartition(".")
+        text = re.sub(r"\b127\.0\.0\.(\d+)", lambda m: f"{network}.{int(last) + int(m[1]) - 1}", text)
+        return re.sub(r"\b192\.168\.0\.10\b", self._box.host, text)
+
+    @staticmethod
+    def _process(words, block):
+        places = os.pathsep.join((os.getcwd(), str(ROOT)))
+        done = subprocess.run(
+            words, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": places, "PYTEST_ADDOPTS": "-p no:cacheprovider"}
+        )  # fmt: skip
+        assert done.returncode == 0, f"{block}: {words}\n{done.stdout}{done.stderr}"
+
+
+def commands_of(text):
+    """The commands of a shell: lines, joined where a quote or a backslash goes on."""
+    command = ""
+    for line in text.splitlines(keepends=True):
+        command += line
+        try:
+            shlex.split(command, comments=True)
+        except ValueError:
+            continue
+        yield command.rstrip("\n")
+        command = ""
+    assert not command, f"this command does not end: {command}"
+
+
+def parsed(app, words):
+    """The values that a command of an app would get; what it would refuse is an error here."""
+    command = typer.main.get_command(app)
+    words = list(words)
+    while hasattr(command, "commands") and words[0] in command.commands:
+        command = command.commands[words.pop(0)]
+    return command.make_context(command.name, words).params
