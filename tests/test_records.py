@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from ur_hil.input_files import MIB, FileKind
 from ur_hil.records import (
-    FieldError,
     Finite,
     Flag,
     Items,
@@ -36,7 +35,7 @@ class Part:
 
     def __post_init__(self) -> None:
         if self.at[0] > self.at[1]:
-            raise FieldError("at", "give the smaller one first")
+            raise ValueError("at", "give the smaller one first")
 
 
 @record

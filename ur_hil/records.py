@@ -22,14 +22,13 @@ from typing import (
     TYPE_CHECKING,
     Annotated,
     Any,
-    Literal,
+    Generic,
     TypeVar,
     Union,
     dataclass_transform,
     get_args,
     get_origin,
     get_type_hints,
-    overload,
 )
 
 if TYPE_CHECKING:
@@ -46,34 +45,18 @@ _PROBLEMS = MappingProxyType(
         "unexpected_keyword_argument": "no such key; {nearest}",
         "literal_error": "{given}; give {expected}",
         "dataclass_type": "{given}; give a table",
-        "dict_type": "{given}; give a table",
         "tuple_type": "{given}; give a list",
         "too_short": "{given}; give a list of {min_length} or more",
         "too_long": "{given}; give a list of {max_length} or fewer",
         "value_error": "{error}",
     }
 )
-
-
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 
 
-class FieldError(ValueError):
-    """Raised by the `__post_init__` of a record: a field does not go with the others.
-
-    Args:
-        field: its name.
-        problem: what was given and what is allowed.
-    """
-
-    def __init__(self, field: str, problem: str) -> None:
-        super().__init__(problem)
-        self.field = field
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class Field:
+class Field(Generic[T]):
     """What a single value may be; stands in the `Annotated` type of a field.
 
     Attributes:
@@ -84,7 +67,7 @@ class Field:
     """
 
     text: str
-    kind: type
+    kind: type[T]
     schema: Mapping[str, Any]
     unit: str = ""
 
@@ -97,31 +80,26 @@ class Field:
         }
 
 
-def number(least: float = -inf, most: float = inf, unit: str = "") -> Field:
+def number(least: float = -inf, most: float = inf, unit: str = "") -> Field[float]:
     """A finite number within bounds."""
     schema = {"type": "float", "strict": True, "ge": least, "le": most, "allow_inf_nan": False}
     return Field(_range_text("number", least, most, unit), float, schema, unit)
 
 
-def whole(least: int, most: int | None = None, unit: str = "") -> Field:
+def whole(least: int, most: int | None = None, unit: str = "") -> Field[int]:
     """A whole number within bounds."""
     schema = {"type": "int", "strict": True, "ge": least} | ({} if most is None else {"le": most})
     return Field(_range_text("whole number", least, inf if most is None else most, unit), int, schema, unit)
 
 
-def text(most: int = 1000) -> Field:
+def text(most: int = 1000) -> Field[str]:
     """A text of printable characters that is not empty."""
-    schema = {
-        "type": "str",
-        "strict": True,
-        "min_length": 1,
-        "max_length": most,
-        "pattern": r"^[^\p{C}\p{Zl}\p{Zp}]*$",
-    }
+    printable = r"^[^\p{C}\p{Zl}\p{Zp}]+$"
+    schema = {"type": "str", "strict": True, "max_length": most, "pattern": printable}
     return Field(f"a text of at most {most} characters on one line", str, schema)
 
 
-def word(known: Iterable[str]) -> Field:
+def word(known: Iterable[str]) -> Field[str]:
     """One of several words."""
     words = list(known)
     return Field(f"one of {', '.join(words)}", str, {"type": "literal", "expected": words})
@@ -129,7 +107,7 @@ def word(known: Iterable[str]) -> Field:
 
 def _range_text(noun: str, least: float, most: float, unit: str) -> str:
     bounds = (f" from {least:g}" if least > -inf else "") + (f" to {most:g}" if most < inf else "")
-    return f"a {'' if bounds else 'finite '}{noun}{bounds}{unit and f' {unit}'}"
+    return f"a {noun}{bounds}{unit and f' {unit}'}" if bounds else f"a finite {noun}{unit and f' in {unit}'}"
 
 
 Flag = Annotated[bool, Field("true or false", bool, {"type": "bool", "strict": True})]
@@ -153,24 +131,24 @@ class Items:
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def record(cls: type[T]) -> type[T]:
-    """Make a frozen dataclass of a class; read by `checked`, it takes no other fields than its own."""
+    """Make a frozen dataclass of a class; read by `checked`, it takes no other fields than its own.
+
+    A `__post_init__` raises ValueError(problem), or ValueError(field, problem), for fields that do not fit
+    each other.
+    """
     made = dataclass(frozen=True, slots=True, kw_only=True)(cls)
     made.__pydantic_config__ = {"extra": "forbid"}  # type: ignore[attr-defined]
     return made
 
 
-def fields_of(kind: type) -> Mapping[str, Field]:
-    """What the fields of a record may hold, by name; those with a `Field` in their type."""
+def fields_of(kind: type) -> Mapping[str, Field[Any]]:
+    """What the fields of a record, or the values of a list, may hold; by name, those with a `Field`."""
     hints = get_type_hints(kind, include_extras=True)
-    found = {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
-    return MappingProxyType({name: field for name, field in found.items() if isinstance(field, Field)})
+    found = {name: _field(hint) for name, hint in hints.items()}
+    return MappingProxyType({name: field for name, field in found.items() if field})
 
 
-@overload
-def checked(kind: type[T], values: object, source: str, error: type[Exception]) -> T: ...
-@overload
-def checked(kind: Field, values: object, source: str, error: type[Exception]) -> Any: ...
-def checked(kind: Any, values: object, source: str, error: type[Exception]) -> Any:
+def checked(kind: type[T] | Field[T], values: object, source: str, error: type[Exception]) -> T:
     """Make a record, or a single value, of what was given.
 
     Args:
@@ -185,7 +163,8 @@ def checked(kind: Any, values: object, source: str, error: type[Exception]) -> A
     from pydantic import ValidationError
 
     try:
-        return _adapter(kind).validate_python(values)
+        made: T = _adapter(kind).validate_python(values)  # type: ignore[arg-type]
+        return made
     except ValidationError as problems:
         raise error(f"{source}: {_problem(kind, problems.errors(include_url=False)[0])}") from None
     except error as problem:  # of a record that knows no file
@@ -214,8 +193,9 @@ def _problem(kind: Any, first: ErrorDetails) -> str:
     elif first["type"] == "unexpected_keyword_argument":
         table = get_type_hints(_bare(_hint(kind, place[:-1])))
         context["nearest"] = nearest(str(place[-1]), table)
-    elif isinstance(error := context.get("error"), FieldError):
-        place = (*place, error.field)
+    elif isinstance(error := context.get("error"), ValueError):
+        *fields, context["error"] = error.args
+        place = (*place, *fields)
     words = _PROBLEMS.get(first["type"], "{given}; {msg}")
     said = words.format(given=_shown(first["input"]), msg=first["msg"], **context)
     path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place)
@@ -232,10 +212,9 @@ def _shown(value: object) -> str:
 def _hint(kind: Any, place: tuple[int | str, ...]) -> Any:
     """The annotation at a place of a record."""
     for step in place:
-        inner = _bare(kind)
-        kind = (
-            get_type_hints(inner, include_extras=True)[step] if isinstance(step, str) else get_args(inner)[0]
-        )
+        bare = _bare(kind)
+        hints: Any = get_type_hints(bare, include_extras=True) if isinstance(step, str) else get_args(bare)
+        kind = hints[step if isinstance(step, str) else 0]
     return kind
 
 
@@ -246,10 +225,15 @@ def _bare(hint: Any) -> Any:
     return hint
 
 
+def _field(hint: Any) -> Field[Any] | None:
+    """The `Field` in an annotation, also of the values of a list."""
+    found = next((one for one in getattr(hint, "__metadata__", ()) if isinstance(one, Field)), None)
+    inner = get_args(hint)
+    return found or (_field(inner[0]) if inner else None)
+
+
 def _allowed(hint: Any) -> str:
-    field = getattr(hint, "__metadata__", (None,))[0]
-    if isinstance(field, Field):
-        return field.text
-    if get_origin(hint) is Literal:
-        return " or ".join(map(repr, get_args(hint)))
-    return "a table" if is_dataclass(_bare(hint)) else "a list"
+    bare, field = _bare(hint), _field(hint)
+    if is_dataclass(bare) or get_origin(bare) is tuple:
+        return "a table" if is_dataclass(bare) else "a list"
+    return field.text if field else " or ".join(map(repr, get_args(bare)))  # of a Literal

@@ -103,7 +103,7 @@ class Controller:
             ControllerError: the file cannot be read, a field does not exist or cannot hold its value.
         """
         values = FILE_KINDS["controller"].read_toml(Path(path))
-        base = checked(word(CONTROLLERS), values.pop("base", DEFAULT), f"{path}: base", ControllerError)
+        base = checked(_BASE, values.pop("base", DEFAULT), f"{path}: base", ControllerError)
         return CONTROLLERS[base].changed(values, lambda name: f"{path}: {name}")
 
     def changed(self, values: Mapping[str, object], where: Callable[[str], str] = str) -> Controller:
@@ -191,6 +191,7 @@ APPROACH = Controller(
 )
 
 CONTROLLERS = MappingProxyType({config.name: config for config in (_PAPER, _PREVIEW, _BEST)})
+_BASE = word(CONTROLLERS)
 
 
 def load_controller(name_or_file: str) -> Controller:

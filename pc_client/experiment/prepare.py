@@ -11,9 +11,10 @@ import numpy as np
 from pc_client.errors import ClientError, RecordingError
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.robot_model import RobotModel, robot_model
-from pc_client.movements.files import load_motion, movement_text
+from pc_client.movements.files import load_motion
 from pc_client.movements.joint_trajectory import JointTrajectory
 from pc_client.movements.movement import Movement
+from pc_client.movements.movement_file import movement_text
 from pc_client.movements.samples import SampledTrajectory
 from pc_client.planning.plan import JointPlan, plan_joints, plan_movement
 from pc_client.recording.loader import load_recording

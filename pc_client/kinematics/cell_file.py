@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pc_client.errors import CellError
 from pc_client.input_files import FILE_KINDS
 from pc_client.kinematics.cell import NOUNS, Cell, Solid, Three, Tool, Wall
-from ur_hil.records import FieldError, Finite, Items, checked, number, record
+from ur_hil.records import Finite, Items, checked, number, record
 from ur_hil.records import text as text_field
 
 MOST_BODIES = 100
@@ -61,15 +61,15 @@ class _Wall:
         if self.point is not None and self.normal is not None:
             planes.append(("normal", self.point, self.normal))
         if len(planes) != 1 or (self.point is None) != (self.normal is None):
-            raise FieldError("point", f"give one of {', '.join(_SIDES)}, or a point and a normal")
+            raise ValueError("point", f"give one of {', '.join(_SIDES)}, or a point and a normal")
         ((field, point, normal),) = planes
         length = hypot(*normal)
         if not 1e-6 <= length <= 1e6:
-            raise FieldError("normal", f"{list(normal)}; give a direction, such as [0, 1, 0]")
+            raise ValueError("normal", f"{list(normal)}; give a direction, such as [0, 1, 0]")
         x, y, z = (component / length for component in normal)
         offset = x * point[0] + y * point[1] + z * point[2]
         if offset >= 0.0:
-            raise FieldError(
+            raise ValueError(
                 field, "the robot's base stands behind this wall; a normal points from the wall to the robot"
             )
         return Wall(self.name, (x, y, z), offset)

@@ -7,8 +7,7 @@ of what is wrong.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -18,15 +17,9 @@ from pc_client.errors import MovementError
 from pc_client.input_files import FILE_KINDS
 from pc_client.movements.columns import parse_rows
 from pc_client.movements.joint_trajectory import JOINT_COLUMNS, JointTrajectory
-from pc_client.movements.movement import Movement, check_duration, check_name
+from pc_client.movements.movement import Movement
+from pc_client.movements.movement_file import movement_text, parse_movement
 from pc_client.movements.samples import FORMS, MIN_SAMPLES, SampledTrajectory, samples_of, write_samples
-from pc_client.movements.trajectory_tables import (
-    KIND_WORDS,
-    TRAJECTORY_FIELDS,
-    parse_trajectory,
-    trajectory_lines,
-)
-from pc_client.toml_tables import TableReader, toml_value
 
 __all__ = [
     "DEFAULT_SET",
@@ -36,7 +29,6 @@ __all__ = [
     "library_path",
     "load_motion",
     "load_movement",
-    "movement_text",
     "save_movement",
 ]
 
@@ -51,12 +43,6 @@ DEFAULT_SET = "paper"
 LIBRARY_SETS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {DEFAULT_SET: _TEN, "arcs": tuple(f"arcs/{name}" for name in _TEN)}
 )
-
-MOST_POINTS = 1000
-"""Most target points of a file: a page of handwriting has some 500."""
-
-_FORMAT = 1
-_FIELDS = f"format, name, kind, duration, stroke_durations, target_points, provenance, {TRAJECTORY_FIELDS}"
 
 
 def library_names(set_name: str = DEFAULT_SET) -> list[str]:
@@ -139,41 +125,13 @@ def save_movement(movement: Movement, path: str | Path) -> None:
         ) from error
 
 
-def movement_text(movement: Movement) -> str:
-    """The TOML file of a movement in closed form, complete and readable."""
-    trajectory = movement.trajectory
-    if movement.kind not in KIND_WORDS:
-        raise MovementError(f"movement {movement.name} is made of samples: save it as a .csv file")
-    lines = [
-        f"# A movement of the TCP, {KIND_WORDS[movement.kind]}.",
-        "# x, y, z over t derive from it; docs/movements.md explains the fields.",
-        f"format = {_FORMAT}",
-        f"name = {toml_value(movement.name)}",
-        f"kind = {toml_value(movement.kind)}",
-        f"duration = {toml_value(movement.duration)}  # s",
-        f"stroke_durations = {toml_value(movement.stroke_durations.tolist())}  # s",
-        "target_points = [  # m, robot base frame",
-        *(f"    {toml_value(point)}," for point in movement.target_points.tolist()),
-        "]",
-    ]
-    if movement.provenance:
-        lines += ["", "[provenance]"]
-        lines += [f"{_toml_key(key)} = {toml_value(value)}" for key, value in movement.provenance.items()]
-    lines += trajectory_lines(trajectory)
-    return "\n".join(lines) + "\n"
-
-
-def _toml_key(key: str) -> str:
-    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else toml_value(key)
-
-
 def _read(path: Path) -> Movement | JointTrajectory:
     suffix = path.suffix.lower()
     if suffix not in (".toml", ".csv"):
         raise MovementError(f"{path}: movement files are .toml (parameters) or .csv (samples)")
     if suffix == ".csv":
         return _parse_samples(FILE_KINDS["samples"].read_text(path), path)
-    return _parse_movement(TableReader(FILE_KINDS["movement"].read_toml(path), str(path)), str(path))
+    return parse_movement(FILE_KINDS["movement"].read_toml(path), str(path))
 
 
 def _parse_samples(text: str, path: Path) -> Movement | JointTrajectory:
@@ -182,38 +140,10 @@ def _parse_samples(text: str, path: Path) -> Movement | JointTrajectory:
     rows = parse_rows(text, str(path), (*FORMS, JOINT_COLUMNS), wanted)
     if len(rows.values) < MIN_SAMPLES:
         raise MovementError(f"{path}: {len(rows.values)} samples; a movement needs at least {MIN_SAMPLES}")
-    with _naming(str(path)):
+    try:
         if rows.columns == JOINT_COLUMNS:
             return JointTrajectory(rows.values[:, 0], rows.values[:, 1:], path.stem)
         trajectory = samples_of(rows)
         return Movement(path.stem, trajectory, np.array([trajectory.duration]), {"file": path.name})
-
-
-def _parse_movement(table: TableReader, source: str) -> Movement:
-    version = table.number("format")
-    if version != _FORMAT:
-        raise table.error("format", f"{version:g}; this program reads format {_FORMAT}")
-    name, kind = table.text("name"), table.text("kind")
-    points = table.points("target_points")
-    provenance = table.table("provenance").facts() if "provenance" in table else {}
-    duration = table.number("duration")
-    if len(points) > MOST_POINTS:
-        raise table.error("target_points", f"{len(points)} points; give {MOST_POINTS} at most")
-    durations = np.array(table.numbers("stroke_durations")) if "stroke_durations" in table else None
-    with _naming(source):
-        check_name(name)
-        check_duration(duration, f"movement {name}")
-        trajectory, durations = parse_trajectory(kind, table, points, duration, durations)
-        table.finish(_FIELDS)
-        return Movement(name, trajectory, durations, provenance)
-
-
-@contextmanager
-def _naming(source: str) -> Iterator[None]:
-    """Put the file's name before messages of those who do not know it."""
-    try:
-        yield
     except MovementError as error:
-        if str(error).startswith(source):
-            raise
-        raise MovementError(f"{source}: {error}") from error
+        raise MovementError(f"{path}: {error}") from error

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pc_client.errors import CellError
 from pc_client.kinematics.cell import NO_CELL, Solid, Wall
 from pc_client.kinematics.cell_file import MOST_BODIES, load_cell, parse_cell
-from pc_client.toml_tables import toml_value
+from pc_client.movements.movement_file import toml_value
 
 SIZES = {"boxes": 3, "cylinders": 2, "spheres": 1, "capsules": 2}
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cell.toml"

@@ -18,9 +18,10 @@ from pc_client.movements import (
     load_movement,
     save_movement,
 )
-from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_SETS, movement_text
+from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_SETS
 from pc_client.movements.generate import write_library
 from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.movement_file import movement_text
 from pc_client.movements.robotic import RoboticTrajectory
 from pc_client.movements.samples import SampledTrajectory
 from pc_client.movements.sigma_lognormal import SigmaLognormal
@@ -158,8 +159,12 @@ ROBOT = movement_text(load_movement("arcs/uniform_4_1"))
         (HUMAN, ("format = 1", "format = 2"), "format: 2"),
         (HUMAN, ("format = 1", ""), "format: missing"),
         (HUMAN, ('name = "arcs_lognorm_4_1"', "name = 3"), "name: 3; give a text"),
-        (HUMAN, ('kind = "lognormal"', 'kind = "human"'), 'kind: "human"'),
-        (HUMAN, ("duration = 5.901", 'duration = "long"'), "duration: 'long'; give a finite number"),
+        (HUMAN, ('kind = "lognormal"', 'kind = "human"'), "kind: 'human'; give one of lognormal, uniform"),
+        (
+            HUMAN,
+            ("duration = 5.901", 'duration = "long"'),
+            "duration: 'long'; give a number from 0 to 1200 s",
+        ),
         (HUMAN, ("duration = 5.901", "duration = 4.0"), "add up to 5.901000 s"),
         (HUMAN, ("sigma = 0.183", "sigma = -1"), "sigma -1"),
         (HUMAN, ("sigma = 0.183", "sigma = nan"), "strokes[1].sigma: nan"),
@@ -167,19 +172,33 @@ ROBOT = movement_text(load_movement("arcs/uniform_4_1"))
         (
             HUMAN,
             ("tilt = 1.327", "tlit = 1.327"),
-            "strokes[0].tlit: no such field; known are arc_angle, tilt",
+            "strokes[0].tlit: no such key; did you mean tilt?",
         ),
         (HUMAN, ("[[strokes]]", "[[stroke]]"), "strokes: missing"),
         (
             HUMAN,
+            ("sigma = 0.183", "mu = 0.183"),
+            "a stroke with start, duration, mu; give start, duration, sigma",
+        ),
+        (
+            HUMAN,
+            ("[provenance]", "[provenance]\ndone = true"),
+            "provenance.done: True; give a text or a number",
+        ),
+        (
+            HUMAN,
             ("0.3061, 0.1286, 0.2948", "0.3061, 0.1286"),
-            "target_points[0]: [0.3061, 0.1286]; give a point",
+            "target_points[0][2]: missing; give a finite number in m, robot base frame",
         ),
         (HUMAN, ("0.3061, 0.1286, 0.2948", "0.3061, 0.1286, inf"), "target_points[0][2]: inf"),
         (HUMAN, ("    [0.3061, 0.1286, 0.2948],\n", ""), "3 strokes with target points of shape (3, 3)"),
         (HUMAN, ("format = 1", "format = = 1"), "line 3"),
         (ROBOT, ("[profile]", "[profil]"), "profile: missing"),
-        (ROBOT, ('corners = "stop"', 'corners = "round"'), 'profile.corners: "round"'),
+        (
+            ROBOT,
+            ('corners = "stop"', 'corners = "round"'),
+            "profile.corners: 'round'; give 'stop' or 'blend'",
+        ),
         (ROBOT, ("ramps = [0.16, 0.05]", "ramps = 0.2"), "profile.ramps: 0.2; give a list"),
         (ROBOT, ("ramps = [0.16, 0.05]", "ramps = [0.2, 0.1, 0.1]"), "one boxcar width"),
         (ROBOT, ("ramps = [0.16, 0.05]", "ramps = [2.2, 0.1]"), "every stroke must last longer"),

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pc_client.errors import MovementError
 from pc_client.movements import Movement, generate_movement, load_movement, save_movement
 from pc_client.movements.durations import Fitts, Isochrony, chained_windows, leg_lengths, retimed
-from pc_client.movements.files import movement_text
+from pc_client.movements.movement_file import movement_text
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Stroke
 from pc_client.movements.timing import FULL_COVERAGE, TwoSidedTiming
@@ -90,11 +90,15 @@ POWER = movement_text(generate_movement("power_law", 4, 1))
 @pytest.mark.parametrize(
     ("text", "change", "complaint"),
     [
-        (JERK, ('passing = "stop"', 'passing = "blend"'), 'profile.passing: "blend"; give "stop" or "via"'),
-        (JERK, ('passing = "stop"', 'passing = "stop"\nramps = [1]'), "profile.ramps: no such field"),
+        (JERK, ('passing = "stop"', 'passing = "blend"'), "profile.passing: 'blend'; give 'stop' or 'via'"),
+        (JERK, ('passing = "stop"', 'passing = "stop"\nramps = [1]'), "profile.ramps: no such key"),
         (JERK, ("duration = 8.685", "duration = 6.0"), "duration: 6.0 s"),
         (JERK, ("stroke_durations", "durations"), "stroke_durations: missing"),
-        (JERK, ('kind = "minimum_jerk"', 'kind = "jerk"'), '"minimum_jerk", "power_law" (samples'),
+        (
+            JERK,
+            ('kind = "minimum_jerk"', 'kind = "jerk"'),
+            "kind: 'jerk'; give one of lognormal, uniform, minimum_jerk, power_law",
+        ),
         (POWER, ("largest_radius = 1.0", "largest_radius = -1.0"), "largest radius of -1.0 m"),
         (POWER, ("largest_radius = 1.0", ""), "profile.largest_radius: missing"),
         (POWER, ("exponent = 0.3333333333333333", "exponent = 3.0"), "exponent 3.0"),
