@@ -105,7 +105,7 @@ class Table:
             "rows": finite(self.frame.drop("n_targets").to_dicts(), 6),
             "mean_snr_db": finite({kind: self.mean_of(kind) for kind in KINDS}, 6),
             "paper_mean_snr_db": {kind: self.mean_of(kind, PAPER.name) for kind in KINDS},
-            "loop": finite(dict(self.loop), 6),
+            "loop": finite(dict(p.loop), 6),
         }
 
     def to_markdown(self) -> str:
@@ -137,11 +137,6 @@ class Table:
     def has_paper_rows(self) -> bool:
         """Whether a movement has the name of one in the paper's Table I."""
         return not PAPER_SNR_DB.keys().isdisjoint(self.runs)
-
-    @property
-    def loop(self) -> Mapping[str, float | str]:
-        """What the client identified of the loop and its margins; empty for old recordings."""
-        return self.provenance.loop
 
     @property
     def title(self) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.experiment import execute
+from pc_client.commands.experiment import execute, read_runs
 from pc_client.commands.options import OutOption, console, say
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
 
@@ -46,28 +46,13 @@ def compare(
     runs = None
     if robot is not None:
         execute(movements, robot, out, 1, settings)
-        runs = _read_runs(out)
+        runs = {run.provenance.movement: run for run in read_runs(out)}
     save_sets(made, out / "movements")
     with console.status("measuring"):
         table = build_comparison(made, runs)
     console.print(table.to_rich())
     for path in _write(table, made[0], runs, out):
         say(str(path))
-
-
-def _read_runs(out: Path) -> dict[str, MeasuredRun]:
-    """The runs of a folder by the movement's name."""
-    from rich.progress import track
-
-    from pc_client.analysis.run import analyse_run
-    from pc_client.recording.loader import load_recording
-
-    files = sorted(out.glob("*.mcap"))
-    runs = [
-        analyse_run(load_recording(path))
-        for path in track(files, description="reading", console=console, transient=True)
-    ]
-    return {run.provenance.movement: run for run in runs}
 
 
 def _write(

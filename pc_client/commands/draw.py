@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pc_client.commands.before_motion import reach
-from pc_client.commands.experiment import execute
+from pc_client.commands.experiment import execute, read_runs
 from pc_client.commands.options import OutOption, RepeatOption, RobotOption, TimeUnitOption, console, say
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import MovementError
@@ -197,19 +197,11 @@ def _summary(drawing: Drawing) -> str:
 
 def _judge(drawings: Sequence[Drawing], out: Path) -> list[Entry]:
     """Read the recordings of the runs and compute all figures."""
-    from rich.progress import track
-
-    from pc_client.analysis.run import analyse_run
     from pc_client.drawing.execution import executed
     from pc_client.drawing.judgement import judge
     from pc_client.drawing.table import Entry
-    from pc_client.recording.loader import load_recording
 
-    runs = [
-        analyse_run(load_recording(path))
-        for path in track(sorted(out.glob("*.mcap")), description="reading", console=console, transient=True)
-    ]
-    runs.sort(key=lambda run: run.provenance.repetition)
+    runs = sorted(read_runs(out), key=lambda run: run.provenance.repetition)
     entries = []
     for drawing in drawings:
         own = [run for run in runs if run.provenance.movement == drawing.movement.name]

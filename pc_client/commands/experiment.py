@@ -22,6 +22,7 @@ from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import ClientError
 
 if TYPE_CHECKING:
+    from pc_client.analysis.run import MeasuredRun
     from pc_client.experiment.prepare import Motion
 
 
@@ -105,3 +106,18 @@ def execute(movements: Sequence[Motion], robot: str, out: Path, repeat: int, set
     )
     for remark in report.remarks:
         say(remark)
+
+
+def read_runs(folder: Path) -> list[MeasuredRun]:
+    """Read and measure all recordings of a folder, by their file names.
+
+    Raises:
+        RecordingError: one cannot be read or measured.
+    """
+    from rich.progress import track
+
+    from pc_client.analysis.run import analyse_run
+    from pc_client.recording.loader import load_recording
+
+    files = track(sorted(folder.glob("*.mcap")), description="reading", console=console, transient=True)
+    return [analyse_run(load_recording(path)) for path in files]

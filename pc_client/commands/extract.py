@@ -124,7 +124,7 @@ def _run(
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from pc_client.executors import open_executor, usable_cores
-    from pc_client.extraction.batch import extract_sources
+    from pc_client.extraction.batch import extract_many
 
     if not sources:
         return []
@@ -141,7 +141,7 @@ def _run(
     )
     with bar, open_executor(workers, dask) as executor:
         task = bar.add_task("extracting", total=len(sources))
-        return extract_sources(
+        return extract_many(
             sources, executor, options, time_unit, n_pictures, lambda outcome: bar.advance(task)
         )
 

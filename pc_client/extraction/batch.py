@@ -1,7 +1,7 @@
 """Many recordings at once, in any `concurrent.futures.Executor`.
 
     with open_executor() as executor:
-        outcomes = extract_many(["drawings.zip", "mine.csv"], executor)
+        outcomes = extract_many(pen_sources(["drawings.zip", "mine.csv"]), executor)
 
 Files are read here and their bytes handed to the jobs, so a worker on another machine needs no disk of ours.
 A recording that cannot be used has an outcome that says so; it does not stop the others.
@@ -12,16 +12,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from pc_client.errors import ClientError, RecordingError
 from pc_client.extraction.extract import ExtractOptions, extract
 from pc_client.extraction.files import parse_pen
 from pc_client.extraction.results import Row, StrokeRow, row_of, stroke_rows
-from pc_client.extraction.sources import PenSource, contents, pen_sources
+from pc_client.extraction.sources import PenSource, contents
 from ur_hil.input_files import MIB
 
-__all__ = ["Job", "Outcome", "extract_many", "extract_sources", "run_job"]
+__all__ = ["Job", "Outcome", "extract_many", "run_job"]
 
 _IN_FLIGHT = 128
 """Jobs handed over and not yet done; enough for many workers."""
@@ -86,30 +85,6 @@ def run_job(job: Job) -> Outcome:
 
 
 def extract_many(
-    paths: Sequence[str | Path],
-    executor: Executor,
-    options: ExtractOptions | None = None,
-    time_unit: str | None = None,
-) -> list[Outcome]:
-    """Extract all recordings that files, folders and .zip archives hold.
-
-    Args:
-        paths: what to extract from.
-        executor: where.
-        options: of each extraction.
-        time_unit: a key of `files.TIME_UNITS`, or None: from each file.
-
-    Returns:
-        One outcome a recording, in the order of `sources.pen_sources`.
-
-    Raises:
-        RecordingError: a folder or an archive cannot be opened, or holds no recording.
-        ClientError: the executor broke down.
-    """
-    return extract_sources(pen_sources(paths), executor, options, time_unit)
-
-
-def extract_sources(
     sources: Sequence[PenSource],
     executor: Executor,
     options: ExtractOptions | None = None,
@@ -117,15 +92,18 @@ def extract_sources(
     n_pictures: int = 0,
     on_outcome: Callable[[Outcome], None] = lambda outcome: None,
 ) -> list[Outcome]:
-    """Like `extract_many`, of recordings that were looked up before.
+    """Extract recordings.
 
     Args:
-        sources: what to extract from.
+        sources: what to extract from, as `sources.pen_sources` finds it in files, folders and .zip archives.
         executor: where.
         options: of each extraction.
         time_unit: a key of `files.TIME_UNITS`, or None: from each file.
         n_pictures: how many of the first recordings get a picture.
         on_outcome: called with every outcome as it comes in, in any order.
+
+    Returns:
+        One outcome a recording, in the order of the sources.
 
     Raises:
         ClientError: the executor broke down.

@@ -14,7 +14,7 @@ from extraction_samples import DRAWINGS, needs_drawings, own_strokes, recorded
 import pc_client.extraction.batch as batch
 from pc_client.errors import ClientError, RecordingError
 from pc_client.executors import open_executor
-from pc_client.extraction.batch import extract_many, extract_sources
+from pc_client.extraction.batch import extract_many
 from pc_client.extraction.extract import extract
 from pc_client.extraction.results import STROKE_COLUMNS, Row, StrokeRow, row_of, stroke_rows, to_json
 from pc_client.extraction.sources import pen_sources
@@ -76,17 +76,17 @@ def check(outcomes, folder):
 
 
 def test_one_after_the_other(folder):
-    check(extract_many([folder], AtOnce()), folder)
+    check(extract_many(pen_sources([folder]), AtOnce()), folder)
 
 
 def test_in_threads(folder):
     with ThreadPoolExecutor(2) as executor:
-        check(extract_many([folder], executor), folder)
+        check(extract_many(pen_sources([folder]), executor), folder)
 
 
 def test_in_processes(folder):
     with open_executor(workers=1) as executor:
-        check(extract_many([folder], executor), folder)
+        check(extract_many(pen_sources([folder]), executor), folder)
 
 
 def test_on_a_dask_cluster(folder):
@@ -97,27 +97,27 @@ def test_on_a_dask_cluster(folder):
         ) as cluster,
         open_executor(dask=cluster.scheduler_address) as executor,
     ):
-        check(extract_many([folder], executor), folder)
+        check(extract_many(pen_sources([folder]), executor), folder)
 
 
 def test_every_outcome_is_told_once_and_few_jobs_are_in_flight(folder, monkeypatch):
     monkeypatch.setattr(batch, "_IN_FLIGHT", 2)
     told = []
     with ThreadPoolExecutor(2) as executor:
-        outcomes = extract_sources(pen_sources([folder]), executor, on_outcome=told.append)
+        outcomes = extract_many(pen_sources([folder]), executor, on_outcome=told.append)
     check(outcomes, folder)
     assert sorted(outcome.name for outcome in told) == [outcome.name for outcome in outcomes]
 
 
 def test_pictures_of_the_first(folder):
-    outcomes = extract_sources(pen_sources([folder]), AtOnce(), n_pictures=2)
+    outcomes = extract_many(pen_sources([folder]), AtOnce(), n_pictures=2)
     assert outcomes[0].picture.startswith(b"\x89PNG")
     assert [outcome.picture for outcome in outcomes[1:]] == [None] * 4
 
 
 def test_an_executor_that_breaks_down_is_one_line(folder):
     with pytest.raises(ClientError, match=r"a worker ended .*out of memory.*fewer workers"):
-        extract_many([folder], AtOnce(broken_from=1))
+        extract_many(pen_sources([folder]), AtOnce(broken_from=1))
 
 
 def test_a_fault_of_ours_costs_one_recording(folder, monkeypatch):
@@ -127,14 +127,14 @@ def test_a_fault_of_ours_costs_one_recording(folder, monkeypatch):
         return extract(recording, options)
 
     monkeypatch.setattr(batch, "extract", faulty)
-    outcomes = extract_many([folder], AtOnce())
+    outcomes = extract_many(pen_sources([folder]), AtOnce())
     assert "a.csv: the extraction failed (ZeroDivisionError" in outcomes[0].error
     assert outcomes[2].row is not None
 
 
 def test_nothing_to_do_is_said(tmp_path):
     with pytest.raises(RecordingError, match="in this folder"):
-        extract_many([tmp_path], AtOnce())
+        extract_many(pen_sources([tmp_path]), AtOnce())
 
 
 def test_json_has_no_nan_and_the_stated_keys():
@@ -177,7 +177,7 @@ def test_drawings_drawn_at_random_reach_the_figures():
     sources = pen_sources([DRAWINGS])
     chosen = [sources[i] for i in np.random.default_rng(7).choice(len(sources), 30, replace=False)]
     with open_executor() as executor:
-        rows = [outcome.row for outcome in extract_sources(chosen, executor)]
+        rows = [outcome.row for outcome in extract_many(chosen, executor)]
     snr_v = np.array([row.snr_v_db for row in rows if row.snr_v_db is not None])
     assert len(snr_v) >= 29
     assert snr_v.mean() >= 20.0
