@@ -83,28 +83,13 @@ def row_of(extraction: Extraction) -> Row:
 def stroke_rows(extraction: Extraction) -> Iterator[StrokeRow]:
     """All strokes of an extraction, in their order."""
     for number, part in enumerate(extraction.parts, start=1):
-        trajectory = part.trajectory
-        for index, (stroke, length) in enumerate(
-            zip(trajectory.strokes, trajectory.lengths.tolist(), strict=True)
-        ):
-            lognormal = stroke.timing.lognormal
-            begin, end = (
-                trajectory.target_points[index].tolist(),
-                trajectory.target_points[index + 1].tolist(),
-            )
-            yield StrokeRow(
-                extraction.name,
-                number,
-                index + 1,
-                lognormal.t0,
-                lognormal.mu,
-                lognormal.sigma,
-                length,
-                stroke.arc_angle,
-                stroke.tilt,
-                *begin,
-                *end,
-            )
+        points, lengths = part.trajectory.target_points.tolist(), part.trajectory.lengths.tolist()
+        for index, stroke in enumerate(part.trajectory.strokes):
+            speed = stroke.timing.lognormal
+            timing = (speed.t0, speed.mu, speed.sigma)
+            shape = (lengths[index], stroke.arc_angle, stroke.tilt)
+            ends = (*points[index], *points[index + 1])
+            yield StrokeRow(extraction.name, number, index + 1, *timing, *shape, *ends)
 
 
 def to_json(rows: Iterable[Row]) -> str:
