@@ -8,7 +8,7 @@ no limits, no sockets.
     minimum_jerk; smooth_path, power_law             two other models of human movement
     durations, variability                           how long strokes last; the same movement another time
     columns, samples                                 tables of numbers as text; (x, y, z, t) files
-    movement, movement_file, files, description  the `Movement`, its file, the library; its figures
+    movement, movement_file, files, description      the `Movement`, its file, the library; its figures
     targets, fit, geometry                           random target points; movements into a workspace
     recipe, arcs, twins, generate                    new movements by a seed, and the library's
     own_points                                       new movements through one's own points

@@ -6,7 +6,6 @@ of what is wrong.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -20,6 +19,7 @@ from pc_client.movements.joint_trajectory import JOINT_COLUMNS, JointTrajectory
 from pc_client.movements.movement import Movement
 from pc_client.movements.movement_file import movement_text, parse_movement
 from pc_client.movements.samples import FORMS, MIN_SAMPLES, SampledTrajectory, samples_of, write_samples
+from ur_hil.records import nearest
 
 __all__ = [
     "DEFAULT_SET",
@@ -94,11 +94,9 @@ def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
     path = Path(name_or_path)
     if not path.suffix and not path.exists():
         known = [name for names in LIBRARY_SETS.values() for name in names]
-        near = difflib.get_close_matches(str(name_or_path), known, n=1)
-        hint = f"did you mean {near[0]}? " if near else ""
         raise MovementError(
-            f'no movement "{name_or_path}": {hint}give the path of a .toml or .csv file, '
-            f"or one of {', '.join(known)}"
+            f'no movement "{name_or_path}": {nearest(str(name_or_path), known)}; '
+            "give one of the library, or the path of a .toml or .csv file"
         )
     return _read(path)
 

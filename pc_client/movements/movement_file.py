@@ -114,7 +114,6 @@ _KINDS: Mapping[str, tuple[str, type[_File]]] = {
     "minimum_jerk": ("human-like: least jerk", _MinimumJerkFile),
     "power_law": ("human-like: the two-thirds power law", _PowerLawFile),
 }
-
 _KIND = word(_KINDS)
 
 #: What makes the timing of a stroke, by the fields that are given.
@@ -154,9 +153,8 @@ def movement_text(movement: Movement) -> str:
         raise MovementError(f"movement {movement.name} is made of samples: save it as a .csv file")
     words, made = _KINDS[movement.kind]
     trajectory = movement.trajectory
-    shape: dict[str, Any]
     if isinstance(trajectory, SigmaLognormal):
-        shape = {"strokes": tuple(map(_stroke_table, trajectory.strokes))}
+        shape: dict[str, Any] = {"strokes": tuple(map(_stroke_table, trajectory.strokes))}
     else:
         profile = get_type_hints(made)["profile"]
         shape = {"profile": profile(**{row.name: getattr(trajectory, row.name) for row in fields(profile)})}
@@ -170,14 +168,8 @@ def movement_text(movement: Movement) -> str:
         provenance=movement.provenance,
         **shape,
     )
-    return "\n".join(
-        (
-            f"# A movement of the TCP, {words}.",
-            "# x, y, z over t derive from it; docs/movements.md explains the fields.",
-            *_lines(file),
-            "",
-        )
-    )
+    comment = f"A movement of the TCP, {words}.\n# x, y, z over t derive from it; docs/movements.md explains"
+    return "\n".join((f"# {comment} the fields.", *_lines(file), ""))
 
 
 def toml_value(value: Any) -> str:

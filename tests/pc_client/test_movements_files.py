@@ -241,7 +241,7 @@ def test_a_stroke_by_k_is_a_stroke_by_its_lead(tmp_path: Path) -> None:
     ("name", "complaint"),
     [
         ("lognorm_4_3", "did you mean lognorm_"),
-        ("nothing like it", "or one of uniform_4_1"),
+        ("nothing like it", "known are uniform_4_1"),
         ("gone/away.toml", "away.toml: cannot be read (No such file"),
         ("movement.json", ".toml (parameters) or .csv"),
     ],
