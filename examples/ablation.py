@@ -21,6 +21,7 @@ from statistics import fmean
 from typing import Any
 
 from pc_client.control.controller import CONTROLLERS, Controller
+from pc_client.errors import ClientError
 from pc_client.movements.files import library_names
 from protocol.ur_types import Ports
 
@@ -53,6 +54,10 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--quick", action="store_true", help="two movements, two compositions, one box")
     parser.add_argument("--set", default="arcs", help="of the library; arcs is what docs/tracking.md shows")
+    parser.add_argument(
+        "--fidelity", nargs="+", help="boxes of these fidelities or files instead, and --composition on each"
+    )
+    parser.add_argument("--composition", nargs="+", choices=COMPOSITIONS, default=list(COMPOSITIONS))
     options = parser.parse_args()
     movements = ["lognorm_4_1", "uniform_4_1"] if options.quick else library_names(options.set)
     cases = [
@@ -62,10 +67,21 @@ def main() -> int:
     ]
     if options.quick:
         cases = [(name, "typical", options.seed, "lockstep") for name in ("preview", "best")]
+    if options.fidelity:
+        cases = [
+            (name, fidelity, options.seed, "lockstep")
+            for fidelity in options.fidelity
+            for name in options.composition
+        ]
     results: list[dict[str, Any]] = []
     for name, fidelity, seed, pace in cases:
-        folder = options.out / f"{name.replace(', ', '_').replace(' ', '_')}-{fidelity}-{seed}-{pace}"
-        result = run_case(name, fidelity, seed, pace, folder, movements)
+        words = (name.replace(", ", "_").replace(" ", "_"), Path(fidelity).stem, str(seed), pace)
+        folder = options.out / "-".join(words)
+        try:
+            result = run_case(name, fidelity, seed, pace, folder, movements)
+        except ClientError as error:
+            print(f"{name:18} {fidelity:8} seed {seed} {pace:8}  {error}", flush=True)
+            continue
         print(f"{name:18} {fidelity:8} seed {seed} {pace:8}  {result['summary']}", flush=True)
         results.append(result)
         write(results, options.out)
@@ -112,7 +128,7 @@ def run_case(
     summary = "  ".join(f"{kind} {' '.join(f'{x:.2f}' for x in means[kind])} dB" for kind in KINDS)
     return {
         "composition": name,
-        "fidelity": fidelity,
+        "fidelity": Path(fidelity).stem,
         "seed": seed,
         "pace": pace,
         "rows": rows,

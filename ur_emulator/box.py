@@ -90,7 +90,8 @@ class Box(BoxOperations):
             pace: "realtime" or "lockstep".
             speed: how many times as fast as real time (realtime pace only).
             seed: of calibration, phases and noise; the same seed is the same arm.
-            fidelity: "exact" (no physics: measured equals asked), "ideal", "typical" or "poor".
+            fidelity: "exact" (no physics: measured equals asked), "ideal", "typical", "poor", or a file
+                that ends in .toml (docs/fidelity.md).
             port_base: offset added to all standard ports; None takes free ports.
             programs: folder of programs and installations, for the dashboard's `load`; None for none.
             control_port: number of the port for the control API over HTTP (docs/control.md); 0: a free one,

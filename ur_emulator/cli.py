@@ -53,7 +53,10 @@ def serve(
     speed: Annotated[float, typer.Option(help="Times as fast as real time (realtime pace only).")] = 1.0,
     seed: Annotated[int, typer.Option(help="Which arm: calibration, gear phases, delays, noise.")] = 0,
     fidelity: Annotated[
-        str, typer.Option(help="How imperfect the arm is: exact (no physics), ideal, typical or poor.")
+        str,
+        typer.Option(
+            help="How imperfect the arm is: exact (no physics), ideal, typical, poor, or FILE.toml."
+        ),
     ] = "typical",
     port_base: Annotated[int, typer.Option(help="Offset added to all standard ports.")] = 0,
     boxes: Annotated[

@@ -3,7 +3,8 @@
 Four sets have names. `exact` has no physics: what is measured is the target, as in the maker's simulator.
 `ideal` is for debugging clients: hardly a delay, hardly any noise. `typical` is what
 logs and reports of real arms show, and the default. `poor` is an arm and a network at the bad end of what
-users report. Every imperfection is here; every number of the arm itself is in `RobotModel`.
+users report. A file names one of them and says what is otherwise (`read_fidelity`). Every imperfection is
+here; every number of the arm itself is in `RobotModel`.
 
 Sources, cited by letter below:
  A  Logs of a real UR3e at rest and moving, 500 Hz (kevinhpham/DalESelfEBot): encoder noise, steps, the filter
@@ -19,12 +20,28 @@ Sources, cited by letter below:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Annotated
 
-ALL_JOINTS = (0, 1, 2, 3, 4, 5)
+from ur_emulator.errors import ModelError
+from ur_hil.input_files import MIB, FileKind
+from ur_hil.records import FieldError, Items, checked, nearest, number, record, whole, word
+
+_FILE = FileKind(MIB, ModelError, "all fields have less than 0.01 MiB")
+_LARGEST_SLOPE = 0.5
+"""Of all waves of a gear together: beyond it the joint might turn back while its motor goes on."""
+
+Share = Annotated[float, number(0.0, 1.0)]
+Angle = Annotated[float, number(0.0, 0.1, "rad")]
+Time = Annotated[float, number(0.0, 0.2, "s")]
+Noise = Annotated[float, number(0.0, 1000.0)]
+SixAngles = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
+SixNoises = tuple[Noise, Noise, Noise, Noise, Noise, Noise]
+Pole = Annotated[float, number(0.1, 10_000.0, "Hz")]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Ripple:
     """One wave of the gears' transmission error.
 
@@ -35,13 +52,13 @@ class Ripple:
         joints: which joints have it, 0 is the base.
     """
 
-    cycles: float
-    rms: float
-    phase: float | None = None
-    joints: tuple[int, ...] = ALL_JOINTS
+    cycles: Annotated[float, number(1.0, 2000.0)]
+    rms: Annotated[float, number(0.0, 0.2)]
+    phase: Annotated[float, number(-10.0, 10.0, "rad")] | None = None
+    joints: Annotated[tuple[Annotated[int, whole(0, 5)], ...], Items(1, 6)] = (0, 1, 2, 3, 4, 5)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Fidelity:
     """One set of imperfections.
 
@@ -81,33 +98,62 @@ class Fidelity:
     """
 
     name: str
-    dead_time: float
-    dead_time_spread: float
-    dead_time_wander: float
-    dead_time_period: float
-    drive_lag: float
-    drive_damping: float | None
-    feedback_age: float
-    sample_jitter: float
-    encoder_sigma: tuple[float, ...]
-    encoder_step: float
-    speed_filter_hz: tuple[float, ...]
-    speed_dead_band: float
-    speed_sigma: float
-    current_sigma: tuple[float, ...]
-    ripples: tuple[Ripple, ...]
-    backlash: float
-    friction_presliding: float
-    friction_error: float
-    mass_error: float
-    calibration_length: float
-    calibration_angle: float
-    force_bias: float
-    force_sigma: float
-    force_friction: float
-    accelerometer_sigma: float
-    voltage_sigma: float
+    dead_time: Time
+    dead_time_spread: Time
+    dead_time_wander: Time
+    dead_time_period: Annotated[float, number(0.1, 600.0, "s")]
+    drive_lag: Time
+    drive_damping: Annotated[float, number(0.1, 5.0)] | None
+    feedback_age: Time
+    sample_jitter: Annotated[float, number(0.0, 0.01, "s")]
+    encoder_sigma: SixAngles
+    encoder_step: Annotated[float, number(1e-9, 0.1, "rad")]
+    speed_filter_hz: tuple[Pole, Pole, Pole, Pole, Pole, Pole]
+    speed_dead_band: Annotated[float, number(0.0, 1.0, "rad/s")]
+    speed_sigma: Annotated[float, number(0.0, 1.0, "rad/s")]
+    current_sigma: SixNoises
+    ripples: Annotated[tuple[Ripple, ...], Items(0, 20)]
+    backlash: Angle
+    friction_presliding: Angle
+    friction_error: Share
+    mass_error: Share
+    calibration_length: Annotated[float, number(0.0, 0.01, "m")]
+    calibration_angle: Angle
+    force_bias: Noise
+    force_sigma: Noise
+    force_friction: Noise
+    accelerometer_sigma: Noise
+    voltage_sigma: Noise
     has_physics: bool = True
+
+    def __post_init__(self) -> None:
+        if self.drive_damping is not None and not self.drive_lag:
+            raise FieldError("drive_damping", "a filter of second order has a lag; give drive_lag above 0")
+        for joint in range(6):
+            slope = sum(2.0**0.5 * ripple.rms for ripple in self.ripples if joint in ripple.joints)
+            if slope > _LARGEST_SLOPE:
+                raise FieldError(
+                    "ripples",
+                    f"the waves of joint {joint} change its speed by up to {slope:.0%}; give smaller rms, "
+                    f"together less than {_LARGEST_SLOPE:.0%} / sqrt(2)",
+                )
+
+
+def read_fidelity(path: Path) -> Fidelity:
+    """The fidelity of a file: `base`, one of those below, and other values of its fields.
+
+    Raises:
+        ModelError: the file cannot be read, a field does not exist or cannot hold its value.
+    """
+    values = _FILE.read_toml(path)
+    bases = {it.name: it for it in FIDELITIES if it.has_physics}
+    base = bases[checked(word(bases), values.pop("base", TYPICAL.name), f"{path}: base", ModelError)]
+    own = {field.name: getattr(base, field.name) for field in fields(base)} | {"name": path.stem}
+    known = own.keys() - {"name", "has_physics"}
+    for name in values:
+        if name not in known:
+            raise ModelError(f"{path}: {name}: no such key; {nearest(name, sorted(known))}")
+    return checked(Fidelity, {**own, **values}, str(path), ModelError)
 
 
 TYPICAL = Fidelity(
@@ -126,7 +172,10 @@ TYPICAL = Fidelity(
     speed_dead_band=1e-3,  # E
     speed_sigma=1e-3,  # A: what is left of 2-6 mrad/s after the ripple
     current_sigma=(0.015, 0.015, 0.012, 0.010, 0.010, 0.010),  # A: 7-20 mA
-    ripples=(Ripple(101.0, 0.008), Ripple(202.0, 0.006)),  # A: .5-1.5 % rms, both together
+    ripples=(
+        Ripple(cycles=101.0, rms=0.008),
+        Ripple(cycles=202.0, rms=0.006),
+    ),  # A: .5-1.5 % rms, both together
     backlash=0.0,  # of strain wave gears; E
     friction_presliding=0.0,
     friction_error=0.15,  # E: friction changes with temperature by more than that
@@ -152,7 +201,7 @@ IDEAL = replace(
     encoder_step=1e-7,
     speed_sigma=1e-5,
     current_sigma=(0.001,) * 6,
-    ripples=(Ripple(101.0, 0.0002), Ripple(202.0, 0.0002)),
+    ripples=(Ripple(cycles=101.0, rms=0.0002), Ripple(cycles=202.0, rms=0.0002)),
     friction_error=0.0,
     mass_error=0.0,
     calibration_length=0.0,  # like the vendor's simulator: the nominal table itself
@@ -173,7 +222,7 @@ POOR = replace(
     drive_lag=0.014,
     feedback_age=0.010,
     sample_jitter=5e-5,
-    ripples=(Ripple(101.0, 0.016), Ripple(202.0, 0.012)),
+    ripples=(Ripple(cycles=101.0, rms=0.016), Ripple(cycles=202.0, rms=0.012)),
     friction_error=0.30,
     mass_error=0.04,
     force_bias=10.0,

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
+from pathlib import Path
 
 from protocol.dashboard.commands import DashboardCommand, commands_of
 from protocol.errors import LocalProtocolError
@@ -18,7 +19,7 @@ from protocol.realtime.layout import RealtimeLayout, frame_size
 from protocol.rtde.fields import RtdeField, input_fields, output_fields
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
-from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.fidelity import Fidelity, read_fidelity
 from ur_emulator.models.software import Software
 from urscript.catalogue import Builtin, catalogue_for
 
@@ -137,16 +138,18 @@ class RobotGeneration:
         return version
 
     def fidelity(self, name: str) -> Fidelity:
-        """Look a fidelity up by its name, in any letter case.
+        """Look a fidelity up by its name, in any letter case; a name that ends in .toml is a file.
 
         Raises:
-            ModelError: no set has that name.
+            ModelError: no set has that name, or the file is wrong.
         """
+        if name.endswith(".toml"):
+            return read_fidelity(Path(name))
         for fidelity in self.fidelities:
             if fidelity.name == name.lower():
                 return fidelity
         known = ", ".join(fidelity.name for fidelity in self.fidelities)
-        raise ModelError(f"unknown fidelity {name!r}: choose one of {known}")
+        raise ModelError(f"unknown fidelity {name!r}: choose one of {known}, or give FILE.toml")
 
     def software(self, version: SoftwareVersion) -> Software:
         """Return a version of the software, with its part of every table; a build number above 0 stays."""
