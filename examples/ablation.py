@@ -12,7 +12,7 @@ import argparse
 import json
 import multiprocessing
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -22,6 +22,7 @@ from typing import Any
 
 from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.errors import ClientError
+from pc_client.experiment.prepare import Experiment, load_movements, prepare_experiment
 from pc_client.movements.files import library_names
 from protocol.ur_types import Ports
 
@@ -73,12 +74,13 @@ def main() -> int:
             for fidelity in options.fidelity
             for name in options.composition
         ]
+    planned = prepare_experiment(load_movements(movements), repeat=3, out=options.out)
     results: list[dict[str, Any]] = []
     for name, fidelity, seed, pace in cases:
         words = (name.replace(", ", "_").replace(" ", "_"), Path(fidelity).stem, str(seed), pace)
         folder = options.out / "-".join(words)
         try:
-            result = run_case(name, fidelity, seed, pace, folder, movements)
+            result = run_case(name, fidelity, seed, pace, replace(planned, out=folder))
         except ClientError as error:
             print(f"{name:18} {fidelity:8} seed {seed} {pace:8}  {error}", flush=True)
             continue
@@ -95,19 +97,15 @@ def write(results: list[dict[str, Any]], out: Path) -> None:
     draw(results, out / "ablation.png")
 
 
-def run_case(
-    name: str, fidelity: str, seed: int, pace: str, folder: Path, movements: Sequence[str]
-) -> dict[str, Any]:
-    """Run movements three times with one composition on one box; returns figures by movement."""
+def run_case(name: str, fidelity: str, seed: int, pace: str, planned: Experiment) -> dict[str, Any]:
+    """Run the movements with one composition on one box; returns figures by movement."""
     from pc_client.analysis.budget import PARTS
     from pc_client.analysis.run import analyse_run
     from pc_client.analysis.table import build_table
     from pc_client.driver.ur_driver import UrDriver
-    from pc_client.experiment.prepare import load_movements, prepare_experiment
     from pc_client.experiment.runner import ExperimentRunner
     from pc_client.recording.loader import load_recording
 
-    planned = prepare_experiment(load_movements(movements), repeat=3, out=folder)
     with box(fidelity, seed, pace) as ports, UrDriver(HOST, ports) as driver:
         report = ExperimentRunner(driver, planned, COMPOSITIONS[name][0]).run()
     table = build_table([analyse_run(load_recording(path)) for path in report.paths])
