@@ -26,7 +26,7 @@ from typing import Annotated
 
 from ur_emulator.errors import ModelError
 from ur_hil.input_files import MIB, FileKind
-from ur_hil.records import FieldError, Items, checked, nearest, number, record, whole, word
+from ur_hil.records import Items, checked, nearest, number, record, whole, word
 
 _FILE = FileKind(MIB, ModelError, "all fields have less than 0.01 MiB")
 _LARGEST_SLOPE = 0.5
@@ -128,11 +128,11 @@ class Fidelity:
 
     def __post_init__(self) -> None:
         if self.drive_damping is not None and not self.drive_lag:
-            raise FieldError("drive_damping", "a filter of second order has a lag; give drive_lag above 0")
+            raise ValueError("drive_damping", "a filter of second order has a lag; give drive_lag above 0")
         for joint in range(6):
             slope = sum(2.0**0.5 * ripple.rms for ripple in self.ripples if joint in ripple.joints)
             if slope > _LARGEST_SLOPE:
-                raise FieldError(
+                raise ValueError(
                     "ripples",
                     f"the waves of joint {joint} change its speed by up to {slope:.0%}; give smaller rms, "
                     f"together less than {_LARGEST_SLOPE:.0%} / sqrt(2)",
