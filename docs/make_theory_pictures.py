@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from pc_client.analysis.figures import BLUE, GREEN, ORANGE, PURPLE, RED, REFERENCE_GREY, svg_figure
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.minimum_jerk import stroke_shape
 from pc_client.movements.robotic import SmoothedSquareWave
 from pc_client.movements.timing import LiteralTiming, TwoSidedTiming
+from pc_client.results.static import figure, svg_text
+from pc_client.results.theme import BLUE, GREEN, ORANGE, PURPLE, RED, REFERENCE_GREY
 
 IMG = Path(__file__).parent / "img"
 LOGNORMAL = Lognormal(0.0, -1.6, 0.25)
@@ -71,10 +72,10 @@ def draw_profiles(axes: Axes) -> None:
 
 
 def main() -> None:
-    with svg_figure(11.0, 3.6, mark="") as (figure, page):
-        draw_lognormal(figure.add_axes((0.055, 0.14, 0.4, 0.76)))
-        draw_profiles(figure.add_axes((0.53, 0.14, 0.455, 0.76)))
-    (IMG / "theory.svg").write_text(page.getvalue(), encoding="utf-8", newline="\n")
+    with figure(3.6) as page:
+        draw_lognormal(page.add_axes((0.055, 0.14, 0.4, 0.76)))
+        draw_profiles(page.add_axes((0.53, 0.14, 0.455, 0.76)))
+    (IMG / "theory.svg").write_text(svg_text(page), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -210,10 +210,11 @@ def markdown(results: list[dict[str, Any]]) -> str:
 
 def draw(results: list[dict[str, Any]], path: Path) -> None:
     """Draw one panel a fidelity: mean SNR of each composition, by kind and run, and the floor."""
-    from pc_client.analysis.figures import BLUE, ORANGE, svg_figure
+    from pc_client.results.static import figure, image_bytes
+    from pc_client.results.theme import BLUE, ORANGE
 
     fidelities = [f for f in FIDELITIES if any(r["fidelity"] == f for r in _of_main(results))]
-    with svg_figure(11.0, 4.4, mark="SIMULATED") as (page, _):
+    with figure(4.4, "SIMULATED") as page:
         for k, fidelity in enumerate(fidelities):
             axes = page.add_axes((0.05 + 0.32 * k, 0.25, 0.285, 0.64))
             cases = [r for r in _of_main(results) if r["fidelity"] == fidelity]
@@ -234,7 +235,7 @@ def draw(results: list[dict[str, Any]], path: Path) -> None:
             if k == 0:
                 axes.set_ylabel("mean SNR [dB]; small to large: runs 1, 2, 3")
                 axes.legend(loc="lower right")
-    page.savefig(path, dpi=110)
+    path.write_bytes(image_bytes(page))
 
 
 def _of_main(results: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -17,7 +17,6 @@ from rich.console import Console
 from rich.progress import track as progress
 
 from pc_client.analysis.budget import PARTS, SPLIT_HZ
-from pc_client.analysis.page import data_uri, render, report_libraries
 from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column
 from pc_client.analysis.table import LAG, MOVEMENT, Table, build_table
 from pc_client.errors import CellError, RecordingError, one_line
@@ -25,6 +24,7 @@ from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.cell_file import parse_cell
 from pc_client.recording.loader import Recording, load_recording
 from pc_client.results.files import write_files
+from pc_client.results.pages import picture, render, report_libraries, zoomable
 from pc_client.results.tables import Column, to_html, to_json
 from protocol.ur_types import JOINT_NAMES
 
@@ -128,7 +128,10 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         {
             "row": row,
             "errors": table.runs[row["name"]][0].errors,
-            "figure": data_uri(figures.draw_movement(table.runs[row["name"]])),
+            "figure": zoomable(
+                figures.movement_sheet(table.runs[row["name"]]),
+                f"Speed, speed error, path, joints and position error of {row['name']}",
+            ),
         }
         for row in _shown(table.frame.to_dicts(), "drawing", console)
     ]
@@ -139,6 +142,7 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
     rows = rows.with_columns(pl.col(_PATH_ERROR.name).list.max())
     return render(
         _TEMPLATE,
+        scripts=True,
         table=table,
         levels=to_html(rows, [*columns, _PATH_ERROR, lag], bold="is_mean", links=True),
         definitions=to_html(means, _DEFINITIONS),
@@ -146,10 +150,18 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         movements=movements,
         split_hz=SPLIT_HZ,
         joint_names=JOINT_NAMES,
-        table_figure=data_uri(figures.draw_table(table)),
-        definitions_figure=data_uri(figures.draw_definitions(table)),
-        budget_figure=data_uri(figures.draw_budget(table)),
-        provenance=provenance_facts(table.all_runs),
+        table_figure=picture(
+            figures.table_figure(table), "Bars of the SNR of each movement, ours beside the paper's"
+        ),
+        definitions_figure=picture(
+            figures.definitions_figure(table), "Four SNR definitions for each movement"
+        ),
+        budget_figure=picture(
+            figures.budget_figure(table), "Share of each part in the error power, for each movement"
+        ),
+        origin=table.provenance.origin,
+        seed=table.provenance.seed,
+        facts=provenance_facts(table.all_runs),
         learned=_learned(table),
         left_out=list(left_out),
     )

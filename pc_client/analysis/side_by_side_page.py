@@ -8,12 +8,12 @@ from pathlib import Path
 
 import polars as pl
 
-from pc_client.analysis.page import data_uri, render, report_libraries
 from pc_client.analysis.report import REPORT_HTML, Report, provenance_facts
 from pc_client.analysis.side_by_side import PUBLISHED, SideBySide, label_of, side_by_side
 from pc_client.analysis.table import LAG, Table
 from pc_client.control.controller import FIELDS
 from pc_client.results.files import write_files
+from pc_client.results.pages import picture, render, report_libraries, zoomable
 from pc_client.results.tables import Column, to_html
 
 _TEMPLATE = "analysis/side_by_side.html.j2"
@@ -40,6 +40,7 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
     rows, columns = shown.shown()
     text = render(
         _TEMPLATE,
+        scripts=True,
         shown=shown,
         n_movements=len(shown.frame),
         cards=[
@@ -50,15 +51,20 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
         links=[_link(table, folder[id(table)], out) for table in shown.columns],
         labels=[label_of(table) for table in shown.columns],
         levels=to_html(rows, [columns[0], Column("n_targets", "targets"), *columns[1:]], bold="is_mean"),
-        levels_figure=data_uri(figures.draw_levels(shown)),
-        speeds_figure=data_uri(figures.draw_speeds(shown)),
+        levels_figure=picture(
+            figures.levels_figure(shown),
+            "Bars of the SNR of each movement: the paper's, and those of each experiment",
+        ),
+        speeds_figure=zoomable(
+            figures.speeds_sheet(shown), "TCP speed over time of each movement, desired and actual"
+        ),
         published=next((t for t in shown.columns if t.provenance.controller == PUBLISHED), None),
         settings=[
             (label_of(tables[0]), _settings(tables))
             for table in shown.columns
             if (tables := shown.changes_of(table))
         ],
-        provenance=_common([provenance_facts(table.all_runs) for table in shown.columns]),
+        facts=_common([provenance_facts(table.all_runs) for table in shown.columns]),
         left_out=[f"{report.paths[0].parent.name}/{line}" for report in reports for line in report.left_out],
     )
     write_files(out.parent, {out.name: text})
@@ -96,8 +102,8 @@ def _value(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _common(facts: Sequence[Mapping[str, str]]) -> list[tuple[str, list[str]]]:
+def _common(facts: Sequence[Mapping[str, str]]) -> Mapping[str, str | list[str]]:
     """Facts of all columns by name: one text where they agree, else one for each column."""
     names = list(dict.fromkeys(name for one in facts for name in one))
-    texts = [(name, [one.get(name, "–") for one in facts]) for name in names]
-    return [(name, given[:1] if len(set(given)) == 1 else given) for name, given in texts]
+    texts = {name: [one.get(name, "–") for one in facts] for name in names}
+    return {name: given[0] if len(set(given)) == 1 else given for name, given in texts.items()}

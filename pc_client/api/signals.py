@@ -74,9 +74,10 @@ class Signals:
 
     def plot(self) -> Figure:
         """A figure: speed of the TCP, joint angles, joint velocities."""
-        from pc_client.analysis.figures import signals_figure
+        from pc_client.analysis.figures import signals_sheet
+        from pc_client.results.static import draw
 
-        return signals_figure(self.t, self.tcp_speed, self.q, self.qd, self.qd_cmd, self.simulated)
+        return draw(signals_sheet(self.t, self.tcp_speed, self.q, self.qd, self.qd_cmd, self.simulated))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,6 +139,7 @@ class Run(Signals):
 
     def plot(self) -> Figure:
         """The figure of the report: TCP speed wanted and actual, its error, path, joints and their errors."""
-        from pc_client.analysis.figures import movement_figure
+        from pc_client.analysis.figures import movement_sheet
+        from pc_client.results.static import draw
 
-        return movement_figure((self.measured,))
+        return draw(movement_sheet((self.measured,)))

@@ -59,13 +59,14 @@ def _write(
     table: Comparison, one: MovementSet, runs: Mapping[str, MeasuredRun] | None, out: Path
 ) -> tuple[Path, ...]:
     """Write table and pictures; returns the files."""
-    from pc_client.comparison.figure import draw_comparison
+    from pc_client.comparison.figure import comparison_sheet
     from pc_client.results.files import write_files
+    from pc_client.results.static import draw, svg_text
     from pc_client.results.tables import to_json
 
     texts = {
         "compare.json": to_json(table.to_json()),
         "compare.md": table.to_markdown(),
-        "compare.svg": draw_comparison(one, runs),
+        "compare.svg": svg_text(draw(comparison_sheet(one, runs))),
     }
     return write_files(out, texts)

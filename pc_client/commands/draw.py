@@ -214,24 +214,25 @@ def _report(entries: Sequence[Entry], out: Path) -> None:
     """Write page, tables and pictures, and show the tables."""
     from rich.progress import track
 
-    from pc_client.drawing.figures import draw as draw_pictures
+    from pc_client.drawing.figures import sheets_of
     from pc_client.drawing.page import render_page
     from pc_client.drawing.shown import Shown
     from pc_client.drawing.table import drawing_rich, drawings_json, drawings_markdown
     from pc_client.results.files import write_files
+    from pc_client.results.static import draw, svg_text
     from pc_client.results.tables import to_json
 
-    pictures = {
-        entry.name: draw_pictures(Shown.of(entry.drawing, entry.executions[-1], entry.verdict))
+    sheets = {
+        entry.name: sheets_of(Shown.of(entry.drawing, entry.executions[-1], entry.verdict))
         for entry in track(entries, description="drawing", console=console, transient=True)
     }
     texts = {
         "draw.json": to_json(drawings_json(entries)),
         "draw.md": drawings_markdown(entries),
-        "report.html": render_page(entries, pictures),
+        "report.html": render_page(entries, sheets),
     }
-    for name, own in pictures.items():
-        texts |= {f"figures/{name}_{kind}.svg": text for kind, text in own.items()}
+    for name, own in sheets.items():
+        texts |= {f"figures/{name}_{kind}.svg": svg_text(draw(sheet)) for kind, sheet in own.items()}
     write_files(out, texts)
     for entry in entries:
         console.print(drawing_rich(entry))

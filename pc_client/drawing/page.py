@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from pc_client.analysis.page import data_uri, render
 from pc_client.drawing.figures import FIGURES
 from pc_client.drawing.shown import COLOURS
 from pc_client.drawing.table import COLUMNS, Entry, facts_of, provenance_facts, table_of
+from pc_client.results.pages import render, zoomable
+from pc_client.results.panels import Sheet
 from pc_client.results.tables import to_html
 
 __all__ = ["render_page"]
@@ -15,15 +16,15 @@ __all__ = ["render_page"]
 _TEMPLATE = "drawing/draw.html.j2"
 
 
-def render_page(entries: Sequence[Entry], pictures: Mapping[str, Mapping[str, str]]) -> str:
+def render_page(entries: Sequence[Entry], sheets: Mapping[str, Mapping[str, Sheet]]) -> str:
     """Return the text of `report.html`.
 
     Args:
         entries: the drawings, at least one.
-        pictures: SVG texts by the drawing's name and the picture's.
+        sheets: `figures.sheets_of` each drawing, by its name.
 
     Raises:
-        ModuleNotFoundError: jinja2 is not installed (extra `report`).
+        ModuleNotFoundError: matplotlib, jinja2 or plotly is not installed (extra `report`).
     """
     sections = [
         {
@@ -32,14 +33,16 @@ def render_page(entries: Sequence[Entry], pictures: Mapping[str, Mapping[str, st
             "factor": entry.drawing.factor,
             "table": to_html(table_of(entry.verdict), COLUMNS),
             "facts": facts_of(entry),
-            "pictures": [(alt, data_uri(pictures[entry.name][name]), name) for name, _, _, alt in FIGURES],
+            "pictures": {name: zoomable(sheet, FIGURES[name]) for name, sheet in sheets[entry.name].items()},
         }
         for entry in entries
     ]
     return render(
         _TEMPLATE,
+        scripts=True,
         sections=sections,
         colours=COLOURS,
-        provenance=provenance_facts(entries),
+        facts=provenance_facts(entries),
         origin=entries[0].executions[0].run.provenance.origin,
+        seed=entries[0].executions[0].run.provenance.seed,
     )

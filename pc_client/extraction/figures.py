@@ -1,30 +1,28 @@
-"""Pictures of extractions, as PNG bytes: one recording, and an overview of many.
+"""Pictures of extractions, as PNG bytes: one recording, and an overview of many. Loads matplotlib.
 
-The only module of the package that loads matplotlib. The recording is the thick grey line, the reconstruction
-the thin one upon it; what stands alone (single strokes, virtual targets) has the colour of its own.
+The recording is the thick grey line, the reconstruction the thin one upon it; what stands alone (single
+strokes, virtual targets) has a colour of its own.
 """
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pc_client.errors import printable
 from pc_client.extraction.extract import Extraction, PartExtraction
 from pc_client.extraction.results import Row
 from pc_client.movements.stroke import Motion
+from pc_client.results.panels import Curve, Panel, Sheet, boxes, cube_around
+from pc_client.results.static import draw, figure, image_bytes
+from pc_client.results.theme import BLUE, RED, REFERENCE_GREY, SKY
 
 __all__ = ["draw_extraction", "draw_overview"]
 
-_RECORDED, _RECONSTRUCTED, _STROKES, _TARGETS = "#A8A29E", "#D55E00", "#56B4E9", "#0072B2"
-_DPI = 110
+_SIZE = (12.0, 4.6)
 #: A part of more strokes is drawn without its single strokes; a longer one at no more than so many times.
 _MOST_STROKES, _MOST_TIMES = 500, 5000
 
@@ -35,29 +33,45 @@ def draw_extraction(extraction: Extraction) -> bytes:
     Args:
         extraction: with at least one part that moves.
     """
-    spatial = extraction.parts[0].p.shape[1] == 3
-    figure = Figure(figsize=(12.0, 4.6), layout="constrained")
-    figure.suptitle(printable(_title(extraction)), fontsize=10, parse_math=False)
-    grid = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.7))
-    path = figure.add_subplot(grid[0], projection="3d" if spatial else None)
-    speed = figure.add_subplot(grid[1])
+    dim = extraction.parts[0].p.shape[1]
+    paths: list[Curve] = []
+    speeds: list[Curve] = []
     for index, part in enumerate(extraction.parts):
-        _draw_path(path, part, labelled=index == 0)
-        _draw_speed(speed, part, labelled=index == 0)
-    if not spatial:
-        for still in extraction.still:
-            path.plot(*still.p[0], marker=".", color=_RECORDED)
-        path.set_aspect("equal", adjustable="datalim")
-    else:
-        path.set_aspect("equal")
-    path.set_title("path, unit of the recording", fontsize=9)
-    path.legend(fontsize=7, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.06), ncols=3)
-    speed.set_title("speed, unit of the recording per s", fontsize=9)
-    speed.set_xlabel("time (s)")
-    speed.set_ylim(bottom=0.0)
-    speed.spines[["top", "right"]].set_visible(False)
-    speed.legend(fontsize=7, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.1), ncols=3)
-    return _png(figure)
+        t, motion = _reconstruction(part)
+        targets = part.trajectory.target_points[:, :dim]
+        names = ("recorded", "reconstructed", "virtual targets", "single strokes") if index == 0 else [""] * 4
+        paths += [
+            Curve(part.p, REFERENCE_GREY, names[0], 4.0, opacity=0.7),
+            Curve(targets, BLUE, width=0.5, style=":"),
+            Curve(targets, BLUE, names[2], 0.0, marker="o", size=4.0, hollow=True),
+            Curve(motion.p[:, :dim], RED, names[1], 1.3),
+        ]
+        speeds.append(Curve(_over(part.t, part.v), REFERENCE_GREY, names[0], 4.0, opacity=0.7))
+        if part.n_strokes <= _MOST_STROKES:
+            strokes = part.trajectory.stroke_speeds(t).T
+            speeds += [Curve(np.c_[t, v], SKY, "" if k else names[3], 0.8) for k, v in enumerate(strokes)]
+        speeds.append(Curve(_over(t, motion.v), RED, names[1], 1.3))
+    paths += [Curve(still.p[:1], REFERENCE_GREY, width=0.0, marker="o") for still in extraction.still]
+    left, right = boxes(_SIZE, (1.0, 1.7), (1,), margins=(0.7, 0.15, 0.75, 0.55), gaps=(0.8, 0.0))[0]
+    everything = np.vstack([curve.points for curve in paths])
+    panels = (
+        Panel(
+            left,
+            paths,
+            labels=("x [unit of the recording]", "y", "z")[:dim],
+            ranges=[(None, None)] * 2 if dim == 2 else cube_around(everything, least=0.3),
+            legend="above",
+            equal=True,
+        ),
+        Panel(
+            right,
+            speeds,
+            labels=("time [s]", "speed, low-passed [unit of the recording per s]"),
+            ranges=((None, None), (0.0, None)),
+            legend="above",
+        ),
+    )
+    return image_bytes(draw(Sheet(_SIZE[1], panels, "", printable(_title(extraction)), _SIZE[0])))
 
 
 def draw_overview(rows: Sequence[Row]) -> bytes:
@@ -68,25 +82,22 @@ def draw_overview(rows: Sequence[Row]) -> bytes:
     """
     moving = [row for row in rows if row.snr_v_db is not None]
     figures = (
-        ("SNR_v (dB)", [row.snr_v_db for row in moving], "%.1f dB", "least"),
-        ("SNR_t (dB)", [row.snr_t_db for row in moving], "%.1f dB", "least"),
-        ("strokes per speed peak", [row.strokes_per_peak for row in moving], "%.2f", "most"),
+        ("SNR_v [dB]", [row.snr_v_db for row in moving], ".1f", "least"),
+        ("SNR_t [dB]", [row.snr_t_db for row in moving], ".1f", "least"),
+        ("strokes per speed peak", [row.strokes_per_peak for row in moving], ".2f", "most"),
     )
-    figure = Figure(figsize=(12.0, 3.4), layout="constrained")
-    figure.suptitle(f"{len(moving)} recordings", fontsize=10)
-    for index, (label, values, form, worst) in enumerate(figures):
-        axes = figure.add_subplot(1, 3, index + 1)
-        known = np.array([value for value in values if value is not None])
-        if len(known):
-            axes.hist(known, bins=min(40, max(5, len(known) // 4)), color=_TARGETS)
-            axes.axvline(known.mean(), color=_RECONSTRUCTED, linewidth=1.5)
-            extreme = f"{worst} {form % (known.min() if worst == 'least' else known.max())}"
-            axes.set_title(f"mean {form % known.mean()}, {extreme}", fontsize=9)
-        axes.set_xlabel(label)
-        axes.spines[["top", "right"]].set_visible(False)
-        if index == 0:
-            axes.set_ylabel("recordings")
-    return _png(figure)
+    size = (12.0, 3.4)
+    places = boxes(size, (1, 1, 1), (1,), margins=(0.6, 0.15, 0.7, 0.55), gaps=(0.5, 0.0))[0]
+    with figure(size[1], width=size[0], title=f"{len(moving)} recordings") as page:
+        for box, (label, values, form, worst) in zip(places, figures, strict=True):
+            axes = page.add_axes(box, xlabel=label, ylabel="recordings")
+            known = np.array([value for value in values if value is not None])
+            if len(known):
+                axes.hist(known, bins=min(40, max(5, len(known) // 4)), color=BLUE)
+                axes.axvline(known.mean(), color=RED, lw=1.5)
+                extreme = known.min() if worst == "least" else known.max()
+                axes.set_title(f"mean {known.mean():{form}}, {worst} {extreme:{form}}")
+    return image_bytes(page)
 
 
 def _title(extraction: Extraction) -> str:
@@ -97,29 +108,8 @@ def _title(extraction: Extraction) -> str:
     )
 
 
-def _draw_path(axes: Any, part: PartExtraction, *, labelled: bool) -> None:
-    dim = part.p.shape[1]
-    labels = ("recorded", "reconstructed", "virtual targets") if labelled else (None, None, None)
-    targets = part.trajectory.target_points[:, :dim]
-    _, reconstruction = _reconstruction(part)
-    axes.plot(*part.p.T, color=_RECORDED, linewidth=4.0, alpha=0.7, label=labels[0])
-    axes.plot(*targets.T, color=_TARGETS, linewidth=0.5, linestyle=":")
-    axes.plot(
-        *targets.T, linestyle="none", marker="o", markersize=4, mfc="none", mec=_TARGETS, label=labels[2]
-    )
-    axes.plot(*reconstruction.p[:, :dim].T, color=_RECONSTRUCTED, linewidth=1.3, label=labels[1])
-
-
-def _draw_speed(axes: Any, part: PartExtraction, *, labelled: bool) -> None:
-    labels = ("recorded, low-passed", "reconstructed", "single strokes") if labelled else (None, None, None)
-    speed = np.linalg.norm(part.v, axis=1)
-    t, reconstruction = _reconstruction(part)
-    axes.plot(part.t, speed, color=_RECORDED, linewidth=4.0, alpha=0.7, label=labels[0])
-    if part.n_strokes <= _MOST_STROKES:
-        for index, lognormal in enumerate(part.trajectory.stroke_speeds(t).T):
-            axes.plot(t, lognormal, color=_STROKES, linewidth=0.8, label=labels[2] if index == 0 else None)
-    reconstructed = np.linalg.norm(reconstruction.v, axis=1)
-    axes.plot(t, reconstructed, color=_RECONSTRUCTED, linewidth=1.3, label=labels[1])
+def _over(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.column_stack((t, np.linalg.norm(v, axis=1)))
 
 
 def _reconstruction(part: PartExtraction) -> tuple[NDArray[np.float64], Motion]:
@@ -127,10 +117,3 @@ def _reconstruction(part: PartExtraction) -> tuple[NDArray[np.float64], Motion]:
     t = part.t[:: 1 + len(part.t) // _MOST_TIMES]
     blocks = [part.trajectory.evaluate(block) for block in np.array_split(t, 1 + len(t) // 250)]
     return t, Motion(*(np.concatenate(values) for values in zip(*blocks, strict=True)))
-
-
-def _png(figure: Figure) -> bytes:
-    page = io.BytesIO()
-    FigureCanvasAgg(figure)
-    figure.savefig(page, format="png", dpi=_DPI)
-    return page.getvalue()

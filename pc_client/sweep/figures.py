@@ -1,81 +1,78 @@
-"""The plots of a sweep, as SVG text: SNR over each axis that varies, and a map over two gains.
-
-Loads matplotlib; import it only where a plot is drawn. Style and colours are those of the report.
-"""
+"""What a sweep shows: SNR over each axis that varies, and a map over two gains."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pc_client.analysis.figures import BLUE, GREEN, ORANGE, PURPLE, RED, SKY, svg_figure
+from pc_client.results.panels import Curve, Panel, Sheet
+from pc_client.results.static import figure
+from pc_client.results.theme import COLOURS
 from pc_client.sweep.columns import origin_of_rows
 
 Rows = Sequence[Mapping[str, Any]]
 
-_COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY)
-_STYLES = (("s", "-"), ("^", "--"), ("o", ":"), ("D", "-."), ("v", "-"), ("P", "--"))
+__all__ = ["axis_sheet", "map_figure"]
+
+_STYLES: tuple[tuple[Literal["s", "^", "o", "D"], Literal["-", "--", ":", "-."]], ...] = (
+    ("s", "-"),
+    ("^", "--"),
+    ("o", ":"),
+    ("D", "-."),
+)
 _NOT_DONE = "#DDDDDD"
-_WIDTH = 11.0
 _MOST_TICKS = 10
 """Values of a grid that are written on its axis."""
 
 
-def draw_axis(rows: Rows, axis: str, *, connect: bool) -> str:
-    """Draw the SNR of all runs over one axis, and its mean by kind of movement, controller and fidelity.
+def axis_sheet(rows: Rows, axis: str, *, connect: bool) -> Sheet:
+    """The SNR of all runs over one axis, and its mean by kind of movement, controller and fidelity.
 
     Args:
         rows: runs that are done.
         axis: a column that varies.
         connect: whether lines join the means of numbers; random samples differ in more than this axis.
-
-    Returns:
-        SVG text.
     """
     values = _in_order(rows, axis)
     # Seeds are numbers, but there is no more or less of a seed.
     scale = axis != "seed" and all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
-    positions = dict(zip(values, values if scale else range(len(values)), strict=True))
+    places = dict(zip(values, values if scale else range(len(values)), strict=True))
     splits = [c for c in ("controller", "fidelity") if c != axis and len(_in_order(rows, c)) > 1]
     groups = list(dict.fromkeys(tuple(row[c] for c in splits) for row in rows))
-    with svg_figure(_WIDTH, 3.2, origin_of_rows(rows).mark) as (figure, page):
-        axes = figure.add_axes((0.06, 0.2 if scale else 0.27, 0.73, 0.68 if scale else 0.61))
-        for kind, colour in zip(_in_order(rows, "kind"), cycle(_COLOURS)):
-            for group, (marker, line) in zip(groups, cycle(_STYLES)):
-                series = [r for r in rows if r["kind"] == kind and tuple(r[c] for c in splits) == group]
-                label = ", ".join((kind, *map(str, group)))
-                style: dict[str, Any] = {"color": colour, "marker": marker}
-                axes.plot(*_points(series, axis, positions), ls="", ms=3, alpha=0.3, **style)
-                axes.plot(
-                    *_mean_points(series, axis, positions),
-                    ls=line if scale and connect else "",
-                    ms=6,
-                    label=label,
-                    **style,
-                )
-        if scale and connect and len(values) <= _MOST_TICKS:
-            axes.set_xticks(values)
-        if not scale:
-            axes.set_xticks(list(positions.values()), [str(value) for value in values])
-            axes.set_xlim(-0.6, len(values) - 0.4)
-            if len(values) > 4:
-                axes.tick_params(axis="x", rotation=20)
-        axes.yaxis.set_major_locator(MaxNLocator(6))
-        axes.set_xlabel(axis)
-        axes.set_ylabel("SNR [dB]")
-        axes.set_title(f"SNR over {axis}: runs and means")
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 0.98), borderaxespad=0.0)
-    return page.getvalue()
+    curves = []
+    for kind, colour in zip(_in_order(rows, "kind"), cycle(COLOURS)):
+        for group, (marker, line) in zip(groups, cycle(_STYLES)):
+            series = [r for r in rows if r["kind"] == kind and tuple(r[c] for c in splits) == group]
+            if not series:
+                continue
+            runs = np.array([(places[row[axis]], row["snr_db"]) for row in series])
+            means = np.array([(x, runs[runs[:, 0] == x, 1].mean()) for x in np.unique(runs[:, 0])])
+            width, label = float(scale and connect), ", ".join((kind, *map(str, group)))
+            curves += [
+                Curve(runs, colour, width=0.0, marker=marker, size=3.0, opacity=0.3),
+                Curve(means, colour, label, width, line, marker, 6.0),
+            ]
+    named = scale and connect and len(values) <= _MOST_TICKS
+    panel = Panel(
+        (0.06, 0.27, 0.73, 0.61),
+        curves,
+        f"SNR over {axis}: runs and means",
+        (axis, "SNR [dB]"),
+        ((None, None) if scale else (-0.6, len(values) - 0.4), (None, None)),
+        "right",
+        ticks={x: f"{v:g}" if scale else str(v) for v, x in places.items()} if named or not scale else None,
+    )
+    return Sheet(3.2, [panel], origin_of_rows(rows).mark)
 
 
-def draw_map(rows: Rows, x: str, y: str) -> str:
-    """Draw the mean SNR over two numeric axes, one panel a fidelity, each with its own colours.
+def map_figure(rows: Rows, x: str, y: str) -> Figure:
+    """The mean SNR over two numeric axes, one panel a fidelity, each with its own colours.
 
     A full grid becomes tiles, with a cross where not all cases could be run; anything else becomes dots.
 
@@ -83,16 +80,13 @@ def draw_map(rows: Rows, x: str, y: str) -> str:
         rows: all of the table, done or not.
         x: column across.
         y: column upwards.
-
-    Returns:
-        SVG text.
     """
     panels = _in_order(rows, "fidelity")
     xs, ys = _in_order(rows, x), _in_order(rows, y)
-    with svg_figure(_WIDTH, 4.2, origin_of_rows(rows).mark) as (figure, page):
-        grid = figure.add_gridspec(1, len(panels), left=0.06, right=0.95, bottom=0.14, top=0.86, wspace=0.2)
+    with figure(4.2, origin_of_rows(rows).mark) as page:
+        grid = page.add_gridspec(1, len(panels), left=0.06, right=0.95, bottom=0.14, top=0.86, wspace=0.2)
         for i, panel in enumerate(panels):
-            axes = figure.add_subplot(grid[0, i])
+            axes = page.add_subplot(grid[0, i])
             points = _means([row for row in rows if row["fidelity"] == panel], x, y)
             levels = [mean for mean in points.values() if mean is not None] or [0.0]
             colours = {"vmin": min(levels), "vmax": max(max(levels), min(levels) + 1e-3), "cmap": "viridis"}
@@ -103,18 +97,8 @@ def draw_map(rows: Rows, x: str, y: str) -> str:
             axes.set_xlabel(x)
             axes.set_ylabel(y if i == 0 else "")
             axes.set_title("mean SNR [dB]" + (f", {panel}" if panel is not None else ""))
-            figure.colorbar(shown, ax=axes, fraction=0.05, pad=0.02)
-    return page.getvalue()
-
-
-def _points(rows: Rows, axis: str, positions: Mapping[Any, float]) -> tuple[list[float], list[float]]:
-    return [positions[row[axis]] for row in rows], [row["snr_db"] for row in rows]
-
-
-def _mean_points(rows: Rows, axis: str, positions: Mapping[Any, float]) -> tuple[list[float], list[float]]:
-    levels = {value: [row["snr_db"] for row in rows if row[axis] == value] for value in positions}
-    known = {value: float(np.mean(level)) for value, level in levels.items() if level}
-    return [positions[value] for value in known], list(known.values())
+            page.colorbar(shown, ax=axes, fraction=0.05, pad=0.02)
+    return page
 
 
 def _draw_tiles(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pc_client.analysis.page import data_uri, render
 from pc_client.control.controller import FIELDS
+from pc_client.results.pages import picture, render
 from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.ranking import rank_settings, spans_grid, varying
 
@@ -29,6 +29,7 @@ def render_page(name: str, rows: Rows) -> str:
     Raises:
         ModuleNotFoundError: matplotlib or jinja2 is not installed (extra `report`).
     """
+    from pc_client.results.static import draw
     from pc_client.sweep import figures
 
     axes = varying(rows)
@@ -47,9 +48,14 @@ def render_page(name: str, rows: Rows) -> str:
         origin=origin_of_rows(rows),
         settings=settings[:_MOST_SETTINGS],
         n_settings=len(settings),
-        map_figure=data_uri(figures.draw_map(rows, *pair)) if pair and done else None,
+        map_figure=picture(figures.map_figure(rows, *pair), "Mean SNR over two settings of the controller")
+        if pair and done
+        else None,
         axis_figures=[
-            (axis, data_uri(figures.draw_axis(done, axis, connect=connect or axis == "repetition")))
+            picture(
+                draw(figures.axis_sheet(done, axis, connect=connect or axis == "repetition")),
+                f"SNR over {axis}",
+            )
             for axis in plotted
         ],
         not_done=[row for row in rows if row["status"] != "done"][:_MOST_ERRORS],

@@ -8,8 +8,10 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from page_support import check_needs_nothing, own_text
 from recording_samples import SIGNALS, append_rows, provenance, record_movement
 from rich.console import Console
 
@@ -138,6 +140,10 @@ def test_a_table_needs_runs() -> None:
         build_table([])
 
 
+def zoomed_of(html: str) -> list[dict[str, Any]]:
+    return [json.loads(data) for data in re.findall(r'<script type="application/json">(.*?)</script>', html)]
+
+
 def figures_of(html: str) -> list[str]:
     return [
         base64.b64decode(data).decode() for data in re.findall(r'"data:image/svg\+xml;base64,([^"]+)"', html)
@@ -151,11 +157,17 @@ def test_report_is_one_page_that_needs_nothing_else(tmp_path: Path) -> None:
     report = build_report(tmp_path)
     assert [p.name for p in report.paths] == ["table1.json", "table1.md", "report.html"]
     html = report.paths[2].read_text()
-    assert re.findall(r"(?:https?:)?//|@import|url\(|<script|<link", re.sub(r"base64,[^\"]+", "", html)) == []
-    assert re.findall(r'(?:src|href)="(?!data:image/svg\+xml;base64,|#)', html) == []
-    assert len(html) < 3_000_000
+    check_needs_nothing(html)
+    assert re.findall(r'href="(?!#)', own_text(html)) == []
+    assert len(html) < 7_000_000
+    zoomed = zoomed_of(html)
+    assert len(zoomed) == 2
+    for figure in zoomed:
+        assert "<b>SIMULATED</b>" in [note["text"] for note in figure["layout"]["annotations"]]
+        assert {"desired", "base", "wrist 3"} <= {trace["name"] for trace in figure["data"]}
+        assert sum(trace["name"].startswith("actual r") for trace in figure["data"]) == 3
     figures = figures_of(html)
-    assert len(figures) == 3 + 2
+    assert len(figures) == 3
     for svg in figures:
         assert "<!-- SIMULATED -->" in svg  # the text as drawn
         assert re.findall(r'(?:xlink:)?href="(?!#)', svg) == []
@@ -201,14 +213,16 @@ def test_report_of_a_real_arm_does_not_say_simulated(tmp_path: Path) -> None:
     assert "SIMULATED" not in html
     assert "measured on a real arm" in html
     assert not any("SIMULATED" in svg or "NOT KNOWN" in svg for svg in figures_of(html))
+    assert not any("SIMULATED" in json.dumps(figure) for figure in zoomed_of(html))
 
 
 def test_names_from_a_recording_cannot_break_the_page(tmp_path: Path) -> None:
     prov = provenance(movement="<b>evil", serial="<script>")
     record_movement(tmp_path / "evil_r1.mcap", lag=0.01, prov=prov)
     html = build_report(tmp_path).paths[2].read_text()
-    assert "<script>" not in html
+    assert "<script>" not in own_text(html)
     assert "<b>evil" not in html
+    assert all("<b>evil" not in json.dumps(figure) for figure in zoomed_of(html))
 
 
 def test_cut_and_aborted_recordings_are_left_out_and_named(tmp_path: Path) -> None:
@@ -239,11 +253,14 @@ def test_folders_without_recordings(tmp_path: Path) -> None:
         build_report(tmp_path)
 
 
-def test_missing_library_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("library", ["jinja2", "plotly"])
+def test_missing_library_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, library: str
+) -> None:
     record(tmp_path, "lognorm_4_1", 1)
-    monkeypatch.setitem(sys.modules, "jinja2", None)
+    monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(
-        RecordingError, match=r"needs jinja2; install it with: pip install 'ur-hil\[report\]'"
+        RecordingError, match=rf"needs {library}; install it with: pip install 'ur-hil\[report\]'"
     ):
         build_report(tmp_path)
 
@@ -251,7 +268,7 @@ def test_missing_library_says_what_to_install(tmp_path: Path, monkeypatch: pytes
 def test_plotting_is_loaded_only_to_plot() -> None:
     code = (
         "import sys, pc_client.recording.recorder, pc_client.recording.export, pc_client.analysis.report\n"
-        "print([m for m in ('matplotlib', 'jinja2', 'pyarrow') if m in sys.modules])"
+        "print([m for m in ('matplotlib', 'plotly', 'jinja2', 'pyarrow') if m in sys.modules])"
     )
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path.cwd()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from drawing_samples import one_part, recording_text, two_parts_and_a_dot
 from fake_robot import FakeRobot
+from page_support import check_needs_nothing
 
 import pc_client.api.arm as arm_module
 import pc_client.commands.draw as draw_module
@@ -82,7 +83,8 @@ def test_a_drawing_becomes_recordings_tables_and_a_page(robot, file, tmp_path, c
     assert one["metres_per_unit"] > 0.0
     assert one["runs"][0]["planned"]["snr_v_db"] > 15.0
     page = (out / "report.html").read_text()
-    assert "http" not in page
+    check_needs_nothing(page)
+    assert page.count('class="zoom"') == 3
     assert str(tmp_path) not in page
     movement = load_movement(saved)
     recording = load_recording(out / "letter_a_r1.mcap")

@@ -17,7 +17,7 @@ import pc_client.api.arm as arm_module
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
-from pc_client.comparison.figure import draw_comparison
+from pc_client.comparison.figure import comparison_sheet
 from pc_client.comparison.filtering import CUTOFF_HZ, filtered_motion
 from pc_client.comparison.likeness import Likeness, measure_likeness
 from pc_client.comparison.movement_set import make_sets, save_sets
@@ -26,6 +26,7 @@ from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, Comparison, bu
 from pc_client.errors import ClientError
 from pc_client.movements import load_movement
 from pc_client.movements.twins import GENERATORS
+from pc_client.results.static import draw, svg_text
 
 RATE = 125.0
 
@@ -187,7 +188,7 @@ def test_a_perfect_run_is_the_filtered_plan_wherever_its_frames_fall_in_a_cycle(
 
 
 def test_page_shows_every_generator(sets):
-    root = ET.fromstring(draw_comparison(sets[0]))
+    root = ET.fromstring(svg_text(draw(comparison_sheet(sets[0]))))
     assert root.tag.endswith("svg")
     panels = [node for node in root.iter() if (node.get("id") or "").startswith("axes_")]
     assert len(panels) == 2 * len(GENERATORS)

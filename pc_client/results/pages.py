@@ -1,0 +1,112 @@
+"""Pages of HTML that need nothing else: style, pictures, scripts inside; no network, date, host or path."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from html import escape
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from pc_client.errors import RecordingError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from pc_client.results.panels import Sheet
+
+__all__ = ["Picture", "picture", "render", "report_libraries", "zoomable"]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A figure in a page; a template writes it as `{{ picture }}`.
+
+    Attributes:
+        address: of the image, which is inside the page.
+        alt: what it shows, for those who do not see it.
+        data: of the figure that takes the image's place where scripts run, as JSON; "" for none.
+    """
+
+    address: str
+    alt: str
+    data: str = ""
+
+    def __html__(self) -> str:
+        """Its element; `jinja2` calls this."""
+        image = f'<img src="{self.address}" alt="{escape(self.alt)}">'
+        if self.data:
+            image = f'<div class="zoom">{image}<script type="application/json">{self.data}</script></div>'
+        return f'<div class="wide">{image}</div>'
+
+
+def picture(figure: Figure, alt: str) -> Picture:
+    """A figure that does not move, as SVG."""
+    from pc_client.results.static import svg_text
+
+    return Picture(_address("svg+xml", svg_text(figure).encode()), alt)
+
+
+def zoomable(sheet: Sheet, alt: str) -> Picture:
+    """A figure that can be zoomed, over an image of it for browsers without scripts and for paper."""
+    from pc_client.results.interactive import plotly_figure
+    from pc_client.results.static import draw, image_bytes
+
+    data = json.dumps(plotly_figure(sheet), separators=(",", ":"), allow_nan=False)
+    return Picture(_address("webp", image_bytes(draw(sheet), "webp")), alt, data.replace("<", "\\u003c"))
+
+
+@contextmanager
+def report_libraries() -> Iterator[None]:
+    """Say which library is missing before anything is drawn; modules that draw are imported in the block.
+
+    Raises:
+        RecordingError: matplotlib, jinja2 or plotly is not installed.
+    """
+    try:
+        import jinja2  # noqa: F401
+        import plotly  # noqa: F401
+
+        yield
+    except ImportError as error:
+        raise RecordingError(
+            f"the report needs {error.name}; install it with: pip install 'ur-hil[report]'"
+        ) from error
+
+
+def render(template: str, *, scripts: bool = False, **values: Any) -> str:
+    """Fill a template that extends `results/base.html.j2`.
+
+    Args:
+        template: its path within `pc_client`, as templates name each other, e.g. "analysis/report.html.j2".
+        scripts: whether the page has figures that can be zoomed.
+        values: what it uses.
+
+    Raises:
+        ModuleNotFoundError: jinja2 or plotly is not installed (extra `report`).
+    """
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    from pc_client.results.interactive import plotly_script
+
+    environment = Environment(
+        loader=FunctionLoader(_text_of),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    plotly = plotly_script() if scripts else ""
+    common: dict[str, Any] = {"plotly": plotly, "labels": (), "left_out": (), "seed": None, "facts": {}}
+    return environment.get_template(template).render(common | values)
+
+
+def _address(kind: str, image: bytes) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(image).decode()}"
+
+
+def _text_of(template: str) -> str:
+    return resources.files("pc_client").joinpath(template).read_text(encoding="utf-8")

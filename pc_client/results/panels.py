@@ -1,0 +1,185 @@
+"""What a figure shows: curves in panels on a sheet, whatever library draws it.
+
+`static.draw` makes a matplotlib figure of a sheet, `interactive.plotly_figure` one that a browser zooms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.results.theme import LETTERS, WIDTH
+
+__all__ = ["Box", "Curve", "Panel", "Range", "Sheet", "boxes", "cube_around"]
+
+Array = NDArray[np.float64]
+#: Left, bottom, width and height of a panel, as shares of the sheet.
+Box = tuple[float, float, float, float]
+#: Lower and upper end of an axis; None: as the curves need it.
+Range = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A line, or single points.
+
+    Attributes:
+        points: (n, 2) or, in space, (n, 3), in the units of the axes; nan interrupts the line.
+        colour: as "#RRGGBB".
+        label: in the legend; none where empty.
+        width: of the line [points]; 0: no line.
+        style: of the line.
+        marker: of the points, as matplotlib names it; none where empty.
+        size: of the markers [points].
+        hollow: whether markers are white inside.
+        opacity: 0 to 1.
+        filled: whether the area between the line and zero is filled.
+        stepped: whether a value holds until the next point.
+    """
+
+    points: Array
+    colour: str
+    label: str = ""
+    width: float = 1.0
+    style: Literal["-", "--", ":", "-."] = "-"
+    marker: Literal["", "o", "s", "^", "D", "v", "P", "x"] = ""
+    size: float = 5.0
+    hollow: bool = False
+    opacity: float = 1.0
+    filled: bool = False
+    stepped: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """Curves in one pair of axes, or in space.
+
+    Attributes:
+        box: its place on the sheet.
+        curves: the first is drawn first.
+        title: above it, at the left.
+        labels: of its axes, with units; an axis without one has no numbers either.
+        ranges: of its axes; panels of a sheet with the same range of x are zoomed together.
+        legend: where it stands; "inside": at the top, for which the axis gets room.
+        columns: of the legend.
+        texts: beside points (2,) or (3,).
+        shaded: (n, 2) begins and ends on x.
+        ticks: texts by place on x, where they are not numbers.
+        slower: a second scale of y at the right is so many times smaller, where 1 none; figures that are
+            zoomed have none.
+        equal: whether x and y have the same scale; in space they always have.
+        view: of a panel in space: elevation and azimuth [degrees].
+        zoom: of a panel in space, 1: its longest edge fills a square.
+    """
+
+    box: Box
+    curves: Sequence[Curve]
+    title: str = ""
+    labels: Sequence[str] = ("", "")
+    ranges: Sequence[Range] = ((None, None), (None, None))
+    legend: Literal["", "above", "inside", "right"] = ""
+    columns: int = 6
+    texts: Sequence[tuple[Array, str]] = ()
+    shaded: Array = field(default_factory=lambda: np.empty((0, 2)))
+    ticks: Mapping[float, str] | None = None
+    slower: float = 1.0
+    equal: bool = False
+    view: tuple[float, float] = (30.0, -60.0)
+    zoom: float = 1.0
+
+    @property
+    def in_space(self) -> bool:
+        """Whether the curves have three coordinates."""
+        return int(self.curves[0].points.shape[1]) == 3
+
+    @property
+    def shape(self) -> Array:
+        """Edges (3,) of a panel in space, relative to the longest."""
+        lengths = np.array([high - low for low, high in self.ranges if low is not None and high is not None])
+        shape: Array = lengths / lengths.max()
+        return shape
+
+    @property
+    def n_legend_rows(self) -> int:
+        """Rows of a legend inside."""
+        return -(-sum(bool(curve.label) for curve in self.curves) // self.columns)
+
+    @property
+    def upwards(self) -> Range:
+        """The range of y, with room for a legend inside."""
+        low, high = self.ranges[1]
+        if self.legend != "inside" or high is not None:
+            return low, high
+        values = np.concatenate([curve.points[:, 1] for curve in self.curves])
+        top = float(np.nanmax(values))
+        span = max(1e-9, top - (float(np.nanmin(values)) if low is None else low))
+        bottom = top - 1.05 * span if low is None else low
+        return bottom, top + (0.05 + 0.16 * self.n_legend_rows) * span
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheet:
+    """A figure.
+
+    Attributes:
+        height: [inches].
+        panels: on it.
+        mark: what the data are, written on it; empty for those of a real arm, or none at all.
+        title: at the top.
+        width: [inches].
+        letters: their size [points].
+    """
+
+    height: float
+    panels: Sequence[Panel]
+    mark: str = ""
+    title: str = ""
+    width: float = WIDTH
+    letters: float = LETTERS
+
+
+def boxes(
+    size: tuple[float, float],
+    widths: Sequence[float],
+    heights: Sequence[float],
+    *,
+    margins: tuple[float, float, float, float],
+    gaps: tuple[float, float],
+) -> list[list[Box]]:
+    """The boxes of a grid of panels, row by row from the top.
+
+    Args:
+        size: width and height of the sheet [inches].
+        widths: of the columns, relative to each other.
+        heights: of the rows, likewise.
+        margins: left, right, top and bottom [inches].
+        gaps: between columns and between rows [inches].
+    """
+    left, right, top, bottom = margins
+    shares_x = np.array(widths) * (size[0] - left - right - gaps[0] * (len(widths) - 1)) / sum(widths)
+    shares_y = np.array(heights) * (size[1] - top - bottom - gaps[1] * (len(heights) - 1)) / sum(heights)
+    lefts = accumulate(shares_x[:-1] + gaps[0], initial=left)
+    tops = accumulate(shares_y[:-1] + gaps[1], initial=top)
+    columns = [(x / size[0], w / size[0]) for x, w in zip(lefts, shares_x, strict=True)]
+    rows = [(1.0 - (y + h) / size[1], h / size[1]) for y, h in zip(tops, shares_y, strict=True)]
+    return [[(float(x), float(y), float(w), float(h)) for x, w in columns] for y, h in rows]
+
+
+def cube_around(points: Array, *, least: float = 1.0, margin: float = 0.0) -> list[Range]:
+    """Ranges (lower, upper) of axes around points (n, dim).
+
+    Args:
+        points: what they hold.
+        least: length of the shortest axis as a share of the longest; 1: a cube.
+        margin: beyond the points, as a share.
+    """
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    longest = max(1e-9, float((high - low).max()))
+    half = 0.5 * (1.0 + margin) * np.maximum(high - low, least * longest)
+    middle = 0.5 * (low + high)
+    return [(float(m - h), float(m + h)) for m, h in zip(middle, half, strict=True)]

@@ -1,0 +1,206 @@
+"""Figures that do not move, by matplotlib: import it only where one is drawn.
+
+A figure stays in the one theme because it is made and written inside `figure` and `svg_text`. The same data
+give the same bytes. Every figure of data that are not known to be of a real arm says so.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from pc_client.results.panels import Curve, Panel, Sheet
+from pc_client.results.theme import LETTERS, MARK_EDGE, MARK_FILL, RED, SHADE, WIDTH, matplotlib_style
+
+__all__ = ["Bars", "bars_of_levels", "draw", "figure", "image_bytes", "svg_text"]
+
+_DPI = 110
+
+
+@contextmanager
+def figure(
+    height: float, mark: str = "", *, width: float = WIDTH, title: str = "", letters: float = LETTERS
+) -> Iterator[Figure]:
+    """Give an empty figure in the theme, to be filled inside the block; arguments as of `Sheet`."""
+    with mpl.rc_context(matplotlib_style(letters)):
+        page = Figure(figsize=(width, height))
+        yield page
+        if title:
+            page.text(0.1 / width, 1.0 - 0.1 / height, title, va="top", fontsize=letters + 1, weight="bold")
+        if mark:
+            box = {"boxstyle": "round,pad=0.3", "fc": MARK_FILL, "ec": MARK_EDGE, "lw": 0.8}
+            place = (0.992, 1.0 - 0.08 / height)
+            page.text(*place, mark, ha="right", va="top", fontsize=8.5, weight="bold", bbox=box)
+
+
+def svg_text(page: Figure) -> str:
+    """A figure as SVG text, without date or program."""
+    text = io.StringIO()
+    with mpl.rc_context(matplotlib_style()):
+        FigureCanvasSVG(page)
+        page.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    return text.getvalue()
+
+
+def image_bytes(page: Figure, kind: Literal["png", "webp"] = "png") -> bytes:
+    """A figure as the bytes of an image file; WebP takes a third of PNG."""
+    data = io.BytesIO()
+    with mpl.rc_context(matplotlib_style()):
+        FigureCanvasAgg(page)
+        page.savefig(data, format=kind, dpi=_DPI, metadata={"Software": None} if kind == "png" else None)
+    return data.getvalue()
+
+
+def draw(sheet: Sheet) -> Figure:
+    """Draw a sheet; the axes of the figure are the panels in their order."""
+    with figure(
+        sheet.height, sheet.mark, width=sheet.width, title=sheet.title, letters=sheet.letters
+    ) as page:
+        for panel in sheet.panels:
+            axes: Any = page.add_axes(panel.box, projection="3d" if panel.in_space else None)
+            for curve in panel.curves:
+                _draw_curve(axes, curve)
+            axes.set_title(panel.title)
+            if panel.in_space:
+                _draw_space(axes, panel)
+            else:
+                _draw_plane(axes, panel)
+            for point, text in panel.texts:
+                axes.text(*point, f"  {text}", path_effects=[withStroke(linewidth=2.5, foreground="white")])
+            _draw_legend(axes, panel)
+    return page
+
+
+def _draw_curve(axes: Any, curve: Curve) -> None:
+    axes.plot(
+        *curve.points.T,
+        color=curve.colour,
+        label=curve.label or None,
+        lw=curve.width,
+        ls=curve.style if curve.width else "",
+        marker=curve.marker,
+        ms=curve.size,
+        mfc="white" if curve.hollow else curve.colour,
+        alpha=curve.opacity,
+        drawstyle="steps-post" if curve.stepped else "default",
+    )
+    if curve.filled:
+        axes.fill_between(*curve.points.T, color=curve.colour, alpha=0.28 * curve.opacity, lw=0)
+
+
+def _draw_plane(axes: Any, panel: Panel) -> None:
+    for begin, end in panel.shaded:
+        axes.axvspan(begin, end, color=SHADE, lw=0, zorder=0)
+    x = panel.ranges[0]
+    axes.set_xlim(*x)
+    axes.set_ylim(*panel.upwards)
+    axes.set(xlabel=panel.labels[0], ylabel=panel.labels[1])
+    axes.tick_params(labelbottom=bool(panel.labels[0]), labelleft=bool(panel.labels[1]))
+    if panel.equal:
+        axes.set_aspect("equal", adjustable="box" if None not in x else "datalim")
+    # So many ticks that their texts do not meet, at some 7 an inch of height.
+    axes.yaxis.set_major_locator(MaxNLocator(3 if axes.bbox.height < 1.2 * mpl.rcParams["figure.dpi"] else 6))
+    if panel.slower != 1.0:
+        second = axes.secondary_yaxis(
+            "right", functions=(lambda v: v / panel.slower, lambda v: v * panel.slower)
+        )
+        second.yaxis.set_major_locator(MaxNLocator(3))
+        second.spines["right"].set_visible(True)
+    if panel.ticks is not None:
+        turned = len(panel.ticks) > 4
+        axes.set_xticks(
+            list(panel.ticks),
+            list(panel.ticks.values()),
+            rotation=20 if turned else 0,
+            ha="right" if turned else "center",
+        )
+        axes.grid(axis="x", visible=False)
+
+
+def _draw_space(axes: Any, panel: Panel) -> None:
+    shape = panel.shape
+    axes.set(xlim=panel.ranges[0], ylim=panel.ranges[1], zlim=panel.ranges[2])
+    # matplotlib keeps the diagonal of the box; here its longest edge is kept.
+    axes.set_box_aspect(tuple(shape), zoom=0.55 * panel.zoom * float(np.linalg.norm(shape)))
+    axes.view_init(*panel.view)
+    if not any(panel.labels):
+        axes.set(xticklabels=(), yticklabels=(), zticklabels=())
+        return
+    axes.set(xlabel=panel.labels[0], ylabel=panel.labels[1], zlabel=panel.labels[2])
+    axes.tick_params(labelsize=mpl.rcParams["font.size"] - 2.0, pad=-1)
+    for axis, length in zip((axes.xaxis, axes.yaxis, axes.zaxis), shape, strict=True):
+        axis.set_major_locator(MaxNLocator(4 if length > 0.6 else 2))
+
+
+def _draw_legend(axes: Any, panel: Panel) -> None:
+    if panel.legend == "above":
+        axes.legend(ncols=panel.columns, loc="lower right", bbox_to_anchor=(1.0, 0.99))
+    elif panel.legend == "right":
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 0.98))
+    elif panel.legend == "inside":
+        axes.legend(ncols=panel.columns, loc="upper left")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bars:
+    """One bar for each name.
+
+    Attributes:
+        label: in the legend.
+        colour: of the bars.
+        levels: (n,) their heights; nan where there is none.
+        runs: single values of each, as circles on the bars; none where empty.
+    """
+
+    label: str
+    colour: str
+    levels: NDArray[np.float64]
+    runs: Sequence[Sequence[float]] = ()
+
+
+def bars_of_levels(
+    names: Sequence[str],
+    series: Sequence[Bars],
+    mark: str,
+    *,
+    title: str,
+    floors: NDArray[np.float64] | None = None,
+) -> Figure:
+    """Draw groups of bars beside each other, in dB.
+
+    Args:
+        names: of the groups.
+        series: the bars of a group, from left to right.
+        mark: as of `Sheet`.
+        title: above the figure, at the left.
+        floors: (n,) a level for each group, as a line over its bars; nan where there is none.
+    """
+    x = np.arange(len(names))
+    width = 0.84 / len(series)
+    with figure(3.4, mark) as page:
+        axes = page.add_axes((0.06, 0.2, 0.925, 0.66))
+        for i, bars in enumerate(series):
+            places = x + width * (i - 0.5 * (len(series) - 1))
+            axes.bar(places, bars.levels, 0.92 * width, color=bars.colour, label=bars.label)
+            for place, levels in zip(places, bars.runs, strict=False):
+                axes.plot([place] * len(levels), levels, "o", ms=3.2, mfc="white", mec="black", mew=0.8)
+        if floors is not None and not np.isnan(floors).all():
+            axes.hlines(floors, x - 0.44, x + 0.44, color=RED, lw=1.4, label="noise floor of the encoders")
+        axes.set_xticks(x, names, rotation=20, ha="right")
+        axes.set_ylabel("SNR [dB]")
+        axes.set_title(title)
+        axes.grid(axis="x", visible=False)
+        axes.legend(ncols=5, loc="lower right", bbox_to_anchor=(0.88 if mark else 1.0, 0.99))
+    return page
