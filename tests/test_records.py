@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import field
 from typing import Annotated, Literal
 
 import pytest
@@ -46,6 +48,7 @@ class Whole:
     colour: Annotated[str, word(("red", "blue"))] = "red"
     end: Literal["stop", "blend"] = "stop"
     on: Flag = False
+    facts: Mapping[str, Finite] = field(default_factory=dict)
 
 
 @pytest.mark.parametrize(
@@ -58,7 +61,7 @@ class Whole:
         ({"share": 10**400}, "give a number from 0 to 1"),
         ({"share": 16**5000}, "share: a number of thousands of digits; give a number from 0 to 1"),
         ({"share": 1, "shade": 1}, "shade: no such key; did you mean share?"),
-        ({"share": 1, "xyz": 1}, "xyz: no such key; known are share, parts, seed, colour, end, on"),
+        ({"share": 1, "xyz": 1}, "xyz: no such key; known are share, parts, seed, colour, end, on, facts"),
         ({"share": 1, "seed": 1.0}, "seed: 1.0; give a whole number from 0"),
         ({"share": 1, "seed": -1}, "seed: -1; give a whole number from 0"),
         ({"share": 1, "colour": "green"}, "colour: 'green'; give one of red, blue"),
@@ -73,6 +76,8 @@ class Whole:
         ({"share": 1, "parts": [{"name": "a", "at": [1]}]}, "parts[0].at[1]: missing; give a finite number"),
         ({"share": 1, "parts": [{"name": "a", "at": [2, 1]}]}, "parts[0].at: give the smaller one first"),
         ({"share": 1, "parts": [{"name": "a", "as": 1}]}, "parts[0].as: no such key; did you mean at?"),
+        ({"share": 1, "facts": 3}, "facts: 3; give a table"),
+        ({"share": 1, "facts": {"a": "x"}}, "facts.a: 'x'; give a finite number"),
         (3, "3; give a table"),
     ],
 )

@@ -45,6 +45,7 @@ _PROBLEMS = MappingProxyType(
         "unexpected_keyword_argument": "no such key; {nearest}",
         "literal_error": "{given}; give {expected}",
         "dataclass_type": "{given}; give a table",
+        "dict_type": "{given}; give a table",
         "tuple_type": "{given}; give a list",
         "too_short": "{given}; give a list of {min_length} or more",
         "too_long": "{given}; give a list of {max_length} or fewer",
@@ -204,7 +205,7 @@ def _problem(kind: Any, first: ErrorDetails) -> str:
 
 def _shown(value: object) -> str:
     try:
-        return _SHORT.repr(value)
+        return "nothing" if value is None else _SHORT.repr(value)
     except ValueError:  # Python writes no whole number of thousands of digits
         return "a number of thousands of digits"
 

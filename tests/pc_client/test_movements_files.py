@@ -175,6 +175,8 @@ ROBOT = movement_text(load_movement("arcs/uniform_4_1"))
             "strokes[0].tlit: no such key; did you mean tilt?",
         ),
         (HUMAN, ("[[strokes]]", "[[stroke]]"), "strokes: missing"),
+        (HUMAN, ("[provenance]", "[provenanc]"), "provenanc: no such key; did you mean provenance?"),
+        (HUMAN, ('kind = "lognormal"', ""), "kind: nothing; give one of lognormal, uniform"),
         (
             HUMAN,
             ("sigma = 0.183", "mu = 0.183"),
