@@ -92,7 +92,7 @@ def main(names: list[str]) -> None:
 
 
 def _measurement_of(name: str) -> str:
-    """The measurement of that name, or that of which a figure of that name is asked."""
+    """The measurement of that name, or the one that has a figure of that name."""
     if name in MEASUREMENTS:
         return name
     for measurement, figures in ASKED.items():

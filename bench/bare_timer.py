@@ -1,6 +1,6 @@
 """How punctual this machine is without us: a process that does nothing but wake up every 8 ms.
 
-Runs beside the realtime measurement, so that a late frame can be told from a late machine.
+Runs beside the realtime measurement, so that a late frame is separated from a late machine.
 Prints the 99.9th percentile and the maximum of its lateness in microseconds when its time is over.
 """
 

@@ -244,11 +244,11 @@ def draw_freedrive(out):
         stage.add_ghost(q[round(when / PERIOD)], JOINT, 0.18)
     stage.add_line(place[::4] - [0.0, 0.0, 0.01], PUSH, 0.004)
     stage.add_arrow(place[0] + [0.04, 0.0, 0.0], place[0] + [0.04, 0.0, 0.0] + 0.012 * force, PUSH)
-    way = 1e3 * np.linalg.norm(place - place[0], axis=1)
+    displacement = 1e3 * np.linalg.norm(place - place[0], axis=1)
     speed = 1e3 * np.linalg.norm(run.column("speed")[:, :3], axis=1)
     moved, held = (
-        way[round(2.4 / PERIOD)],
-        np.abs(way - way[round(2.9 / PERIOD)])[round(3.0 / PERIOD) :].max(),
+        displacement[round(2.4 / PERIOD)],
+        np.abs(displacement - displacement[round(2.9 / PERIOD)])[round(3.0 / PERIOD) :].max(),
     )
     figure, (upper, lower) = page(
         stage.picture(), 2, f"freedrive_mode: {force[1]:.0f} N sideways move the tool {moved:.0f} mm"
@@ -257,12 +257,18 @@ def draw_freedrive(out):
         axis.axvspan(0.5, 1.3, color=RED, alpha=0.12, lw=0)
         axis.axvspan(3.0, 3.5, color=RED, alpha=0.12, lw=0)
         axis.axvline(2.5, color=GREY, lw=1, ls="--")
-    upper.plot(t, way, color=BLUE)
-    upper.set_ylabel("way of the tool [mm]")
-    upper.text(0.9, 0.9 * way.max(), "push", color=RED, ha="center")
-    upper.text(3.25, 0.45 * way.max(), "the same push,\nheld", color=RED, ha="center")
+    upper.plot(t, displacement, color=BLUE)
+    upper.set_ylabel("displacement of the tool [mm]")
+    upper.text(0.9, 0.9 * displacement.max(), "push", color=RED, ha="center")
+    upper.text(3.25, 0.45 * displacement.max(), "the same push,\nheld", color=RED, ha="center")
     upper.text(
-        2.46, 0.12 * way.max(), "end_freedrive_mode", rotation=90, color="0.35", ha="right", fontsize=8
+        2.46,
+        0.12 * displacement.max(),
+        "end_freedrive_mode",
+        rotation=90,
+        color="0.35",
+        ha="right",
+        fontsize=8,
     )
     lower.plot(t, speed, color=BLUE)
     lower.set_ylabel("tool speed [mm/s]")
@@ -312,7 +318,7 @@ def draw_force_mode(out):
     upper.set_ylabel("force along z [N]")
     upper.legend(fontsize=8, loc="lower right", framealpha=0.9)
     lower.plot(t, 1e3 * (place[:, 2] - TABLE_HEIGHT), color=BLUE, label="height of the tool above the table")
-    lower.plot(t, 1e3 * place[:, 1], color=RED, label="way of the move on top")
+    lower.plot(t, 1e3 * place[:, 1], color=RED, label="with the displacement of the move")
     lower.set_ylabel("[mm]")
     lower.legend(fontsize=8, loc="upper left")
     for axis in (upper, lower):

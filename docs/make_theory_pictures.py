@@ -29,7 +29,7 @@ def draw_lognormal(axes: Axes) -> None:
     points = {
         "inflection": (before, (-8, 6), "right"),
         "top: exp(mu − sigma²)": (LOGNORMAL.mode, (0, 7), "center"),
-        "half the way: exp(mu)": (LOGNORMAL.median, (10, 2), "left"),
+        "half the length: exp(mu)": (LOGNORMAL.median, (10, 2), "left"),
         "mean": (LOGNORMAL.mean, (10, -8), "left"),
         "inflection ": (after, (10, 0), "left"),
     }
@@ -44,7 +44,12 @@ def draw_lognormal(axes: Axes) -> None:
     done = LOGNORMAL.evaluate(t).done
     axes.plot(t, 8.0 * done, color=REFERENCE_GREY, lw=1.2)
     axes.annotate(
-        "way done F (0 to 1)", (0.435, 7.9), (0, -11), textcoords="offset points", fontsize=8, color="#666666"
+        "F, 0 to 1",
+        (0.435, 7.9),
+        (0, -11),
+        textcoords="offset points",
+        fontsize=8,
+        color="#666666",
     )
     axes.set(xlim=(0.0, 0.55), ylim=(0.0, 9.0), xlabel="t − t0 [s]", ylabel="Lambda [1/s]")
     axes.set_title("A stroke: mu = −1.6, sigma = .25")

@@ -268,7 +268,7 @@ def _serve(connection: Connection, fidelity: str, seed: int, pace: str) -> None:
     from ur_emulator import ControlBox
     from ur_emulator.errors import PortError
 
-    # Moved up, out of the way of a box on the standard ports.
+    # Moved up, so that a box on the standard ports is not disturbed.
     for port_base in range(8_000, 28_000, 1000):
         control_box = ControlBox(host=HOST, port_base=port_base, fidelity=fidelity, seed=seed, pace=pace)
         try:

@@ -1,4 +1,4 @@
-"""Words of a configuration that nobody knows: what was given, what it is nearest to."""
+"""Unknown words in a configuration: what was given, what it is nearest to."""
 
 from __future__ import annotations
 

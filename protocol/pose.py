@@ -57,7 +57,7 @@ def _quaternion(rx: float, ry: float, rz: float) -> _Quaternion:
 
 def _rotvec(w: float, x: float, y: float, z: float) -> Vector3:
     """Any non-zero length will do: only ratios enter."""
-    if w < 0.0:  # the same rotation, the short way round
+    if w < 0.0:  # the same rotation, by the smaller angle
         w, x, y, z = -w, -x, -y, -z
     sine = sqrt(x * x + y * y + z * z)
     scale = 2.0 / w if sine < _TINY else 2.0 * atan2(sine, w) / sine

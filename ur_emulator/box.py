@@ -260,7 +260,7 @@ class Box(BoxOperations):
         return numbers
 
     def _shut_down(self) -> None:
-        """Close the box as one that was switched off, after what is under way in the loop."""
+        """Close the box as one that was switched off, after the present turn of the loop."""
         self.is_shut_down = True
         self._loop.call_soon_threadsafe(lambda: self.on_end(), self._fail)
 

@@ -222,7 +222,7 @@ class Budgets:
 
     # 300 kB of lines as they usually are.
     log_lines: int = _budget(
-        3_000, "lines", "what --log shows and nobody reads", "the newest are lost, a line says how many"
+        3_000, "lines", "lines of --log that are not read", "the newest are lost, a line says how many"
     )
 
 

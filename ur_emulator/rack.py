@@ -7,7 +7,7 @@
     with BoxRack([{"host": "127.0.0.2"}, {"host": "127.0.0.3", "fidelity": "poor"}]) as boxes:
         ...
 
-The boxes know nothing of each other; an error in a cycle ends its box, the others go on. In real time their
+The boxes are independent; an error in a cycle ends its box, the others go on. In real time their
 cycles are spread over the period.
 """
 

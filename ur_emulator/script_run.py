@@ -81,7 +81,7 @@ class ScriptBox:
 
     @property
     def time(self) -> float:
-        """Robot time since the program began [s]: at the start of the cycle under way."""
+        """Robot time since the program began [s]: at the start of the present cycle."""
         return (self._controller.snapshot.tick - self._start_tick) * self.step_time
 
     def run(self, program: CompiledProgram, limit: float, report: Callable[[Report], None]) -> RunEnd:
@@ -223,7 +223,7 @@ class _Run:
                 self._answer(request_id, kind, text)
 
     def _answer(self, request_id: int, kind: RequestedType, question: str) -> None:
-        """Answer for the operator; a program whose question nobody answers has failed."""
+        """Answer for the operator; a program whose question is not answered has failed."""
         text = self._answers.popleft() if self._answers else None
         answer = None if text is None else _parsed(text, kind, request_id)
         if answer is not None:

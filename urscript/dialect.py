@@ -64,7 +64,7 @@ INT_AS_CONDITION: Final = False
 """`if 1:` is a run-time error (U, never seen in a script). Strings are allowed: empty is false (D)."""
 
 SIX_NUMBERS_FIT_A_POSE_VARIABLE: Final = True
-"""A variable that holds a pose takes a list of six numbers, and the other way round (O: a driver for the
+"""A variable that holds a pose takes a list of six numbers, and vice versa (O: a driver for the
 UR5e has one name for joints in its thread and for a pose in its body). They stay two types otherwise (D)."""
 
 NONE_FITS_EVERY_VARIABLE: Final = True

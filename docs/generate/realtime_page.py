@@ -20,7 +20,7 @@ same socket ([scripts.md](scripts.md)), which sends no answer to them. Port 3001
 frames and ignores all input.
 
 A frame is its size in bytes (a 32-bit integer, itself included) and then 64-bit floats, all
-big-endian. A frame has no type and no version: only the size tells them apart. A frame of an older
+big-endian. A frame has no type and no version: only the size distinguishes them. A frame of an older
 version is the beginning of a newer one. A client that does not read loses whole frames, never parts
 ([tested](../security.md)).
 """

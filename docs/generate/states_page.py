@@ -128,7 +128,7 @@ def render() -> str:
                     row.arm.value,
                     row.program.value,
                     "yes" if row.latches else "",
-                    row.way_out,
+                    row.remedy,
                     row.why,
                 )
                 for row in MODES
@@ -182,10 +182,10 @@ def render() -> str:
                     command.value,
                     " → ".join(
                         f"{step.name} ({PASSING_TIME[step]:g} s)" if step in PASSING_TIME else step.name
-                        for step in way
+                        for step in modes
                     ),
                 )
-                for (mode, command), way in TRANSITIONS.items()
+                for (mode, command), modes in TRANSITIONS.items()
             ),
         ),
         _JOINTS,
@@ -246,10 +246,10 @@ def _robot_edges() -> Iterator[tuple[str, str, str]]:
     """Give each step once: the first of a transition with its command, the others with the time before."""
     first: dict[tuple[RobotMode, RobotMode], str] = {}
     later: dict[tuple[RobotMode, RobotMode], str] = {}
-    for (mode, command), way in TRANSITIONS.items():
-        if way[0] is not mode:
-            first.setdefault((mode, way[0]), command.value)
-        for before, step in pairwise(way):
+    for (mode, command), modes in TRANSITIONS.items():
+        if modes[0] is not mode:
+            first.setdefault((mode, modes[0]), command.value)
+        for before, step in pairwise(modes):
             label = f"after {PASSING_TIME[before]:g} s" if before in PASSING_TIME else "at once"
             later.setdefault((before, step), label)
     for (before, step), label in (later | first).items():

@@ -107,7 +107,7 @@ def build_tables(run_dir: Path | str, console: Console | None = None) -> Report:
             runs.append(analyse_run(_whole(load_recording(path))))
         except RecordingError as error:
             left_out.append(f"{path.name}: {one_line(error).removeprefix(str(path)).lstrip(': ')}")
-        except Exception as error:  # one file that nobody thought of must not cost the others
+        except Exception as error:  # an unexpected error in one file must not stop the others
             left_out.append(f"{path.name}: cannot be measured ({type(error).__name__}: {one_line(error)})")
     if not runs:
         raise RecordingError(f"{run_dir} holds no usable recording; {left_out[0]}")

@@ -114,7 +114,7 @@ def shifted_pair(
     The window moves with the lag, so that the same piece of the reference is judged as without a shift.
 
     Raises:
-        RecordingError: nearly nothing of the movement is left.
+        RecordingError: too little of the movement is left.
     """
     half_cycle = 0.5 * float(np.median(np.diff(track.t)))
     shifted_t = track.t - lag_s

@@ -21,7 +21,7 @@ __all__ = ["Movement"]
 class Movement(movement.Movement):
     """A movement of the TCP from rest to rest, in the robot's base frame; metres and seconds.
 
-    It knows no robot: `plan` says whether an arm can do it.
+    It is independent of a robot: `plan` checks whether an arm can execute it.
     """
 
     __slots__ = ()
@@ -57,7 +57,7 @@ class Movement(movement.Movement):
     def from_samples(
         cls, t: ArrayLike, points: ArrayLike, rotations: ArrayLike | None = None, *, name: str = "samples"
     ) -> Self:
-        """A movement brought along as samples; a spline goes through them, nothing is smoothed.
+        """A movement given as samples; a spline goes through them, nothing is smoothed.
 
         Args:
             t: (n,) increasing times [s], n >= 4.

@@ -117,7 +117,7 @@ def _folder_of(plan: SweepConfig, out: Path | None) -> Path:
     """Where the results go.
 
     Raises:
-        SweepError: nobody said it.
+        SweepError: it was not confirmed.
     """
     folder = out or plan.output
     if folder is None:

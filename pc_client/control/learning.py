@@ -1,7 +1,7 @@
 """What one run teaches the next: iterative learning control of one movement, joint by joint.
 
 The last run was driven by its whole command u = feed-forward + learned + feedback, and left the error e. The
-next run begins with what the feedback had to add, and with the command that would have made e vanish:
+next run begins with what the feedback had to add, and with the command that would have made e zero:
 
     c_next = Q [ (u - feed-forward) + gain P_model^-1 (differenced e) ]
 

@@ -45,7 +45,7 @@ class LoopModel:
 
     @classmethod
     def of_delay(cls, delay: float, residual: float) -> LoopModel:
-        """The loop of a controller that knows one delay [s] and nothing of a lag."""
+        """The loop of a controller that knows one delay [s] and no lag."""
         return cls(delay, 0.0, None, residual)
 
     @property

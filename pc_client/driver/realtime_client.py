@@ -53,7 +53,7 @@ class RealtimeClient:
 
     Attributes:
         last_stamp: newest time stamp seen [s], or None before the first frame.
-        time_waits: the robot's time stands still when nobody wants anything: it has repeated a time stamp
+        time_waits: the robot's time stops when nothing waits for it: it has repeated a time stamp
             while no program ran, which a real controller never does.
     """
 

@@ -61,7 +61,7 @@ class ReverseServer:
         return self._listener.port
 
     def forget_callers(self) -> None:
-        """Close calls that nobody waits for any more; to be called before a program is started.
+        """Close calls that are no longer expected; to be called before a program is started.
 
         Raises:
             DriverError: they do not end.
@@ -87,7 +87,7 @@ class ReverseServer:
             The connection; the caller closes it.
 
         Raises:
-            DriverError: nobody called in time, or the caller is not our program.
+            DriverError: no call in time, or the caller is not our program.
         """
         waited = Patience()
         while True:

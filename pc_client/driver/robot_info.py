@@ -1,4 +1,4 @@
-"""Which robot answers: firmware, model, serial number, and whether it is simulated, real, or nobody knows."""
+"""Which robot answers: firmware, model, serial number, and whether it is simulated, real or unknown."""
 
 from __future__ import annotations
 

@@ -95,4 +95,4 @@ class _Events:
                 if not data:
                     break
                 self._rtde.receive_data(data)
-        raise DriverError("the RTDE port says nothing of use")
+        raise DriverError("the RTDE port sends no usable answer")

@@ -68,7 +68,7 @@ class Listener(Protocol):
         ...
 
     def accept(self, timeout: float) -> Transport | None:
-        """The next caller, or None when nobody called for `timeout` seconds."""
+        """The next caller, or None when there was no call for `timeout` seconds."""
         ...
 
     def close(self) -> None:
@@ -218,7 +218,7 @@ class TcpListener:
         return int(self._socket.getsockname()[1])
 
     def accept(self, timeout: float) -> TcpTransport | None:
-        """The next caller, or None when nobody called for `timeout` seconds."""
+        """The next caller, or None when there was no call for `timeout` seconds."""
         self._socket.settimeout(timeout)
         try:
             connected, address = self._socket.accept()
@@ -238,7 +238,7 @@ class TcpNetwork:
         """Connect.
 
         Raises:
-            DriverError: unknown name, nobody answers, connection refused.
+            DriverError: unknown name, no answer, connection refused.
         """
         try:
             connected = socket.create_connection((host, port), timeout)

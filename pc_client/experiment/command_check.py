@@ -1,4 +1,4 @@
-"""The last look at a whole run of commands that nobody has planned: what was learned, before it is sent.
+"""The check of a whole run of commands that no plan contains: what was learned, before it is sent.
 
 The limits are those that the plan itself was held against, and the controller's own.
 """

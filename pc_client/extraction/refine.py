@@ -164,7 +164,7 @@ def _data_equations(chain: Chain, fit_target: FitTarget) -> _Equations:
     columns = dim + len(chain) * size
     # Column j of the matrix from its diagonal down is band[j, : bandwidth]. Seen with steps one shorter, the
     # same memory is the matrix itself, (column, row), so a piece is added as a square. What lies above the
-    # diagonal falls into the second half of the columns, where nobody looks.
+    # diagonal falls into the second half of the columns, which are not read.
     band = np.zeros((columns + 1, 2 * bandwidth))
     stride = band.strides[1]
     square = np.lib.stride_tricks.as_strided(

@@ -1,6 +1,6 @@
-"""Movements of the TCP: human-like (three models), robot-like (trapezoids) or brought along as samples.
+"""Movements of the TCP: human-like (three models), robot-like (trapezoids) or given as samples.
 
-A `Movement` gives position and velocity at any time in closed form. This package knows no robot: no joints,
+A `Movement` gives position and velocity at any time in closed form. This package has no robot: no joints,
 no limits, no sockets.
 
     lognormal, timing, stroke, sigma_lognormal       the human-like model, from lognormal to movement

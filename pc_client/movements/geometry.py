@@ -16,7 +16,7 @@ __all__ = ["UR3_BOX", "WORKING_BOXES", "Box", "Similarity", "read_only"]
 
 
 def read_only(values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
-    """A private float64 copy that nobody can write to."""
+    """A read-only float64 copy."""
     array = np.array(values, dtype=np.float64)
     if shape is not None:
         array = array.reshape(shape)

@@ -1,4 +1,4 @@
-"""A motion of the joints brought along as (t, q0 .. q5) samples; planning lays a spline through them."""
+"""A motion of the joints given as (t, q0 .. q5) samples; planning lays a spline through them."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ __all__ = [
     "export_samples",
 ]
 
-#: Which model made a movement, as its file says it; "samples" were brought along.
+#: Which model made a movement, as its file says it; "samples" are given.
 Kind = Literal["lognormal", "uniform", "minimum_jerk", "power_law", "samples"]
 
 _KINDS: Mapping[type, Kind] = MappingProxyType(
@@ -53,7 +53,7 @@ LONGEST_DURATION = 1200.0
 
 
 def check_name(name: str) -> None:
-    """Refuse a name of which no file name of the same folder can be made, on any system.
+    """Refuse a name that is no file name of the same folder on every system.
 
     Raises:
         MovementError: saying what is allowed.

@@ -1,4 +1,4 @@
-"""A movement brought along as samples of position, or of pose, over time: a spline through them.
+"""A movement given as samples of position, or of pose, over time: a spline through them.
 
 Samples are taken as they are: nothing is smoothed and nothing is resampled here. Positions get a natural
 cubic spline, orientations scipy's rotation spline, which has a continuous angular acceleration.

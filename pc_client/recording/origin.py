@@ -1,4 +1,4 @@
-"""The words for where data come from: a simulated arm, a real one, or nobody knows.
+"""The words for where data come from: a simulated arm, a real one, or unknown.
 
 Everything that shows data takes them from here. Only data of an arm that is known to be real bear no mark.
 """

@@ -47,13 +47,13 @@ def main(arguments: list[str]) -> None:
 
 
 def _note_end(box: subprocess.Popen[bytes], folder: Path) -> None:
-    """Write how the box ended, in one step, so that nobody reads half of it."""
+    """Write how the box ended, in one step, so that no reader gets half of it."""
     code = box.wait()
     partial = folder / f"{ENDED_FILE}.part"
     try:
         partial.write_text(str(code))
         partial.replace(folder / ENDED_FILE)
-    except OSError:  # the folder has gone: nobody asks any more
+    except OSError:  # the folder is gone: there is no reader
         return
 
 

@@ -33,11 +33,11 @@ class ResultStore:
 
     @property
     def n_settled(self) -> int:
-        """Cases of which an outcome is known."""
+        """Cases with an outcome."""
         return len(self._outcomes)
 
     def waiting(self) -> list[Case]:
-        """Cases of which none is known."""
+        """Cases without an outcome."""
         return [case for identity, case in self._cases.items() if identity not in self._outcomes]
 
     def settle(self, case: Case, outcome: Outcome) -> None:

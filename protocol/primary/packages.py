@@ -1,7 +1,7 @@
 """Whole packages of the primary and secondary ports, for either end.
 
 A new connection gets the version message (its own segment: some clients read it from a single `recv`),
-then the startup message, then states at 10 Hz, of which the first holds all sub-packages. On the secondary
+then the startup message, then states at 10 Hz; the first state holds all sub-packages. On the secondary
 port only the messages in `SECONDARY_MESSAGES` are sent. A reader gets unknown packages as they are.
 
 Sources: UR "Primary/Secondary Client Interface" (2021); captures of 3.3, 3.10, 5.4 and 5.8.

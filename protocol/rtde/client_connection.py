@@ -103,7 +103,7 @@ class RtdeClientConnection:
         if not self._was_started:
             raise RemoteProtocolError("the robot sent data before it had answered a start request")
         if self.state is not RtdeState.STARTED:
-            return None  # assumed harmless: on its way when we paused
+            return None  # assumed harmless: it was sent before the pause
         recipe = self._outputs.get(recipe_id)
         if recipe is None:
             raise RemoteProtocolError(f"the robot sent data of recipe {recipe_id}, which was not set up")

@@ -150,7 +150,7 @@ class PauseReply:
     accepted: bool
 
 
-# --- both ways
+# --- both directions
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,7 +51,7 @@ COMMANDS = {
     SafetyEvent.POWERED_OFF: PowerOff(),
 }
 # The event that leads from NORMAL into a mode.
-WAY_IN = {
+ENTRY = {
     SafetyMode.NORMAL: None,
     SafetyMode.REDUCED: SafetyEvent.REDUCED_ON,
     SafetyMode.RECOVERY: SafetyEvent.RANGE_LEFT,

@@ -23,7 +23,7 @@ from urscript import compile_program
 P = ProgramState
 
 
-def test_the_page_shows_every_mode_event_and_way():
+def test_the_page_shows_every_mode_event_and_transition():
     text = states_page.render()
     for row in MODES:
         assert f"| {row.mode.name} | {int(row.mode)} |" in text
@@ -43,7 +43,7 @@ ENDS = [
 START = StartProgram(compile_program(ENDLESS))
 
 
-def ways_of(*commands):
+def transitions_of(*commands):
     """States that a moving program passes when these commands come, one every 100 cycles but for (n, command)."""
     bench = moving()
     seen = [P(bench.now.runtime_state)]
@@ -56,24 +56,24 @@ def ways_of(*commands):
     return list(pairwise(seen))
 
 
-def test_every_way_of_the_page_is_taken_and_no_other():
+def test_every_transition_of_the_page_is_taken_and_no_other():
     taken = set()
     for pause in PAUSES:
-        taken.update(ways_of(pause))
+        taken.update(transitions_of(pause))
     for end in [*ENDS, PowerOff()]:
         for before in ([], [PauseProgram()], [(3, PauseProgram())]):
-            taken.update(ways_of(*before, end))
-    taken.update(ways_of(PauseProgram(), ResumeProgram()))
-    taken.update(ways_of((3, PauseProgram()), ResumeProgram()))
-    taken.update(ways_of(SafeguardStop(True), SafeguardStop(False)))
-    taken.update(ways_of(StopProgram(), START))
-    taken.update(ways_of((3, StopProgram()), START))
+            taken.update(transitions_of(*before, end))
+    taken.update(transitions_of(PauseProgram(), ResumeProgram()))
+    taken.update(transitions_of((3, PauseProgram()), ResumeProgram()))
+    taken.update(transitions_of(SafeguardStop(True), SafeguardStop(False)))
+    taken.update(transitions_of(StopProgram(), START))
+    taken.update(transitions_of((3, StopProgram()), START))
     assert taken == {(row.state, row.then) for row in states_page.PROGRAM_TRANSITIONS}
 
 
 @pytest.mark.parametrize("pause", PAUSES)
 def test_pauses_lead_to_paused(pause):
-    assert ways_of(pause) == [(P.PLAYING, P.PAUSING), (P.PAUSING, P.PAUSED)]
+    assert transitions_of(pause) == [(P.PLAYING, P.PAUSING), (P.PAUSING, P.PAUSED)]
 
 
 def test_every_number_of_the_safety_mode_that_a_cb3_uses_is_on_the_page():

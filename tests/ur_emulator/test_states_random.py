@@ -5,7 +5,7 @@ from box_support import Bench
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
-from states_support import BRAKING, COMMANDS, ENDLESS, WAY_IN, check_wires, failures
+from states_support import BRAKING, COMMANDS, ENDLESS, ENTRY, check_wires, failures
 
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.commands.power import PowerOn, ReleaseBrakes, StartFreedrive
@@ -65,7 +65,7 @@ ANYTHING = (
 # What wakes an arm up, three times as likely: else most boxes would sleep.
 LIKELY = (*ANYTHING, *3 * (ReleaseEmergencyStop(), RestartSafety(), SafeguardStop(False)))
 LIKELY += 3 * (UnlockProtectiveStop(), ReleaseBrakes(), StartProgram(PROGRAMS[0]))
-STOPS = tuple(COMMANDS[event] for mode, event in WAY_IN.items() if mode not in MOVING_MODES)
+STOPS = tuple(COMMANDS[event] for mode, event in ENTRY.items() if mode not in MOVING_MODES)
 RESTING = 0.03  # rad/s, what sensors may say of an arm at rest
 
 
@@ -112,7 +112,7 @@ class AnyBox(RuleBasedStateMachine):
     @rule(program=st.sampled_from(PROGRAMS[:3]), ticks=st.integers(1, 40), stop=st.sampled_from(STOPS))
     def stop_at_work(self, program, ticks, stop):
         """A program is at work, and something stops it."""
-        self.the_way_back_is_always_open()
+        self.the_return_is_always_possible()
         self.tick(StartProgram(program))
         for _ in range(ticks):
             self.tick()
@@ -145,7 +145,7 @@ class AnyBox(RuleBasedStateMachine):
         assert text.count("\n") == 0
 
     @rule()
-    def the_way_back_is_always_open(self):
+    def the_return_is_always_possible(self):
         """Whatever has happened: release, close, restart, confirm, release the brakes; then programs run."""
         for command in (
             AssignSafetyInput(0, "none"),

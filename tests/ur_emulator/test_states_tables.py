@@ -1,7 +1,7 @@
 """The tables of safety modes and events, written down once more by hand, and the box that follows them."""
 
 import pytest
-from states_support import BRAKING, COMMANDS, WAY_IN, infos, moving
+from states_support import BRAKING, COMMANDS, ENTRY, infos, moving
 
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.commands.power import PowerOn, ReleaseBrakes
@@ -55,7 +55,7 @@ CASES = [(event, was, EXPECTED[event][i]) for event in SafetyEvent for i, was in
 def test_the_tables_are_whole():
     assert {row.mode for row in MODES} == set(FROM)
     assert set(EVENTS) == set(EXPECTED) == set(SafetyEvent)
-    assert all(row.way_out for row in MODES if row.mode is not N)
+    assert all(row.remedy for row in MODES if row.mode is not N)
     assert {N, RD, RC} == MOVING_MODES
     assert {N, RD, RC, SG} == WATCHED_MODES
 
@@ -95,12 +95,12 @@ def test_what_lies_under_a_mode_comes_back():
 
 def enter(mode):
     bench = moving(fidelity="ideal")
-    way_in = WAY_IN[mode]
+    entry = ENTRY[mode]
     if mode is M.RECOVERY:
         bench.controller.safety.handle(E.RANGE_LEFT)
         bench.controller.state.past.snapshot = bench.now._replace(actual_q=(7.0, *bench.now.actual_q[1:]))
-    elif way_in is not None:
-        bench.tick(1, COMMANDS[way_in])
+    elif entry is not None:
+        bench.tick(1, COMMANDS[entry])
     return bench
 
 
@@ -138,7 +138,7 @@ def test_what_a_mode_does_to_arm_program_and_power(mode):
 
 
 @pytest.mark.parametrize("mode", [mode for mode in FROM if not ROW[mode].may_have_power])
-def test_power_is_refused_with_a_word_about_the_way_out(mode):
+def test_power_is_refused_with_the_remedy(mode):
     bench = enter(mode)
     bench.tick(BRAKING)
     bench.tick(1, PowerOn(), ReleaseBrakes())
@@ -148,12 +148,12 @@ def test_power_is_refused_with_a_word_about_the_way_out(mode):
     assert first.startswith("power on refused")
     assert second.startswith("brake release refused")
     assert mode.name in first
-    assert ROW[mode].way_out in first
+    assert ROW[mode].remedy in first
 
 
 # --- robot and joint modes
 
-WAYS = {
+TRANSITION_LISTS = {
     (RobotMode.POWER_OFF, ModeCommand.POWER_ON): "POWER_ON IDLE",
     (RobotMode.POWER_OFF, ModeCommand.BRAKE_RELEASE): "POWER_ON IDLE BACKDRIVE RUNNING",
     (RobotMode.POWER_ON, ModeCommand.BRAKE_RELEASE): "POWER_ON IDLE BACKDRIVE RUNNING",
@@ -170,7 +170,7 @@ WAYS = {
 
 @pytest.mark.parametrize("mode", RobotMode)
 @pytest.mark.parametrize("command", ModeCommand)
-def test_ways_of_the_robot_mode(mode, command):
+def test_transitions_of_the_robot_mode(mode, command):
     machine = RobotModeMachine(mode, 0.008)
     machine.command(command)
     seen = [machine.mode]
@@ -179,8 +179,8 @@ def test_ways_of_the_robot_mode(mode, command):
         if machine.mode is not seen[-1]:
             seen.append(machine.mode)
     assert not machine.is_changing
-    assert " ".join(step.name for step in seen) == WAYS.get((mode, command), mode.name)
-    assert ((mode, command) in TRANSITIONS) is ((mode, command) in WAYS)
+    assert " ".join(step.name for step in seen) == TRANSITION_LISTS.get((mode, command), mode.name)
+    assert ((mode, command) in TRANSITIONS) is ((mode, command) in TRANSITION_LISTS)
 
 
 def test_joint_modes():

@@ -3,7 +3,7 @@
 import pytest
 from box_support import MessageReader, connect
 from rtde_support import RtdeClient
-from states_support import BRAKING, COMMANDS, WAY_IN, check_wires, moving
+from states_support import BRAKING, COMMANDS, ENTRY, check_wires, moving
 
 from protocol.primary.layout import MasterboardData, RobotModeData
 from protocol.primary.messages import ErrorCodeMessage, SafetyModeMessage
@@ -19,14 +19,14 @@ from ur_emulator.commands.safety import (
 )
 from ur_emulator.controller.safety.modes import SafetyEvent
 
-MODES = [mode for mode in WAY_IN if mode is not SafetyMode.RECOVERY]
+MODES = [mode for mode in ENTRY if mode is not SafetyMode.RECOVERY]
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_ports_agree_in_every_cycle_of_a_mode(mode):
     bench = moving(fidelity="ideal")
     check_wires(bench)
-    bench.tick(1, *([COMMANDS[WAY_IN[mode]]] if WAY_IN[mode] else []))
+    bench.tick(1, *([COMMANDS[ENTRY[mode]]] if ENTRY[mode] else []))
     for _ in range(BRAKING):
         check_wires(bench)
         bench.tick()
@@ -34,7 +34,7 @@ def test_ports_agree_in_every_cycle_of_a_mode(mode):
     check_wires(bench)
 
 
-def test_ports_agree_in_recovery_and_on_the_way_up():
+def test_ports_agree_in_recovery_and_while_powering_up():
     bench = moving(fidelity="ideal")
     bench.tick(1, COMMANDS[SafetyEvent.POWERED_OFF])
     bench.tick(1, ReleaseBrakes())
@@ -79,7 +79,7 @@ class Dashboard:
         raise AssertionError(f"{line} never answered {wanted}, but {reply}")
 
 
-def test_an_emergency_stop_and_the_way_back_by_the_dashboard(box):
+def test_an_emergency_stop_and_the_recovery_by_the_dashboard(box):
     with Dashboard(box) as dashboard, connect(box, "rtde") as sock, connect(box, "primary") as primary:
         messages = MessageReader(primary)
         messages.state()  # the box has seen this client

@@ -184,14 +184,14 @@ def parameter(
         low: least number.
         high: greatest number; of a vector, its greatest length.
         default: taken when it is not given; without it the parameter is required.
-        details: `kind`, `choices` or `lengths`, where the type of the field does not tell.
+        details: `kind`, `choices` or `lengths`, where the type of the field does not define it.
     """
     declared = {"meaning": meaning, "unit": unit, "low": low, "high": high, **details}
     return field(default=default, metadata=declared)
 
 
 def _details_of(annotation: Any) -> dict[str, Any]:
-    """Return the kind of a field by its type, and what else the type tells."""
+    """Return the kind of a field by its type, and what else the type defines."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin in (Union, UnionType):
         types = [one for one in arguments if one is not NoneType]

@@ -41,9 +41,9 @@ class StartFreedrive:
 
 
 def _give_power(box: Box, command: ModeCommand) -> None:
-    """Power the joints or open their brakes, if the safety mode allows it; clients are told if not."""
+    """Power the joints or open their brakes, if the safety mode allows it; clients get a message if not."""
     mode = box.state.safety.mode
     if ROW[mode].may_have_power:
         box.state.mode.command(command)
     else:
-        inform(box.state, f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].way_out}")
+        inform(box.state, f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].remedy}")

@@ -84,7 +84,7 @@ def _why_not_running(state: ControllerState) -> str:
     """Return why no program may move the arm now; "" if one may."""
     if state.safety.is_stopped:
         safety = state.safety.mode
-        return f"the robot is in {safety.name}, it must be RUNNING: {ROW[safety].way_out}"
+        return f"the robot is in {safety.name}, it must be RUNNING: {ROW[safety].remedy}"
     mode = state.mode.mode
     return "" if mode is RobotMode.RUNNING else f"the robot is in {mode.name}, it must be RUNNING"
 

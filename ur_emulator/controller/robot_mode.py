@@ -11,7 +11,7 @@ from enum import Enum
 
 from protocol.ur_types import JointMode, RobotMode, SafetyMode
 
-# How long the box stays in a passing mode before the next one of its way [s].
+# How long the box stays in a passing mode before the next one of its sequence [s].
 PASSING_TIME = {
     RobotMode.NO_CONTROLLER: 0.5,
     RobotMode.DISCONNECTED: 0.5,
@@ -122,9 +122,9 @@ class RobotModeMachine:
 
     def command(self, command: ModeCommand) -> None:
         """Start the transition that the table gives for `command`; without one nothing changes."""
-        way = TRANSITIONS.get((self.mode, command))
-        if way is not None:
-            self._enter(way[0], list(way[1:]))
+        modes = TRANSITIONS.get((self.mode, command))
+        if modes is not None:
+            self._enter(modes[0], list(modes[1:]))
 
     def step(self) -> None:
         """Advance one cycle."""

@@ -44,7 +44,7 @@ class ControllerState:
         clock: control cycles, and those of programs.
         motion: targets of the joints, and the thread that moves them.
         place_arm: puts the resting arm at joint angles [rad]; False where it would touch something.
-        mode: robot mode, and the modes on the way to another one.
+        mode: robot mode, and the modes that lead to another one.
         safety: causes of safety modes, and the mode that they lead to.
         speed: speed slider, and the limits of a safety mode that has some.
         tool: TCP, payload and gravity.

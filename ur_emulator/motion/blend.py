@@ -26,7 +26,7 @@ from ur_emulator.motion.tool import UnreachableError
 _SHARPEST_ARC = 0.9 * pi
 _STRAIGHT = 1e-6  # m/m
 _SAMPLES = 8  # intervals of a blend, for its greatest speed
-# Where the ways before and behind the waypoint differ by a greater factor, a blend of two joint moves is
+# Where the lengths before and behind the waypoint differ by a greater factor, a blend of two joint moves is
 # shaped as if they differed by this one: else the curve overshoots.
 _GREATEST_RATIO = 3.0
 
@@ -64,7 +64,7 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
         most: how much of the end of the first move it may replace.
 
     Returns:
-        None when there is no way to blend, or the arm cannot follow the curve.
+        None when there is no length to blend, or the arm cannot follow the curve.
     """
     before = first.last_part(r, most)
     after = second.first_part(r, 0.5 * second.path.length)
@@ -180,7 +180,7 @@ def _corner(first: PosePath, second: PosePath, leg: Leg, leave: float, enter: fl
     waypoint = leg.goal_pose
     d1, d2 = slope[:3], end_slope[:3]
     r, r2 = dist(start[:3], waypoint[:3]), dist(end[:3], waypoint[:3])
-    # The speed is constant only where s is the way of the tool on both lines.
+    # The speed is constant only where s is the path length of the tool on both lines.
     if abs(hypot(*d1) - 1.0) > _STRAIGHT or abs(hypot(*d2) - 1.0) > _STRAIGHT or min(r, r2) <= 0.0:
         return None
     if abs(r - r2) > 1e-6 * min(r, r2):

@@ -1,4 +1,4 @@
-"""Conveyor tracking: an overlay that displaces the tool by the way of the belt.
+"""Conveyor tracking: an overlay that displaces the tool by the displacement of the belt.
 
 The belt's position comes as counts of an encoder, whole numbers once a cycle. An estimate of position and
 speed smooths them, without lag at constant speed. The tool follows the estimate with bounded acceleration, so
@@ -130,7 +130,7 @@ class Conveyor:
         self._clock = clock
         self._origin = count()
         self._estimate = BeltEstimate(0.0, clock())
-        self._carried = 0.0  # way of the tool [ticks]
+        self._carried = 0.0  # displacement of the tool [ticks]
         self._speed = 0.0
 
     def displace(self, tool_pose: Pose, dt: float) -> Pose:
@@ -140,7 +140,7 @@ class Conveyor:
         return self._belt.carry(tool_pose, self._carried)
 
     def _follow(self, ticks_per_metre: float, dt: float) -> None:
-        """Move the tool's way towards the belt's."""
+        """Move the tool's displacement towards the belt's."""
         a = CATCH_UP_ACCELERATION * ticks_per_metre
         deceleration = _APPROACH * a
         error = self._estimate.position - self._carried

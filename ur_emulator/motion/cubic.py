@@ -22,12 +22,12 @@ class Cubic:
         cls, start: Sequence[float], slope: Sequence[float], end: Sequence[float], end_slope: Sequence[float]
     ) -> Cubic:
         """Return the curve with these values and derivatives at u = 0 and u = 1 (Hermite's form)."""
-        way = [b - a for a, b in zip(start, end, strict=True)]
+        difference = [b - a for a, b in zip(start, end, strict=True)]
         return cls(
             tuple(start),
             tuple(slope),
-            tuple(3.0 * w - 2.0 * a - b for w, a, b in zip(way, slope, end_slope, strict=True)),
-            tuple(a + b - 2.0 * w for w, a, b in zip(way, slope, end_slope, strict=True)),
+            tuple(3.0 * w - 2.0 * a - b for w, a, b in zip(difference, slope, end_slope, strict=True)),
+            tuple(a + b - 2.0 * w for w, a, b in zip(difference, slope, end_slope, strict=True)),
         )
 
     def at(self, u: float) -> tuple[Vector, Vector]:

@@ -155,7 +155,7 @@ class ForceMode:
         self._wrench += share * (np.array(measured.wrench) - self._wrench)
         self._twist += share * (np.array(measured.twist) - self._twist)
         place = pose_add(self._shift, tool_pose)
-        axes = self.frame.turn(place, [way / dt for way in along_path])
+        axes = self.frame.turn(place, [displacement / dt for displacement in along_path])
         if axes is None or not self._chosen.any():
             speed = np.zeros(6)
             cancelled = np.zeros(6)
@@ -163,9 +163,9 @@ class ForceMode:
             rotation = _block_diagonal(axes)
             speed = rotation @ self._axis_speeds(rotation, measured.q, dt)
             # The program's motion along compliant axes, turned by the displacement, is not executed.
-            way = np.array(along_path)
-            way[3:] = rotvec_to_matrix(self._shift[3:]) @ way[3:]
-            cancelled = rotation @ np.where(self._chosen, rotation.T @ way, 0.0)
+            displacement = np.array(along_path)
+            displacement[3:] = rotvec_to_matrix(self._shift[3:]) @ displacement[3:]
+            cancelled = rotation @ np.where(self._chosen, rotation.T @ displacement, 0.0)
         step = 0.5 * dt * (self._speed + speed) - cancelled
         self._speed = speed
         self._shift = pose_add(six(step.tolist()), self._shift)

@@ -31,7 +31,7 @@ class JointPath(Protocol):
         """Return joint angles [rad] and their derivative [rad per unit of s].
 
         Args:
-            s: way travelled.
+            s: length travelled.
             near: joint angles close to those at s, for the inverse kinematics [rad].
 
         Raises:
@@ -49,10 +49,10 @@ class JointLine:
     def __init__(self, start: Sequence[float], goal: Sequence[float]) -> None:
         self._start = six(start)
         self._goal = six(goal)
-        way = [b - a for a, b in zip(start, goal, strict=True)]
-        length = max(map(abs, way))
+        difference = [b - a for a, b in zip(start, goal, strict=True)]
+        length = max(map(abs, difference))
         self.length = length if length > LEAST_LENGTH else 0.0
-        self._share = six([w / self.length if self.length > 0.0 else 0.0 for w in way])
+        self._share = six([w / self.length if self.length > 0.0 else 0.0 for w in difference])
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
         """See JointPath; the end is exactly the goal."""
@@ -82,7 +82,7 @@ class JointCurve:
 
 
 class ToolPath:
-    """A path of the tool; s is metres of its way."""
+    """A path of the tool; s is its length travelled [m]."""
 
     def __init__(self, path: PosePath, tool: Tool) -> None:
         self.path = path

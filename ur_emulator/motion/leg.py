@@ -53,14 +53,14 @@ class Leg:
     samples: tuple[Sample, ...] = ()
 
     def near(self, s: float) -> Vector6:
-        """Return joint angles close to those after the way s [rad], for the inverse kinematics."""
+        """Return joint angles close to those after the length s [rad], for the inverse kinematics."""
         if not self.samples:
             return self.path.at(s, ())[0]
-        sample = self.samples[max(0, bisect_right(self.samples, s, key=_way) - 1)]
+        sample = self.samples[max(0, bisect_right(self.samples, s, key=_length) - 1)]
         return six([q + (s - sample.s) * k for q, k in zip(sample.q, sample.slope, strict=True)])
 
     def position(self, s: float) -> Vector3:
-        """Return the position of the tool after the way s [m]."""
+        """Return the position of the tool after the length s [m]."""
         path = self.path
         return (path.path.at(s)[0] if isinstance(path, ToolPath) else self.tool.pose(path.at(s, ())[0]))[:3]
 
@@ -74,23 +74,23 @@ class Leg:
         Args:
             from_blend: the leg begins with a blend.
         """
-        way, t, a = self.path.length, self.t, self.a
-        if t <= 0.0 or way <= 0.0:
+        length, t, a = self.path.length, self.t, self.a
+        if t <= 0.0 or length <= 0.0:
             return self
         ramps = (not from_blend) + (self.r <= 0.0)
         if ramps == 0:
-            v = way / t
+            v = length / t
         elif ramps == 1:
-            a = max(a, 2.0 * way / t**2)
-            v = 2.0 * a * way / (a * t + sqrt(max(0.0, (a * t) ** 2 - 2.0 * a * way)))
+            a = max(a, 2.0 * length / t**2)
+            v = 2.0 * a * length / (a * t + sqrt(max(0.0, (a * t) ** 2 - 2.0 * a * length)))
         else:
-            top = min(self.v, sqrt(a * way))
-            stretch = min(t / (way / top + top / a), _STANDSTILL)
+            top = min(self.v, sqrt(a * length))
+            stretch = min(t / (length / top + top / a), _STANDSTILL)
             v, a = top / stretch, a / stretch**2
         return replace(self, v=min(v, _FASTEST), a=min(a, _STRONGEST))
 
     def starting_at(self, q: Vector6, pose: Pose) -> Leg | None:
-        """Return the straight way to the same joint angles from another start.
+        """Return the straight path to the same joint angles from another start.
 
         Args:
             q: joint angles at the start [rad].
@@ -126,7 +126,7 @@ class Leg:
     def _part(self, r: float, most: float, distance: Callable[[float], float]) -> float:
         path = self.path
         if isinstance(path, ToolPath) and isinstance(path.path, PoseLine):
-            rate = path.path.way_rate
+            rate = path.path.length_rate
             return min(most, r / rate) if rate > 0.0 else most
         return _inside(lambda d: distance(d) <= r, most)
 
@@ -191,7 +191,7 @@ def move_tool(
     return Leg(ToolPath(path, tool), tool, goal, goal_pose, v, a, t, r, process, samples)
 
 
-def _way(sample: Sample) -> float:
+def _length(sample: Sample) -> float:
     return sample.s
 
 

@@ -62,7 +62,7 @@ class Move:
         rest = plan(self._segments[0].intervals, 0.0)
         assert rest is not None
         self._use(rest)
-        # A move without way may have a duration.
+        # A move of length 0 may have a duration.
         self._wait = leg.t if leg.path.length <= 0.0 else 0.0
         self.done = self.duration <= 0.0
         self.returned = False
@@ -191,11 +191,11 @@ class Move:
             self._stopping = stopping_curve(intervals, self._ends[-1] - self._zone * last.scale)
 
     def _at(self, s: float) -> int:
-        """Return the index of the segment at a way."""
+        """Return the index of the segment at a length."""
         return min(bisect_right(self._ends, s), len(self._segments) - 1)
 
     def _ahead(self, s: float) -> list[PathSegment]:
-        """Return the rest of the segments after a way."""
+        """Return the rest of the segments after a length."""
         k = self._at(s)
         segment = self._segments[k]
         begin = segment.begin + (s - (self._ends[k - 1] if k > 0 else 0.0)) / segment.scale

@@ -61,8 +61,8 @@ class LastDisplacement:
         """See Overlay."""
         if self._velocity is not ZERO6:
             after = twist_towards(self._velocity, ZERO6, self.LINEAR, self.ANGULAR, dt)
-            way = [0.5 * dt * (a + b) for a, b in zip(self._velocity, after, strict=True)]
-            self._shift = pose_add(six(way), self._shift)
+            displacement = [0.5 * dt * (a + b) for a, b in zip(self._velocity, after, strict=True)]
+            self._shift = pose_add(six(displacement), self._shift)
             self._velocity = after if any(after) else ZERO6
         return pose_add(self._shift, tool_pose)
 

@@ -1,4 +1,4 @@
-"""Paths of the tool: straight line and arc, as pure functions of the way travelled.
+"""Paths of the tool: straight line and arc, as pure functions of the length travelled.
 
 `at(s)` gives the pose and its derivative with respect to s, a twist in base axes per unit of s. Orientation
 turns on the geodesic at a constant rate, on the same parameter. Sources: URScript manual CB3 3.15, movel and
@@ -14,15 +14,15 @@ from typing import Protocol
 from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.models.robot_model import Vector3, Vector6, six
 
-# A rotation without way needs a speed too; nothing is published. Chosen: a rotation counts as the way of a
-# point at this distance from the tool centre point, if that is longer than the tool's own way [m/rad].
+# A rotation in place needs a speed too; nothing is published. Chosen: a rotation counts as the path of a
+# point at this distance from the tool centre point, if that is longer than the tool's own path [m/rad].
 TURN_LEVER = 0.1
 # Three points are on a line if the sine of the angle between their chords is below this.
 _FLAT = 1e-6
 # Points closer than this coincide [m]: the position of the arm is known up to rounding. Chosen: far below the
 # repeatability of an arm.
 _COINCIDENT = 1e-6
-# A shorter way than this is rounding of the kinematics and counts as none [m or rad].
+# A length shorter than this is rounding of the kinematics and counts as none [m or rad].
 LEAST_LENGTH = 1e-9
 
 
@@ -31,7 +31,7 @@ class PosePath(Protocol):
 
     Attributes:
         length: greatest s [m].
-        rate: greatest speed of the pose when s moves at 1; 1 where s is the way itself.
+        rate: greatest speed of the pose when s moves at 1; 1 where s is the length itself.
         bend: greatest acceleration of the pose when s moves at a constant 1 [1/m].
     """
 
@@ -71,7 +71,7 @@ class PoseLine:
         self._twist = times(1.0 / self.length if self.length > 0.0 else 0.0, self._change)
 
     @property
-    def way_rate(self) -> float:
+    def length_rate(self) -> float:
         """Way of the tool per unit of s; below 1 where the line is mainly a rotation."""
         return _norm(self._twist)
 

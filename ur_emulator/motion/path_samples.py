@@ -41,7 +41,7 @@ class Sample(NamedTuple):
     """A point of a path in joint space.
 
     Attributes:
-        s: way of the tool [m].
+        s: path length of the tool [m].
         q: joint angles [rad].
         slope: their derivative with respect to s [rad/m].
         aspect: `Tool.aspect` there.
@@ -107,15 +107,15 @@ def joint_limits(samples: tuple[Sample, ...], robot: RobotModel) -> tuple[Limits
     """Return the limits of the joints between the samples of a path."""
     found: list[Limits] = []
     for a, b in pairwise(samples):
-        way = b.s - a.s
+        length = b.s - a.s
         speed, fastest, bend = float("inf"), 0.0, 0.0
         for k, most in enumerate(robot.qd_max):
             u, w = a.slope[k], b.slope[k]
-            rate = max(abs(u), abs(w), abs(_middle(a, b, k, way)))
+            rate = max(abs(u), abs(w), abs(_middle(a, b, k, length)))
             if rate > 0.0:
                 speed = min(speed, JOINT_SPEED_SHARE * most / rate)
             fastest = max(fastest, rate)
-            bend = max(bend, abs(w - u) / way)
+            bend = max(bend, abs(w - u) / length)
         if bend > 0.0:
             speed = min(speed, (JOINT_ACCELERATION / bend) ** 0.5)
         speed = max(speed, LEAST_SPEED)
@@ -146,9 +146,9 @@ def _take(samples: list[Sample], path: PosePath, tool: Tool, s: float, near: Vec
     pose, twist = path.at(s)
     if samples:
         last = samples[-1]
-        way = s - last.s
-        if max(map(abs, last.slope)) * way <= _FARTHEST:
-            x, y, z, i, j, k = (q + way * slope for q, slope in zip(last.q, last.slope, strict=True))
+        length = s - last.s
+        if max(map(abs, last.slope)) * length <= _FARTHEST:
+            x, y, z, i, j, k = (q + length * slope for q, slope in zip(last.q, last.slope, strict=True))
             near = (x, y, z, i, j, k)
     q = tool.joints(pose, near)
     if q is None:
@@ -161,15 +161,15 @@ def _is_rough(a: Sample, b: Sample, robot: RobotModel, speed: float) -> bool:
     # Close to a singularity the denser samples keep the arm on its side of it.
     if a.aspect != b.aspect:
         return True
-    way = b.s - a.s
+    length = b.s - a.s
     for k, most in enumerate(robot.qd_max):
-        u, w, middle = a.slope[k], b.slope[k], _middle(a, b, k, way)
+        u, w, middle = a.slope[k], b.slope[k], _middle(a, b, k, length)
         rate, off = max(abs(u), abs(w), abs(middle)), abs(middle - 0.5 * (u + w))
-        if (speed * rate > _FAST * most and off > _ROUGH * rate) or off * way > _GREATEST_JUMP:
+        if (speed * rate > _FAST * most and off > _ROUGH * rate) or off * length > _GREATEST_JUMP:
             return True
     return False
 
 
-def _middle(a: Sample, b: Sample, joint: int, way: float) -> float:
+def _middle(a: Sample, b: Sample, joint: int, length: float) -> float:
     """Return the slope half-way between two samples, if the joint follows a cubic."""
-    return 1.5 * (b.q[joint] - a.q[joint]) / way - 0.25 * (a.slope[joint] + b.slope[joint])
+    return 1.5 * (b.q[joint] - a.q[joint]) / length - 0.25 * (a.slope[joint] + b.slope[joint])

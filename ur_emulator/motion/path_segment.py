@@ -75,14 +75,14 @@ def _intervals(limits: tuple[Limits, ...], begin: float, end: float, scale: floa
     found: list[Interval] = []
     s = begin
     for limit in limits:
-        way = min(limit.end, end) - s
-        if way > 0.0:
+        length = min(limit.end, end) - s
+        if length > 0.0:
             bounds = limit.bounds
-            # What a bend leaves of the acceleration changes with the speed, so not over long ways.
-            n = min(_MOST, max(1, ceil(way / _SHORT * max(b for _, b in bounds))))
+            # What a bend leaves of the acceleration changes with the speed, so not over long intervals.
+            n = min(_MOST, max(1, ceil(length / _SHORT * max(b for _, b in bounds))))
             if scale != 1.0:
                 bounds = tuple((scale * a, b / scale) for a, b in bounds)
-            found += n * [Interval(way * scale / n, (scale * limit.speed) ** 2, bounds)]
+            found += n * [Interval(length * scale / n, (scale * limit.speed) ** 2, bounds)]
             s = limit.end
     return tuple(found)
 

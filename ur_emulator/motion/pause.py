@@ -17,7 +17,7 @@ from ur_emulator.motion.target import JointTarget
 
 # Rate of change of the time scaling [1/s]. Chosen: as for the speed slider, at rest after 0.25 s.
 PAUSE_RATE = 4.0
-# Leading axis on the way back to the path [rad/s, rad/s^2]. Chosen: slow.
+# Leading axis on the return to the path [rad/s, rad/s^2]. Chosen: slow.
 RETURN_SPEED, RETURN_ACCELERATION = 0.25, 1.0
 
 
@@ -69,7 +69,7 @@ class Suspended(NamedTuple):
 
 
 class ReturnToPath:
-    """The way back to where a move left its path; then the move continues.
+    """The return to where a move left its path; then the move continues.
 
     Attributes:
         done: back on the path.
@@ -80,22 +80,22 @@ class ReturnToPath:
     def __init__(self, move: Move, back_to: Vector6) -> None:
         self.move = move
         self.back_to = back_to
-        self._way: Move | None = None
+        self._return: Move | None = None
         self.done = False
 
     @property
     def is_braking(self) -> bool:
-        """True until the way back has begun."""
-        return self._way is None
+        """True until the return has begun."""
+        return self._return is None
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Come to rest, then return."""
-        if self._way is None:
+        if self._return is None:
             if any(target.qd):
                 return StopJ(RETURN_ACCELERATION).step(target, dt, scale)
             leg = move_j(target.q, self.back_to, self.move.leg.tool, a=RETURN_ACCELERATION, v=RETURN_SPEED)
-            self._way = Move(leg)
-        way = self._way
-        after = way.step(target, dt, scale)
-        self.done = way.done
+            self._return = Move(leg)
+        move = self._return
+        after = move.step(target, dt, scale)
+        self.done = move.done
         return after

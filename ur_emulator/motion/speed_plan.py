@@ -1,12 +1,12 @@
 """Speed along a path: the fastest plan within the limits of all its parts.
 
-A plan is made in z, the square of the speed: at a constant acceleration z is a straight line over the way,
+A plan is made in z, the square of the speed: at a constant acceleration z is a straight line over the length,
 z' = 2 a. A curve from the end backwards gives the greatest z from which the arm can stop at the end; one from
 the beginning forwards gives the greatest z that the arm can reach. The plan is the lowest of both and the
 limits.
 
 On a curved path a part of the acceleration changes the direction: a - b z remains along the path, with the
-bend b per unit of way. Units are those of the path.
+bend b per unit of length. Units are those of the path.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Interval(NamedTuple):
     bounds: tuple[tuple[float, float], ...]
 
     def slope(self, z: float) -> float:
-        """Return the greatest constant change of z per way, away from an end where it is `z`.
+        """Return the greatest constant change of z per length, away from an end where it is `z`.
 
         The bounds hold up to the other end, or up to the cap where that comes first.
         """
@@ -69,7 +69,7 @@ class SpeedPlan:
         phases: in order.
         times: when each begins; the first at 0.
         duration: when the end is reached.
-        length: way in all.
+        length: of the whole path.
     """
 
     phases: tuple[Phase, ...]
@@ -78,7 +78,7 @@ class SpeedPlan:
     length: float
 
     def at(self, t: float) -> tuple[float, float]:
-        """Return way and speed at a time; at rest at the end from the end on."""
+        """Return length travelled and speed at a time; at rest at the end from the end on."""
         if t >= self.duration:
             return self.length, 0.0
         k = max(0, bisect_right(self.times, t) - 1)
@@ -91,7 +91,7 @@ class StoppingCurve(NamedTuple):
     """The greatest squares of the speed from which the path can still come to rest at a point.
 
     Attributes:
-        knots: ways, rising; the last is the point.
+        knots: lengths, rising; the last is the point.
         z: squares at them, straight lines between.
     """
 
@@ -128,12 +128,12 @@ def plan(intervals: Sequence[Interval], entry: float) -> SpeedPlan | None:
     for interval, z_end, down in zip(intervals, backward[1:], slopes, strict=True):
         done = 0.0
         for end, z_next in _shape(interval, z, z_end, down):
-            way = end - done
-            if way > _NOTHING * interval.length:
+            length = end - done
+            if length > _NOTHING * interval.length:
                 v = sqrt(z)
-                phases.append(Phase(begin + done, v, 0.5 * (z_next - z) / way))
+                phases.append(Phase(begin + done, v, 0.5 * (z_next - z) / length))
                 times.append(time)
-                time += 2.0 * way / (v + sqrt(z_next))
+                time += 2.0 * length / (v + sqrt(z_next))
                 done = end
             z = z_next
         begin += interval.length
@@ -173,7 +173,7 @@ def _backward(intervals: Sequence[Interval]) -> tuple[list[float], list[float]]:
 
 
 def _shape(interval: Interval, z: float, z_end: float, down: float) -> list[tuple[float, float]]:
-    """Return the corners (way, z) of a plan within one interval: rising, at the cap, falling.
+    """Return the corners (length, z) of a plan within one interval: rising, at the cap, falling.
 
     Args:
         interval: in question.

@@ -69,11 +69,11 @@ class TaskFrame:
         return self._axes
 
     def _turn_to_point(self, tool: NDArray[np.float64]) -> None:
-        way = self._origin - tool
-        distance = float(np.linalg.norm(way))
+        offset = self._origin - tool
+        distance = float(np.linalg.norm(offset))
         if distance < MIN_DISTANCE:
             return
-        y = way / distance
+        y = offset / distance
         # z is as close to the given one as possible; if that is parallel to y, the given x takes its place.
         z = self._given[:, 2] - (self._given[:, 2] @ y) * y
         if np.linalg.norm(z) < 1e-6:

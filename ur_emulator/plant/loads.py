@@ -51,7 +51,7 @@ class Loads:
             set_payload_body(self._model, mass, cog)
 
     def attach(self, mass: float, cog: Vector3) -> None:
-        """Set the true payload, of which the controller does not know.
+        """Set the true payload, which the controller does not know.
 
         Raises:
             PlantError: when the mass [kg] is negative or a number is not finite.

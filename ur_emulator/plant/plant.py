@@ -199,7 +199,7 @@ class Plant:
         self._drives.set_payload(mass, cog)
 
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
-        """Set the true payload at the flange, of which the controller does not know.
+        """Set the true payload at the flange, which the controller does not know.
 
         From now on `set_payload` only declares.
 

@@ -28,7 +28,7 @@ class PlantState(NamedTuple):
     """The state of the arm after a cycle, as the control box reads it; names as in RTDE where one exists.
 
     The first group is measured: noisy, and as old as the feedback age. The second group is computed inside
-    the box for the present target. The third tells the safety system about the present moment.
+    the box for the present target. The third is for the safety system: the present state.
 
     Attributes:
         actual_q: joint angles [rad].

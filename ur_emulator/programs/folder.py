@@ -137,7 +137,7 @@ class ProgramFolder:
         """Write a file in one step: a reader never sees half of it.
 
         Raises:
-            ProgramFileError: it cannot be written; nothing of it stays.
+            ProgramFileError: it cannot be written; no part of it stays.
         """
         try:
             inner_files.write(self._known_root(), inside, data)

@@ -42,7 +42,7 @@ def write(root: Path, inside: PurePosixPath, data: bytes) -> None:
     """Write a file in one step, in place of what has its name.
 
     Raises:
-        OSError: it cannot be written; nothing of it stays.
+        OSError: it cannot be written; no part of it stays.
     """
     with _opened(root, inside.parent) as folder:
         with suppress(FileNotFoundError):

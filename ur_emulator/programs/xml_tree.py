@@ -38,7 +38,7 @@ class XmlTree:
         Args:
             name: of the file.
             root: of the tree.
-            take_steps: told the name and how many elements a reference has led past; may raise.
+            take_steps: gets the name and how many elements a reference has passed; may raise.
 
         Raises:
             ProgramFileError: the elements are nested too deep.
@@ -61,7 +61,7 @@ class XmlTree:
             ProgramFileError: the reference does not lead to an element.
         """
         for _ in range(_MAX_STEPS):
-            self._take_steps(self.name, 1 + len(element))  # whoever asks looks at its children
+            self._take_steps(self.name, 1 + len(element))  # the caller looks at its children
             reference = element.get("reference")
             if reference is None:
                 return element

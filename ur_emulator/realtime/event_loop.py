@@ -7,8 +7,8 @@ must be called next.
 Callbacks go in rounds: every socket that is ready and every call that waits gets one turn in a round. When a
 service is due the round is interrupted, and goes on after the service: no crowd of clients delays a cycle,
 and no client keeps another from its turn. So a callback must be short: what remains to be done goes into the
-next round by `call_soon`. An error in a callback ends its registration, its owner is told, and the loop goes
-on (see `barrier`).
+next round by `call_soon`. An error in a callback ends its registration, its owner gets the error, and the
+loop goes on (see `barrier`).
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ class EventLoop:
     # --- running
 
     def run(self) -> None:
-        """Run until `stop`; an error that nobody takes ends the loop and is raised here."""
+        """Run until `stop`; an error without an owner ends the loop and is raised here."""
         self.is_running = True
         self._thread = threading.get_ident()
         try:

@@ -68,7 +68,7 @@ class LineWriter:
     # --- in the thread
 
     def _run(self) -> None:
-        with suppress(OSError):  # nobody reads any more
+        with suppress(OSError):  # there is no reader any more
             while (lines := self._next_lines()) is not None:
                 self._write(lines)
 

@@ -1,7 +1,7 @@
 """Long tasks of the services of one loop: done in another process, one at a time.
 
-A task that takes long keeps its process for itself, and the others go on in a new one, so that nobody waits
-for a long program or a damaged file of somebody else for more than a moment.
+A task that takes long keeps its process for itself, and the others go on in a new one, so that no client
+waits for a long program or a damaged file of somebody else for more than a moment.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Place:
     """A place among the tasks that wait.
 
     Attributes:
-        sender: whose task it is; those of one sender are never under way at once.
+        sender: whose task it is; those of one sender never run at the same time.
         turn: tasks with a lower one come first.
         arrived: when it was asked for; decides among those of the same turn.
     """
@@ -75,7 +75,7 @@ class Task:
         request: the pickled function with its arguments.
         done: called at its end, unless it is dropped.
         failed: called with an error in `done`.
-        is_dropped: nobody wants its result any more.
+        is_dropped: its result is no longer wanted.
     """
 
     place: Place
@@ -124,7 +124,7 @@ class TaskQueue:
         return task
 
     def drop(self, task: Task) -> None:
-        """Drop a task; no effect after its end. One under way ends at the latest when it begins to take long.
+        """Drop a task; no effect after its end. One that runs ends at the latest when it begins to take long.
 
         So a client that asks and goes, again and again, cannot make the box start a process each time.
         """

@@ -96,7 +96,7 @@ class WorkerProcess:
             self._outbox = memoryview(b"")
 
     def receive(self) -> list[bytes]:
-        """Return the answers of which all has come.
+        """Return the answers that have come completely.
 
         Raises:
             EOFError: the process has ended.
@@ -216,7 +216,7 @@ def out_of_memory() -> str:
 
 
 def _limit_memory() -> None:
-    """Limit what this process has beside what it needs for itself; some systems cannot tell what that is."""
+    """Limit what this process has beside what it needs for itself; some systems do not report that amount."""
     with suppress(OSError):
         n_pages = int(Path("/proc/self/statm").read_text().split()[5])
         limit = n_pages * resource.getpagesize() + BUDGETS.task_memory

@@ -1,4 +1,4 @@
-"""Builtins about errors and limits, most of which only keep a setting, and `powerdown`."""
+"""Builtins about errors and limits (most only keep a setting), and `powerdown`."""
 
 from __future__ import annotations
 

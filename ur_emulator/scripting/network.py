@@ -45,7 +45,7 @@ class RemoteCallError(Exception):
 
 
 class RemoteCall(Protocol):
-    """One call of a remote procedure, under way or done."""
+    """One call of a remote procedure, running or done."""
 
     @property
     def is_done(self) -> bool:
@@ -69,7 +69,7 @@ class RemoteServer(Protocol):
         ...
 
     def close(self) -> None:
-        """Close the connection and forget the calls under way; a later call connects again."""
+        """Close the connection and forget the running calls; a later call connects again."""
         ...
 
 
@@ -77,7 +77,7 @@ class Network(Protocol):
     """Opens connections for scripts."""
 
     def open(self, host: str, port: int) -> ScriptSocket:
-        """Begin to connect to `host`:`port`; the result tells when it is done."""
+        """Begin to connect to `host`:`port`; the result says when it is done."""
         ...
 
     def remote_server(self, url: str) -> RemoteServer:

@@ -28,8 +28,8 @@ _STANDS_STILL = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
 class ProgramSlot:
     """Runs programs on a controller.
 
-    A primary program plays, or it is on its way to a pause (PAUSING, until the arm rests), in it (PAUSED), or
-    on its way out of it (RESUMING, for a cycle, and until the arm is back on a path that it had to leave).
+    A primary program plays, or it comes to a pause (PAUSING, until the arm rests), in it (PAUSED), or
+    leaves it (RESUMING, for a cycle, and until the arm is back on a path that it had to leave).
     Time that a paused program counts, in `sleep` and the time-outs of its sockets, stands still.
 
     Attributes:
@@ -114,7 +114,7 @@ class ProgramSlot:
         self._state.events.append(ProgramStarted(program.name, self._primary))
 
     def stop(self) -> None:
-        """End the primary program, if one runs, and stop the arm, also on its last way to a waypoint."""
+        """End the primary program, if one runs, and stop the arm, also on its last segment to a waypoint."""
         if self._primary is not None:
             self._primary.kill()
             self._end()

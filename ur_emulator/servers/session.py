@@ -43,7 +43,7 @@ class Session(ABC):
         self.answer_requests()
 
     def answer_requests(self) -> None:
-        """Begin to answer what has arrived; harmless if that is under way."""
+        """Begin to answer what has arrived; harmless if that has begun."""
         if not self.is_busy:
             self.is_busy = True
             self._answer_for_a_turn()
@@ -85,7 +85,7 @@ class Session(ABC):
         elif error is not None:
             self.connection.failed(error)
         elif not self.connection.takes_answers:
-            self.connection.close()  # gone: what it has sent ahead is not done for nobody
+            self.connection.close()  # gone: what it has sent ahead is not executed
         elif self.connection.has_ended:
             self.connection.close_when_sent()
         else:

@@ -2,7 +2,7 @@
 
 A generator yields where it has to wait; it is continued after every cycle and when a task of the worker
 process has ended. So nothing waits for a clock, and a request is answered after it was done. An error ends
-the steps in which it was raised, and who has begun them is told.
+the steps in which it was raised, and the caller that began them gets it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class StepRunner:
             self.advance()
 
     def advance(self) -> None:
-        """Go on with everything that is under way."""
+        """Go on with everything that has begun."""
         under_way, self._under_way = self._under_way, []
         self._under_way = [task for task in under_way if not self._advance(*task)] + self._under_way
 

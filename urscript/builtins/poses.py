@@ -82,7 +82,7 @@ def wrench_trans(T_from_to: Any, w_from: Any) -> list[float]:
     """A wrench [F, M] seen from another frame, whose pose in the present frame is T_from_to.
 
     F_to = R^T F and M_to = R^T (M - p x F): the torque about the new point, in the new axes. Assumed: some
-    scripts in the field read the rotation the other way; to be checked on a real arm.
+    scripts in the field read the rotation in the opposite direction; to be checked on a real arm.
 
     Source: e-Series script directory, get_tcp_force: its example takes the wrench at the TCP from
     `wrench_trans(get_tcp_offset(), get_wrench_at_tool_flange())`.

@@ -48,7 +48,7 @@ class WorkBudget:
     """Units of work of a control cycle, shared by programs.
 
     Args:
-        per_cycle: Units that each cycle gives; without a limit for programs that nobody waits beside.
+        per_cycle: Units that each cycle gives; without a limit where no client waits for the program.
         most: Units that one cycle may use when those before it used few.
 
     Attributes:

@@ -97,7 +97,7 @@ class Scheduler:
     robot when the units of a cycle do not suffice.
 
     Attributes:
-        is_between: A turn is under way: the threads go on in the next cycle where they stopped.
+        is_between: A turn has begun: the threads go on in the next cycle where they stopped.
         threads: Unfinished threads, the main thread first, then by age.
         main: The thread whose end ends the program.
     """

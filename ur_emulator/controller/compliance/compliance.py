@@ -3,7 +3,7 @@
 Freedrive (also "teach mode") is requested by the program, by a client or by inputs that are set up for it;
 force mode by the program. Both are modes of the robot, not of the thread that has requested them.
 Source: URScript manual CB3 3.15: freedrive_mode, teach_mode, force_mode, set_*_digital_input_action. Chosen:
-an input acts once no move is under way, with or without a program; freedrive replaces force mode.
+an input acts once no move runs, with or without a program; freedrive replaces force mode.
 """
 
 from __future__ import annotations

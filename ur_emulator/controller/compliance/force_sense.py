@@ -16,7 +16,7 @@ from ur_emulator.controller.compliance.external_sensor import ExternalSensor
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
 
-# Least and most time that is averaged to tell a zero from noise [s]: 0.2 s leave 0.6 N of 3 N, 1 s 0.3 N.
+# Least and most time that is averaged to separate a zero from noise [s]: 0.2 s leave 0.6 N of 3 N, 1 s 0.3 N.
 # The greater one is the length of the history.
 MIN_AVERAGING_TIME, MAX_AVERAGING_TIME = 0.2, 1.0
 # Precision of the estimate [N, Nm]. Source: UR3/CB3 manual.

@@ -35,7 +35,7 @@ class Decoder(IntEnum):
     FALLING = 4
 
 
-# Steps from (A, B) before to (A, B) now; two changes at once cannot be told apart and count nothing.
+# Steps from (A, B) before to (A, B) now; two changes at once are ambiguous and count nothing.
 _CYCLE = ((False, False), (True, False), (True, True), (False, True))
 _QUADRATURE = {(a, _CYCLE[(i + step) % 4]): step for i, a in enumerate(_CYCLE) for step in (1, -1)}
 
@@ -78,7 +78,7 @@ class Encoder:
         self.count = 0.0
 
     def set_count(self, count: float) -> None:
-        """Set the count from a program; the difference is taken the shorter way round."""
+        """Set the count from a program; the smaller of the two differences is taken."""
         self.travel += self.unwind(count - self.count)
         self.count = count
 

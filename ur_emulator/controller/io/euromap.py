@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-# Signals each way: two words of the Modbus map (protocol notes, section 9).
+# Signals in each direction: two words of the Modbus map (protocol notes, section 9).
 N_EUROMAP = 32
 
 

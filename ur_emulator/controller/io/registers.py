@@ -1,8 +1,8 @@
 """General purpose registers of the controller: booleans, integers and floats, inputs and outputs apart.
 
-Ranges: 128 booleans, 48 integers, 48 floats each way; the lower part is meant for fieldbuses, the upper for
-RTDE clients. Registers keep their values when programs end.
-Source: UR RTDE guide; URScript manual CB3 3.15, read_input_boolean_register and related builtins.
+Ranges: 128 booleans, 48 integers, 48 floats in each direction; the lower part is meant for fieldbuses, the
+upper for RTDE clients. Registers keep their values when programs end. Source: UR RTDE guide; URScript manual
+CB3 3.15, read_input_boolean_register and related builtins.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class RegisterValues(NamedTuple):
 
 
 class Registers:
-    """Inputs are written by clients and read by scripts; outputs the other way round."""
+    """Inputs are written by clients and read by scripts; outputs vice versa."""
 
     __slots__ = ("_memories", "_values", "inputs", "outputs")
 

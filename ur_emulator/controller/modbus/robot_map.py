@@ -185,7 +185,7 @@ def read_register(state: ControllerState, address: int) -> int:
 
 
 def write_register(state: ControllerState, address: int, value: int) -> bool:
-    """Write a register, of which the low 16 bits count; False if it can only be read.
+    """Write a register; its low 16 bits count; False if it can only be read.
 
     Raises:
         MapAddressError: there is none at this address.

@@ -48,7 +48,7 @@ class ModeRow:
         arm: what it does to the arm.
         program: what it does to the program.
         latches: its cause is not a button or input that somebody releases.
-        way_out: what to do about it, for messages.
+        remedy: what to do about it, for messages.
         why: source of the above.
     """
 
@@ -56,7 +56,7 @@ class ModeRow:
     arm: ArmEffect
     program: ProgramEffect
     latches: bool
-    way_out: str
+    remedy: str
     why: str
 
     @property

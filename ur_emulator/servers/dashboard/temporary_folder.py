@@ -1,6 +1,6 @@
 """A temporary folder that goes away: with the box, or, after a box was killed, when the next one is made.
 
-Each is locked as long as its box lives; the system drops the lock of a process that has ended in any way.
+Each is locked as long as its box lives; the system drops the lock of a process that has ended for any reason.
 """
 
 from __future__ import annotations

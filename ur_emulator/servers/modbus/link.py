@@ -81,7 +81,7 @@ class ModbusLink:
         self._wanted[signal] = None
 
     def forget(self, signal: ModbusSignal) -> None:
-        """Do nothing more for a signal; an answer under way is dropped."""
+        """Do nothing more for a signal; an outstanding answer is dropped."""
         self._signals.discard(signal)
         self._wanted.pop(signal, None)
         self._waiting.pop(signal, None)
@@ -245,7 +245,7 @@ class ModbusLink:
         return now >= max(request.sent_at for request in self._under_way.values()) + self._period
 
     def _next(self) -> int:
-        """Return a transaction number that is not under way."""
+        """Return a transaction number that is not in use."""
         self._transaction = self._transaction % 0xFFFF + 1
         while self._transaction in self._under_way:
             self._transaction = self._transaction % 0xFFFF + 1

@@ -14,7 +14,7 @@ from protocol.primary.messages import ProgramLabelMessage, ProgramThreadsMessage
 from protocol.ur_types import SoftwareVersion
 from urscript import RunningProgram
 
-# Characters of a label or a name, and threads, that a message tells of: clients hold packages of 4096 bytes.
+# Characters of a label or a name, and threads, that a message names: clients hold packages of 4096 bytes.
 MAX_TEXT = 60
 MAX_THREADS = 30
 

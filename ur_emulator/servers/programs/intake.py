@@ -2,9 +2,9 @@
 
 Words act at once: they never wait for a program. What waits when a client stops the program or switches the
 power off is stopped with it, whoever has sent it: on a real controller it would run already. Programs begin
-in the order of arrival, but who sends many at once lets others go first, and nobody waits for a program that
-takes long to compile: it does not begin any more when a newer one of another client has begun meanwhile. A
-program is compiled also when its sender has closed the connection meanwhile, as many do.
+in the order of arrival, but who sends many at once lets others go first, and no client waits for a program
+that takes long to compile: it does not begin any more when a newer one of another client has begun meanwhile.
+A program is compiled also when its sender has closed the connection meanwhile, as many do.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Box(Protocol):
     """The part of a box that takes what comes.
 
     Attributes:
-        stops: how often clients have stopped the program so far, in whatever way.
+        stops: how often clients have stopped the program so far, by any command.
     """
 
     stops: int
@@ -226,7 +226,7 @@ class ProgramIntake:
     def _drop_gone(self) -> None:
         """Drop programs of clients that have gone until the rest keeps its budget, the longest one aside.
 
-        Who has left most loses its newest first: nobody loses a program by what others have left.
+        The client with most waiting programs loses its newest first; no client loses a program to others.
         """
         gone = [other for other in self._senders if not other.is_open]
         programs = [program for other in gone for program in other.programs]
@@ -254,7 +254,7 @@ class ProgramIntake:
             self._warn(f"programs that were stopped before they began: {len(stopped)}")
 
     def _drop(self, program: Program) -> None:
-        """Let go of a program that was handed over, or that nobody wants any more."""
+        """Let go of a program that was handed over, or that is no longer wanted."""
         sender = program.sender
         if sender.compiling is program:
             sender.compiling = None

@@ -26,7 +26,7 @@ class Sender:
         n_sent: how many programs it has sent since none of its waited.
         held: script of it that the box keeps, as `BUDGETS` counts it [bytes].
         is_open: its connection is open.
-        is_told: it was told that it sends too much.
+        is_told: it was informed that it sends too much.
     """
 
     channel: ScriptChannel = field(default_factory=ScriptChannel)
@@ -52,7 +52,7 @@ class Program:
         text: of it.
         place: among all that wait for the compiler.
         stops: how often the program had been stopped when it arrived.
-        is_secondary: it is a `sec` program; nobody stops it.
+        is_secondary: it is a `sec` program; it cannot be stopped.
         task: compiles it.
         outcome: what has come of it.
     """

@@ -2,7 +2,7 @@
 
 A client that may send programs could otherwise do through a socket of its program what the control API allows
 only to the users of this machine. Every connection of a box asks here with the address that it will use, so
-names and other ways to write an address change nothing.
+names and other forms of an address change nothing.
 """
 
 from __future__ import annotations

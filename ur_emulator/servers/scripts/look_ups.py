@@ -1,4 +1,4 @@
-"""Look-ups of host names for all boxes of this process, in a few threads: the system has no other way.
+"""Look-ups of host names for all boxes of this process, in a few threads: the system offers no other method.
 
 A thread lives while a name waits for it. A name whose script has gone is forgotten; one that is being looked
 up keeps its thread until the system gives up, so a box has only some of the threads.

@@ -87,7 +87,7 @@ class XmlRpcClient:
         for server in (*self._busy, *self._connected):
             server.close()
 
-    # --- what the servers tell
+    # --- what the servers report
 
     def begin(self, server: XmlRpcServer) -> None:
         """A server has a call to make."""
@@ -128,7 +128,7 @@ class XmlRpcServer:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a call is under way."""
+        """Whether a call is running."""
         return bool(self._calls)
 
     def call(self, method: str, arguments: Sequence[Any]) -> XmlRpcCall:
@@ -145,13 +145,13 @@ class XmlRpcServer:
         return call
 
     def close(self) -> None:
-        """Close the connection and forget the calls under way."""
+        """Close the connection and forget the running calls."""
         self._calls.clear()
         self._end_exchange()
         self._disconnect()
 
     def give_up(self, why: str) -> None:
-        """Fail the calls under way."""
+        """Fail the running calls."""
         for call, _ in self._calls:
             call.finish(None, why)
         self.close()
