@@ -79,8 +79,6 @@ COMMAND_SIGNALS = (Signal("cmd_qd", 6, "rad/s"), Signal("phase", 1, "enum", "uin
 ROW_TOPICS = STATE_TOPIC, REFERENCE_TOPIC, COMMAND_TOPIC = "/robot_state", "/reference", "/command"
 PROVENANCE_RECORD, UNITS_RECORD, SUMMARY_RECORD = "provenance", "units", "summary"
 
-CDR_HEAD_BYTES = 4
-
 MOST_NUMBERS = 2000
 """Most numbers in a row: ten times those of the largest frame."""
 
@@ -102,7 +100,7 @@ class Topic(NamedTuple):
     @property
     def dtype(self) -> np.dtype[np.void]:
         """Numpy record of the CDR message: packed, as no field needs padding."""
-        head = [("cdr", "u1", (CDR_HEAD_BYTES,))]
+        head = [("head of CDR", "u1", (4,))]  # no signal has such a name
         return np.dtype([*head, *((s.name, _NUMPY_TYPES[s.type], (s.count,)) for s in self.signals)])
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -20,7 +20,7 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Message, Metadata, Schema
+from mcap.records import Channel, Chunk, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
@@ -41,6 +41,8 @@ from pc_client.recording.layout import (
 from pc_client.recording.provenance import Provenance
 
 _RECORD_HEAD = struct.Struct("<BQ")
+_CHUNK_HEAD_BYTES = 40  # of one that is not compressed
+_MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CRC = struct.Struct("<I")
 _NEEDED = (Signal("timestamp", 1, "s"), *REFERENCE_SIGNALS, *COMMAND_SIGNALS)
 
@@ -109,10 +111,9 @@ def load_recording(path: Path | str) -> Recording:
         raise RecordingError(f"{path} is not a recording: an MCAP file begins with {MCAP0_MAGIC!r}")
     scan = _Scan()
     damage = scan.read(data)
-    signals = tuple(signal for topic in scan.topics.values() for signal in topic.signals)
-    if not scan.has_begun:  # killed before the first chunk: no rows, but it is known of what run
-        signals = _NEEDED
-    missing = _missing_signal(signals)
+    columns, missing = scan.columns(), scan.missing_signal()
+    if missing and not scan.has_begun:  # stopped before its first chunk was whole: no rows
+        columns, missing = {signal: _as_column(signal, np.empty((0, signal.count))) for signal in _NEEDED}, ""
     if PROVENANCE_RECORD not in scan.metadata or missing:
         reason = damage or (f"no signal {missing!r}" if missing else "no provenance")
         raise RecordingError(f"{path} holds no recording of this package: {reason}")
@@ -127,18 +128,16 @@ def load_recording(path: Path | str) -> Recording:
     return Recording(
         path=path,
         provenance=provenance,
-        signals=signals,
+        signals=tuple(columns),
         summary=summary,
         complete=not damage,
         damage=damage,
-        _columns=scan.columns() or {s.name: np.empty((0, s.count)[: 1 + (s.count > 1)]) for s in signals},
+        _columns={signal.name: values for signal, values in columns.items()},
     )
 
 
-def _missing_signal(signals: Iterable[Signal]) -> str | None:
-    """The first signal that every recording has and this one has not, or not with as many numbers."""
-    counts = {signal.name: signal.count for signal in signals}
-    return next((need.name for need in _NEEDED if counts.get(need.name) != need.count), None)
+def _as_column(signal: Signal, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return values[:, 0] if signal.count == 1 else values
 
 
 class _Scan:
@@ -150,7 +149,8 @@ class _Scan:
         self.others: set[int] = set()  # channels for viewers, which repeat what the rows say
         self.metadata: dict[str, dict[str, str]] = {}
         self.rows: dict[int, bytearray] = {}
-        self.has_begun = False  # schemas, channels or rows have been seen
+        self.sizes: dict[int, int] = {}  # of a message of each channel
+        self.has_begun = False  # what comes behind the head has been seen
 
     def read(self, data: bytes) -> str:
         """Take in all whole records; return what is missing or damaged, "" when nothing is."""
@@ -160,7 +160,7 @@ class _Scan:
             position = start - _RECORD_HEAD.size
             try:
                 if end > len(data):
-                    if in_rows and opcode == Opcode.CHUNK:
+                    if in_rows and opcode == Opcode.CHUNK and len(data) > start + _CHUNK_HEAD_BYTES:
                         self._take_chunk(data[start:], is_cut=True)
                     return f"cut off inside a record at byte {position} of {len(data)}"
                 if opcode == Opcode.DATA_END:
@@ -168,6 +168,7 @@ class _Scan:
                     if _CRC.unpack_from(data, start)[0] not in (0, crc32(data[:position])):
                         damage = "damaged: the checksum over all records is wrong"
                 elif in_rows:
+                    self.has_begun |= opcode not in (Opcode.HEADER, Opcode.METADATA)
                     self._take(opcode, data[start:end])
             except (McapError, RecordingError, ValueError, OverflowError, struct.error) as error:
                 return f"damaged: record at byte {position} cannot be read ({error})"
@@ -176,21 +177,23 @@ class _Scan:
                 return damage if whole else "cut off inside the end mark"
         return f"cut off at byte {len(data)}: the end mark is missing"
 
-    def columns(self) -> dict[str, NDArray[np.float64]]:
+    def columns(self) -> dict[Signal, NDArray[np.float64]]:
         """Return one array a signal; a row counts when all its messages are there."""
-        dtypes = {channel: topic.dtype for channel, topic in self.topics.items()}
-        n_rows = min((len(self.rows[channel]) // dtypes[channel].itemsize for channel in dtypes), default=0)
-        columns: dict[str, NDArray[np.float64]] = {}
+        n_rows = min((len(rows) // self.sizes[channel] for channel, rows in self.rows.items()), default=0)
+        columns = {}
         for channel, topic in self.topics.items():
-            rows = np.frombuffer(self.rows[channel], dtypes[channel], n_rows)
+            rows = np.frombuffer(self.rows[channel], topic.dtype, n_rows)
             for signal in topic.signals:
-                values = rows[signal.name].astype(np.float64)
-                columns[signal.name] = values[:, 0] if signal.count == 1 else values
+                columns[signal] = _as_column(signal, rows[signal.name].astype(np.float64))
         return columns
+
+    def missing_signal(self) -> str:
+        """The first signal that every recording has and this one has not, or not with as many numbers."""
+        counts = {signal.name: signal.count for topic in self.topics.values() for signal in topic.signals}
+        return next((need.name for need in _NEEDED if counts.get(need.name) != need.count), "")
 
     def _take(self, opcode: int, body: bytes) -> None:
         stream = ReadDataStream(BytesIO(body))
-        self.has_begun |= opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK, Opcode.MESSAGE)
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
             self.schemas[schema.id] = schema
@@ -202,18 +205,18 @@ class _Scan:
         elif opcode == Opcode.CHUNK:
             self._take_chunk(body)
         elif opcode == Opcode.MESSAGE:
-            self._take_message(Message.read(stream, len(body)))
+            self._take_message(body)
 
-    def _take_message(self, message: Message) -> None:
-        channel = message.channel_id
+    def _take_message(self, body: bytes) -> None:
+        channel = _MESSAGE_HEAD.unpack_from(body)[0]
         if channel in self.others:
             return
         if channel not in self.rows:
             raise ValueError(f"a message names the unknown channel {channel}")
-        size = self.topics[channel].dtype.itemsize
-        if len(message.data) != size:
-            raise ValueError(f"a message has {len(message.data)} bytes, its topic needs {size}")
-        self.rows[channel] += message.data
+        size = len(body) - _MESSAGE_HEAD.size
+        if size != self.sizes[channel]:
+            raise ValueError(f"a message has {size} bytes, its topic needs {self.sizes[channel]}")
+        self.rows[channel] += body[_MESSAGE_HEAD.size :]
 
     def _take_channel(self, channel: Channel) -> None:
         if channel.topic not in ROW_TOPICS:
@@ -230,6 +233,7 @@ class _Scan:
         others = [known for number, known in self.topics.items() if number != channel.id]
         check_row([signal for known in (*others, topic) for signal in known.signals])
         self.topics[channel.id] = topic
+        self.sizes[channel.id] = topic.dtype.itemsize
         self.rows.setdefault(channel.id, bytearray())
 
     def _take_chunk(self, body: bytes, *, is_cut: bool = False) -> None:
@@ -240,7 +244,9 @@ class _Scan:
         if not is_cut and chunk.uncompressed_crc not in (0, crc32(chunk.data)):
             raise ValueError("its checksum is wrong")
         for opcode, start, end in _records(chunk.data, 0):
-            if opcode != Opcode.CHUNK and end <= len(chunk.data):
+            if opcode == Opcode.MESSAGE and end <= len(chunk.data):
+                self._take_message(chunk.data[start:end])
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL) and end <= len(chunk.data):
                 self._take(opcode, chunk.data[start:end])
 
 

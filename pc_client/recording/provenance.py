@@ -6,17 +6,23 @@ experiment must give the same bytes.
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import field, fields
+from math import inf
+from typing import Annotated, get_type_hints
 
 from pc_client.errors import RecordingError
 from pc_client.recording.origin import Origin, origin_of
+from ur_hil.records import Finite, Flag, Items, checked, record, text, whole
+
+MOST_LETTERS = 200
+"""Longest name in a provenance: movement, controller, robot."""
+
+Word = Annotated[str, text(MOST_LETTERS)]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Provenance:
     """Where a recording comes from.
 
@@ -42,23 +48,23 @@ class Provenance:
         cell_text: the file of the surroundings and the tool, as it was read; empty where none was given.
     """
 
-    movement: str
-    kind: str
-    repetition: int
-    controller: str
-    robot_model: str
-    firmware: str
-    serial: str
-    simulated: bool | None
-    seed: int | None
-    pace: str
-    client_version: str
-    cycle_time_s: float = 0.008
-    identified_delay_s: float | None = None
-    controller_config: Mapping[str, float | int | bool | str | None] = field(default_factory=dict)
+    movement: Word
+    kind: Word
+    repetition: Annotated[int, whole(1, 1 << 31)]
+    controller: Word
+    robot_model: Word
+    firmware: Word
+    serial: Word
+    simulated: Flag | None
+    seed: Annotated[int, whole(-(1 << 63), (1 << 63) - 1)] | None
+    pace: Word
+    client_version: Word
+    cycle_time_s: Finite = 0.008
+    identified_delay_s: Finite | None = None
+    controller_config: Mapping[str, Finite | Flag | str | None] = field(default_factory=dict)
     loop: Mapping[str, float | str] = field(default_factory=dict)
     movement_text: str = ""
-    target_points: tuple[tuple[float, float, float], ...] = ()
+    target_points: Annotated[tuple[tuple[Finite, Finite, Finite], ...], Items(0)] = ()
     cell_text: str = ""
 
     @property
@@ -78,13 +84,10 @@ class Provenance:
 
     def to_metadata(self) -> dict[str, str]:
         """Return the flat string map that goes into the file: texts as they are, all else as JSON."""
-        metadata = {}
-        for item in dataclasses.fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, Mapping):
-                value = dict(value)
-            metadata[item.name] = value if isinstance(value, str) else json.dumps(value)
-        return metadata
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return {
+            name: value if isinstance(value, str) else json.dumps(value) for name, value in values.items()
+        }
 
     @classmethod
     def from_metadata(cls, metadata: Mapping[str, str]) -> Provenance:
@@ -94,73 +97,24 @@ class Provenance:
             RecordingError: a key without default is missing, or a value cannot be read.
         """
         values: dict[str, object] = {}
-        for item in dataclasses.fields(cls):
-            text = metadata.get(item.name)
-            if text is None:
-                continue
-            try:
-                values[item.name] = value = text if item.type == "str" else json.loads(text)
-            except (ValueError, RecursionError) as error:
+        for name, kind in get_type_hints(cls).items():
+            if (value := metadata.get(name)) is not None:
+                try:
+                    values[name] = value if kind is str else json.loads(value)
+                except (ValueError, RecursionError) as error:
+                    raise RecordingError(f"provenance {name}: {value[:60]!r} is not JSON") from error
+        provenance = checked(cls, values, "provenance", RecordingError)
+        for name, fact in provenance.loop.items():
+            if not _is_fact(name, fact):
                 raise RecordingError(
-                    f"provenance {item.name!r} cannot be read: {text[:60]!r} is not JSON"
-                ) from error
-            if not _HOLDS[str(item.type)](value) or (item.name in _WORDS and not _is_word(text)):
-                raise RecordingError(f"provenance {item.name!r} is {text[:60]!r}, must be {item.type}")
-        if "target_points" in values:
-            points: list[list[float]] = values["target_points"]  # type: ignore[assignment]
-            values["target_points"] = tuple((p[0], p[1], p[2]) for p in points)
-        try:
-            return cls(**values)  # type: ignore[arg-type]
-        except TypeError as error:
-            raise RecordingError(f"the recording's provenance is incomplete: {error}") from error
+                    f"provenance: loop.{name}: {str(fact)[:60]!r} is nothing that is identified"
+                )
+        return provenance
 
 
-def _is_number(value: object) -> bool:
-    return not isinstance(value, bool) and (
-        (isinstance(value, int) and abs(value) < 1 << 63)
-        or (isinstance(value, float) and math.isfinite(value))
-    )
-
-
-def _is_plain(value: object) -> bool:
-    return value is None or isinstance(value, bool | str) or _is_number(value)
-
-
-def _is_fact(item: tuple[str, object]) -> bool:
-    name, value = item
-    if name == "learning_limited_by":
-        return isinstance(value, str)
+def _is_fact(name: str, value: float | str) -> bool:
+    if isinstance(value, str) or name == "learning_limited_by":
+        return isinstance(value, str) and name == "learning_limited_by"
     if name in ("dead_time_s", "lag_s", "joint_spread_s"):
-        return _is_number(value) and 0.0 <= value <= 1.0  # type: ignore[operator]
-    return _is_number(value) or value == math.inf  # margins may be endless
-
-
-def _is_point(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))
-
-
-def _is_word(text: str) -> bool:
-    return len(text) <= MOST_LETTERS and text.isprintable()
-
-
-MOST_LETTERS = 200
-"""Longest name in a provenance: movement, controller, robot."""
-
-_WORDS = ("movement", "kind", "controller", "robot_model", "firmware", "serial", "pace", "client_version")
-
-_HOLDS: Mapping[str, Callable[[object], bool]] = {
-    "str": lambda value: True,
-    "int": lambda value: isinstance(value, int) and _is_number(value),
-    "int | None": lambda value: value is None or (isinstance(value, int) and _is_number(value)),
-    "bool | None": lambda value: value is None or isinstance(value, bool),
-    "float": _is_number,
-    "float | None": lambda value: value is None or _is_number(value),
-    "Mapping[str, float | int | bool | str | None]": lambda value: (
-        isinstance(value, dict) and all(map(_is_plain, value.values()))
-    ),
-    "Mapping[str, float | str]": lambda value: isinstance(value, dict) and all(map(_is_fact, value.items())),
-    "tuple[tuple[float, float, float], ...]": lambda value: (
-        isinstance(value, list) and all(map(_is_point, value))
-    ),
-}
-"""What a value of each type in `Provenance` may be, as JSON."""
+        return 0.0 <= value <= 1.0
+    return value > -inf  # margins may be endless

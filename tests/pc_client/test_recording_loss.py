@@ -115,6 +115,14 @@ def test_cut_inside_the_head_is_refused_in_one_line(tmp_path: Path, head: int, w
         assert "\n" not in str(caught.value)
 
 
+def test_cut_inside_the_first_chunk_keeps_the_provenance(tmp_path: Path, head: int, whole: bytes) -> None:
+    for cut in range(head, head + 2000, 13):
+        recording = load_bytes(tmp_path, whole[:cut])
+        assert recording.provenance == provenance()
+        assert "cut off" in recording.damage
+        assert is_prefix(recording)
+
+
 def test_a_flipped_bit_ends_the_reading_there(tmp_path: Path, head: int, whole: bytes) -> None:
     middle = bytearray(whole)
     middle[head + int(1.5 * (len(whole) - head) / (N_ROWS / ROWS_PER_CHUNK))] ^= 0x10
