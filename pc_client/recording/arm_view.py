@@ -3,8 +3,8 @@
 They are for eyes: 25 times a second, whatever the control cycle, so that a file grows little by them. Every
 cycle is in `/robot_state`. The transforms move the arm also in viewers that read no URDF.
 
-    /robot_description   the URDF                             once
-    /tf_static           base_link -> base, wrist_3_link -> tool0   once
+    /robot_description   the URDF, once
+    /tf_static           base_link to base, wrist_3_link to tool0, once
     /tf                  the six links; in `base`: `actual_tcp` as reported, `desired_tcp` as the reference
     /joint_states        actual_q, actual_qd under the names of the URDF
     /tcp_pose            reported TCP pose in `base`
@@ -49,7 +49,6 @@ _LATCHED = """\
   liveliness_lease_duration: {sec: 2147483647, nsec: 4294967295}
   avoid_ros_namespace_conventions: false
 """
-
 
 _BASE, _ACTUAL_TCP, _DESIRED_TCP = text("base"), text("actual_tcp"), text("desired_tcp")
 
@@ -140,7 +139,7 @@ class ArmView:
         if row % self._every:
             return
         q, qd, pose = (frame[part].tolist() for part in (self._q, self._qd, self._pose))
-        if not all(map(isfinite, (*q, *pose))):
+        if not all(map(isfinite, (*q, *pose, hypot(*pose[3:])))):
             return
         stamp = divmod(log_time, 10**9)
         tcp = (*pose[:3], *_quaternion(*pose[3:]))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from fake_robot import PERIOD, FakeRobot
+from mcap.reader import make_reader
 from recording_samples import SIGNALS, provenance
 
 from pc_client.control.controller import CONTROLLERS
@@ -106,6 +107,18 @@ def test_a_robot_in_real_time_that_repeats_frames_is_not_in_lockstep(tmp_path, r
     report = run(FakeRobot(lockstep=False, delay=4, on_tick=repeat), one)
     assert n_streams == 3  # approach, identification, run
     assert load_recording(report.paths[0]).provenance.pace == "realtime"
+
+
+@pytest.mark.parametrize("lockstep", [False, True])
+def test_log_times_are_absolute_in_real_time_only(tmp_path, monkeypatch, lockstep):
+    """In lockstep they are the controller's, so that equal runs give equal bytes."""
+    now = 1_700_000_000_000_000_000
+    monkeypatch.setattr("pc_client.experiment.runner.time.time_ns", lambda: now)
+    one = prepare_experiment(load_movements(["uniform_4_1"]), repeat=1, out=tmp_path)
+    path = run(FakeRobot(lockstep=lockstep, delay=4), one).paths[0]
+    with path.open("rb") as stream:
+        first = next(message.log_time for _, _, message in make_reader(stream).iter_messages("/robot_state"))
+    assert first == (round(load_recording(path).t[0] * 1e9) if lockstep else now)
 
 
 def test_two_movements_twice(two, tmp_path):

@@ -237,11 +237,11 @@ def test_units_of_all_signals_are_in_the_file(recording: Path) -> None:
     assert (units["actual_q"], units["actual_TCP_pose"], units["cmd_qd"]) == ("rad", "m, rad", "rad/s")
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -1e300])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1.7e308])
 @pytest.mark.parametrize("name", ["timestamp", "actual_q", "actual_TCP_pose"])
 def test_a_frame_without_sense_is_recorded_as_it_is(tmp_path: Path, name: str, value: float) -> None:
     frame = np.zeros(len(NAMES))
-    frame[NAMES.index(name)] = value
+    frame[NAMES.index(name) :][:6] = value
     zeros = np.zeros(6)
     arm = arm_tree(ROBOTS["ur3"])
     with Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, arm=arm) as recorder:
