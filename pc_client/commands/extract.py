@@ -63,7 +63,7 @@ def extract(
     """Find the strokes of recorded movements, and say how well they reconstruct them."""
     from pc_client.extraction.extract import ExtractOptions
     from pc_client.extraction.files import TIME_UNITS
-    from pc_client.extraction.results import STROKE_COLUMNS, to_json
+    from pc_client.extraction.results import STROKE_COLUMNS, table_of, to_json
     from pc_client.results.files import write_files
     from pc_client.results.tables import frame_of, to_csv
 
@@ -80,7 +80,7 @@ def extract(
     unit = None if time_unit == "auto" else time_unit
     outcomes = _run(sources, options, unit, n_pictures, workers, dask)
     rows = [outcome.row for outcome in outcomes if outcome.row is not None]
-    strokes = (stroke._asdict() for outcome in outcomes for stroke in outcome.strokes)
+    strokes = [stroke for outcome in outcomes for stroke in outcome.strokes]
     contents: dict[str, str | bytes] = {
         "extraction.json": to_json(rows),
         "strokes.csv": to_csv(frame_of(strokes, STROKE_COLUMNS)),
@@ -89,7 +89,7 @@ def extract(
         from pc_client.extraction.figures import draw_overview
 
         contents |= _pictures(outcomes)
-        contents["overview.png"] = draw_overview(rows)
+        contents["overview.png"] = draw_overview(table_of(rows))
     write_files(out, contents)
     _show(outcomes, rows)
     errors = [*unusable, *(outcome.error for outcome in outcomes if outcome.error is not None)]
@@ -161,10 +161,10 @@ def _show(outcomes: Sequence[Outcome], rows: Sequence[Row]) -> None:
         return
     import polars as pl
 
-    from pc_client.extraction.results import COLUMNS
+    from pc_client.extraction.results import COLUMNS, table_of
     from pc_client.results.tables import to_rich
 
-    frame = pl.DataFrame(rows).with_columns(lognormality=pl.col("snr_v_db") / pl.col("n_strokes"))
+    frame = table_of(rows)
     if len(frame) <= _MOST_ROWS:
         console.print(to_rich(frame, COLUMNS))
         for outcome in outcomes:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pc_client.errors import ClientError, RecordingError
 from pc_client.extraction.extract import ExtractOptions, extract
 from pc_client.extraction.files import parse_pen
-from pc_client.extraction.results import Row, StrokeRow, row_of, stroke_rows
+from pc_client.extraction.results import Row, figures_of, strokes_of
 from pc_client.extraction.sources import PenSource, contents
 from ur_hil.input_files import MIB
 
@@ -54,7 +54,7 @@ class Outcome:
 
     Attributes:
         name: of the recording.
-        row: its figures, or None when it could not be used.
+        row: its figures (`results.figures_of`), or None when it could not be used.
         strokes: its strokes.
         remarks: what was mended, and what to know about the strokes.
         picture: a PNG file's bytes, where one was wanted and something moves.
@@ -63,7 +63,7 @@ class Outcome:
 
     name: str
     row: Row | None = None
-    strokes: tuple[StrokeRow, ...] = ()
+    strokes: tuple[Row, ...] = ()
     remarks: tuple[str, ...] = ()
     picture: bytes | None = None
     error: str | None = None
@@ -81,7 +81,9 @@ def run_job(job: Job) -> Outcome:
         from pc_client.extraction.figures import draw_extraction
 
         picture = draw_extraction(extraction)
-    return Outcome(job.name, row_of(extraction), tuple(stroke_rows(extraction)), extraction.remarks, picture)
+    return Outcome(
+        job.name, figures_of(extraction), tuple(strokes_of(extraction)), extraction.remarks, picture
+    )
 
 
 def extract_many(

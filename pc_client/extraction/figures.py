@@ -6,19 +6,21 @@ strokes, virtual targets) has a colour of its own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.errors import printable
 from pc_client.extraction.extract import Extraction, PartExtraction
-from pc_client.extraction.results import Row
 from pc_client.movements.stroke import Motion
 from pc_client.results.panels import Curve, Panel, Sheet, boxes, cube_around
 from pc_client.results.static import draw, figure, image_bytes
 from pc_client.results.theme import BLUE, RED, REFERENCE_GREY, SKY
+
+if TYPE_CHECKING:
+    import polars as pl
 
 __all__ = ["draw_extraction", "draw_overview"]
 
@@ -74,24 +76,24 @@ def draw_extraction(extraction: Extraction) -> bytes:
     return image_bytes(draw(Sheet(_SIZE[1], panels, "", printable(_title(extraction)), _SIZE[0])))
 
 
-def draw_overview(rows: Sequence[Row]) -> bytes:
+def draw_overview(table: pl.DataFrame) -> bytes:
     """A batch: histograms of SNR_v, SNR_t and strokes per speed peak.
 
     Args:
-        rows: of recordings; those in which nothing moves are passed over.
+        table: `results.table_of` recordings; those in which nothing moves are passed over.
     """
-    moving = [row for row in rows if row.snr_v_db is not None]
+    moving = table.drop_nulls("snr_v_db")
     figures = (
-        ("SNR_v [dB]", [row.snr_v_db for row in moving], ".1f", "least"),
-        ("SNR_t [dB]", [row.snr_t_db for row in moving], ".1f", "least"),
-        ("strokes per speed peak", [row.strokes_per_peak for row in moving], ".2f", "most"),
+        ("SNR_v [dB]", "snr_v_db", ".1f", "least"),
+        ("SNR_t [dB]", "snr_t_db", ".1f", "least"),
+        ("strokes per speed peak", "strokes_per_peak", ".2f", "most"),
     )
     size = (12.0, 3.4)
     places = boxes(size, (1, 1, 1), (1,), margins=(0.6, 0.15, 0.7, 0.55), gaps=(0.5, 0.0))[0]
     with figure(size[1], width=size[0], title=f"{len(moving)} recordings") as page:
-        for box, (label, values, form, worst) in zip(places, figures, strict=True):
+        for box, (label, name, form, worst) in zip(places, figures, strict=True):
             axes = page.add_axes(box, xlabel=label, ylabel="recordings")
-            known = np.array([value for value in values if value is not None])
+            known = moving[name].drop_nulls().to_numpy()
             if len(known):
                 axes.hist(known, bins=min(40, max(5, len(known) // 4)), color=BLUE)
                 axes.axvline(known.mean(), color=RED, lw=1.5)

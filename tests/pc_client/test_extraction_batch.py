@@ -16,7 +16,7 @@ from pc_client.errors import ClientError, RecordingError
 from pc_client.executors import open_executor
 from pc_client.extraction.batch import extract_many
 from pc_client.extraction.extract import extract
-from pc_client.extraction.results import STROKE_COLUMNS, Row, StrokeRow, row_of, stroke_rows, to_json
+from pc_client.extraction.results import STROKE_COLUMNS, figures_of, strokes_of, table_of, to_json
 from pc_client.extraction.sources import pen_sources
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.sigma_lognormal import SigmaLognormal
@@ -62,14 +62,19 @@ def folder(tmp_path_factory):
     return path
 
 
+def row(*values):
+    return dict(zip(("file", "snr_v_db", "snr_t_db", "n_strokes", "n_speed_peaks"), values, strict=True))
+
+
 def check(outcomes, folder):
     assert [outcome.name for outcome in outcomes] == [
         str(folder / n) for n in ("a.csv", "b.csv", "c.csv", "d.txt", "e.txt")
     ]
     a, b, c, d, e = outcomes
     assert (a.error, c.error, d.error) == (None, None, None)
-    assert (a.row.n_strokes, c.row.n_strokes, d.row) == (2, 2, Row(d.name, None, None, 0, 0))
-    assert min(a.row.snr_v_db, c.row.snr_v_db) >= 60.0
+    assert (a.row["n_strokes"], c.row["n_strokes"]) == (2, 2)
+    assert d.row == row(d.name, None, None, 0, 0)
+    assert min(a.row["snr_v_db"], c.row["snr_v_db"]) >= 60.0
     assert 'line 2: "nothing" is not a number' in b.error
     assert "no text file" in e.error
     assert (b.row, e.row) == (None, None)
@@ -138,26 +143,24 @@ def test_nothing_to_do_is_said(tmp_path):
 
 
 def test_json_has_no_nan_and_the_stated_keys():
-    text = to_json([Row("a/ä.txt", 20.5, 30.25, 4, 3), Row("dot", None, None, 0, 0)])
+    text = to_json([row("a/ä.txt", 20.5, 30.25, 4, 3), row("dot", None, None, 0, 0)])
     assert json.loads(text) == [
         {"file": "a/ä.txt", "snr_v_db": 20.5, "snr_t_db": 30.25, "n_strokes": 4, "n_speed_peaks": 3},
         {"file": "dot", "snr_v_db": None, "snr_t_db": None, "n_strokes": 0, "n_speed_peaks": 0},
     ]
     with pytest.raises(ValueError, match="not JSON compliant"):
-        to_json([Row("a", float("nan"), 1.0, 1, 1)])
+        to_json([row("a", float("nan"), 1.0, 1, 1)])
     assert json.loads(to_json([])) == []
-    assert Row("dot", None, None, 0, 0).strokes_per_peak is None
+    assert table_of([row("a", 20.0, 1.0, 4, 5), row("dot", None, None, 0, 0)])[
+        "lognormality", "strokes_per_peak"
+    ].rows() == [(5.0, 0.8), (None, None)]
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_movement_comes_back_from_the_table_of_strokes_alone(dim):
     result = extract(recorded(own_strokes(2, dim, n=3), dim))
-    rows = list(
-        csv.DictReader(
-            io.StringIO(to_csv(frame_of((row._asdict() for row in stroke_rows(result)), STROKE_COLUMNS)))
-        )
-    )
-    assert list(rows[0]) == list(StrokeRow._fields)
+    rows = list(csv.DictReader(io.StringIO(to_csv(frame_of(strokes_of(result), STROKE_COLUMNS)))))
+    assert list(rows[0]) == [column.name for column in STROKE_COLUMNS]
     numbers = [{key: float(value) for key, value in row.items() if key != "file"} for row in rows]
     targets = [[row[f"{axis}0"] for axis in "xyz"] for row in numbers]
     targets.append([numbers[-1][f"{axis}1"] for axis in "xyz"])
@@ -169,7 +172,7 @@ def test_the_movement_comes_back_from_the_table_of_strokes_alone(dim):
     part = result.parts[0]
     assert trajectory.evaluate(part.t).p == pytest.approx(part.trajectory.evaluate(part.t).p, abs=1e-12)
     assert trajectory.lengths == pytest.approx([row["length"] for row in numbers])
-    assert row_of(result).n_strokes == 3
+    assert figures_of(result)["n_strokes"] == 3
 
 
 @needs_drawings
@@ -178,9 +181,10 @@ def test_drawings_drawn_at_random_reach_the_figures():
     chosen = [sources[i] for i in np.random.default_rng(7).choice(len(sources), 30, replace=False)]
     with open_executor() as executor:
         rows = [outcome.row for outcome in extract_many(chosen, executor)]
-    snr_v = np.array([row.snr_v_db for row in rows if row.snr_v_db is not None])
+    table = table_of(rows)
+    snr_v = table["snr_v_db"].drop_nulls()
     assert len(snr_v) >= 29
     assert snr_v.mean() >= 20.0
-    assert np.mean(snr_v > 15.0) >= 0.95
-    assert np.mean([row.snr_t_db for row in rows if row.snr_t_db is not None]) >= 25.0
-    assert sum(row.n_strokes for row in rows) <= 1.2 * sum(row.n_speed_peaks for row in rows)
+    assert (snr_v > 15.0).mean() >= 0.95
+    assert table["snr_t_db"].mean() >= 25.0
+    assert table["n_strokes"].sum() <= 1.2 * table["n_speed_peaks"].sum()

@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from pc_client.extraction.extract import extract
 from pc_client.extraction.figures import draw_extraction, draw_overview
 from pc_client.extraction.recording import PenPart, PenRecording
-from pc_client.extraction.results import Row
+from pc_client.extraction.results import table_of
 
 
 def ink(png):
@@ -29,6 +29,15 @@ def test_a_recording(dim):
 
 @pytest.mark.parametrize("n", [0, 1, 40])
 def test_a_batch(n):
-    rows = [Row(f"{i}.txt", 20.0 + i, 30.0 + i, 5 + i, 6) for i in range(n)]
-    empty = ink(draw_overview([Row("dot", None, None, 0, 0)]))
-    assert (ink(draw_overview(rows)) > empty + 0.01) is (n > 0)
+    rows = [
+        {
+            "file": f"{i}.txt",
+            "snr_v_db": 20.0 + i,
+            "snr_t_db": 30.0 + i,
+            "n_strokes": 5 + i,
+            "n_speed_peaks": 6,
+        }
+        for i in range(n)
+    ]
+    empty = ink(draw_overview(table_of([{"file": "dot", "n_strokes": 0, "n_speed_peaks": 0}])))
+    assert (ink(draw_overview(table_of(rows))) > empty + 0.01) is (n > 0)
