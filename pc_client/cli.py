@@ -48,6 +48,7 @@ _EXTRAS = {
     "jinja2": "report",
     "pyarrow": "export",
     "distributed": "cluster",
+    "optuna": "search",
 }
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import closing
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import closing, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,15 +24,13 @@ from pc_client.commands.options import (
 from pc_client.errors import ClientError, SweepError
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    import polars as pl
 
     from pc_client.api.arm import Arm
     from pc_client.sweep.case import Case, GivenRobot, SimulatedArm
     from pc_client.sweep.config import SweepConfig
-    from pc_client.sweep.folder import SweepFolder
-    from pc_client.sweep.ranking import Setting
+    from pc_client.sweep.outcome import Outcome
     from pc_client.sweep.result_store import ResultStore
-    from pc_client.sweep.schedule import Outcomes
 
 _MOST_SHOWN = 5
 """Settings and errors on the terminal; table and page have all."""
@@ -44,88 +44,106 @@ def sweep(
     workers: WorkersOption = None,
     dask: DaskOption = None,
     format: Annotated[
-        str | None,
-        typer.Option(
-            "--format", metavar="parquet|csv", help="Of the table; parquet where pyarrow is there, else csv."
-        ),
-    ] = None,
+        str, typer.Option("--format", metavar="parquet|csv", help="Of the table's file.")
+    ] = "parquet",
     yes: YesOption = False,
 ) -> None:
     """Run every combination of gains, arms and movements; a second call goes on where the first ended."""
-    from pc_client.sweep.case import GivenRobot, all_cases
+    from pc_client.sweep.case import GivenRobot
     from pc_client.sweep.config import read_config
-    from pc_client.sweep.folder import SweepFolder
-    from pc_client.sweep.result_store import ResultStore
+    from pc_client.sweep.result_store import FORMATS, ResultStore
     from pc_client.sweep.run_case import run_case
-    from pc_client.sweep.schedule import run_in_turn, run_side_by_side
-    from pc_client.sweep.table import table_content, table_format
+    from pc_client.sweep.schedule import Sweep, in_turn, side_by_side
 
     check_workers(workers, dask)
+    if format not in FORMATS:
+        raise typer.BadParameter(f"no table format {format!r}: give one of {', '.join(FORMATS)}")
     plan = read_config(config)
-    if plan.host is not None and (workers is not None or dask is not None):
-        raise typer.BadParameter(f"robot = {plan.host!r} is one robot: no --workers and no --dask")
-    folder = SweepFolder(_folder_of(plan, out))
-    written_as = table_format(format)
+    host, port_base = plan.file.robot, plan.file.port_base or 0
+    if host is not None and (workers is not None or dask is not None):
+        raise typer.BadParameter(f"robot = {host!r} is one robot: no --workers and no --dask")
+    store = ResultStore(_folder_of(plan, out), plan.file.keep_recordings)
     arm: Arm | None = None
     arms: Sequence[SimulatedArm] | Sequence[GivenRobot] = plan.arms
-    if plan.host is not None:
-        arm = reach(plan.host, ports_of(plan.port_base), plan.cell, yes=yes)
+    if host is not None:
+        arm = reach(host, ports_of(port_base), plan.cell, yes=yes)
         serial = arm.report.info.serial
-        arms = (GivenRobot(plan.host, plan.port_base, arm.model.name, serial, plan.cell, plan.reverse_port),)
-    cases = all_cases(plan.movements, arms, plan.controllers, plan.repeat)
-    folder.prepare()
-    store = ResultStore(cases, folder, plan.keep_recordings)
-    waiting = store.waiting()
-    say(f"{len(store)} cases, {store.n_settled} of them done before; results in {folder.path}")
-    if arm is None:
-        outcomes = run_side_by_side(waiting, plan.keep_recordings, run_case, workers=workers, dask=dask)
-    else:
-        if waiting:
-            _confirm(arm, waiting)
-        outcomes = run_in_turn(waiting, plan.keep_recordings, run_case)
+        arms = (GivenRobot(host, port_base, arm.model.name, serial, plan.cell, plan.file.reverse_port),)
+    store.prepare()
+    work = Sweep(plan, arms, store)
+    n_left = plan.n_cases - store.n_settled
+    say(f"{plan.n_cases} cases, {store.n_settled} of them done before; results in {store.path}")
+    if arm is not None and work.waiting:
+        _confirm(arm, work.waiting, n_left * plan.file.repeat)
+    job = partial(run_case, keep_recordings=plan.file.keep_recordings)
+    runner = nullcontext(in_turn(job)) if arm else side_by_side(job, workers=workers, dask=dask)
     try:
-        _work(store, outcomes, live=arm is None)
+        with runner as run, closing(work.run(run)) as outcomes:
+            _work(outcomes, plan.n_cases, store.n_settled, live=arm is None)
     except KeyboardInterrupt as interrupt:
         doubts = "".join(f"; {note}" for note in getattr(interrupt, "__notes__", ()))
         raise ClientError(
-            f"interrupted{doubts}; {store.n_settled} of {len(store)} cases are kept in {folder.path}, "
+            f"interrupted{doubts}; {store.n_settled} of {plan.n_cases} cases are kept in {store.path}, "
             "the same command goes on from there"
         ) from interrupt
     finally:  # of what there is, whatever ended it
-        table = store.rows()
-        path = folder.write(f"sweep.{written_as}", table_content(table, written_as))
+        path = store.write_table(format)
     say(f"table: {path}")
-    _draw(folder, config.stem, table)
+    table = store.table()
+    _draw(store, config.stem, table)
     _show(table)
-    if left := len(store.waiting()):
-        say(f"{left} cases have not begun: look at the arm, then give the same command again")
-    if left or any(row["status"] == "failed" for row in table):
+    if work.waiting and (n_left := plan.n_cases - store.n_settled):
+        say(f"{n_left} cases have not begun: look at the arm, then give the same command again")
+    if (table["status"] == "failed").any():
         raise typer.Exit(1)
 
 
-def _work(store: ResultStore, outcomes: Outcomes, *, live: bool) -> None:
-    """Settle case by case, and show how far it is."""
-    from pc_client.sweep.progress import SweepProgress
+def _work(outcomes: Iterator[Outcome], n_cases: int, n_settled: int, *, live: bool) -> None:
+    """Run the cases, and show how far it is.
 
-    with closing(outcomes), SweepProgress(console, len(store), store.n_settled, live=live) as progress:
-        for case, outcome in outcomes:
-            store.settle(case, outcome)
-            progress.finished(outcome)
+    Args:
+        outcomes: as they come.
+        n_cases: cases in all.
+        n_settled: those that were done before.
+        live: True: the clock ticks. False: redrawn when a case is done; the thread that lets it tick would
+            take the interpreter from a control loop in this process.
+    """
+    from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
+
+    counts: Counter[str] = Counter()
+    n_runs = 0
+    columns = (*Progress.get_default_columns(), MofNCompleteColumn(), TimeElapsedColumn())
+    bar = Progress(*columns, console=console, auto_refresh=live, transient=True)
+    task = bar.add_task("running", total=n_cases, completed=n_settled)
+    try:
+        with bar:
+            bar.refresh()
+            for outcome in outcomes:
+                counts[outcome.status] += 1
+                n_runs += len(outcome.rows) if outcome.status == "done" else 0
+                troubles = "".join(f", {counts[it]} {it}" for it in ("refused", "failed") if counts[it])
+                bar.update(task, advance=1, description=f"running{troubles}")
+                bar.refresh()
+    finally:
+        if counts:
+            words = ", ".join(f"{counts[it]} {it}" for it in ("done", "refused", "failed") if counts[it])
+            minutes = max(bar.tasks[0].elapsed or 0.0, 0.1) / 60.0
+            say(f"{words} in {60.0 * minutes:.0f} s, {n_runs / minutes:.0f} runs a minute")
 
 
 def _folder_of(plan: SweepConfig, out: Path | None) -> Path:
     """Where the results go.
 
     Raises:
-        SweepError: it was not confirmed.
+        SweepError: it is not given.
     """
-    folder = out or plan.output
+    folder = out or plan.file.output
     if folder is None:
         raise SweepError(f"{plan.source}: no folder for the results; give output = DIR, or --out DIR")
-    return folder
+    return Path(folder)
 
 
-def _confirm(arm: Arm, cases: Sequence[Case]) -> None:
+def _confirm(arm: Arm, waiting: Sequence[Case], n_runs: int) -> None:
     """Show all that an arm is going to do, and ask.
 
     Raises:
@@ -134,14 +152,12 @@ def _confirm(arm: Arm, cases: Sequence[Case]) -> None:
     from pc_client.experiment.prepare import Experiment
     from pc_client.sweep.run_case import plan_case
 
-    by_movement = {case.movement: case for case in cases}
-    plans = [plan_case(case) for case in by_movement.values()]
-    runs = sum(case.repeat for case in cases) // len(plans)
+    plans = [plan_case(case) for case in {case.movement: case for case in waiting}.values()]
     planned = tuple(planned for plan in plans for planned in plan.planned)
-    arm.confirm(Experiment(plans[0].model, planned, runs, Path()))
+    arm.confirm(Experiment(plans[0].model, planned, n_runs // len(plans), Path()))
 
 
-def _draw(folder: SweepFolder, name: str, table: Sequence[dict[str, object]]) -> None:
+def _draw(store: ResultStore, name: str, table: pl.DataFrame) -> None:
     """Write the page with the plots; without matplotlib the table has to do."""
     from pc_client.sweep.page import render_page
 
@@ -153,43 +169,29 @@ def _draw(folder: SweepFolder, name: str, table: Sequence[dict[str, object]]) ->
             f"no plots: they need {error.name}; run `pip install 'ur-hil[report]'` and give the command again"
         )
         return
-    say(f"plots: {folder.write('sweep.html', page.encode())}")
+    say(f"plots: {store.write('sweep.html', page.encode())}")
 
 
-def _show(table: Sequence[dict[str, object]]) -> None:
+def _show(table: pl.DataFrame) -> None:
     """Say on the terminal what is best and what went wrong."""
-    from pc_client.sweep.ranking import rank_settings
+    from pc_client.results.tables import to_rich
+    from pc_client.sweep.ranking import RANKING, rank_settings
 
     settings = rank_settings(table)
-    console.print(_ranking_table(settings[:_MOST_SHOWN]))
-    complete = [setting for setting in settings if setting.complete]
-    if complete:
-        best = complete[0]
-        margin = "no feedback" if best.gain_margin is None else f"gain margin {best.gain_margin:.2f}"
-        say(f"best of {len(settings)}: {best.name}: {best.mean_snr_db:.2f} dB, {best.n_runs} runs, {margin}")
+    console.print(to_rich(settings.head(_MOST_SHOWN), RANKING))
+    best = settings.row(0, named=True)
+    if best["complete"]:
+        gain = best["gain_margin"]
+        margin = "no feedback" if gain is None else f"gain margin {gain:.2f}"
+        say(
+            f"best of {len(settings)}: {best['setting']}: {best['mean_snr_db']:.2f} dB, "
+            f"{best['n_runs']} runs, {margin}"
+        )
     else:
         say("no setting has all its cases done: there is no best one")
     for status in ("refused", "failed"):
-        errors = [row for row in table if row["status"] == status]
-        for row in errors[:_MOST_SHOWN]:
+        errors = table.filter(table["status"] == status)
+        for row in errors.head(_MOST_SHOWN).to_dicts():
             say(f"{status}: {row['case']} ({row['movement']}): {row['error']}")
         if len(errors) > _MOST_SHOWN:
             say(f"{status}: {len(errors) - _MOST_SHOWN} more, see the table")
-
-
-def _ranking_table(settings: Sequence[Setting]) -> Table:
-    from rich.box import SIMPLE_HEAD
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for heading in settings[0].values:
-        table.add_column(heading, overflow="fold")
-    for heading in ("mean SNR\n[dB]", "gain\nmargin", "max error\n[mm]", "runs", "refused", "failed"):
-        table.add_column(escape(heading), justify="right")
-    for setting in settings:
-        figures = (setting.mean_snr_db, setting.gain_margin, setting.max_position_error_mm)
-        counts = (setting.n_runs, setting.n_refused, setting.n_failed)
-        texts = ("" if figure is None else f"{figure:.2f}" for figure in figures)
-        table.add_row(*setting.texts().values(), *texts, *map(str, counts))
-    return table

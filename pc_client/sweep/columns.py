@@ -3,27 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from pc_client.analysis.budget import PARTS
 from pc_client.control.controller import FIELDS
 from pc_client.recording.origin import Origin, origin_of
-
-
-@dataclass(frozen=True, slots=True)
-class Column:
-    """One column.
-
-    Attributes:
-        name: with its unit, where it has one.
-        kind: type of its values; any of them may be missing.
-        text: what it is.
-    """
-
-    name: str
-    kind: type
-    text: str
+from pc_client.results.tables import Column
 
 
 def budget_column(part: str) -> str:
@@ -32,39 +17,46 @@ def budget_column(part: str) -> str:
 
 
 FACTORS = (
-    Column("robot", str, "type of the arm"),
-    Column("fidelity", str, "how imperfect the simulated arm is; none for a robot that was there already"),
-    Column("seed", int, "which simulated arm of its kind"),
-    Column("movement", str, "name of the movement"),
-    Column("controller", str, "named controller that the settings start from"),
-    *(Column(name, field.kind, f"as in Controller: {field.text}") for name, field in FIELDS.items()),
+    Column("robot", kind=str, text="type of the arm"),
+    Column(
+        "fidelity",
+        kind=str,
+        text="how imperfect the simulated arm is; none for a robot that was there already",
+    ),
+    Column("seed", kind=int, text="which simulated arm of its kind"),
+    Column("movement", kind=str, text="name of the movement"),
+    Column("controller", kind=str, text="named controller that the settings start from"),
+    *(
+        Column(name, kind=field.kind, text=f"as in Controller: {field.text}")
+        for name, field in FIELDS.items()
+    ),
 )
 """What a case is made of; the axes of a sweep are those of them that vary."""
 
 FIGURES = (
-    Column("simulated", bool, "true: the robot says so; false: a real arm; missing: not known"),
-    Column("kind", str, "model of the movement: lognormal, uniform ..."),
-    Column("repetition", int, "run within the case, from 1"),
-    Column("snr_db", float, "SNR of the TCP speed, Eq. 10 of the paper: neither shifted nor smoothed"),
-    Column("snr_shifted_db", float, "the same after the one time shift that makes it best"),
-    Column("lag_ms", float, "that shift; positive: the arm is behind"),
-    Column("vector_snr_db", float, "SNR of the TCP velocity vector"),
-    Column("vector_snr_shifted_db", float, "the same after its own best shift"),
-    Column("max_position_error_mm", float, "largest distance of reference and reported TCP at one time"),
-    Column("rms_position_error_mm", float, "its root mean square"),
-    Column("max_path_error_mm", float, "the same after the best shift and without the constant offset"),
-    *(Column(budget_column(part), float, f"share of {part} in the error power, 0..1") for part in PARTS),
-    Column("delay_ms", float, "loop delay that the client identified before the first run"),
-    Column("gain_margin", float, "factor by which both gains may grow on this loop; refused below 2"),
-    Column("late_frames", int, "frames that came late"),
-    Column("lost_frames", int, "frames that never came"),
+    Column("simulated", kind=bool, text="true: the robot says so; false: a real arm; missing: not known"),
+    Column("kind", kind=str, text="model of the movement: lognormal, uniform ..."),
+    Column("repetition", kind=int, text="run within the case, from 1"),
+    Column("snr_db", text="SNR of the TCP speed, Eq. 10 of the paper: neither shifted nor smoothed"),
+    Column("snr_shifted_db", text="the same after the one time shift that makes it best"),
+    Column("lag_ms", text="that shift; positive: the arm is behind"),
+    Column("vector_snr_db", text="SNR of the TCP velocity vector"),
+    Column("vector_snr_shifted_db", text="the same after its own best shift"),
+    Column("max_position_error_mm", text="largest distance of reference and reported TCP at one time"),
+    Column("rms_position_error_mm", text="its root mean square"),
+    Column("max_path_error_mm", text="the same after the best shift and without the constant offset"),
+    *(Column(budget_column(part), text=f"share of {part} in the error power, 0..1") for part in PARTS),
+    Column("delay_ms", text="loop delay that the client identified before the first run"),
+    Column("gain_margin", text="factor by which both gains may grow on this loop; refused below 2"),
+    Column("late_frames", kind=int, text="frames that came late"),
+    Column("lost_frames", kind=int, text="frames that never came"),
 )
 """What is measured on a run."""
 
 COLUMNS = (
-    Column("case", str, "identity: equal cases of any sweep share it"),
-    Column("status", str, "done, refused (gain margin too small, nothing ran) or failed"),
-    Column("error", str, "why it is not done"),
+    Column("case", kind=str, text="identity: equal cases of any sweep share it"),
+    Column("status", kind=str, text="done, refused (gain margin too small, nothing ran) or failed"),
+    Column("error", kind=str, text="why it is not done"),
     *FACTORS,
     *FIGURES,
 )

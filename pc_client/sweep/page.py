@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+import polars as pl
 
 from pc_client.control.controller import FIELDS
 from pc_client.results.pages import picture, render
 from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.ranking import rank_settings, spans_grid, varying
-
-Rows = Sequence[Mapping[str, Any]]
 
 _TEMPLATE = "sweep/sweep.html.j2"
 _MOST_SETTINGS = 25
@@ -19,12 +16,12 @@ _MOST_SETTINGS = 25
 _MOST_ERRORS = 50
 
 
-def render_page(name: str, rows: Rows) -> str:
+def render_page(name: str, table: pl.DataFrame) -> str:
     """Return the text of `sweep.html`.
 
     Args:
         name: of the sweep.
-        rows: of the table, at least one.
+        table: of the sweep, at least one row.
 
     Raises:
         ModuleNotFoundError: matplotlib or jinja2 is not installed (extra `report`).
@@ -32,11 +29,12 @@ def render_page(name: str, rows: Rows) -> str:
     from pc_client.results.static import draw
     from pc_client.sweep import figures
 
-    axes = varying(rows)
+    rows = table.to_dicts()
+    axes = varying(table)
     done = [row for row in rows if row["status"] == "done" and row["snr_db"] is not None]
-    pair = map_axes(rows)
-    settings = rank_settings(rows)
-    connect = spans_grid(rows)
+    pair = map_axes(table)
+    settings = rank_settings(table)
+    connect = spans_grid(table)
     # Repetitions are no axis of the sweep, but a controller may learn from one to the next.
     plotted = [axis for axis in (*axes, "repetition") if len({row[axis] for row in done}) > 1]
     return render(
@@ -46,7 +44,7 @@ def render_page(name: str, rows: Rows) -> str:
         n_runs=sum(row["status"] == "done" for row in rows),
         n_cases=len({row["case"] for row in rows}),
         origin=origin_of_rows(rows),
-        settings=settings[:_MOST_SETTINGS],
+        settings=settings.head(_MOST_SETTINGS).to_dicts(),
         n_settings=len(settings),
         map_figure=picture(figures.map_figure(rows, *pair), "Mean SNR over two settings of the controller")
         if pair and done
@@ -63,8 +61,8 @@ def render_page(name: str, rows: Rows) -> str:
     )
 
 
-def map_axes(rows: Rows) -> tuple[str, str] | None:
+def map_axes(table: pl.DataFrame) -> tuple[str, str] | None:
     """The axes of the map: both gains if they vary, else the controller's first two numbers that do."""
-    numbers = [axis for axis in varying(rows) if axis in FIELDS and FIELDS[axis].kind is float]
+    numbers = [axis for axis in varying(table) if axis in FIELDS and FIELDS[axis].kind is float]
     numbers.sort(key=lambda axis: axis not in ("gain_p", "gain_i"))
     return (numbers[0], numbers[1]) if len(numbers) > 1 else None

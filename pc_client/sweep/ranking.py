@@ -6,119 +6,92 @@ for one of the arms, or failed on one movement, has a mean over something else.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from math import prod
-from statistics import fmean
 from typing import Any
 
+import polars as pl
+
 from pc_client.control.controller import FIELDS
+from pc_client.results.tables import Column
 from pc_client.sweep.columns import FACTORS
 
-Rows = Sequence[Mapping[str, Any]]
+RANKING = (
+    Column("setting", align="left", kind=str),
+    Column("mean_snr_db", "mean SNR", "dB", ".2f"),
+    Column("gain_margin", "gain margin", format=".2f", narrow="gain\nmargin"),
+    Column("max_position_error_mm", "max error", "mm", ".2f"),
+    Column("n_runs", "runs", kind=int),
+    Column("n_refused", "refused", kind=int),
+    Column("n_failed", "failed", kind=int),
+)
+"""What is shown of a ranking."""
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """What came of one setting of the controller.
+def judge(table: pl.DataFrame, by: Sequence[str]) -> pl.DataFrame:
+    """What came of each setting.
 
-    Attributes:
-        values: what distinguishes it from the others, by column.
-        n_runs: runs that were done.
-        mean_snr_db: mean over them, Eq. 10; None without any.
-        gain_margin: the smallest of all its loops; None when there is no feedback.
-        max_position_error_mm: the largest of all runs.
-        n_refused: cases that were refused.
-        n_failed: cases that failed.
+    Args:
+        table: rows of a sweep.
+        by: columns that distinguish settings.
+
+    Returns:
+        These columns and those of `RANKING` but the first, in the order of the table: mean over the runs that
+        are done, smallest gain margin of all loops, largest error. `complete` says whether the mean may stand
+        beside others.
     """
-
-    values: Mapping[str, Any]
-    n_runs: int
-    mean_snr_db: float | None
-    gain_margin: float | None
-    max_position_error_mm: float | None
-    n_refused: int
-    n_failed: int
-
-    @property
-    def complete(self) -> bool:
-        """Whether its mean may stand beside others."""
-        return self.mean_snr_db is not None and not self.n_refused and not self.n_failed
-
-    @property
-    def name(self) -> str:
-        """Its values in one phrase."""
-        return ", ".join(f"{name} = {value}" for name, value in self.texts().items())
-
-    def texts(self) -> dict[str, str]:
-        """Its values as texts, by column."""
-        return {name: _short(value) for name, value in self.values.items()}
+    done = pl.col("status") == "done"
+    judged = table.group_by(by, maintain_order=True).agg(
+        pl.col("snr_db").filter(done).mean().alias("mean_snr_db"),
+        pl.col("gain_margin").min(),
+        pl.col("max_position_error_mm").filter(done).max(),
+        done.sum().alias("n_runs"),
+        (pl.col("status") == "refused").sum().alias("n_refused"),
+        (pl.col("status") == "failed").sum().alias("n_failed"),
+    )
+    all_done = (pl.col("n_refused") == 0) & (pl.col("n_failed") == 0)
+    return judged.with_columns(complete=pl.col("mean_snr_db").is_not_null() & all_done)
 
 
-def varying(rows: Rows) -> list[str]:
+def rank_settings(table: pl.DataFrame) -> pl.DataFrame:
+    """All settings of the controller, the best first, incomplete ones last; equals as in the table.
+
+    Returns:
+        What `judge` returns, and the values of a setting in one phrase, as `setting`.
+    """
+    axes = _controller_axes(table) or ["controller"]
+    judged = judge(table, axes)
+    names = [", ".join(f"{axis} = {_short(row[axis])}" for axis in axes) for row in judged.to_dicts()]
+    return judged.with_columns(setting=pl.Series(names, dtype=pl.String)).sort(
+        "complete", "mean_snr_db", descending=True, nulls_last=True, maintain_order=True
+    )
+
+
+def varying(table: pl.DataFrame) -> list[str]:
     """The axes of a sweep: columns of `FACTORS` with more than one value, in their order.
 
     Named controllers differ in many fields; those that follow from the name are no axes of their own.
     """
-    axes = [column.name for column in FACTORS if len({row.get(column.name) for row in rows}) > 1]
+    axes = [column.name for column in FACTORS if table[column.name].n_unique() > 1]
     if "controller" not in axes:
         return axes
-    names = {row["controller"] for row in rows}
+    n_names = table["controller"].n_unique()
     return [
-        axis
-        for axis in axes
-        if axis not in FIELDS or len({(row["controller"], row[axis]) for row in rows}) > len(names)
+        axis for axis in axes if axis not in FIELDS or table.select("controller", axis).n_unique() > n_names
     ]
 
 
-def spans_grid(rows: Rows) -> bool:
-    """Whether each value of the controller's fields was tried with each: not so for random samples."""
-    axes = _controller_axes(rows)
-    settings = {tuple(row[axis] for axis in axes) for row in rows}
-    return len(settings) == prod(len({row[axis] for row in rows}) for axis in axes)
+def spans_grid(table: pl.DataFrame) -> bool:
+    """Whether each value of the controller's fields was tried with each: not so in a search."""
+    axes = _controller_axes(table)
+    return not axes or table.select(axes).n_unique() == prod(table[axis].n_unique() for axis in axes)
 
 
-def rank_settings(rows: Rows) -> list[Setting]:
-    """All settings of the controller, the best first, incomplete ones last.
-
-    Args:
-        rows: of the table, with values of all `FACTORS`.
-    """
-    axes = _controller_axes(rows) or ["controller"]
-    groups: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
-    for row in rows:
-        groups.setdefault(tuple(row[axis] for axis in axes), []).append(row)
-    settings = [_judge(dict(zip(axes, key, strict=True)), group) for key, group in groups.items()]
-    # The sort is stable: equals keep the order of the table.
-    return sorted(settings, key=lambda s: (not s.complete, -(s.mean_snr_db or 0.0), s.mean_snr_db is None))
-
-
-def _controller_axes(rows: Rows) -> list[str]:
-    of_controller = {"controller", *FIELDS}
-    return [name for name in varying(rows) if name in of_controller]
-
-
-def _judge(values: Mapping[str, Any], rows: Rows) -> Setting:
-    done = [row for row in rows if row["status"] == "done"]
-    snr = [row["snr_db"] for row in done if row["snr_db"] is not None]
-    margins = [row["gain_margin"] for row in rows if row.get("gain_margin") is not None]
-    errors = [row["max_position_error_mm"] for row in done]
-    return Setting(
-        values=values,
-        n_runs=len(done),
-        mean_snr_db=fmean(snr) if snr else None,
-        gain_margin=min(margins, default=None),
-        max_position_error_mm=max(errors, default=None),
-        n_refused=sum(row["status"] == "refused" for row in rows),
-        n_failed=sum(row["status"] == "failed" for row in rows),
-    )
+def _controller_axes(table: pl.DataFrame) -> list[str]:
+    return [name for name in varying(table) if name in {"controller", *FIELDS}]
 
 
 def _short(value: Any) -> str:
-    return (
-        f"{value:.4g}"
-        if isinstance(value, float)
-        else str(value).lower()
-        if isinstance(value, bool)
-        else str(value)
-    )
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value).lower() if isinstance(value, bool) else str(value)

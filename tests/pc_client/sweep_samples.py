@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import os
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from pc_client.control.controller import CONTROLLERS
 from pc_client.errors import GainMarginError
 from pc_client.movements.files import library_path
 from pc_client.sweep.case import Case, MovementFile, SimulatedArm
 from pc_client.sweep.outcome import Outcome, failed
+from pc_client.sweep.result_store import ResultStore
 
 PREVIEW = CONTROLLERS["preview"]
 
@@ -41,7 +43,7 @@ def figures(case, repetition=1):
     }
 
 
-def invented(case, keep_recordings):
+def invented(case, keep_recordings=False):
     """A job without a robot: gains above 20 are refused, seed 13 brings bad luck."""
     if case.controller.gain_p > 20.0:
         error = GainMarginError("too much", margin=0.5, delay=0.03)
@@ -53,23 +55,42 @@ def invented(case, keep_recordings):
     return Outcome("done", rows=rows, recordings=tuple((name, b"mcap") for name in names))
 
 
-def deadly(case, keep_recordings):
+def deadly(case, keep_recordings=False):
     """A job whose process does not survive seed 13."""
     if case.arm.seed == 13:
         os._exit(9)
     return invented(case, keep_recordings)
 
 
-def faulty(case, keep_recordings):
+def process_id(case):
+    """A job that says where it runs; its process does not survive seed 13."""
+    return Outcome("done", str(os.getpid())) if case.arm.seed != 13 else deadly(case)
+
+
+def faulty(case):
     """A job with a mistake in it."""
     raise ZeroDivisionError("division by zero")
 
 
-def interrupted(case, keep_recordings):
+def interrupted(case, keep_recordings=False):
     """A job during which somebody presses Ctrl-C, at seed 13."""
     if case.arm.seed == 13:
         raise KeyboardInterrupt
     return invented(case, keep_recordings)
+
+
+def table_of(*cases):
+    """The table of cases that the invented job has done."""
+    return table_with((case, invented(case)) for case in cases)
+
+
+def table_with(outcomes):
+    outcomes = list(outcomes)
+    with TemporaryDirectory() as folder:
+        store = ResultStore(Path(folder), keep_recordings=False)
+        for case, outcome in outcomes:
+            store.settle(case, outcome)
+        return store.table(case for case, _ in outcomes)
 
 
 def write(folder: Path, text: str) -> Path:

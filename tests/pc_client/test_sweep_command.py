@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import sys
+from contextlib import nullcontext
 
 import pytest
 import sweep_samples
@@ -35,12 +36,15 @@ def job(monkeypatch):
     ran = []
 
     def use(function):
-        def side_by_side(cases, keep, job, *, workers, dask):
-            for case in cases:
-                ran.append(case)
-                yield case, function(case, keep)
+        def side_by_side(job, *, workers, dask):
+            def run(cases):
+                for case in cases:
+                    ran.append(case)
+                    yield case, function(case, **job.keywords)
 
-        monkeypatch.setattr("pc_client.sweep.schedule.run_side_by_side", side_by_side)
+            return nullcontext(run)
+
+        monkeypatch.setattr("pc_client.sweep.schedule.side_by_side", side_by_side)
         return ran
 
     return use
@@ -49,7 +53,7 @@ def job(monkeypatch):
 @pytest.fixture
 def quick_job(job, monkeypatch):
     """The same without plots, which take seconds."""
-    monkeypatch.setattr("pc_client.sweep.page.render_page", lambda name, rows: name)
+    monkeypatch.setattr("pc_client.sweep.page.render_page", lambda name, table: name)
     return job
 
 
@@ -140,18 +144,49 @@ def test_refused_cases_alone_are_no_failure(quick_job, tmp_path, capsys):
     assert "best of 6: gain_p = 5, gain_i = 2" in capsys.readouterr().out
 
 
-def test_random_samples_are_drawn_as_dots(job, tmp_path, capsys):
-    job(sweep_samples.invented)
-    text = """
-        movements = ["uniform_4_1"]
-        random = 12
-        [controller]
-        gain_p = { from = 1.0, to = 30.0, scale = "log" }
-        gain_i = { from = 0.0, to = 5.0 }
-    """
-    assert run(write(tmp_path, text), tmp_path / "out", "--format", "csv") == 0
-    assert (tmp_path / "out" / "sweep.html").read_text().count("<img") == 3
+SEARCH = """
+movements = ["uniform_4_1", "lognorm_4_1"]
+[search]
+trials = 12
+batch = 4
+[controller]
+gain_p = { low = 1.0, high = 40.0, log = true }
+gain_i = { low = 0.0, high = 5.0 }
+"""
+
+
+def test_the_settings_of_a_search_are_drawn_as_dots(job, tmp_path, capsys):
+    ran = job(sweep_samples.invented)
+    assert run(write(tmp_path, SEARCH), tmp_path / "out", "--format", "csv") == 0
+    assert (tmp_path / "out" / "sweep.html").read_text().count("<img") == 4
     assert "best of 12" in capsys.readouterr().out
+    assert len(ran) == 24
+
+
+@pytest.mark.parametrize("after", [0, 1, 9, 16, 23])
+def test_an_interrupted_search_goes_on_as_if_it_had_not_been(quick_job, after, tmp_path):
+    path = write(tmp_path, SEARCH)
+    ran = quick_job(sweep_samples.invented)
+    assert run(path, tmp_path / "whole", "--format", "csv") == 0
+    whole = list(ran)
+    ran.clear()
+
+    def interrupt(case, keep_recordings):
+        if len(ran) > after:
+            raise KeyboardInterrupt
+        return sweep_samples.invented(case)
+
+    quick_job(interrupt)
+    assert run(path, tmp_path / "parts", "--format", "csv") == 1
+    ran.clear()
+    quick_job(sweep_samples.invented)
+    assert run(path, tmp_path / "parts", "--format", "csv") == 0
+    assert ran == whole[after:]
+    assert files_of(tmp_path / "parts") == files_of(tmp_path / "whole")
+
+
+def files_of(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_one_case_alone_needs_no_plots(job, tmp_path, capsys):
@@ -170,12 +205,12 @@ def test_without_matplotlib_there_is_a_table(job, tmp_path, capsys, monkeypatch)
 
 
 def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, capsys, monkeypatch):
-    from pc_client.sweep.folder import SweepFolder
+    from pc_client.sweep.result_store import ResultStore
 
     stored = []
-    real = SweepFolder.store
+    real = ResultStore.settle
 
-    def store(self, case, outcome):
+    def settle(self, case, outcome):
         if len(stored) == 5:
             (self.path / "cases").rename(self.path / "gone")
             (self.path / "cases").write_text("")
@@ -183,7 +218,7 @@ def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, ca
         stored.append(case)
 
     ran = quick_job(sweep_samples.invented)
-    monkeypatch.setattr(SweepFolder, "store", store)
+    monkeypatch.setattr(ResultStore, "settle", settle)
     assert run(write(tmp_path, GRID), tmp_path / "out", "--format", "csv") == 1
     assert "cannot write" in one_line(capsys)
     assert len(ran) == 6
@@ -194,7 +229,7 @@ def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, ca
     [
         (GRID, ["--workers", "0"], 2, "workers"),
         (GRID, ["--workers", "2", "--dask", "tcp://x:1"], 2, "only one"),
-        (GRID, ["--format", "xlsx"], 1, "parquet, csv"),
+        (GRID, ["--format", "xlsx"], 2, "parquet, csv"),
         (GRID + "gain_d = 3", [], 1, "did you mean gain_"),
         ('movements = ["uniform_4_1"]\nrobot = "127.0.0.1"', ["--workers", "2"], 2, "one robot"),
         ('movements = ["uniform_4_1"]\nrobot = "no.such.invalid"', ["--yes"], 1, "cannot be looked up"),
@@ -285,6 +320,6 @@ def test_a_robot_that_stops_ends_the_sweep(robot, tmp_path, capsys):
 
 def test_every_case_of_the_grid_is_there_once(tmp_path):
     config = read_config(write(tmp_path, GRID))
-    cases = all_cases(config.movements, config.arms, config.controllers, config.repeat)
+    cases = all_cases(config.movements, config.arms, next(config.batches(None)), config.file.repeat)
     count = functools.reduce(lambda n, values: n * len(values), [(1, 2), (1, 2), (1, 2, 3), (1, 2)], 1)
     assert len(cases) == count == 24

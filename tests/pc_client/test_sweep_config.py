@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from sweep_samples import PREVIEW, write
 
 from pc_client.errors import ClientError
 from pc_client.movements.files import library_path
 from pc_client.sweep.case import Case, GivenRobot, SimulatedArm, all_cases
-from pc_client.sweep.config import FIDELITIES, KEYS, read_config
-from pc_client.sweep.controller_axes import Range, grid, samples
+from pc_client.sweep.config import FIDELITIES, SweepFile, read_config
 from pc_client.sweep.run_case import plan_case
 
 ROOT = Path(__file__).parents[2]
@@ -22,7 +20,7 @@ EXAMPLES = sorted((ROOT / "examples" / "sweeps").glob("*.toml"))
 
 
 def cases_of(config):
-    return all_cases(config.movements, config.arms, config.controllers, config.repeat)
+    return all_cases(config.movements, config.arms, next(config.batches(None)), config.file.repeat)
 
 
 def test_the_shortest_file(tmp_path):
@@ -30,7 +28,7 @@ def test_the_shortest_file(tmp_path):
     (case,) = cases_of(config)
     assert case.arm == SimulatedArm("ur3", "typical", 0)
     assert case.controller == PREVIEW
-    assert (config.repeat, config.keep_recordings, config.output) == (1, False, None)
+    assert (config.file.repeat, config.file.keep_recordings, config.file.output) == (1, False, None)
 
 
 def test_every_combination(tmp_path):
@@ -53,7 +51,7 @@ def test_every_combination(tmp_path):
     assert {case.controller.gain_p for case in cases} == {1.0, 2.5}
     assert {case.controller.path_tolerance for case in cases} == {0.02}
     assert {case.controller.name for case in cases} == {"paper", "preview"}
-    assert config.output == Path("out/here")
+    assert config.file.output == "out/here"
 
 
 def test_movement_files_lie_beside_the_configuration(tmp_path):
@@ -66,8 +64,12 @@ def test_movement_files_lie_beside_the_configuration(tmp_path):
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_make_sense(path):
     config = read_config(path)
-    assert config.output is not None
-    assert len(cases_of(config)) > 10
+    assert config.file.output is not None
+    assert config.n_cases > 10
+
+
+MOVES = 'movements = ["uniform_4_1"]'
+SEARCH = "[search]\ntrials = 3\n[controller]"
 
 
 @pytest.mark.parametrize(
@@ -75,23 +77,23 @@ def test_examples_make_sense(path):
     [
         ("movements = [", "not TOML"),
         ("", "movements: missing"),
-        ("movements = []", "at least one"),
+        ("movements = []", "a list of 1 or more"),
         ('movements = "uniform_4_1"', "give a list"),
         ('movements = ["uniform_4_11"]', "did you mean uniform_4_1?"),
         ('movements = ["nowhere.toml"]', "nowhere.toml"),
         ('movements = ["uniform_4_1", "uniform_4_1"]', "twice"),
-        ("movements = [1]", "give texts"),
+        ("movements = [1]", "movements[0]: 1; give a text"),
         ('MOVES\nmovment = ["uniform_4_1"]', "did you mean movements?"),
         ("MOVES\nfidelitys = []", "did you mean fidelities?"),
         ("MOVES\ngain_p = 3", "put it under [controller]"),
-        ('MOVES\nfidelities = ["flawless"]', "known are exact, ideal, typical, poor"),
-        ('MOVES\nfidelities = ["tipical"]', "did you mean typical?"),
-        ('MOVES\nrobots = ["ur4"]', "did you mean ur"),
-        ('MOVES\ncontrollers = ["pid"]', "'pid' is not known"),
-        ("MOVES\nseeds = [1.5]", "whole numbers"),
-        ("MOVES\nseeds = [-1]", "whole numbers"),
-        ("MOVES\nseeds = [true]", "whole numbers"),
-        ("MOVES\nseeds = 3", "seeds = [...]"),
+        ('MOVES\nfidelities = ["flawless"]', "give one of exact, ideal, typical, poor"),
+        ('MOVES\nfidelities = ["poor", "tipical"]', "fidelities[1]: 'tipical'"),
+        ('MOVES\nrobots = ["ur4"]', "give one of ur3, ur5, ur10"),
+        ('MOVES\ncontrollers = ["pid"]', "give one of paper, preview, best"),
+        ("MOVES\nseeds = [1.5]", "a whole number from 0"),
+        ("MOVES\nseeds = [-1]", "a whole number from 0"),
+        ("MOVES\nseeds = [true]", "a whole number from 0"),
+        ("MOVES\nseeds = 3", "seeds: 3; give a list"),
         ("MOVES\nrepeat = 0", "1 to 99"),
         ("MOVES\nrepeat = 2.0", "1 to 99"),
         ("MOVES\nkeep_recordings = 1", "true or false"),
@@ -101,10 +103,11 @@ def test_examples_make_sense(path):
         ('MOVES\ncell = "cell.toml"', "goes with robot"),
         ('MOVES\nrobot = "10.0.0.2"\nreverse_port = 70000', "0 to 65535"),
         ('MOVES\nrobot = "10.0.0.2"\nseeds = [1]', "is for simulated arms"),
-        ("MOVES\nrandom_seed = 1", "goes with random"),
-        ("MOVES\nrandom = 5", "nothing to draw"),
-        ("MOVES\nrandom = 0\n[controller]\ngain_p = [1]", "random: 0"),
-        ("MOVES\ncontroller = 3", "give a table [controller]"),
+        ("MOVES\n[search]\ntrials = 5", "nothing to choose"),
+        ("MOVES\n[search]\n[controller]\ngain_p = [1]", "trials: missing"),
+        ("MOVES\n[search]\ntrials = 0\n[controller]\ngain_p = [1]", "search.trials: 0"),
+        ("MOVES\n[search]\ntrials = 5\nsampler = 'best'\n[controller]\ngain_p = [1]", "one of tpe, random"),
+        ("MOVES\ncontroller = 3", "controller: 3; give a table"),
         ("MOVES\n[controller]\ngain_q = 3", "did you mean gain_"),
         ('MOVES\n[controller]\nname = "mine"', "controller.name: no such key"),
         ("MOVES\n[controller]\ngain_p = []", "an empty list"),
@@ -116,18 +119,19 @@ def test_examples_make_sense(path):
         ("MOVES\n[controller]\ngain_p = true", "give a number"),
         ("MOVES\n[controller]\nuses_preview = 1", "true or false"),
         ("MOVES\n[controller]\nspeed_share = 1.2", "0.1 to 1"),
-        ("MOVES\n[controller]\ngain_p = { from = 1, to = 2 }", "give random = N"),
-        ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 2, to = 1 }", "must be the smaller"),
-        ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 2 }", "without 'to'"),
-        ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 0, to = 1, scale = 'log' }", "above 0"),
-        ("MOVES\nrandom = 3\n[controller]\ngain_p = { from = 0, to = 1, scale = 'sin' }", "linear"),
-        ("MOVES\nrandom = 3\n[controller]\ngain_p = { form = 0, to = 1 }", "did you mean from?"),
-        ("MOVES\nrandom = 3\n[controller]\nuses_preview = { from = 0, to = 1 }", "a range is of numbers"),
+        ("MOVES\n[controller]\ngain_p = { low = 1, high = 2 }", "give a table [search]"),
+        ("MOVES\nSEARCH\ngain_p = { low = 2, high = 1 }", "above low"),
+        ("MOVES\nSEARCH\ngain_p = { low = 2 }", "high: missing"),
+        ("MOVES\nSEARCH\ngain_p = { low = 1, high = 201 }", "high: 201.0; give a number from 0 to 200 1/s"),
+        ("MOVES\nSEARCH\ngain_p = { low = 0, high = 1, log = true }", "above 0"),
+        ("MOVES\nSEARCH\ngain_p = { low = 0, high = 1, log = 'yes' }", "true or false"),
+        ("MOVES\nSEARCH\ngain_p = { low = 0, high = 1, lgo = true }", "lgo: no such key"),
+        ("MOVES\nSEARCH\nuses_preview = { low = 0, high = 1 }", "a range is of numbers"),
         (f"MOVES\nseeds = {list(range(2000))}\n[controller]\ngain_p = {list(range(100))}", "at most 100000"),
     ],
 )
 def test_what_makes_no_sense_is_one_line_with_file_and_key(text, words, tmp_path):
-    path = write(tmp_path, text.replace("MOVES", 'movements = ["uniform_4_1"]'))
+    path = write(tmp_path, text.replace("MOVES", MOVES).replace("SEARCH", SEARCH))
     with pytest.raises(ClientError) as caught:
         read_config(path)
     message = str(caught.value)
@@ -141,13 +145,13 @@ def test_a_given_robot_stands_in_its_cell(tmp_path):
     text = 'movements = ["uniform_4_1"]\nrobot = "10.0.0.2"\n'
     bare = read_config(write(tmp_path, text))
     config = read_config(write(tmp_path, text + 'cell = "cell.toml"\nreverse_port = 0\n'))
-    assert (bare.cell.name, bare.reverse_port) == ("", None)
-    assert (config.cell.name, config.cell.tool.mass, config.reverse_port) == ("bench", 0.5, 0)
+    assert (bare.cell.name, bare.file.reverse_port) == ("", None)
+    assert (config.cell.name, config.cell.tool.mass, config.file.reverse_port) == ("bench", 0.5, 0)
     robots = [
         GivenRobot("10.0.0.2", 0, "ur3", "1", cell, port)
         for cell, port in ((bare.cell, None), (config.cell, None), (config.cell, 0))
     ]
-    cases = [Case(config.movements[0], robot, config.controllers[0], 1) for robot in robots]
+    cases = [Case(config.movements[0], robot, PREVIEW, 1) for robot in robots]
     # The cell belongs to what a case is; the port does not.
     assert cases[0].identity != cases[1].identity == cases[2].identity
     assert plan_case(cases[1]).model.cell is config.cell
@@ -167,29 +171,5 @@ def test_fidelities_are_those_of_the_box():
 
 def test_every_key_is_explained_in_the_documentation():
     page = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
-    for key in KEYS:
+    for key in (field.name for field in fields(SweepFile)):
         assert f"`{key}`" in page or f"`[{key}]`" in page
-
-
-AXES = {"gain_p": Range(1.0, 30.0, True), "gain_i": Range(0.0, 20.0, False), "slew_limit": (10.0, 20.0)}
-
-
-@given(seed=st.integers(0, 2**32), n=st.integers(1, 20))
-def test_samples_lie_in_their_ranges_and_more_of_them_begin_with_the_same(seed, n):
-    drawn = samples(PREVIEW, AXES, n, seed)
-    for setting in drawn:
-        assert 1.0 <= setting.gain_p <= 30.0
-        assert 0.0 <= setting.gain_i <= 20.0
-        assert setting.slew_limit in (10.0, 20.0)
-    assert samples(PREVIEW, AXES, n + 3, seed)[:n] == drawn
-
-
-def test_one_more_field_does_not_change_the_other_samples():
-    few = samples(PREVIEW, {"gain_p": AXES["gain_p"]}, 5, 1)
-    many = samples(PREVIEW, AXES, 5, 1)
-    assert [s.gain_p for s in few] == [s.gain_p for s in many]
-    assert len({s.gain_p for s in many}) == 5
-
-
-def test_a_grid_without_axes_is_the_controller_itself():
-    assert grid(PREVIEW, {}, "file") == [PREVIEW]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 
 import pytest
-from sweep_samples import case, deadly, faulty, interrupted, invented
+from sweep_samples import case, deadly, faulty, interrupted, invented, process_id
 
 from pc_client.sweep.outcome import Outcome, failed
 from pc_client.sweep.run_case import run_case
-from pc_client.sweep.schedule import run_in_turn, run_side_by_side
+from pc_client.sweep.schedule import in_turn, side_by_side
 
 CASES = [case(seed=seed) for seed in (1, 2, 13, 3, 4, 5)]
 
@@ -18,48 +19,56 @@ def statuses(outcomes):
     return {case.arm.seed: outcome.status for case, outcome in outcomes}
 
 
+def done_by(job, cases=CASES, *, workers=None, dask=None):
+    with side_by_side(job, workers=workers, dask=dask) as run:
+        return list(run(cases))
+
+
 def test_side_by_side_in_processes():
-    outcomes = list(run_side_by_side(CASES, False, invented, workers=2, dask=None))
+    outcomes = done_by(invented, workers=2)
     assert len(outcomes) == len(CASES)
     assert statuses(outcomes) == {1: "done", 2: "done", 13: "failed", 3: "done", 4: "done", 5: "done"}
-    assert all(outcome == invented(case, False) for case, outcome in outcomes)
+    assert all(outcome == invented(case) for case, outcome in outcomes)
 
 
 def test_side_by_side_on_dask():
     distributed = pytest.importorskip("distributed")
+    keeping = partial(invented, keep_recordings=True)
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
-        outcomes = list(run_side_by_side(CASES, True, invented, workers=None, dask=cluster.scheduler_address))
-    assert dict(outcomes) == {case: invented(case, True) for case in CASES}
+        outcomes = done_by(keeping, dask=cluster.scheduler_address)
+    assert dict(outcomes) == {case: keeping(case) for case in CASES}
 
 
 def test_a_job_that_kills_its_worker_costs_only_its_own_case():
-    outcomes = list(run_side_by_side(CASES, False, deadly, workers=1, dask=None))
+    outcomes = done_by(deadly, workers=1)
     assert len(outcomes) == len(CASES)
     assert statuses(outcomes) == {1: "done", 2: "done", 13: "failed", 3: "done", 4: "done", 5: "done"}
     (error,) = [outcome.error for case, outcome in outcomes if case.arm.seed == 13]
     assert "worker process died" in error
 
 
+def test_processes_last_for_all_batches_and_are_replaced_when_one_has_died():
+    with side_by_side(process_id, workers=1, dask=None) as run:
+        ids = [[outcome.error for _, outcome in run([case(seed=seed)])] for seed in (1, 2, 13, 3, 4)]
+    assert ids[0] == ids[1]
+    assert "worker process died" in ids[2][0]
+    assert ids[0] != ids[3] == ids[4]
+
+
 def test_a_mistake_in_the_job_is_a_row_too():
-    ((_, outcome),) = run_side_by_side([case()], False, faulty, workers=1, dask=None)
+    ((_, outcome),) = done_by(faulty, [case()], workers=1)
     assert outcome == failed("ZeroDivisionError: division by zero")
 
 
 def test_nothing_to_do_starts_nothing(monkeypatch):
     monkeypatch.setattr("pc_client.sweep.schedule.open_executor", None)
-    assert list(run_side_by_side([], False, invented, workers=2, dask=None)) == []
-
-
-def test_one_robot_works_in_turn_and_stops_after_a_failure():
-    outcomes = list(run_in_turn(CASES, False, invented))
-    assert [case.arm.seed for case, _ in outcomes] == [1, 2, 13]
-    assert outcomes[-1][1].status == "failed"
+    assert done_by(invented, [], workers=2) == []
 
 
 def test_ctrl_c_goes_through():
-    outcomes = run_in_turn(CASES, False, interrupted)
+    outcomes = in_turn(interrupted)(CASES)
     assert [next(outcomes)[0].arm.seed for _ in range(2)] == [1, 2]
     with pytest.raises(KeyboardInterrupt):
         next(outcomes)
