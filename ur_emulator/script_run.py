@@ -230,7 +230,7 @@ class _Run:
             self._report(ReportKind.QUESTION, f"{question} {text}", *self._place())
             self._commands.append(answer)
             return
-        given = "and nobody answers" if text is None else f"'{text}' is none"
+        given = "and there is no answer" if text is None else f"'{text}' is none"
         self.status = RunStatus.FAILED
         message = f"the program asks for {_KINDS[kind]}: '{question}', {given} (--answer)"
         self._report(ReportKind.FAILURE, message, *self._place())

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 PUBLISHED = "paper"
-"""Name of the controller with the published law."""
+"""Name of the controller with the published control law."""
 
 _FIGURES = (LEVEL, LAG, ERROR)
 """What is shown of each experiment; in the frame with the number of the experiment behind the name."""

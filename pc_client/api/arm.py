@@ -45,8 +45,8 @@ __all__ = ["Arm", "Confirm", "connect", "plan"]
 Confirm = Callable[[str], bool]
 """Is shown what an arm is going to do that is not known to be simulated; returns whether it may."""
 
-_NOBODY = (
-    "nobody can be asked whether the arm may move: run this at a terminal, or give "
+_NO_TERMINAL = (
+    "there is no terminal to ask at whether the arm may move: run this at one, or give "
     "connect(..., confirm=lambda text: True) where somebody has made sure"
 )
 QUESTION = "The arm is going to move. Is the space around it free, and the emergency stop at hand?"
@@ -56,15 +56,15 @@ def ask_at_terminal(text: str) -> bool:
     """Show what is going to happen and ask at the terminal.
 
     Raises:
-        ClientError: nobody can be asked.
+        ClientError: there is no terminal to ask at.
     """
     if sys.stdin is None or sys.stdin.closed:
-        raise ClientError(_NOBODY)
+        raise ClientError(_NO_TERMINAL)
     print(text)
     try:
         return input(f"{QUESTION} [y/N]: ").strip().lower() in ("y", "yes")
     except EOFError:
-        raise ClientError(_NOBODY) from None
+        raise ClientError(_NO_TERMINAL) from None
 
 
 def connect(
@@ -273,7 +273,7 @@ class Arm:
         """Ask whether an arm that is not known to be simulated may do an experiment; nothing moves.
 
         Raises:
-            ClientError: the answer was no, nobody can be asked, or there is no clear path to the start.
+            ClientError: the answer was no, there is no terminal, or no clear path to the start.
         """
         self._ask(lambda: self._text_of(wanted))
 

@@ -38,7 +38,7 @@ def _ask(text: str) -> bool:
     """Show what is going to happen, and ask.
 
     Raises:
-        ClientError: nobody can be asked.
+        ClientError: there is no terminal to ask at.
         typer.Abort: the answer is no.
     """
     import sys
@@ -48,6 +48,6 @@ def _ask(text: str) -> bool:
     say(text)
     if sys.stdin is None or sys.stdin.closed:
         raise ClientError(
-            "nobody can be asked whether the arm may move: run this at a terminal, or give --yes"
+            "there is no terminal to ask at whether the arm may move: run this at one, or give --yes"
         )
     return typer.confirm(QUESTION, abort=True)

@@ -1,4 +1,4 @@
-"""Bytes on their way to the file of a recording: a disk that fails must not fail who makes them."""
+"""Bytes that wait for the file of a recording: a failing disk raises no error in the code that makes them."""
 
 from __future__ import annotations
 

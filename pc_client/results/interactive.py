@@ -105,8 +105,8 @@ def thinned(points: NDArray[np.float64], most: int = MOST_POINTS) -> NDArray[np.
         return points
     keep = {0, n - 1}
     for stretch in np.array_split(np.arange(n), max(1, (most - 2) // (2 * dim))):
-        for way in (1.0, -1.0):
-            values = way * points[stretch]
+        for sign in (1.0, -1.0):
+            values = sign * points[stretch]
             keep.update(stretch[np.where(np.isnan(values), np.inf, values).argmin(axis=0)].tolist())
     return points[sorted(keep)]
 

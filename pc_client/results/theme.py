@@ -1,6 +1,6 @@
 """Colours, letters and sizes that all figures have in common; loads no plotting library.
 
-The colours are those of Okabe and Ito, which colour-blind readers can tell apart. The reference is the thick
+The colours are those of Okabe and Ito, which colour-blind readers can distinguish. The reference is the thick
 grey line in every figure, so that a figure can be read without its legend.
 """
 

@@ -35,7 +35,7 @@ MOST_MEMORY = 300e6  # bytes; of the box and its worker processes together
 PORT_BASE, CONTROL_PORT = 1000, 30_900
 _START = "import sys\nsys.argv[0] = 'ur-emulator'\n{prelude}\nfrom ur_emulator.cli import main\nmain()\n"
 _MOVE = "def alive():\n  speedj([{speed}, 0, 0, 0, 0, 0], 2.0, 0.1)\n  stopj(5.0)\nend\n"
-_TELL_AGAIN = 250  # frames
+_REPORT_AGAIN = 250  # frames
 _numbers = count(1)
 
 
@@ -139,7 +139,7 @@ class BoxUnderAttack:
         speed = 0.1 * (-1) ** next(self._turns)
         with self.connect("realtime") as sock, sock.makefile("rb") as frames:
             for k in range(round(PATIENCE / PERIOD)):
-                if k % _TELL_AGAIN == 0:  # what others have sent before may take the place of the program
+                if k % _REPORT_AGAIN == 0:  # what others have sent before may take the place of the program
                     self.send("secondary", _MOVE.format(speed=speed))
                 frame = frames.read(LAYOUT.size)
                 if len(frame) < LAYOUT.size:

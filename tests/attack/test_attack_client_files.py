@@ -255,7 +255,7 @@ def test_an_archive_that_bursts_is_unpacked_no_further_than_its_limit(tmp_path: 
     assert outcomes[1][1] == b"0,0,0\n1,1,1\n"
 
 
-def test_ways_of_packing_that_cannot_be_unpacked_piece_by_piece_are_refused(tmp_path: Path) -> None:
+def test_packing_methods_that_cannot_be_unpacked_piece_by_piece_are_refused(tmp_path: Path) -> None:
     path = zipped(tmp_path / "a.zip", {"a.csv": bytes(MIB)}, zipfile.ZIP_BZIP2)
     ((_, content),) = contents(pen_sources([path]))
     assert "pack it by deflate" in str(content)

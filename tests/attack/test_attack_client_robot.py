@@ -220,7 +220,7 @@ def test_a_dashboard_without_the_end_of_a_line(box: ControlBox) -> None:
     assert "without the end of a line" in line_of(box, dashboard=endless_line)
 
 
-def test_an_arm_that_dashboard_and_primary_port_tell_differently(box: ControlBox) -> None:
+def test_an_arm_that_dashboard_and_primary_port_report_differently(box: ControlBox) -> None:
     assert "UR5 (dashboard), UR3 (port 30001)" in line_of(box, dashboard=says_ur5)
     with Between(box, dashboard=says_ur5) as between:
         driver = UrDriver("127.0.0.1", between.ports, reverse_port=0)

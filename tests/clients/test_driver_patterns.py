@@ -257,7 +257,7 @@ def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_
             rtde.until(lambda v: v["runtime_state"] == STOPPED)
 
 
-def test_a_program_is_told_by_key_messages(box):
+def test_a_program_is_reported_by_key_messages(box):
     with PrimaryWire(box) as primary:
         primary.write("def named():\n\tsync()\nend\n")
         titles = []

@@ -155,7 +155,7 @@ def test_settings_and_uploaded_programs(robot, old_box):
     robot.movej(start, acc=ACCELERATION, vel=SPEED)
 
 
-def test_the_realtime_monitor_sees_what_the_secondary_port_tells(robot):
+def test_the_realtime_monitor_sees_what_the_secondary_port_reports(robot):
     monitor = robot.get_realtime_monitor()
     joints = at_rest(robot)
     assert np.allclose(monitor.q_actual(wait=True), joints, atol=CLOSE_Q)

@@ -86,7 +86,7 @@ def test_read_only_twins_ignore_everything(lockstep_box, port):
 
 
 @pytest.mark.parametrize("port", SCRIPT_PORTS)
-def test_an_error_in_a_program_is_told_with_its_line(lockstep_box, port):
+def test_an_error_in_a_program_is_reported_with_its_line(lockstep_box, port):
     with Messages(lockstep_box) as primary:
         primary.next()
         send(lockstep_box, port, "def f():\n  x = 1\n  y = = 2\nend\n")

@@ -76,7 +76,7 @@ def test_the_recording_stays_where_a_folder_is_given(arm, tmp_path):
     np.testing.assert_array_equal(again.q, run.q)
 
 
-def test_a_controller_that_learns_does_so_from_run_to_run(arm):
+def test_a_controller_with_ilc_learns_from_run_to_run(arm):
     first, second = arm.repeat(ur.Movement.through(POINTS, durations=[2.0]), 2, ur.Controller.best())
     assert second.measured.recording.summary["learned_from"] == 1
     assert second.snr > first.snr

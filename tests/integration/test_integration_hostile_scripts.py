@@ -177,7 +177,7 @@ def test_a_script_that_was_flooded_reads_on_where_it_was(lockstep_box):
         peer.close()
 
 
-def test_a_script_that_sends_to_a_peer_that_never_reads_is_told(lockstep_box):
+def test_a_script_that_sends_to_a_peer_that_never_reads_is_reported(lockstep_box):
     text = (
         'def talk():\n  socket_open("127.0.0.1", PORT)\n  s = "0123456789"\n  i = 0\n  while i < 6:\n    s = str_cat(s, s)\n'
         "    i = i + 1\n  end\n  sent = 0\n  while socket_send_string(s):\n    sent = sent + 1\n    if sent % 100 == 0:\n"

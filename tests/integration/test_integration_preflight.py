@@ -75,7 +75,7 @@ def test_an_arm_with_its_own_calibration_is_ready(ur_client, robot, seed):
 @pytest.mark.parametrize(
     ("version", "unreported"), [("3.2.0", "; not reported by this software: payload"), ("3.11.0", "")]
 )
-def test_software_that_does_not_tell_the_payload_is_not_refused(ur_client, version, unreported):
+def test_software_that_does_not_report_the_payload_is_not_refused(ur_client, version, unreported):
     with ControlBox(pace="lockstep", port_base=free_port_base(), version=version) as box:
         doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
     assert doctor.code == 0, doctor.out

@@ -12,13 +12,13 @@ from ur_emulator import ControlBox
 
 # No serial number before 3.12; up to 3.2 the build number stands in the place of the third number.
 @pytest.mark.parametrize(("version", "told"), [("3.2.0", r"3\.2\.\d+"), ("3.11.0", r"3\.11\.0")])
-def test_a_box_that_tells_no_serial_number_is_simulated(ur_client, version, told):
+def test_a_box_that_reports_no_serial_number_is_simulated(ur_client, version, told):
     with ControlBox(pace="lockstep", port_base=free_port_base(), seed=7, version=version) as box:
         doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
     assert re.search(f"UR3, software {told}, serial number unknown, SIMULATED", doctor.out)
 
 
-def test_a_box_that_tells_no_serial_number_may_be_run_again_and_its_data_are_marked(ur_client, tmp_path):
+def test_a_box_that_reports_no_serial_number_may_be_run_again_and_its_data_are_marked(ur_client, tmp_path):
     out = tmp_path / "out"
     with ControlBox(pace="lockstep", port_base=free_port_base(), seed=7, version="3.2.0") as box:
         for _ in range(2):

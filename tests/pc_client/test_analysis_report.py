@@ -195,7 +195,7 @@ APART = {"dead_time_s": 0.024, "lag_s": 0.008, "joint_spread_s": 0.002}
 
 
 @pytest.mark.parametrize(("loop", "told"), [(MARGINS, False), ({**MARGINS, **APART}, True)])
-def test_only_what_was_identified_is_told_of_the_loop(
+def test_only_what_was_identified_is_reported_of_the_loop(
     tmp_path: Path, loop: dict[str, float], told: bool
 ) -> None:
     record(tmp_path, "lognorm_4_1", 1, loop=loop)

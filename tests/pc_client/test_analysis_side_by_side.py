@@ -103,7 +103,7 @@ def test_the_page_shows_all_and_needs_nothing_else(reports: list[Report]) -> Non
     assert out.read_text() == html
 
 
-def test_what_is_ours_is_told_where_the_published_controller_is_shown(
+def test_what_is_ours_is_reported_where_the_published_controller_is_shown(
     reports: list[Report], tmp_path: Path
 ) -> None:
     build_side_by_side([reports[1]], tmp_path / "report.html")

@@ -156,7 +156,7 @@ def test_a_tool_that_reaches_the_floor_refuses_the_plan_of_a_bare_arm():
     assert error.joint == 5
 
 
-def test_a_box_that_is_far_enough_is_told_in_the_plan():
+def test_a_box_that_is_far_enough_is_reported_in_the_plan():
     far = Solid("press", "boxes", (0.1, 0.1, 0.1), (0.8, 0.0, 0.25))
     cell = Cell("bench", floor_z=-0.3, solids=(far,), tool=BALL)
     plan = plan_movement(STROKES, model=robot_model("ur3", cell))
@@ -176,7 +176,7 @@ def test_a_larger_margin_is_kept_when_asked():
         plan_movement(STROKES, model=robot_model("ur3", far), limits=limits)
 
 
-def test_the_approach_is_led_around_what_stands_in_its_way():
+def test_the_approach_goes_around_obstacles():
     # A post that the arm sweeps over on the direct line from its side, and clears with the arm straight up.
     q_now = START + np.array((2.8, 0, 0, 0, 0, 0))
     direct = plan_approach(PLAN, q_now, model=robot_model("ur3"))
@@ -191,7 +191,7 @@ def test_the_approach_is_led_around_what_stands_in_its_way():
     assert "of walls and solids of the cell" in approach_text(path)
 
 
-def test_an_approach_without_a_free_way_is_refused_with_both_bodies():
+def test_an_approach_without_a_free_route_is_refused_with_both_bodies():
     q_now = START + np.array((2.8, 0, 0, 0, 0, 0))
     half_way = 0.5 * (q_now + START)
     post = Solid("post", "cylinders", (0.02, 0.6), (*dh_pose(half_way)[:2, 3], 0.3))

@@ -116,7 +116,7 @@ def test_the_preferred_branch_is_elbow_up_clear_and_points_forward_and_down(name
     assert clearance.own.least[0] > 0.005
 
 
-def test_the_flange_face_tells_the_floor_distance_of_a_tool_that_points_down():
+def test_the_flange_face_sets_the_floor_distance_of_a_tool_that_points_down():
     # Flange face down (tool z = -z): the lowest point of the last link is the face, 0 to 2 mm below the TCP.
     q = np.radians((0, -90, -90, -90, 90, 0))
     T = tcp_pose(UR3, q)

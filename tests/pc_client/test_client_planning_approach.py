@@ -38,7 +38,7 @@ def assert_above_the_plane(approach):
         assert min(heights[1:]) >= FLOOR_MARGIN
 
 
-def test_from_home_the_direct_way_is_taken():
+def test_from_home_the_direct_route_is_taken():
     approach = plan_approach(PLAN, HOME, model=UR3)
     assert approach.plan is PLAN
     assert len(approach.waypoints) == 1
@@ -85,7 +85,7 @@ def test_already_there_it_takes_no_time():
     assert len(approach.waypoints) == 1
 
 
-def test_when_the_direct_line_is_not_clear_the_arm_is_raised_on_the_way():
+def test_when_the_direct_line_is_not_clear_the_arm_is_raised_first():
     # Wrist 2 is bent to the side on which wrist 1 would swing the flange into the forearm.
     q_now = np.radians((-30, -100, 90, 10, -90, -130))
     approach = plan_approach(PLAN, q_now, model=UR3)
@@ -102,7 +102,7 @@ def test_when_the_direct_line_is_not_clear_the_arm_is_raised_on_the_way():
     np.testing.assert_array_equal(approach.motion.at(approach.duration)[0], approach.plan.start_q)
 
 
-def test_the_elbow_takes_the_long_way_where_the_short_one_is_folded():
+def test_the_elbow_takes_the_longer_route_where_the_shorter_one_is_folded():
     # 80 deg is nearer to -127 deg by way of 180, where the arm is folded onto itself.
     q_now = np.radians((-110, -140, 80, -140, -10, 170))
     approach = plan_approach(PLAN, q_now, model=UR3)
@@ -123,7 +123,7 @@ def test_raised_postures_stay_within_the_joint_ranges(turns):
 
 @settings(max_examples=25)
 @given(st.integers(0, 10**6))
-def test_from_any_clear_posture_the_way_found_is_clear(seed):
+def test_from_any_clear_posture_the_route_found_is_clear(seed):
     rng = np.random.default_rng(seed)
     q_now = np.radians(rng.uniform((-180, -200, -150, -200, -180, -180), (180, 20, 150, 20, 180, 180)))
     turned = q_now + 2 * np.pi * rng.integers(-1, 2, 6)
@@ -163,7 +163,7 @@ def test_five_joints_are_not_an_arm():
 
 
 @pytest.mark.parametrize(("name", "reach"), [("ur3", 0.5), ("ur5", 0.85), ("ur10", 1.3)])
-def test_on_the_way_the_flange_of_any_arm_is_slow(name, reach):
+def test_during_the_approach_the_flange_of_any_arm_is_slow(name, reach):
     model = robot_model(name)
     centre = WORKING_BOXES[name].centre
     plan = plan_movement(StraightStrokes([centre, centre + np.array((0.0, 0.1, 0.0))], 2.0), model=model)
@@ -173,7 +173,7 @@ def test_on_the_way_the_flange_of_any_arm_is_slow(name, reach):
     np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
 
 
-def test_the_way_in_words_tells_from_where_to_where_and_how_slowly():
+def test_the_text_of_an_approach_names_start_end_and_speed():
     approach = plan_approach(PLAN, HOME, model=UR3)
     text = approach_text(approach)
     assert "(0.0, -90.0, 0.0, -90.0, 0.0, 0.0) deg" in text

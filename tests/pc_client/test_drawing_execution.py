@@ -75,7 +75,7 @@ def test_times_map_back_exactly(drawing):
     np.testing.assert_allclose(begins, drawing.factor * drawing.joined.pen_down[:, 0])
 
 
-def test_the_plan_tells_the_person_as_well_as_the_strokes_do(drawing):
+def test_the_plan_reconstructs_the_person_as_well_as_the_strokes_do(drawing):
     """The recording is what its strokes say, so all that is left are the tails of neighbours and lifts."""
     verdict = judge(drawing, [])
     assert verdict.plan.snr_v_db > 40.0

@@ -113,7 +113,7 @@ def test_recordings_in_space_keep_their_axes_and_lift_upwards():
     plane=st.sampled_from(sorted(PLANES)),
     y_up=st.booleans(),
 )
-def test_the_way_back_is_exact(angle, size, plane, y_up):
+def test_the_inverse_is_exact(angle, size, plane, y_up):
     extraction = one_part()
     options = PlacementOptions(plane=plane, y_up=y_up, rotation=angle, size=size)
     similarity = place(marks_of(extraction), drawn(extraction), options).similarity

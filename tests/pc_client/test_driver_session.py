@@ -49,7 +49,7 @@ def test_session_without_dashboard_server():
         assert "NOT KNOWN whether real or simulated" in str(driver.info)
 
 
-def test_configuration_data_tell_the_arm_when_the_dashboard_does_not():
+def test_configuration_data_report_the_arm_when_the_dashboard_does_not():
     robot = FakeRobot(has_dashboard=False)
     robot.state = encode_state([ConfigurationData(robot_type=RobotType.UR10)], SoftwareVersion(3, 4))
     with UrDriver("robot", network=robot) as driver:
@@ -92,7 +92,7 @@ def test_an_arm_that_was_built_later_is_unknown():
         assert driver.info.model == "unknown"
 
 
-def test_software_that_does_not_tell_whether_a_program_runs_is_refused():
+def test_software_that_does_not_report_whether_a_program_runs_is_refused():
     robot = FakeRobot()
     robot.version = SoftwareVersion(3, 1)
     with pytest.raises(DriverError, match=r"3\.1\.0, CB3, must be a CB3's, 3\.2 or later"):
@@ -175,7 +175,7 @@ def test_callers_from_elsewhere_are_turned_away():
     assert stranger.closed
 
 
-def test_the_reverse_port_is_always_the_same_unless_told_otherwise():
+def test_the_default_reverse_port_is_always_the_same():
     robot = FakeRobot()
     for given, expected in ((None, REVERSE_PORT), (4321, 4321), (0, 50123)):
         with UrDriver("robot", reverse_port=given, network=robot):

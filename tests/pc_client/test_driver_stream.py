@@ -98,7 +98,7 @@ def test_heartbeats_are_neither_answered_nor_logged():
     assert report.lost_frames == 0
 
 
-def test_a_robot_whose_time_waits_is_told_from_one_that_repeats_a_frame():
+def test_a_robot_whose_time_waits_is_distinguished_from_one_that_repeats_a_frame():
     def repeat(robot):
         if robot.tick == 1050:
             robot.pipes["realtime"].incoming.append(robot.frame())
@@ -471,7 +471,7 @@ def test_a_program_that_ends_early_is_quoted(said, words):
         stream(robot)
 
 
-def test_an_error_of_the_program_is_told_instead_of_its_end():
+def test_an_error_of_the_program_is_reported_instead_of_its_end():
     def fail(robot):
         robot.report(RuntimeExceptionMessage(line=2, column=3, text="out_of_cheese"))
         program_ends(robot)

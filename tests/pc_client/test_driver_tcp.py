@@ -25,7 +25,7 @@ def pair():
     theirs.close()
 
 
-def test_bytes_go_both_ways_without_delay(pair):
+def test_bytes_go_in_both_directions_without_delay(pair):
     ours, theirs = pair
     ours.send(b"abc")
     assert theirs.recv(10) == b"abc"

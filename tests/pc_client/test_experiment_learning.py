@@ -92,7 +92,7 @@ def test_facts_of_the_loop_go_with_the_recording(two, tmp_path, lockstep):
     assert recording.provenance.controller_config["uses_ilc"] is True
 
 
-def test_preview_neither_learns_nor_tells_lag_from_delay(two, tmp_path):
+def test_preview_neither_learns_nor_separates_lag_from_delay(two, tmp_path):
     short = replace(two, planned=two.planned[:1], repeat=2)
     report, recordings = run(WavyRobot(), short, tmp_path, CONTROLLERS["preview"])
     assert [r.summary["learned_from"] for r in recordings] == [0, 0]

@@ -181,7 +181,7 @@ def test_the_flange_pose_is_judged_without_the_tcp_offset(offset, q):
     assert flange.reported.startswith("0.0 mm, 0.0 mrad")
 
 
-def test_what_a_robot_does_not_tell_is_neither_passed_nor_refused():
+def test_what_a_robot_does_not_report_is_neither_passed_nor_refused():
     fake = robot(payload=None)
     fake.state = encode_state([ConfigurationData(robot_type=RobotType.UR3)], fake.version)
     conditions = preflight(report(fake), UR3)
@@ -191,7 +191,7 @@ def test_what_a_robot_does_not_tell_is_neither_passed_nor_refused():
     assert conditions_text(conditions).count("not reported") == 3
 
 
-def test_an_arm_that_is_not_told_cannot_be_compared():
+def test_an_arm_that_is_not_reported_cannot_be_compared():
     fake = robot(has_dashboard=False)
     fake.state = encode_state([ConfigurationData(robot_type=99)], fake.version)
     conditions = {condition.name: condition.verdict for condition in preflight(report(fake), None)}
@@ -211,7 +211,7 @@ def test_the_payload_is_asked_for_by_rtde(version, told):
     assert ask_rtde(fake, "robot", Ports.standard().rtde, "payload") == told
 
 
-def test_an_rtde_port_that_says_nothing_or_nonsense_tells_nothing():
+def test_an_rtde_port_that_sends_nothing_or_nonsense_reports_nothing():
     fake = robot()
     answers = fake.took
     for nonsense in (b"", b"SSH-2.0-OpenSSH_9.2\r\n"):

@@ -105,7 +105,7 @@ def test_on_a_dask_cluster(folder):
         check(extract_many(pen_sources([folder]), executor), folder)
 
 
-def test_every_outcome_is_told_once_and_few_jobs_are_in_flight(folder, monkeypatch):
+def test_every_outcome_is_reported_once_and_few_jobs_are_in_flight(folder, monkeypatch):
     monkeypatch.setattr(batch, "_IN_FLIGHT", 2)
     told = []
     with ThreadPoolExecutor(2) as executor:

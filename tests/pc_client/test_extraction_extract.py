@@ -141,7 +141,7 @@ def cut_off_at_both_ends():
     return PenRecording("cut off", (PenPart(t, path),))
 
 
-def test_what_few_strokes_cannot_tell_gets_more_and_says_so():
+def test_a_recording_that_few_strokes_cannot_reconstruct_gets_more_with_a_remark():
     result = extract(cut_off_at_both_ends())
     assert result.snr_v_db > 15.0
     assert result.n_strokes > 1.2 * result.n_speed_peaks
@@ -154,7 +154,7 @@ def test_a_budget_by_hand_is_strict():
     assert not result.remarks
 
 
-def test_more_strokes_tell_more():
+def test_more_strokes_reconstruct_more():
     few, many = (extract(hand(), ExtractOptions(strokes_per_peak=ratio)) for ratio in (1.0, 1.5))
     assert many.n_strokes > few.n_strokes
     assert many.snr_v_db > few.snr_v_db + 0.5

@@ -125,7 +125,7 @@ def test_parts_whose_clock_starts_again_come_one_after_the_other():
     assert "1 of 2 parts began before the last ended" in recording.remarks[0]
 
 
-def test_long_gaps_are_told():
+def test_long_gaps_are_reported():
     assert parse("t,x,y\n0,0,0\n.01,1,0\n.02,1,0\n3.5,3,0\n").remarks == (
         "a gap of 3.48 s bridged by a straight line",
     )

@@ -127,9 +127,7 @@ def test_signals_that_cannot_be_recorded_are_refused(
 
 
 @pytest.mark.parametrize("simulated", [True, False, None])
-def test_provenance_tells_a_real_arm_from_one_that_is_not_known(
-    tmp_path: Path, simulated: bool | None
-) -> None:
+def test_provenance_separates_a_real_arm_from_an_unknown_one(tmp_path: Path, simulated: bool | None) -> None:
     real = provenance(simulated=simulated, seed=None, identified_delay_s=None)
     with Recorder(tmp_path / "a.mcap", real, SIGNALS) as recorder:
         append_rows(recorder, 1)

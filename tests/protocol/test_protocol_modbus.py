@@ -61,7 +61,7 @@ FRAMES = [
 
 
 @pytest.mark.parametrize(("frame", "data"), FRAMES)
-def test_every_frame_four_ways(frame, data):
+def test_every_frame_by_four_methods(frame, data):
     data = bytes.fromhex(data)
     assert encode_frame(*frame) == data
     inbox = bytearray(data)

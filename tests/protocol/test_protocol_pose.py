@@ -48,7 +48,7 @@ def test_matrix_of_a_rotation_vector_is_scipys(rotvec):
 
 
 @given(rotvecs())
-def test_rotation_vector_of_a_matrix_gives_the_matrix_back_and_is_the_short_way(rotvec):
+def test_rotation_vector_of_a_matrix_gives_the_matrix_back_with_the_smaller_angle(rotvec):
     matrix = Rotation.from_rotvec(rotvec).as_matrix()
     back = P.rotvec_from_flat(*matrix.ravel().tolist())
     assert math.hypot(*back) <= math.pi * (1 + 1e-15)

@@ -74,7 +74,7 @@ MESSAGE_IDS = [f"{type(message).__name__} {version}" for version, message, _ in 
 
 
 @pytest.mark.parametrize(("version", "message", "data"), MESSAGES, ids=MESSAGE_IDS)
-def test_messages_four_ways(version, message, data):
+def test_messages_by_four_methods(version, message, data):
     version, data = SoftwareVersion.parse(version), bytes.fromhex(data)
     assert P.encode_message_package(message, version) == data
     assert read(data, version) == [message]
@@ -195,7 +195,7 @@ def test_state_totals_are_the_documented_ones(version, first, later):
 
 
 @pytest.mark.parametrize("version", [version for version, _, _ in TOTALS])
-def test_states_four_ways(version):
+def test_states_by_four_methods(version):
     version = SoftwareVersion.parse(version)
     records = [distinct(record) for record in S.state_types(version, first=True)]
     data = S.encode_state(reversed(records), version)

@@ -24,7 +24,7 @@ MESSAGES = [
 
 
 @pytest.mark.parametrize(("version", "message", "data"), MESSAGES)
-def test_messages_four_ways(version, message, data):
+def test_messages_by_four_methods(version, message, data):
     version, data = SoftwareVersion.parse(version), bytes.fromhex(data)
     assert encode_message_package(message, version).hex(" ") == data.hex(" ")
     assert read(data, version) == [message]

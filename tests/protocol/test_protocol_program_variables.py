@@ -75,7 +75,7 @@ IDS = [f"{type(message).__name__} {version} {i}" for i, (version, message, _) in
 
 
 @pytest.mark.parametrize(("version", "message", "data"), MESSAGES, ids=IDS)
-def test_messages_four_ways(version, message, data):
+def test_messages_by_four_methods(version, message, data):
     version, data = SoftwareVersion.parse(version), bytes.fromhex(data)
     assert S.encode_program_state(message, version).hex(" ") == data.hex(" ")
     assert read(data, version) == [message]

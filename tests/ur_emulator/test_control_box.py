@@ -46,7 +46,7 @@ def test_the_state_is_a_frozen_view_of_the_last_cycle(box):
     assert box.state == state  # in lockstep nothing happens by itself
 
 
-def test_an_operation_tells_its_cycle_and_time_goes_on_by_one(box):
+def test_an_operation_reports_its_cycle_and_time_goes_on_by_one(box):
     before = box.state.tick
     assert box.set_digital_input("standard", 0, True) == before + 1
     assert box.state.tick == before + 1
@@ -408,7 +408,7 @@ def test_a_text_that_nobody_can_send_on_is_refused(box):
 # --- threads and life
 
 
-def test_who_submits_a_command_is_told_what_has_come_of_it(box):
+def test_who_submits_a_command_gets_its_result(box):
     told = queue.SimpleQueue()
     for command in (Push((1, 0, 0), duration=0.1), RemoveObstacle("wall"), AnswerRequest(1), StopProgram()):
         box.submit(command, lambda result, refusal: told.put((result, refusal and str(refusal))))
@@ -433,7 +433,7 @@ def test_a_box_that_does_not_run_says_so():
     assert "power_on" in box.log[0].text
 
 
-def test_who_waits_when_the_box_ends_is_told():
+def test_who_waits_when_the_box_ends_gets_an_error():
     outcome = []
     with ControlBox(pace="lockstep", port_base=None) as box:
         box.run_program(LOOP)
@@ -451,7 +451,7 @@ def test_who_waits_when_the_box_ends_is_told():
     assert [type(error) for error in outcome] == [NotRunningError]
 
 
-def test_the_thread_of_the_box_is_told_not_to_wait_for_itself():
+def test_the_thread_of_the_box_may_not_wait_for_itself():
     outcome = []
     box = ControlBox(pace="lockstep", port_base=None)
 
@@ -468,7 +468,7 @@ def test_the_thread_of_the_box_is_told_not_to_wait_for_itself():
     assert "thread of the box" in str(outcome[0])
 
 
-def test_many_threads_have_their_way_with_one_box(box):
+def test_many_threads_use_one_box(box):
     ticks, failures = [], []
 
     def work(n):

@@ -451,7 +451,7 @@ def test_the_most_silent_client_makes_room_for_a_new_one(box):
             client.__exit__()
 
 
-def test_clients_of_a_box_that_ends_are_told():
+def test_clients_of_a_box_that_ends_are_informed():
     with control_box() as box:
         http = Http(box)
         http.send(http.request("POST", "/v1/wait_until", {"robot_mode": "IDLE", "timeout": 60}))

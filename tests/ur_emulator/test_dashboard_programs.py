@@ -142,7 +142,7 @@ def test_a_script_program_carries_the_name_of_its_file(box, dashboard):
         assert reader.message(TextMessage).text == "counted 3"
 
 
-def test_a_program_that_does_not_compile_is_told_when_it_is_played(box, dashboard):
+def test_a_program_that_does_not_compile_is_reported_when_it_is_played(box, dashboard):
     with connect(box, "primary") as sock:
         reader = MessageReader(sock)
         reader.next()
@@ -356,7 +356,7 @@ def test_a_pc_that_does_not_answer_gives_a_program_that_says_so(box, dashboard, 
         dashboard.until("programState", "STOPPED pc.urp")
 
 
-def test_a_pc_that_sends_nonsense_is_told_on_the_primary_port(box, dashboard, folder):
+def test_a_pc_that_sends_nonsense_is_informed_on_the_primary_port(box, dashboard, folder):
     with pc_with_script("x = = 1\n") as (port, _), connect(box, "primary") as sock:
         (folder / "pc.urp").write_bytes(urp(external_control("127.0.0.1", port)))
         reader = MessageReader(sock)

@@ -54,7 +54,7 @@ def test_unwind_in_a_script():
 
 
 @given(st.sampled_from(sorted(RANGES)), st.data())
-def test_unwind_finds_the_way_between_two_counts(range_id, data):
+def test_unwind_finds_the_difference_of_two_counts(range_id, data):
     low, size = RANGES[range_id]
     encoder = Encoder()
     encoder.feed(range_id)
@@ -73,7 +73,7 @@ def pulses(decoder, steps, pins=(0, 1)):
     return bench.controller.state.encoders.encoders[0].count
 
 
-def test_quadrature_counts_both_ways():
+def test_quadrature_counts_in_both_directions():
     assert pulses(1, QUADRATURE[1:] + QUADRATURE) == 7
     assert pulses(1, (QUADRATURE[1], QUADRATURE[2], QUADRATURE[1])) == 1
     assert pulses(1, QUADRATURE[:0:-1]) == 65536 - 3

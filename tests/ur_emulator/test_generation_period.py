@@ -49,7 +49,7 @@ def test_a_box_begins_a_minute_after_its_start_and_counts_in_its_own_cycles(gene
 
 
 @every_generation
-def test_programs_are_told_the_cycle_and_sync_takes_one(generation):
+def test_programs_get_the_cycle_and_sync_takes_one(generation):
     bench = Bench(generation=generation)
     assert bench.run(body("textmsg(get_steptime())")) == [f"{generation.period_s:g}"]
     took = time_of(bench, "i = 0\nwhile i < 50:\n  i = i + 1\n  sync()\nend")

@@ -25,7 +25,7 @@ REPORTS_SINCE = SoftwareVersion(3, 13)
 
 
 @pytest.mark.parametrize(("given", "numbers", "day", "message"), TOLD, ids=[row[0] for row in TOLD])
-def test_every_port_tells_the_same_software(tmp_path, given, numbers, day, message):
+def test_every_port_reports_the_same_software(tmp_path, given, numbers, day, message):
     version = SoftwareVersion(*numbers)
     folder = write_programs(tmp_path)
     with ControlBox(version=given, pace="lockstep", port_base=None, programs=folder) as box:

@@ -193,6 +193,6 @@ def test_silent_clients_are_asked_whether_they_are_still_there(loop):
     close_all(port, clients, sock)
 
 
-def test_an_address_of_another_machine_is_told_from_a_taken_port(loop):
+def test_an_address_of_another_machine_is_distinguished_from_a_taken_port(loop):
     with pytest.raises(PortError, match=r"192\.0\.2\.1 is not an address of this machine"):
         Listener(loop, "192.0.2.1", 0, Clients(), set(), print, pytest.fail, "dashboard", Places())

@@ -428,7 +428,7 @@ def forbid_low_ports(monkeypatch):
     monkeypatch.setattr(listener.socket, "socket", Socket)
 
 
-def test_a_forbidden_port_is_told_from_a_taken_one(monkeypatch):
+def test_a_forbidden_port_is_distinguished_from_a_taken_one(monkeypatch):
     loop = EventLoop()
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(PortError) as error:
         Listener(

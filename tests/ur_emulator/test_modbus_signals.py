@@ -193,7 +193,7 @@ def test_deleting_what_is_not_there_is_harmless(bench):
     assert run(bench, 'modbus_delete_signal("ghost")', 'textmsg("on")') == ["on"]
 
 
-def test_units_are_told_apart_by_host_and_port(bench):
+def test_units_are_distinguished_by_host_and_port(bench):
     run(
         bench,
         'modbus_add_signal("10.0.0.2", 255, 0, 0, "a")',

@@ -379,7 +379,7 @@ def test_the_waypoint_is_that_of_the_move_under_way_also_when_more_are_known():
 @pytest.mark.parametrize(
     "second", ["movel(pose_add(p0,p[2,0,0,0,0,0]))", "movec(p0,pose_add(p0,p[0,3,0,0,0,0]))"]
 )
-def test_a_way_out_of_reach_behind_a_blend_is_a_protective_stop_and_no_more(first, second):
+def test_a_path_out_of_reach_after_a_blend_is_a_protective_stop_and_no_more(first, second):
     bench = Bench(fidelity="ideal")
     bench.run("movej(p[0.25,-0.25,0.25,2.2,-2.2,0], a=8, v=3)\n")
     bench.events.clear()

@@ -10,7 +10,7 @@ from ur_emulator.models.fidelity import IDEAL, POOR, TYPICAL
 from ur_emulator.models.ur3 import UR3
 from ur_emulator.plant.plant import Plant
 
-OUT_OF_THE_WAY = HOME - np.array((1.0, 0.3, 0.3, 1.0, 1.0, 1.0))
+RAISED = HOME - np.array((1.0, 0.3, 0.3, 1.0, 1.0, 1.0))
 
 
 def measured_lag(fidelity, seed):
@@ -61,9 +61,9 @@ def test_reported_positions_follow_a_smooth_move_after_that_delay():
 @pytest.mark.parametrize("speed", [0.4, 1.0])
 def test_speed_ripple_is_about_one_percent(speed):
     plant = Plant(UR3, TYPICAL, 1)
-    plant.reset(OUT_OF_THE_WAY)
+    plant.reset(RAISED)
     n = int(1.0 / speed / PERIOD)
-    ramp = SpeedRamp(OUT_OF_THE_WAY)
+    ramp = SpeedRamp(RAISED)
     ramp.run(plant, speed, 70)
     _, states = ramp.run(plant, speed, n)
     assert plant.n_contacts == 0

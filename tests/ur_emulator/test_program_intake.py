@@ -192,7 +192,7 @@ def test_a_program_that_is_not_compiled_is_refused_and_the_next_one_goes_on(inta
     assert box.take() == [ScriptFailed(1, 1, "the program cannot be compiled: it has ended: try again"), "b"]
 
 
-def test_a_client_may_let_so_much_wait_and_is_told_once(intake, tasks, box, one, two):
+def test_a_client_may_let_so_much_wait_and_is_informed_once(intake, tasks, box, one, two):
     intake.received(one, program("a", size=MAX_PROGRAM - 64) + program("b", size=MAX_PROGRAM // 6) * 3)
     intake.received(two, program("c"))
     assert box.take() == [TOO_MUCH]

@@ -147,7 +147,7 @@ def test_a_call_of_the_program_below_it_is_another_program(box):
     assert (error.line, error.column, error.text) == (1, 1, "compile_error_name_not_found:prog:")
 
 
-def test_the_secondary_port_tells_of_nothing():
+def test_the_secondary_port_reports_nothing():
     class Client:
         sent = ()
 

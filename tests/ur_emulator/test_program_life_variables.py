@@ -179,7 +179,7 @@ def test_a_client_that_comes_later_gets_everything():
     assert third.packages() == [GlobalVariablesUpdate()]
 
 
-def test_programs_that_follow_each_other_within_a_cycle_are_told_apart():
+def test_programs_that_follow_each_other_within_a_cycle_are_distinguished():
     bench = PortBench()
     client = bench.client()
     client.packages()
@@ -199,7 +199,7 @@ def test_programs_that_follow_each_other_within_a_cycle_are_told_apart():
     ]
 
 
-def test_only_the_primary_port_tells_of_variables_and_labels():
+def test_only_the_primary_port_reports_variables_and_labels():
     bench = PortBench(all_messages=False)
     client = bench.client()
     bench.start('def p():\n  $ 1 "Robot Program"\n  global a = 1\n' + FOREVER)
@@ -434,7 +434,7 @@ def test_lines_of_labels(line, label):
     assert parse_label(line) == label
 
 
-def test_a_label_that_is_none_is_not_told():
+def test_a_label_that_is_none_is_not_reported():
     bench = PortBench()
     client = bench.client()
     bench.start("def p():\n  $ nonsense\n" + FOREVER)

@@ -181,7 +181,7 @@ def test_the_bytes_of_reports_are_bounded(folder, monkeypatch):
     assert sum(path.stat().st_size for path in folder.rglob("*.zip")) <= 20_000
 
 
-def test_the_dashboard_tells_that_no_report_is_written_any_more(folder):
+def test_the_dashboard_reports_that_no_report_is_written_any_more(folder):
     (folder / "flightreports").mkdir()
     for number in range(BUDGETS.report_files):
         (folder / "flightreports" / f"flightreport_{number}.zip").touch()
@@ -266,7 +266,7 @@ def test_the_temporary_folder_of_a_killed_box_goes_with_the_next_one(tmp_path, m
 # --- what is told
 
 
-def test_no_answer_and_no_log_entry_tells_where_the_folder_is(folder, outside):
+def test_no_answer_and_no_log_entry_reports_where_the_folder_is(folder, outside):
     (folder / "link.script").symlink_to(outside / "secret.script")
     (folder / "lost.urp").write_bytes(urp(script_line("x = 1"), installation="gone"))
     (folder / "file.urp").write_bytes(urp('<Script type="File"><file>gone.script</file></Script>'))

@@ -58,7 +58,7 @@ class Turns:
     failed = pytest.fail
 
 
-def test_the_owner_of_a_socket_is_told_once_and_the_socket_is_watched_no_more(loop, ready):
+def test_the_owner_of_a_socket_is_informed_once_and_the_socket_is_no_longer_watched(loop, ready):
     errors = []
     loop.watch(ready, selectors.EVENT_READ, fail, errors.append)
     loop.add(Turns(loop, 5))
@@ -206,7 +206,7 @@ def test_an_error_in_a_command_ends_who_has_sent_it(box, monkeypatch):
 
 
 @pytest.mark.parametrize("method", ["publish", "_package"], ids=["states", "messages"])
-def test_a_port_that_cannot_publish_is_told_once_and_the_others_publish(box, method, monkeypatch):
+def test_a_port_that_cannot_publish_is_reported_once_and_the_others_publish(box, method, monkeypatch):
     with connect(box, "primary") as reader, connect(box, "secondary") as sock:
         assert reader.recv(1)
         monkeypatch.setattr(box._port_set._ports["primary"], method, fail)
@@ -226,7 +226,7 @@ def test_a_popup_with_a_long_title_is_shown(box):
     assert not faults(box)
 
 
-def test_an_error_of_an_operation_is_told_to_who_asked(box, monkeypatch):
+def test_an_error_of_an_operation_is_reported_to_the_caller(box, monkeypatch):
     monkeypatch.setattr(ReadState, "steps", fail)
     with pytest.raises(KeyError, match="defect"):
         box.state()
@@ -255,7 +255,7 @@ def test_an_error_in_accepting_costs_a_pause_of_that_port(box, monkeypatch):
     assert line.startswith(f"dashboard port {box.ports.dashboard} pauses: {DEFECT}")
 
 
-def test_an_error_after_a_task_is_told_to_who_has_asked_for_it(box, monkeypatch):
+def test_an_error_after_a_task_is_reported_to_the_caller(box, monkeypatch):
     with connect(box, "secondary") as sock:
         with monkeypatch.context() as patch:
             patch.setattr(box._intake, "_start", fail)

@@ -40,7 +40,7 @@ def test_lines_come_in_order_and_the_last_one_before_the_end(pipe):
     assert end.read().splitlines() == lines
 
 
-def test_nobody_waits_for_a_reader_who_is_told_how_much_was_lost(pipe, monkeypatch):
+def test_no_thread_waits_for_a_reader_and_the_reader_gets_how_much_was_lost(pipe, monkeypatch):
     monkeypatch.setattr(line_writer, "BUDGETS", replace(line_writer.BUDGETS, log_lines=50))
     end, stream = pipe
     writer = writer_to(stream)

@@ -69,7 +69,7 @@ def has_ended(pid):
     return False
 
 
-def test_tasks_are_done_in_order_and_what_they_raise_is_told(bench):
+def test_tasks_are_done_in_order_and_what_they_raise_is_reported(bench):
     for function, *arguments in (
         (operator.add, 1, 2),
         (operator.truediv, 1, 0),
@@ -177,7 +177,7 @@ def test_a_loop_that_ends_does_not_wait_for_its_task(bench):
     assert has_ended(pid)
 
 
-def test_a_process_that_cannot_be_started_is_told_and_tried_again(bench, monkeypatch):
+def test_a_process_that_cannot_be_started_is_reported_and_tried_again(bench, monkeypatch):
     def fail():
         raise OSError("too many")
 

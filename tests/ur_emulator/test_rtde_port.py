@@ -178,7 +178,7 @@ def test_the_cycles_that_are_sent_do_not_depend_on_how_long_time_stood_still(ben
     assert clients[0].stamps() == [first, first + 5, first + 10]
 
 
-def test_a_state_reached_between_two_packages_is_told_once_time_stands_still(bench):
+def test_a_state_reached_between_two_packages_is_reported_once_time_stands_still(bench):
     client = bench.client("timestamp", frequency=25.0)
     client.ask(M.Start())
     bench.tick(2)

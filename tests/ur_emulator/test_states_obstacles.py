@@ -57,7 +57,7 @@ def test_the_arm_is_stopped(bench, kind):
     assert bench.now.target_qd == (0.0,) * 6
 
 
-def test_after_the_obstacle_is_gone_the_way_is_free(bench):
+def test_after_the_obstacle_is_gone_the_path_is_free(bench):
     bench.tick(1, OBSTACLES["box"])
     bench.start(PUSH_ON)
     bench.tick(400)
@@ -77,7 +77,7 @@ def test_the_touch_is_felt_as_a_force_that_pushes_back(bench):
     assert min(force[1] for force in forces) < -50.0
 
 
-def test_an_obstacle_of_the_same_name_gives_way(bench):
+def test_an_obstacle_of_the_same_name_is_replaced(bench):
     bench.tick(1, OBSTACLES["box"])
     bench.tick(1, AddObstacle("it", "sphere", (0.05,), (0.3, -0.4, 0.15, *UPRIGHT)))
     assert bench.controller.plant.obstacles.names == ("it",)

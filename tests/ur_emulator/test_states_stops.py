@@ -75,7 +75,7 @@ def test_the_arm_brakes_as_it_can_then_loses_its_power(command):
     assert bench.now.runtime_state == ProgramState.STOPPED
 
 
-def test_joint_modes_tell_of_the_stop_while_the_arm_brakes():
+def test_joint_modes_report_the_stop_while_the_arm_brakes():
     bench = moving()
     assert bench.tick(1, PRESS).joint_mode == (JointMode.READY_FOR_POWER_OFF,) * 6
     assert bench.tick(BRAKING).joint_mode == (JointMode.POWER_OFF,) * 6
@@ -391,7 +391,7 @@ def test_the_scale_of_an_arm_at_rest_is_that_of_the_slider():
 # --- the pendant and the start
 
 
-def test_the_teach_button_guides_by_hand_and_is_told():
+def test_the_teach_button_guides_by_hand_and_is_reported():
     bench = Bench()
     bench.tick(5, PressButton("teach", True), PressButton("power", True))
     assert bench.now.robot_status_bits & 0b1100 == 0b1100

@@ -26,7 +26,7 @@ end
 """
 
 
-def test_all_instructions_have_the_position_that_python_tells():
+def test_all_instructions_have_the_position_that_python_reports():
     program = compile_program(TEXT)
     module = marshal.loads(program.compiled.code)
     functions = [constant for constant in module.co_consts if isinstance(constant, CodeType)]

@@ -484,7 +484,7 @@ elseif for in then do && || += ++ // /* 5s 1,5 lambda \u201c \xe2\x80\x9c \xb0 -
 """
 
 
-def assert_tells(text):
+def assert_reports(text):
     errors, _ = check_with_advice(text)
     assert bool(errors) == bool(check_program(text)[0])
     n_lines = text.count("\n") + 1
@@ -498,23 +498,23 @@ def assert_tells(text):
 
 
 @given(st.lists(st.sampled_from([*WORDS, *FOREIGN.split(), "\n", "\t"]), max_size=30).map(" ".join))
-def test_any_words_are_told_about(text):
-    assert_tells(text)
+def test_any_words_get_diagnostics(text):
+    assert_reports(text)
 
 
 @given(st.text(st.characters(max_codepoint=255), max_size=60))
-def test_any_bytes_are_told_about(text):
-    assert_tells(text)
+def test_any_bytes_get_diagnostics(text):
+    assert_reports(text)
 
 
 @settings(max_examples=50)
 @given(programs, st.data())
-def test_a_program_with_something_cut_out_is_told_about(tree, data):
+def test_an_incomplete_program_gets_diagnostics(tree, data):
     text = print_program(tree)
     start = data.draw(st.integers(0, len(text)))
     end = data.draw(st.integers(start, min(len(text), start + 8)))
     put = data.draw(st.sampled_from(["", " ", "\n", ";", "=", ")", "end", "x"]))
-    assert_tells(text[:start] + put + text[end:])
+    assert_reports(text[:start] + put + text[end:])
 
 
 @settings(max_examples=50)

@@ -40,7 +40,7 @@ def body(*lines):
 # --- what it tells ---------------------------------------------------------------------------------------
 
 
-def test_moves_are_told_with_start_place_goal_and_duration(run):
+def test_moves_are_reported_with_start_place_goal_and_duration(run):
     # 0.3 rad at 1 rad/s and 2 rad/s2 are a triangle: 2 * sqrt(0.3 / 2) = 0.775 s, 97 cycles.
     text = body(
         f"movej({HOME})",
@@ -103,7 +103,7 @@ def test_a_stream_ends_where_the_program_stops_calling(run):
     assert [event["duration"] for event in events] == [0.032, 0.008, 0.008]
 
 
-def test_threads_beside_the_moving_one_are_told_in_between(run):
+def test_threads_beside_the_moving_one_are_reported_in_between(run):
     text = "def p():\n  thread t():\n    sleep(0.1)\n    textmsg(1)\n  end\n  run t()\n"
     lines = run(f"{text}  movej({HOME})\n  textmsg(2)\nend\n").stdout.splitlines()
     mover = run(f"{text.replace('textmsg(1)', f'movej({HOME})')}  sleep(5)\nend\n").stdout.splitlines()[0]

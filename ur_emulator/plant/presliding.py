@@ -41,10 +41,10 @@ class Presliding:
         self._bristles[:] = 0.0
 
     def apply(self, size: NDArray[np.float64]) -> None:
-        """Set the torque for the way since the last call; `size` of the friction (6,) [Nm]."""
-        way = self._now - self._last
-        ahead = np.sign(way)
-        self._bristles += (ahead - self._bristles) * -np.expm1(-np.abs(way) / self._angle)
+        """Set the torque for the displacement since the last call; `size` of the friction (6,) [Nm]."""
+        moved = self._now - self._last
+        ahead = np.sign(moved)
+        self._bristles += (ahead - self._bristles) * -np.expm1(-np.abs(moved) / self._angle)
         self._last[:] = self._now
         np.multiply(self._bristles, -size, self._torque)
 

@@ -11,7 +11,7 @@ _row = Chapter("ioconfiguration").row
 EXACT, APPROXIMATE, DECLARED = Support.EXACT, Support.APPROXIMATE, Support.DECLARED_ONLY
 INT, NUMBER, STRING, LIST = ParamType.INT, ParamType.NUMBER, ParamType.STRING, ParamType.LIST
 
-_KEPT = "kept as configuration; nobody guides the arm by hand"
+_KEPT = "kept as configuration; without effect, since the arm is not guided by hand"
 _ACTION = Param("action", STRING, choices=("default", "freedrive"))
 _DOMAIN = Param("domain", INT, unit="0 current 4-20 mA, 1 voltage 0-10 V", low=0, high=1)
 _RUNSTATE_UNIT = "0 keep, 1 low when stopped, 2 high when stopped, 3 high running and low stopped"

@@ -454,7 +454,7 @@ _CONVEYORS: tuple[Builtin, ...] = (
         "None",
         "let the following moves follow a linear conveyor",
         support=APPROXIMATE,
-        note="smoothing of the count and the way to catch up with the belt are chosen",
+        note="smoothing of the count and the method to catch up with the belt are chosen",
     ),
     _row(
         "track_conveyor_circular",
@@ -467,7 +467,7 @@ _CONVEYORS: tuple[Builtin, ...] = (
         "None",
         "let the following moves follow a circular conveyor",
         support=APPROXIMATE,
-        note="turns about the z axis of the centre; smoothing and the way to catch up are chosen",
+        note="turns about the z axis of the centre; smoothing and the method to catch up are chosen",
     ),
     _row(
         "stop_conveyor_tracking",
