@@ -42,7 +42,7 @@ def compare(
 
     with console.status("making movements"):
         made = make_sets(targets, seed, sets)
-    movements = [movement for one in made for movement in one.movements.values()]
+    movements = [movement for one in made for movement in one.values()]
     runs = None
     if robot is not None:
         execute(movements, robot, out, 1, settings)

@@ -27,7 +27,7 @@ def comparison_sheet(one: MovementSet, runs: Mapping[str, MeasuredRun] | None = 
         one: the movements.
         runs: their recordings by name, or None.
     """
-    n_rows = -(-len(one.movements) // _COLUMNS)
+    n_rows = -(-len(one) // _COLUMNS)
     height = _PANEL_HEIGHT * n_rows + 0.75
     grid = boxes(
         (_WIDTH, height),
@@ -36,11 +36,11 @@ def comparison_sheet(one: MovementSet, runs: Mapping[str, MeasuredRun] | None = 
         margins=(0.6, 0.15, 0.65, 0.5),
         gaps=(0.25, 0.4),
     )
-    plans = {movement.name: planned_signal(movement) for movement in one.movements.values()}
+    plans = {movement.name: planned_signal(movement) for movement in one.values()}
     top = 1.08e3 * max(float(plan.speed.max()) for plan in plans.values())
     cube = cube_around(np.vstack([1e3 * plan.motion.p for plan in plans.values()]))
     panels = []
-    for index, (kind, movement) in enumerate(one.movements.items()):
+    for index, (kind, movement) in enumerate(one.items()):
         row, column = divmod(index, _COLUMNS)
         plan, run = plans[movement.name], (runs or {}).get(movement.name)
         speeds = [Curve(np.c_[plan.t, 1e3 * plan.speed], REFERENCE_GREY, width=2.6)]

@@ -5,10 +5,8 @@ All but the duplicate, which moves its target points as people do, have the same
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 
 from pc_client.errors import ClientError
 from pc_client.movements.files import save_movement
@@ -18,21 +16,11 @@ from pc_client.movements.twins import GENERATORS
 
 __all__ = ["MovementSet", "make_sets", "save_sets"]
 
-
-@dataclass(frozen=True, slots=True)
-class MovementSet:
-    """The movements of one seed.
-
-    Attributes:
-        seed: of the target points, and of what is random in the generators.
-        movements: by the generator's name, in the order of `GENERATORS`.
-    """
-
-    seed: int
-    movements: Mapping[str, Movement]
+MovementSet = Mapping[str, Movement]
+"""The movements of one seed by the generator's name, in the order of `GENERATORS`."""
 
 
-def make_sets(n_targets: int, seed: int, n_sets: int) -> tuple[MovementSet, ...]:
+def make_sets(n_targets: int, seed: int, n_sets: int) -> list[MovementSet]:
     """Make the movements of the seeds seed, seed + 1 ...
 
     Args:
@@ -42,21 +30,16 @@ def make_sets(n_targets: int, seed: int, n_sets: int) -> tuple[MovementSet, ...]
     """
     if n_sets < 1:
         raise ClientError(f"{n_sets} sets of movements is nothing to compare; give at least one")
-    return tuple(
-        MovementSet(
-            number,
-            MappingProxyType(
-                {
-                    kind: generate_movement(kind, n_targets, number, name=f"{kind}_{n_targets}_seed{number}")
-                    for kind in GENERATORS
-                }
-            ),
-        )
+    return [
+        {
+            kind: generate_movement(kind, n_targets, number, name=f"{kind}_{n_targets}_seed{number}")
+            for kind in GENERATORS
+        }
         for number in range(seed, seed + n_sets)
-    )
+    ]
 
 
-def save_sets(sets: tuple[MovementSet, ...], folder: Path) -> None:
+def save_sets(sets: Sequence[MovementSet], folder: Path) -> None:
     """Write all movements as files into a folder, so that each can be run or looked at by itself.
 
     Raises:
@@ -67,5 +50,5 @@ def save_sets(sets: tuple[MovementSet, ...], folder: Path) -> None:
     except OSError as error:
         raise ClientError(f"cannot use the folder {folder}: {error.strerror or error}") from error
     for movements in sets:
-        for movement in movements.movements.values():
+        for movement in movements.values():
             save_movement(movement, folder / f"{movement.name}.toml")

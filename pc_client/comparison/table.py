@@ -169,10 +169,10 @@ def build_comparison(
     rows = [
         row
         for one in sets
-        for generator, movement in one.movements.items()
+        for generator, movement in one.items()
         for row in _rows(generator, movement, runs, rate)
     ]
-    n_strokes = len(next(iter(sets[0].movements.values())).target_points) - 1
+    n_strokes = len(next(iter(sets[0].values())).target_points) - 1
     return Comparison(pl.DataFrame(rows, infer_schema_length=None), n_strokes, rate, robot)
 
 

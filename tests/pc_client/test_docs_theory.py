@@ -301,7 +301,7 @@ def test_exponents_of_the_page() -> None:
     assert (TWO_THIRDS, TORSION_EXPONENT) == (1.0 / 3.0, 1.0 / 6.0)
     assert "the pure case, b = 0" in SENTENCES
     assert Isochrony().exponent == 0.0
-    made = make_sets(4, 1, 1)[0].movements["power_law"]
+    made = make_sets(4, 1, 1)[0]["power_law"]
     assert "R is 1 m here" in SENTENCES
     assert made.trajectory.largest_radius == 1.0
 
