@@ -65,7 +65,7 @@ def line(points: Array, colour: str, width: float, extra: str = "", inside: str 
 
 
 def revealed(points: Array, done: Array, colour: str, duration: float) -> str:
-    """A line that appears from its begin; `done` is the share that is visible in each frame."""
+    """A line that appears from its start; `done` is the share that is visible in each frame."""
     values = [f"{1.0 - share:.4f}" for share in done]
     inside = animate("stroke-dashoffset", values, duration)
     return line(points, colour, 2.5, 'pathLength="1" stroke-dasharray="1" stroke-dashoffset="0"', inside)

@@ -166,7 +166,7 @@ class Arm:
         *,
         out: str | Path | None = None,
     ) -> Run:
-        """Move to the begin of a plan, identify the loop, follow the plan, and measure what came of it.
+        """Move to the start of a plan, identify the loop, follow the plan, and measure what came of it.
 
         Args:
             plan: from `plan`, or what it takes.
@@ -186,7 +186,7 @@ class Arm:
         *,
         out: str | Path | None = None,
     ) -> tuple[Run, ...]:
-        """Run a plan several times; a controller that learns does so from one run to the next.
+        """Run a plan several times; a controller with ILC learns from one run to the next.
 
         Arguments and errors are those of `run`.
         """

@@ -43,7 +43,7 @@ class Likeness:
 
 
 def measure_likeness(motion: Motion, rate: float) -> Likeness:
-    """Measure a movement from its begin to its end.
+    """Measure a movement from start to end.
 
     Args:
         motion: at equal steps, each (n, 3); filtered if it was measured.

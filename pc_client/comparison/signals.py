@@ -28,10 +28,10 @@ _REST = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A movement as samples, from its begin to its end.
+    """A movement as samples, from start to end.
 
     Attributes:
-        t: (n,), s since its begin.
+        t: (n,), s since its start.
         motion: each (n, 3).
         rate: samples a second, Hz.
     """

@@ -155,7 +155,7 @@ def _facts(extraction: Extraction, placement: Placement, joined: Joined) -> dict
 
 
 def _between_slow_moments(trajectory: SigmaLognormal) -> NDArray[np.float64]:
-    """Times (s) between the speed minima of a movement, its begin and its end."""
+    """Times (s) between the speed minima of a movement, its start and its end."""
     t = np.linspace(0.0, trajectory.duration, max(200, int(500 * trajectory.duration)))
     slow, _ = find_peaks(-np.linalg.norm(trajectory.evaluate(t).v, axis=1))
     return np.diff(np.concatenate(([0.0], t[slow], [trajectory.duration])))

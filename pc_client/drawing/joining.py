@@ -2,9 +2,9 @@
 
 The sum of strokes does not care who made them, so marks and lifts stand in one chain of target points:
 
-    lowered pen   one stroke from above the begin of the first mark
+    lowered pen   one stroke from above the start of the first mark
     mark 1        its own strokes
-    pen-up move   two strokes over a via point above the sheet, to the begin of mark 2, overlapping in time
+    pen-up move   two strokes over a via point above the sheet, to the start of mark 2, overlapping in time
     mark 2 ...
     lifted pen    one stroke to above the end of the last mark
 
@@ -39,7 +39,7 @@ __all__ = ["TAIL", "Joined", "join", "least_gaps"]
 TAIL = 1e-3
 #: Share of the drawing's size that may be left to do before the movement begins and after it ends.
 _REST = 1e-4
-#: Least time, s of the hand, to lower the pen at the begin and to lift it at the end.
+#: Least time, s of the hand, to lower the pen at the start and to lift it at the end.
 _LOWERING_S = 0.4
 #: Least time, s of the hand, between two marks.
 _LEAST_GAP_S = 0.1
@@ -68,7 +68,7 @@ class Joined:
     pen_down: NDArray[np.float64]
 
     def gap_intervals(self) -> list[tuple[float, float]]:
-        """Begin and end (s) of each gap."""
+        """Start and end (s) of each gap."""
         edges = [0.0, *self.pen_down.ravel().tolist(), self.trajectory.duration]
         return list(zip(edges[::2], edges[1::2], strict=True))
 

@@ -130,7 +130,7 @@ class Verdict:
 
     @property
     def best(self) -> RunVerdict:
-        """The last run: the one that has learned most, where the controller learns."""
+        """The last run: with ILC the one that has learned most."""
         return self.runs[-1]
 
 

@@ -76,7 +76,7 @@ class Shown:
 
     @property
     def span(self) -> tuple[float, float]:
-        """Begin and end of the movement, s of the hand since the pen first came down."""
+        """Start and end of the movement, s of the hand since the pen first came down."""
         return -self.start, self.drawing.joined.trajectory.duration - self.start
 
     @property

@@ -1,7 +1,7 @@
 """A session with one robot: connect, stream, and always leave the arm stopped.
 
 Works by the real protocol only. Whatever moves the arm is streamed, so that the program on the robot stops it
-when we fall silent. Every end of a motion (done, refused, Ctrl-C, lost robot) goes through
+when commands stop. Every end of a motion (done, refused, Ctrl-C, lost robot) goes through
 `stop`: first the stop word to the program, then a program of our own that stops the arm.
 """
 
@@ -67,7 +67,7 @@ class UrDriver:
     Attributes:
         info: which robot answered.
         layout: columns of its realtime frames.
-        time_waits: the robot's time stood still at the begin of every stream so far, as in lockstep; a robot
+        time_waits: the robot's time stood still at the start of every stream so far, as in lockstep; a robot
             in real time that repeats a frame now and then does not do so each time.
     """
 

@@ -223,7 +223,7 @@ class VelocityStream:
                 self._reverse.send(encode_velocity(VelocityMode.HOLD))
 
     def _wait_for_new(self, report: StreamReport) -> list[RealtimeFrame]:
-        """Sit out heartbeats until time goes on."""
+        """Skip heartbeats until time goes on."""
         waited, longest = Patience(), self._frames.patience(LONGEST_STANDSTILL)
         while True:
             arrival = self._frames.receive()

@@ -1,6 +1,6 @@
 """The loop of this session: stream the small excitation, evaluate what came back.
 
-What is found here is all that the controller ever learns about the arm's dynamics; it is the same for all
+The controller uses no other data about the arm's dynamics than those found here; it is the same for all
 movements of the experiment.
 """
 
@@ -41,7 +41,7 @@ class Identification:
         estimate: dead time and lag as one delay.
         loop: dead time and lag apart, for a controller that uses them; else the delay alone.
         margins: of the feedback on this loop.
-        learning: the filter of a controller that learns; None for another.
+        learning: the filter of a controller with ILC; None without.
     """
 
     estimate: DelayEstimate
@@ -150,7 +150,7 @@ def _check_return(drift: NDArray[np.float64]) -> None:
 
 
 def learning_filter(config: Controller, loop: LoopModel, period: float) -> LearningFilter | None:
-    """The filter of a controller that learns.
+    """The filter of a controller with ILC.
 
     Raises:
         DriverError: learning would not converge for every loop within the spread of the identified one.

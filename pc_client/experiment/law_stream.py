@@ -31,7 +31,7 @@ ACCELERATION = 5.0
 """Of the robot's `speedj` [rad/s2], of the leading joint, where a user names no other."""
 
 _REACTION = 0.1
-"""From a frame to the begin of the robot's ramp [s]: the loop's delay, and the robot's patience with us."""
+"""From a frame to the start of the robot's ramp [s]: the loop's delay, and the robot's patience with us."""
 
 _SPEED_SHARE = 0.95
 """Of the joint speed limits that a law may use, as the controllers do."""

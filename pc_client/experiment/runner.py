@@ -114,7 +114,7 @@ class ExperimentRunner:
         return report
 
     def _approach(self, plan: JointPlan) -> JointPlan:
-        """Move slowly to the begin of the plan; returns it in the turns where the arm is."""
+        """Move slowly to the start of the plan; returns it in the turns where the arm is."""
         approach = plan_approach(plan, self._driver.actual_q(), model=self._experiment.model)
         self._observer.approaching(approach)
         run_approach(self._driver, approach, self._experiment.model)

@@ -1,8 +1,8 @@
-"""Where a further stroke would pay most, and which strokes do nothing.
+"""Where a further stroke would raise the SNR most, and which strokes have no effect.
 
 Candidates are found by matched pursuit: a lognormal of some width at some time, with the amplitude vector
-that fits best, takes a certain energy out of the residual velocity; the one that takes most is chosen and
-subtracted, and the search goes on. This only looks; all strokes are refined together afterwards.
+that fits best, reduces the energy of the residual velocity; the one that reduces it most is chosen and
+subtracted, and the search goes on. The strokes are refined together afterwards (`refine`).
 
 Source: the order of Robust XZERO (largest first, subtract, go on), section 3.1 of the theory notes.
 """
@@ -32,7 +32,7 @@ class Candidate(NamedTuple):
 
 
 def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: int) -> list[Candidate]:
-    """The lognormals that take most of a residual velocity, best first.
+    """The lognormals that reduce the energy of a residual velocity most, best first.
 
     Args:
         t: uniform times, (n,), s.
@@ -66,7 +66,7 @@ def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: 
 
 
 def idle_strokes(chain: Chain, v_scale: float, step: float, cost: float) -> NDArray[np.bool_]:
-    """Strokes whose own velocity is small against what is left unexplained anyhow, (s,).
+    """Strokes with a velocity that is small against the residual, (s,).
 
     Args:
         chain: the strokes.

@@ -50,7 +50,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of one recording.
+    """The result of one recording.
 
     Attributes:
         name: of the recording.

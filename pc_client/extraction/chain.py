@@ -1,14 +1,14 @@
-"""The strokes of a part as the extraction holds them: arrays, in the variables in which a fit is tame.
+"""The strokes of a part in the extraction: arrays, in variables that make the fit well-conditioned.
 
-The theory's (t0, mu, sigma) slide along a ridge: for small sigma a lognormal tends to a Gaussian, and only
-the median time t0 + e^mu and the width e^mu sigma are left fixed by the data. So these two are variables
-here, and sigma beside them is a pure number that says how skew the lognormal is:
+The theory's (t0, mu, sigma) are strongly correlated: for small sigma a lognormal tends to a Gaussian, and
+the data determine only the median time t0 + e^mu and the width e^mu sigma. So these two are variables here,
+with sigma as a pure number that sets the skewness:
 
     median m = t0 + e^mu,   width w = e^mu sigma,   sigma     <=>     t0 = m - w / sigma,   mu = ln(w / sigma)
 
-Space is held by the virtual target points. Each belongs to the stroke that ends there and the stroke that
-begins there; moving one changes the movement only while these two strokes run, so that all that is computed
-of a fit is local in time. That the targets may go where they want, off the path, is the idea of iDeLog.
+The positions are those of the virtual target points. Each belongs to the stroke that ends there and the
+stroke that begins there; moving one changes the movement only while these two strokes run, so the
+computations of a fit are local in time. Targets that may lie off the path are the idea of iDeLog.
 
 Source: sections 1.5 and 3 of the theory notes.
 """
@@ -46,7 +46,7 @@ class Bounds(NamedTuple):
     """What a stroke may be, each as (least, most).
 
     Attributes:
-        sigma: below .08 a lognormal is a Gaussian for all purposes (skewness .24), and its t0 runs away.
+        sigma: below .08 a lognormal is nearly a Gaussian (skewness .24), and its t0 is undetermined.
         width: s; from the narrowest lognormal that a 12 Hz signal can show to one of a slow sweep.
         arc_angle: rad; an arc of 2 pi has no chord, so its target points could not carry it.
     """
@@ -88,7 +88,7 @@ class Chain:
 
     @property
     def chords(self) -> NDArray[np.float64]:
-        """From the begin of each stroke to its end, (s, dim)."""
+        """From the start of each stroke to its end, (s, dim)."""
         chords: NDArray[np.float64] = np.diff(self.targets, axis=0)
         return chords
 
@@ -126,7 +126,7 @@ def normals_across(chords: NDArray[np.float64], normals: NDArray[np.float64]) ->
 def inserted(chain: Chain, median: NDArray[np.float64], width: NDArray[np.float64], sigma: float) -> Chain:
     """The chain with further strokes that do not move anything yet (chord 0), each put in by its median.
 
-    A fit gives them their chords in its first, linear step; nothing gets worse by an insertion.
+    A fit gives them their chords in its first, linear step; an insertion changes no error.
     """
     order = np.argsort(median)
     at = np.searchsorted(chain.median, median[order])
@@ -145,7 +145,7 @@ def inserted(chain: Chain, median: NDArray[np.float64], width: NDArray[np.float6
 
 
 def without(chain: Chain, drop: NDArray[np.bool_]) -> Chain:
-    """The chain without some strokes (drop is (s,)): the stroke after a dropped one begins at its begin.
+    """The chain without some strokes (drop is (s,)): the stroke after a dropped one begins at its start.
 
     The end of the whole chain is kept when its last stroke is dropped.
     """
@@ -201,7 +201,7 @@ def sigma_lognormal(chain: Chain, duration: float) -> SigmaLognormal:
 
     Args:
         chain: at least one stroke; no chord is nothing.
-        duration: when the movement is taken to be over, s.
+        duration: end of the movement, s.
     """
     targets = np.zeros((len(chain.targets), 3))
     targets[:, : chain.targets.shape[1]] = chain.targets

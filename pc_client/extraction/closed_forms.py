@@ -1,6 +1,6 @@
 """A lognormal from characteristic points of one speed profile, in closed form.
 
-Of a lognormal three points are used: the inflection before the peak (2), the peak (3) and the inflection
+Three points of a lognormal are used: the inflection before the peak (2), the peak (3) and the inflection
 behind it (4). Their heights give sigma, by one formula each, and with sigma any two of their times give mu:
 
     sigma^2 = -2 - 2 b - 1 / (2 b),   b = ln(v_i / v_3), i = 2 or 4
@@ -86,5 +86,5 @@ def lognormal_from_points(
 
 
 def turn_rate(directions: tuple[float, float], distances: tuple[float, float]) -> float:
-    """By how much the direction turns per length run: (phi_4 - phi_2) / (s_4 - s_2), rad per length."""
+    """Change of direction per length: (phi_4 - phi_2) / (s_4 - s_2), rad per length."""
     return (directions[1] - directions[0]) / (distances[1] - distances[0])

@@ -1,4 +1,4 @@
-"""The order of things in a fit: first strokes, joint refinement, further strokes while they pay.
+"""The sequence of a fit: first strokes, joint refinement, further strokes while they raise the SNR enough.
 
 All parts of a recording share one budget of strokes, and a further stroke goes to where most of the velocity
 is still unexplained, whichever part that is.
@@ -85,12 +85,12 @@ class Scales:
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """What a fit came to.
+    """The result of a fit.
 
     Attributes:
         chains: the strokes of each part.
-        through: True: the signal is so clean that the strokes were fitted through the low-pass: it is what
-            the filter makes of them that is the recording, and so they have to be judged.
+        through: True: the signal is so clean that the strokes were fitted through the low-pass: the filtered
+            strokes give the recording, and are compared with it.
     """
 
     chains: list[Chain]

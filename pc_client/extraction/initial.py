@@ -2,8 +2,8 @@
 
 The minima are the salient points; in time they divide the part into intervals, in space they are the first
 virtual targets. Sigma, median and width of each stroke come from the closed forms, by the candidate that fits
-the measured speed best; its arc angle from the directions at its inflections. What they get wrong, overlap
-above all, is the business of the joint refinement.
+the measured speed best; its arc angle from the directions at its inflections. Their errors, overlap
+above all, are corrected by the joint refinement.
 
 Source: section 3.1 of the theory notes: segmentation of iDeLog, parameters of Robust XZERO.
 """

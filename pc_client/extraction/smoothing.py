@@ -9,7 +9,7 @@ Three steps, in this order:
 The hand holds little above 10 Hz; what a recorder adds above (quantised positions, late time stamps) is not
 the strokes' business. The filter must not shift anything in time, hence forwards and backwards. At its ends a
 part is continued by point reflection, so that the first and the last position stay where they are and a part
-may begin and end in full motion.
+may start and end in full motion.
 
 Source: section 2 of the theory notes (12 Hz low-pass of signatures).
 """
@@ -53,7 +53,7 @@ MIN_DURATION_S = 0.02
 MIN_EXTENT = 1e-5
 
 _ORDER = 4
-#: The impulse response has died away (to 1e-6) after this time, s.
+#: The impulse response has decayed (to 1e-6) after this time, s.
 _SETTLED_S = 0.5
 #: A time step is steady within this factor of the typical one; a clock can be trusted with this share of
 #: steady steps, and a curve can be drawn through so many of them.
@@ -134,7 +134,7 @@ def _interpolated(part: PenPart, t: NDArray[np.float64]) -> NDArray[np.float64]:
     """Positions at the times t: cubic splines where the clock is steady, straight lines elsewhere.
 
     A cubic spline is exact to the fourth order, but swings out where two time stamps lie close together and
-    the clock is not to be trusted, or where few samples jump. There nothing but the straight line is known
+    the clock is not to be trusted, or where few samples jump. There only the straight line is known
     between two samples.
     """
     points: NDArray[np.float64] = make_interp_spline(part.t, part.p, k=1)(t)

@@ -21,7 +21,7 @@ from pc_client.kinematics.robot_model import RobotModel
 Array = NDArray[np.float64]
 
 POSITION_TOLERANCE = 1e-11
-"""Largest position error of a solution [m]; a hundredth of what plans promise, still far above rounding."""
+"""Largest position error of a solution [m]; a hundredth of the accuracy of plans, far above rounding."""
 
 ROTATION_TOLERANCE = 1e-11
 """Largest rotation error of a solution [rad]."""

@@ -1,7 +1,7 @@
 """The client's nominal arm: published geometry through Pinocchio, and limits of its own.
 
 The geometry is read from example-robot-data, whose UR files equal UR's published DH table; its *limits* are
-wrong (the UR3 file carries UR10 torques and 124-183 deg/s) and its masses are guesses, so neither is used.
+wrong (the UR3 file carries UR10 torques and 124-183 deg/s) and its masses are estimates, so neither is used.
 Nothing here may be fed with the kinematics of an emulated box: a client of a real arm does not know them.
 
 Frames: everything is expressed in UR's `base` frame, the frame of the DH table and of the TCP poses that a

@@ -1,6 +1,6 @@
 """How long a stroke lasts for its length: isochrony and Fitts' law, and strokes re-timed by them.
 
-Both rules speak of proportions between the strokes of one movement; the total is the movement's own. People
+Both rules set the proportions between the strokes of one movement; the total is that of the movement. People
 draw large and small in nearly the same time (isochrony, T = a D^b with b of .1 to .5, here 0 for the pure
 case: the theory's mu and sigma are kept and only D scales). When they must hit a target they take longer
 for a farther and a smaller one (Fitts, T = a + b log2(2 D / W)).
@@ -108,7 +108,7 @@ def chained_windows(
 
     Args:
         proportions: (n,), above 0.
-        total: from the begin of the first window, 0, to the end of the last, s.
+        total: from the start of the first window, 0, to the end of the last, s.
         overlap: share of the shorter of two windows in which both are open, 0 to below 1.
 
     Returns:

@@ -1,7 +1,7 @@
 """Fit a movement into the robot's workspace: move, scale and rotate it, and, only when asked, slow it down.
 
 The similarity of space changes no shape: neither of the path nor of the speed over time. Slowing down is the
-theory's own scaling of time. Joint limits are the business of planning.
+theory's own scaling of time. Planning checks the joint limits.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def evaluate_lognormals(t: ArrayLike, t0: ArrayLike, mu: ArrayLike, sigma: Array
     age = np.where(begun, age, 1.0)
     z = (np.log(age) - mu) / sigma
     done = np.where(begun, ndtr(z), 0.0)
-    # z**2 overflows to inf only where the lognormal is 0 anyhow; clipping keeps numpy silent about it.
+    # z**2 overflows to inf only where the lognormal is 0; clipping avoids numpy's warning.
     rate = np.where(begun, np.exp(-0.5 * np.minimum(z * z, 1e4)) / (sigma * _SQRT_TWO_PI * age), 0.0)
     rate_change = -rate / age * (1.0 + z / sigma)
     return LognormalValues(done, rate, rate_change)

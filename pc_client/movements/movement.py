@@ -171,7 +171,7 @@ class Movement:
     def motion(self, t: ArrayLike) -> Motion:
         """Position, velocity and acceleration at the times t, s; each (n, 3).
 
-        Before 0 and after `duration` the TCP rests at the begin and the end.
+        Before 0 and after `duration` the TCP rests at the start and the end.
         """
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         if not np.all(np.isfinite(times)):
@@ -183,7 +183,7 @@ class Movement:
     def sample(self, t: ArrayLike) -> MovementSample:
         """Position (m) and velocity (m/s) at the times t, s, a number or (n,); each (n, 3).
 
-        Before 0 and after `duration` the TCP rests at the begin and the end.
+        Before 0 and after `duration` the TCP rests at the start and the end.
         """
         motion = self.motion(t)
         return MovementSample(motion.p, motion.v)

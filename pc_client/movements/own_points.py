@@ -63,7 +63,7 @@ def through(
         setback: of blended corners, m.
 
     Returns:
-        The movement. Whether an arm can do it is the business of planning.
+        The movement. Planning checks whether an arm can execute it.
 
     Raises:
         MovementError: saying what is wrong with the points, durations or choices.

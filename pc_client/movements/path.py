@@ -3,7 +3,7 @@
 A blend is a pair of clothoids: the curvature grows in proportion to the path length from 0 to its top in the
 middle of the corner and falls to 0 again, so that a robot that passes it at a steady speed meets no jump of
 acceleration. Positions are Fresnel integrals of the arc length: exact, and no table to interpolate. This
-module knows no time.
+module is independent of time.
 """
 
 from __future__ import annotations

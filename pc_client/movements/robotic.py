@@ -2,7 +2,7 @@
 
 The speed is a square wave convolved with one boxcar (trapezoids) or two (S-curves). Way, speed and
 acceleration are piecewise polynomials written down in closed form; the convolution has area 1, so the length
-of every stroke is kept exactly. Where the path goes is the business of `path.py`.
+of every stroke is kept exactly. `path.py` defines the path.
 
 Source: section II.C; a square wave of the levels l_j / T_j, "smoothed with realistic aspect".
 """
@@ -43,7 +43,7 @@ class SmoothedSquareWave:
     """Levels of speed in windows of time, convolved with boxcars of area 1.
 
     Attributes:
-        windows: (n, 2), s: begin and end of each level.
+        windows: (n, 2), s: start and end of each level.
         levels: (n,), m/s.
         ramps: width of the boxcar (s), or of both: the longer one bounds the acceleration by level / width,
             the shorter one bounds the jerk.

@@ -5,9 +5,9 @@ Everything is closed form and evaluated for all strokes and all times at once:
     p(t) = A_0 + sum_j D_j F_j sinc(d_j F_j / 2) [cos(d_j (F_j - 1) / 2) c_j + sin(d_j (F_j - 1) / 2) m_j]
     v(t) =       sum_j D_j Lambda_j              [cos(d_j (F_j - 1/2))   c_j + sin(d_j (F_j - 1/2))   m_j]
 
-with A_0 the first target point, D_j the arc length, d_j the turn, c_j the chord direction and m_j the normal
-in the plane of stroke j. Inner target points are virtual: where strokes overlap the path cuts the corner. The
-last one is always reached.
+with A_0 the first target point, D_j the arc length, d_j the arc angle, c_j the chord direction and m_j the
+normal in the plane of stroke j. Inner target points are virtual: where strokes overlap the path cuts the
+corner. The last one is always reached.
 
 Source: Eq. 1-4, carried to three dimensions by giving each stroke a plane of its own (as iDeLog3D does).
 """
@@ -37,7 +37,7 @@ class SigmaLognormal:
     Attributes:
         target_points: (n, 3), m.
         strokes: the n - 1 strokes.
-        duration: when the movement is taken to be over, s; it begins at 0.
+        duration: end of the movement, s; it begins at 0.
     """
 
     target_points: NDArray[np.float64]

@@ -3,7 +3,7 @@
 The quintic spline through the points, natural at its ends (third and fourth derivative zero), over the
 centripetal parameter: a step of the parameter is the square root of the distance of two points, which keeps
 the curve from swinging out at sharp turns. It is continuous up to the fourth derivative, so curvature and
-torsion are smooth along the path. Two points give the straight line. This module knows no time.
+torsion are smooth along the path. Two points give the straight line. This module is independent of time.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ class PlanarStroke:
     Attributes:
         timing: when.
         length: D, arc length of the stroke, m.
-        theta_start: direction of the velocity at the begin, rad.
+        theta_start: direction of the velocity at the start, rad.
         theta_end: direction of the velocity at the end, rad.
     """
 
@@ -62,7 +62,7 @@ class PlanarStroke:
         return cls(timing, length, chord_direction - 0.5 * arc_angle, chord_direction + 0.5 * arc_angle)
 
     def evaluate(self, t: ArrayLike) -> Motion:
-        """Displacement from the begin, velocity and acceleration at the times t (n,), s; each (n, 2)."""
+        """Displacement from the start, velocity and acceleration at the times t (n,), s; each (n, 2)."""
         lognormal = self.timing.lognormal.evaluate(np.atleast_1d(np.asarray(t, dtype=np.float64)))
         d = self.theta_end - self.theta_start
         half = 0.5 * d * lognormal.done
@@ -109,7 +109,7 @@ def arc_frame(a: ArrayLike, b: ArrayLike, tilt: float) -> tuple[NDArray[np.float
     """The two unit vectors that span the plane of an arc from a to b.
 
     Args:
-        a: begin of the arc, (3,), m.
+        a: start of the arc, (3,), m.
         b: end of the arc, (3,), m, not the same point.
         tilt: angle about the chord, rad, of the plane. At 0 the second vector points as far upwards (+z) as
             it can; for a vertical chord, as far along +x.
@@ -140,7 +140,7 @@ def lift_strokes(planar: Sequence[PlanarStroke]) -> tuple[Stroke, ...]:
     """The paper's 2.5-D scheme: the speed profile of strokes designed in a plane, on straight lines in space.
 
     Each stroke keeps its timing; its length becomes the distance of the two 3-D target points it is given,
-    its bending is lost, as in the paper. Where strokes overlap their velocities are added as vectors, so
+    its bending is lost, as in the paper. Where strokes overlap their velocities add up as vectors, so
     corners are rounded and the movement can be executed; where they do not, the path is the polyline itself.
 
     Source: section II.B, last paragraph.

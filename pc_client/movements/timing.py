@@ -1,8 +1,8 @@
-"""When a stroke happens: from a window in time to the lognormal that fills it.
+"""The time of a stroke: from a window in time to the lognormal that fills it.
 
 Two constructions, both exact. `LiteralTiming` is the paper's (Eq. 7-9) and what its recipe uses;
 `TwoSidedTiming` asks both tails of the lognormal to lie inside the window and is what strokes that overlap
-use. Each knows its lognormal and how to slow itself down. This module knows no space.
+use. Each has its lognormal and a slower copy of itself. This module is independent of space.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ FULL_COVERAGE = 3.0 * math.sqrt(2.0)
 
 
 class Timing(Protocol):
-    """Anything that stands for one lognormal and can be slowed down."""
+    """Anything that defines one lognormal and can be slowed down."""
 
     @property
     def lognormal(self) -> Lognormal:
@@ -77,11 +77,12 @@ class LiteralTiming:
     """The paper's construction: all of the length done at the end of the window, the peak in its middle.
 
     Attributes:
-        start: begin of the window, s (the paper's t_min of the stroke before).
+        start: start of the window, s (the paper's t_min of the stroke before).
         duration: length of the window, s, > 0.
         lead: how long before the window the command is given, s, >= 0. The paper leaves it open. 0 is the
-            literal reading (k = 2: the first quarter of the window is dead, kurtosis 3.4); a lead of one to
-            five durations gives the centred lognormals with kurtosis about 3 that its text asks for.
+            literal reading (k = 2: the first quarter of the window is without motion, kurtosis 3.4); a lead
+            of one to five durations gives the centred lognormals with kurtosis about 3 that its text asks
+            for.
 
     Source: Eq. 7-9 with k = (lead + duration) / (lead + duration / 2).
     """
@@ -115,10 +116,10 @@ class LiteralTiming:
 
 @dataclass(frozen=True, slots=True)
 class TwoSidedTiming:
-    """Both tails inside the window: F = Phi(-c) at its begin and Phi(c) at its end.
+    """Both tails inside the window: F = Phi(-c) at its start and Phi(c) at its end.
 
     Attributes:
-        start: begin of the window, s.
+        start: start of the window, s.
         duration: length of the window, s, > 0.
         sigma: width and, with it, asymmetry of the lognormal, > 0: people show .1 to .35 in reaches.
         coverage: c; 3 sqrt 2 leaves 2.2e-5 of the length outside the window, 3 leaves .27 %.

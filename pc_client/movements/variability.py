@@ -1,8 +1,8 @@
-"""Human variability: the same movement as a person would do it another time.
+"""Human variability: the same movement as a person would repeat it.
 
 People repeat a movement with other parameters of its strokes, within ranges that were published for
-handwriting. Some of those are relative to quantities that depend on the choice of a unit or an axis; what is
-made of them here:
+handwriting. Some of those are relative to quantities that depend on the choice of a unit or an axis. They are
+used here in this form:
 
     length    each stroke's D, relative
     sigma     each stroke's sigma, relative
@@ -58,7 +58,7 @@ class VariabilityRanges:
         rhythm: of t0.
         pace: of mu.
         sigma: of sigma.
-        theta_start: of the direction at the begin.
+        theta_start: of the direction at the start.
         theta_end: of the direction at the end.
     """
 
@@ -84,7 +84,7 @@ def duplicate(
     """The movement as a person might repeat it, by a seed.
 
     It begins at the same point with the same rest before and after; its other target points move, because its
-    strokes have other lengths and directions. Whether an arm can do it is the business of planning.
+    strokes have other lengths and directions. Planning checks whether an arm can execute it.
 
     Args:
         movement: a "lognormal" one.

@@ -38,7 +38,7 @@ _RAISED = MappingProxyType({1: -pi / 2, 2: 0.0, 3: -pi / 2, 4: 0.0})
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """A checked path to the begin of a plan.
+    """A checked path to the start of a plan.
 
     Attributes:
         plan: the plan to run afterwards, shifted by whole turns to begin where the approach ends.
@@ -72,7 +72,7 @@ class Approach:
 
 
 def plan_approach(plan: JointPlan, q_now: ArrayLike, *, model: RobotModel) -> Approach:
-    """Plan a slow joint move from the present posture to the begin of a plan.
+    """Plan a slow joint move from the present posture to the start of a plan.
 
     Args:
         plan: the plan that shall begin afterwards.
@@ -197,5 +197,5 @@ _ROUTES: tuple[Callable[[Array, Array], tuple[Array, ...]], ...] = (
     lambda q_from, q_to: (_raised(q_to),),
     lambda q_from, q_to: (_raised(q_from), _raised(q_to)),
 )
-"""Postures between begin and end of a route, shortest first: none; or postures with the arm straight up,
+"""Postures between start and end of a route, shortest first: none; or postures with the arm straight up,
 turning the base while folding down, while rising, or in between."""

@@ -55,7 +55,7 @@ class JointSpline:
         self._intervals = len(knots) - 1
         self._step = self.duration / self._intervals
         self._rate = self._intervals / self.duration
-        # scipy's c is (4, intervals, joints), highest power first, in u = time since the interval's begin.
+        # scipy's c is (4, intervals, joints), highest power first, in u = time since the interval's start.
         c3, c2, c1, c0 = CubicSpline(np.linspace(0.0, self.duration, len(knots)), knots, bc_type="clamped").c
         q_rows = np.stack((c0, c1, c2, c3), axis=1)
         qd_rows = np.stack((c1, 2.0 * c2, 3.0 * c3, np.zeros_like(c3)), axis=1)
@@ -113,7 +113,7 @@ class JointSpline:
         return JointSpline(self.duration, self.q_knots + np.asarray(offset, dtype=np.float64))
 
     def _locate(self, t: ArrayLike) -> tuple[Array, NDArray[np.intp], Array]:
-        """Return times (n,), the interval of each, and the time since that interval's begin."""
+        """Return times (n,), the interval of each, and the time since that interval's start."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         inside = np.clip(times, 0.0, self.duration)
         i = np.minimum((inside * self._rate).astype(np.intp), self._intervals - 1)

@@ -92,7 +92,7 @@ class JointPlan:
 
     @property
     def start_q(self) -> Array:
-        """(6,) joint angles at the begin [rad]: where the arm must be before the stream starts."""
+        """(6,) joint angles at the start [rad]: where the arm must be before the stream starts."""
         start: Array = self.q[0]
         return start
 

@@ -1,7 +1,7 @@
 """Reads a recording back, also one whose end is missing.
 
 The reader goes through the file from its beginning and never needs the index at its end, so that a run that
-was killed loads up to its last whole row. What it must not do: guess. Damage inside the file ends the reading
+was killed loads up to its last whole row. It never guesses. Damage inside the file ends the reading
 there, and `Recording.complete` and `Recording.damage` say so.
 """
 
@@ -251,7 +251,7 @@ class _Scan:
 
 
 def _records(data: bytes, position: int) -> Iterator[tuple[int, int, int]]:
-    """Opcode, begin and end of the content of each record from a position on; the last may end outside."""
+    """Opcode, start and end of the content of each record from a position on; the last may end outside."""
     while position + _RECORD_HEAD.size <= len(data):
         opcode, length = _RECORD_HEAD.unpack_from(data, position)
         start = position + _RECORD_HEAD.size

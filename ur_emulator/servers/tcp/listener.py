@@ -26,7 +26,7 @@ from ur_emulator.servers.tcp.connection import Connection
 from ur_emulator.servers.tcp.places import Places
 from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
-# The begin of a request over HTTP; no script, no command of the dashboard and no package begins so.
+# The start of a request over HTTP; no script, no command of the dashboard and no package begins so.
 _WEB_REQUEST = re.compile(rb"(GET|HEAD|POST|PUT|PATCH|DELETE|OPTIONS|CONNECT|TRACE) ")
 # Buffer of the system for what a client sends and the box has not read yet.
 RECEIVE_BUFFER = 64 * 1024
