@@ -38,6 +38,7 @@ class MeasuredRun:
         """The run as a row of a table: levels in dB, lags in ms, parts of the error budget as shares."""
         whose, snr, errors, budget = self.provenance, self.snr, self.errors, self.budget
         return {
+            "simulated": whose.simulated,
             "name": whose.movement,
             "kind": whose.kind,
             "n_targets": len(whose.target_points),

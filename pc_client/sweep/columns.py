@@ -6,15 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pc_client.analysis.budget import PARTS
+from pc_client.analysis.run import budget_column
 from pc_client.control.controller import FIELDS
 from pc_client.recording.origin import Origin, origin_of
 from pc_client.results.tables import Column
-
-
-def budget_column(part: str) -> str:
-    """The column of one part of the error budget."""
-    return f"budget_{part.replace(' ', '_')}"
-
 
 FACTORS = (
     Column("robot", kind=str, text="type of the arm"),
