@@ -162,11 +162,11 @@ def _space(box: Box, shown: Shown) -> Panel:
         Curve(p[:1], "#000000", width=0.0, marker="o", hollow=True),
     ]
     if shown.drawing.flat:
-        curves.append(Curve(_sheet(shown), _PAPER_EDGE, "sheet"))
+        curves.append(Curve(_sheet(shown), _PAPER_EDGE))
     return Panel(
         box,
         curves,
-        "TCP path, base frame",
+        "TCP path",
         ("x [mm]", "y [mm]", "z [mm]"),
         cube_around(np.vstack([curve.points for curve in curves]), least=0.35, margin=0.1),
         "above",

@@ -177,11 +177,17 @@ def _axes(panels: Sequence[Panel], index: int) -> tuple[dict[str, Any], dict[str
 def _scene(panel: Panel) -> dict[str, Any]:
     left, bottom, width, height = panel.box
     up, around = np.radians(panel.view)
-    eye = 2.8 / panel.zoom * np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+    away = 1.6 * float(np.linalg.norm(panel.shape)) / panel.zoom
+    eye = away * np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+    # What is looked at lies left of the middle, where the numbers of the axes need the more room.
+    middle = 0.1 * np.array([np.sin(around), -np.cos(around), 0.0])
     labels = panel.labels if any(panel.labels) else ("", "", "")
     return {
         "domain": {"x": [left, left + width], "y": [bottom, bottom + height]},
-        "camera": {"eye": dict(zip("xyz", np.round(eye, 4).tolist(), strict=True))},
+        "camera": {
+            name: dict(zip("xyz", np.round(values, 4).tolist(), strict=True))
+            for name, values in (("eye", eye), ("center", middle))
+        },
         "aspectratio": dict(zip("xyz", panel.shape.tolist(), strict=True)),
         "annotations": [
             dict(zip("xyz", point.tolist(), strict=True))
@@ -189,8 +195,13 @@ def _scene(panel: Panel) -> dict[str, Any]:
             for point, text in panel.texts
         ],
         **{
-            f"{name}axis": {"title": {"text": label}, "range": list(between), "showticklabels": bool(label)}
-            for name, label, between in zip("xyz", labels, panel.ranges, strict=True)
+            f"{name}axis": {
+                "title": {"text": label},
+                "range": list(between),
+                "showticklabels": bool(label),
+                "nticks": 5 if edge > 0.6 else 3,
+            }
+            for name, label, between, edge in zip("xyz", labels, panel.ranges, panel.shape, strict=True)
         },
     }
 

@@ -6,57 +6,34 @@ import base64
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from html import escape
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from pc_client.errors import RecordingError
 
 if TYPE_CHECKING:
+    from markupsafe import Markup
     from matplotlib.figure import Figure
 
     from pc_client.results.panels import Sheet
 
-__all__ = ["Picture", "picture", "render", "report_libraries", "zoomable"]
+__all__ = ["picture", "render", "report_libraries", "zoomable"]
 
 
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """A figure in a page; a template writes it as `{{ picture }}`.
-
-    Attributes:
-        address: of the image, which is inside the page.
-        alt: what it shows, for those who do not see it.
-        data: of the figure that takes the image's place where scripts run, as JSON; "" for none.
-    """
-
-    address: str
-    alt: str
-    data: str = ""
-
-    def __html__(self) -> str:
-        """Its element; `jinja2` calls this."""
-        image = f'<img src="{self.address}" alt="{escape(self.alt)}">'
-        if self.data:
-            image = f'<div class="zoom">{image}<script type="application/json">{self.data}</script></div>'
-        return f'<div class="wide">{image}</div>'
-
-
-def picture(figure: Figure, alt: str) -> Picture:
-    """A figure that does not move, as SVG."""
+def picture(figure: Figure, alt: str) -> Markup:
+    """The element of a figure that does not move, as SVG; `alt` says what it shows."""
     from pc_client.results.static import svg_text
 
-    return Picture(_address("svg+xml", svg_text(figure).encode()), alt)
+    return _element("svg+xml", svg_text(figure).encode(), alt)
 
 
-def zoomable(sheet: Sheet, alt: str) -> Picture:
-    """A figure that can be zoomed, over an image of it for browsers without scripts and for paper."""
+def zoomable(sheet: Sheet, alt: str) -> Markup:
+    """The element of a figure that can be zoomed, over an image for paper and where scripts do not run."""
     from pc_client.results.interactive import plotly_figure
     from pc_client.results.static import draw, image_bytes
 
-    data = json.dumps(plotly_figure(sheet), separators=(",", ":"), allow_nan=False)
-    return Picture(_address("webp", image_bytes(draw(sheet), "webp")), alt, data.replace("<", "\\u003c"))
+    data = json.dumps(plotly_figure(sheet), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return _element("webp", image_bytes(draw(sheet), "webp"), alt, data)
 
 
 @contextmanager
@@ -104,8 +81,15 @@ def render(template: str, *, scripts: bool = False, **values: Any) -> str:
     return environment.get_template(template).render(common | values)
 
 
-def _address(kind: str, image: bytes) -> str:
-    return f"data:image/{kind};base64,{base64.b64encode(image).decode()}"
+def _element(kind: str, image: bytes, alt: str, data: str = "") -> Markup:
+    from markupsafe import Markup
+
+    address = f"data:image/{kind};base64,{base64.b64encode(image).decode()}"
+    element = Markup('<img src="{}" alt="{}">').format(address, alt)
+    if data:
+        script = Markup('<script type="application/json">{}</script>').format(Markup(data))
+        element = Markup('<div class="zoom">{}{}</div>').format(element, script)
+    return Markup('<div class="wide">{}</div>').format(element)
 
 
 def _text_of(template: str) -> str:

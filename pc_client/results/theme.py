@@ -78,7 +78,6 @@ def plotly_template(letters: float) -> dict[str, Any]:
         "gridcolor": "#D0D0D0",
         "backgroundcolor": "#F7F7F7",
         "showbackground": True,
-        "nticks": 5,
         "hoverformat": ".1f",
         "tickfont": {"size": letters - 2},
         "title": {"font": {"size": letters - 1}},
