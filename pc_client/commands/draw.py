@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -61,7 +61,7 @@ def draw(
         float, typer.Option("--lift", metavar="MM", help="How far the pen is lifted between parts.")
     ] = 30.0,
     y: Annotated[
-        str,
+        Literal["auto", "up", "down"],
         typer.Option(
             "--y",
             metavar="auto|up|down",
@@ -86,11 +86,8 @@ def draw(
     settings: RunSettings,
 ) -> None:
     """Draw what people drew: extract strokes, fit them into the workspace, execute, compare."""
-    from pc_client.extraction.files import TIME_UNITS
     from pc_client.extraction.sources import read_recording
 
-    if time_unit != "auto" and time_unit not in TIME_UNITS:
-        raise typer.BadParameter(f"no time unit {time_unit!r}: give auto or one of {', '.join(TIME_UNITS)}")
     if save is not None and len(files) > 1:
         raise typer.BadParameter("--save is for one drawing: give one FILE")
     options = _options(plane, size, rotate, lift, y)
@@ -113,8 +110,6 @@ def draw(
 def _options(plane: str, size: str, rotate: str, lift: float, y: str) -> PlacementOptions:
     from pc_client.drawing.placement import PlacementOptions
 
-    if y not in ("auto", "up", "down"):
-        raise typer.BadParameter(f"--y {y!r}: give auto, up or down")
     try:
         return PlacementOptions(
             plane=plane,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -52,7 +52,7 @@ def extract(
         ),
     ] = None,
     figures: Annotated[
-        str,
+        Literal["few", "all", "none"],
         typer.Option(
             "--figures", metavar="few|all|none", help=f"Pictures: of the first {_FEW_FIGURES}, all or none."
         ),
@@ -62,15 +62,10 @@ def extract(
 ) -> None:
     """Find the strokes of recorded movements, and say how well they reconstruct them."""
     from pc_client.extraction.extract import ExtractOptions
-    from pc_client.extraction.files import TIME_UNITS
     from pc_client.extraction.results import STROKE_COLUMNS, table_of, to_json
     from pc_client.results.files import write_files
     from pc_client.results.tables import frame_of, to_csv
 
-    if time_unit != "auto" and time_unit not in TIME_UNITS:
-        raise typer.BadParameter(f"no time unit {time_unit!r}: give auto or one of {', '.join(TIME_UNITS)}")
-    if figures not in ("few", "all", "none"):
-        raise typer.BadParameter(f"no figures {figures!r}: give few, all or none")
     check_workers(workers, dask)
     if figures != "none":
         import matplotlib  # noqa: F401  # when it is missing, say so before the work is done

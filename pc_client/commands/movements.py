@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -15,14 +15,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pc_client.movements.movement import Movement
-    from pc_client.movements.own_points import Style
-    from pc_client.movements.robotic import Corners
 
 app = typer.Typer(help="The movement library.", rich_markup_mode=None)
 
 
 _CornersOption = Annotated[
-    str,
+    Literal["stop", "blend"],
     typer.Option(
         "--corners",
         metavar="stop|blend",
@@ -110,7 +108,7 @@ def generate(
     """Make a random movement in the UR3's workspace, check that the arm can do it, and save it."""
     from pc_client.movements.generate import generate_movement
 
-    _check_and_save(generate_movement(kind, targets, seed, name=out.stem, corners=_corners(corners)), out)
+    _check_and_save(generate_movement(kind, targets, seed, name=out.stem, corners=corners), out)
 
 
 @app.command("new")
@@ -125,7 +123,7 @@ def new(
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Movement file to write, .toml.")],
     style: Annotated[
-        str,
+        Literal["human", "robot"],
         typer.Option("--style", metavar="human|robot", help="Lognormal strokes, or constant speeds."),
     ] = "human",
     durations: Annotated[
@@ -141,15 +139,12 @@ def new(
     """Make a movement through your own target points, check that the arm can do it, and save it."""
     from pc_client.movements.own_points import load_targets, through
 
-    if style not in ("human", "robot"):
-        raise typer.BadParameter(f'--style {style}: give "human" or "robot"')
     points, times = load_targets(targets)
     if durations is not None:
         if times is not None:
             raise typer.BadParameter(f"--durations, but {targets} has a column t: give only one of them")
         times = _numbers(durations)
-    how: Style = "human" if style == "human" else "robot"
-    _check_and_save(through(points, how, times, name=out.stem, corners=_corners(corners)), out)
+    _check_and_save(through(points, style, times, name=out.stem, corners=corners), out)
 
 
 @app.command("duplicate")
@@ -182,14 +177,6 @@ def _check_and_save(movement: Movement, out: Path) -> None:
     save_movement(movement, out)
     say(plan_text(plan))
     say(f"saved: {out}")
-
-
-def _corners(word: str) -> Corners:
-    if word == "stop":
-        return "stop"
-    if word == "blend":
-        return "blend"
-    raise typer.BadParameter(f'--corners {word}: give "stop" or "blend"')
 
 
 def _numbers(words: str) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -54,7 +54,7 @@ SetOption = Annotated[
     str | None, typer.Option("--set", metavar="NAME", help="Ten movements of the library: paper or arcs.")
 ]
 TimeUnitOption = Annotated[
-    str,
+    Literal["auto", "s", "ms", "us", "ns"],
     typer.Option(
         "--time-unit",
         metavar="auto|s|ms|us|ns",

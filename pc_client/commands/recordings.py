@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -57,7 +57,9 @@ def report(
 
 def export(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording, .mcap.")],
-    to: Annotated[str, typer.Option("--to", metavar="csv|parquet", help="Format of the table.")] = "csv",
+    to: Annotated[
+        Literal["csv", "parquet"], typer.Option("--to", metavar="csv|parquet", help="Format of the table.")
+    ] = "csv",
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Beside the recording by default.")
     ] = None,
@@ -66,11 +68,9 @@ def export(
     from pc_client.recording.export import export as write_table
     from pc_client.recording.loader import load_recording
 
-    if to not in ("csv", "parquet"):
-        raise typer.BadParameter(f"cannot export to {to!r}: use csv or parquet")
     recording = load_recording(file)
     if recording.damage:
         say(f"{file}: {recording.damage}; exporting {recording.n_rows} rows")
-    path = write_table(recording, out or file.with_suffix(f".{to}"), "csv" if to == "csv" else "parquet")
+    path = write_table(recording, out or file.with_suffix(f".{to}"), to)
     say(f"data: {recording.provenance.origin.says}")
     say(str(path))

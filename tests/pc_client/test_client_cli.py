@@ -61,7 +61,7 @@ def test_every_command_has_help(command, capsys):
         (["fly"], "fly"),
         (["movements"], "command"),
         (["doctor", "--robot", "x", "--quickly"], "quickly"),
-        (["export", "x.mcap", "--to", "xlsx"], "csv or parquet"),
+        (["export", "x.mcap", "--to", "xlsx"], "is not one of 'csv', 'parquet'"),
         ([*RUN, "--gain-p", "300"], "--gain-p: 300.0; give a number from 0 to 200 1/s"),
         ([*RUN, "--gain-i", "nan"], "--gain-i: nan; give a number"),
         ([*RUN, "--acceleration", "0"], "--acceleration: 0.0; give a number from 0.1 to 100 rad/s2"),

@@ -130,8 +130,8 @@ def test_several_drawings_repeated_are_one_page_with_a_section_each(robot, tmp_p
         (["--size", "-3"], "more than 0"),
         (["--rotate", "left"], "give a number or auto"),
         (["--lift", "0"], "lift of 0 mm"),
-        (["--time-unit", "min"], "no time unit"),
-        (["--y", "left"], "auto, up or down"),
+        (["--time-unit", "min"], "is not one of 'auto', 's', 'ms', 'us', 'ns'"),
+        (["--y", "left"], "'left' is not one of 'auto', 'up', 'down'"),
         (["other.txt", "--save", "x.toml"], "one drawing"),
     ],
 )

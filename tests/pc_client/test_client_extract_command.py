@@ -133,8 +133,11 @@ def test_the_unit_of_time_can_be_given(here):
     [
         (["extract"], "FILE"),
         (["extract", "one.csv"], "--out"),
-        (["extract", "one.csv", "--out", "o", "--time-unit", "hours"], "give auto or one of s, ms, us, ns"),
-        (["extract", "one.csv", "--out", "o", "--figures", "some"], "few, all or none"),
+        (
+            ["extract", "one.csv", "--out", "o", "--time-unit", "hours"],
+            "is not one of 'auto', 's', 'ms', 'us', 'ns'",
+        ),
+        (["extract", "one.csv", "--out", "o", "--figures", "some"], "is not one of 'few', 'all', 'none'"),
         (["extract", "one.csv", "--out", "o", "--workers", "0"], "workers"),
         (["extract", "one.csv", "--out", "o", "--workers", "2", "--dask", "tcp://h:1"], "give only one"),
         (["extract", "one.csv", "--out", "o", "--strokes-per-peak", "0"], "strokes-per-peak"),

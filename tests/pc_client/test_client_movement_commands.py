@@ -84,7 +84,11 @@ def test_duplicate_varies_a_movement_of_the_library(tmp_path, capsys):
             "kind uniform",
             1,
         ),
-        (["movements", "generate", "--corners", "cut", "--out", "x.toml"], 'give "stop" or "blend"', 2),
+        (
+            ["movements", "generate", "--corners", "cut", "--out", "x.toml"],
+            "'cut' is not one of 'stop', 'blend'",
+            2,
+        ),
         (["movements", "list", "--set", "all"], "give one of paper, arcs", 1),
         (["movements", "duplicate", "uniform_4_1", "--out", "x.toml"], "give a lognormal", 1),
         (["movements", "duplicate", "lognorm_4_1", "--out", "x.csv"], "saved as a .toml", 1),
