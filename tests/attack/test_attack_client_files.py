@@ -318,6 +318,8 @@ ODD = [
     "0",
     "5e-324",
     "9" * 5000,
+    "0x" + "f" * 5000,
+    "[" * 50 + "]" * 50,
     '""',
     "[]",
     "{}",
@@ -394,6 +396,21 @@ def test_toml_that_no_parser_likes(tmp_path: Path, kind: str, text: str) -> None
     path.write_text(text)
     with pytest.raises(ClientError):
         READERS[kind][0](path)
+
+
+@pytest.mark.parametrize(
+    ("kind", "key"), [(kind, key) for kind in READERS for key in ("name", "movements", "gain_p")]
+)
+@pytest.mark.parametrize(
+    "value", [".a" * 5000 + " = 1", f" = 0x{'f' * 10_000}", f" = [{'true, ' * 100_000}]"]
+)
+def test_a_key_with_a_monstrous_value(tmp_path: Path, kind: str, key: str, value: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(f"{key}{value}")
+    tracemalloc.start()
+    assert complaint(READERS[kind][0], path).isprintable()
+    assert tracemalloc.get_traced_memory()[1] < 200 * MIB
+    tracemalloc.stop()
 
 
 @pytest.mark.parametrize("kind", READERS)

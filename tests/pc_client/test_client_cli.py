@@ -175,7 +175,7 @@ def test_run_records_and_reports(robot, tmp_path, capsys):
     assert cli.run(["export", str(recording), "--to", "csv"]) == 0
     assert "data: SIMULATED" in capsys.readouterr().out
     header, *rows = recording.with_suffix(".csv").read_text().splitlines()
-    assert header.startswith("timestamp,")
+    assert header.startswith("timestamp [s],")
     assert len(rows) > 500
 
 
