@@ -104,7 +104,7 @@ def _draw_plane(axes: Any, panel: Panel) -> None:
     for begin, end in panel.shaded:
         axes.axvspan(begin, end, color=SHADE, lw=0, zorder=0)
     x = panel.ranges[0]
-    axes.set_xlim(*x)
+    axes.set_xlim(*x, auto=None in x)  # a fixed range of x could not be widened for equal scales
     axes.set_ylim(*panel.upwards)
     axes.set(xlabel=panel.labels[0], ylabel=panel.labels[1])
     axes.tick_params(labelbottom=bool(panel.labels[0]), labelleft=bool(panel.labels[1]))

@@ -21,10 +21,11 @@ def ink(png):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_a_recording(dim):
+def test_a_recording(dim, caplog):
     (part,) = recorded(own_strokes(0, dim, n=2), dim).parts
     dot = PenPart([9.0], [[0.0] * dim])
     assert ink(draw_extraction(extract(PenRecording("folder/own.csv", (part, dot))))) > 0.02
+    assert caplog.text == ""  # nothing that matplotlib complains about
 
 
 @pytest.mark.parametrize("n", [0, 1, 40])
