@@ -14,7 +14,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
@@ -27,6 +27,7 @@ _ONE_THREAD_EACH = {
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
     "VECLIB_MAXIMUM_THREADS": "1",
+    "POLARS_MAX_THREADS": "1",
 }
 
 _DASK_TIMEOUT = "10s"
@@ -80,7 +81,7 @@ def _processes(workers: int) -> Iterator[Executor]:
         try:
             # The pool starts a process with each of the first jobs. It does so here, where the children
             # inherit what they must have from their first instruction on.
-            with _environment(_ONE_THREAD_EACH), _interrupts_ignored():
+            with _worker_state():
                 for _ in range(workers):
                     pool.submit(_nothing)
             yield pool
@@ -132,25 +133,19 @@ def _nothing() -> None:
 
 
 @contextmanager
-def _environment(values: Mapping[str, str]) -> Iterator[None]:
-    """Set variables of the environment that are not set, for a while."""
-    added = {name: value for name, value in values.items() if name not in os.environ}
+def _worker_state() -> Iterator[None]:
+    """Set for a while what new processes inherit: one thread each, and Ctrl-C is ignored.
+
+    Only the main thread may ignore Ctrl-C; in others the workers do so themselves when they begin.
+    """
+    added = {name: value for name, value in _ONE_THREAD_EACH.items() if name not in os.environ}
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if in_main_thread else None
     os.environ.update(added)
     try:
         yield
     finally:
         for name in added:
             os.environ.pop(name, None)
-
-
-@contextmanager
-def _interrupts_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C for a while; only the main thread may, in others nothing changes."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
+        if in_main_thread:
+            signal.signal(signal.SIGINT, before)

@@ -76,7 +76,7 @@ def simulated_box(arm: SimulatedArm) -> Iterator[Box]:
 
 
 class _PortTakenError(SweepError):
-    """Somebody was faster."""
+    """Another program has taken a port."""
 
 
 @contextmanager

@@ -6,8 +6,9 @@ import polars as pl
 
 from pc_client.control.controller import FIELDS
 from pc_client.results.pages import picture, render
+from pc_client.results.tables import to_html
 from pc_client.sweep.columns import origin_of_rows
-from pc_client.sweep.ranking import rank_settings, spans_grid, varying
+from pc_client.sweep.ranking import RANKING, rank_settings, spans_grid, varying
 
 _TEMPLATE = "sweep/sweep.html.j2"
 _MOST_SETTINGS = 25
@@ -44,8 +45,9 @@ def render_page(name: str, table: pl.DataFrame) -> str:
         n_runs=sum(row["status"] == "done" for row in rows),
         n_cases=len({row["case"] for row in rows}),
         origin=origin_of_rows(rows),
-        settings=settings.head(_MOST_SETTINGS).to_dicts(),
+        settings=to_html(settings.head(_MOST_SETTINGS), RANKING),
         n_settings=len(settings),
+        n_shown=min(len(settings), _MOST_SETTINGS),
         map_figure=picture(figures.map_figure(rows, *pair), "Mean SNR over two settings of the controller")
         if pair and done
         else None,

@@ -20,10 +20,10 @@ RANKING = (
     Column("setting", align="left", kind=str),
     Column("mean_snr_db", "mean SNR", "dB", ".2f"),
     Column("gain_margin", "gain margin", format=".2f", narrow="gain\nmargin"),
-    Column("max_position_error_mm", "max error", "mm", ".2f"),
+    Column("max_position_error_mm", "max position error", "mm", ".2f", narrow="max error\n[mm]"),
     Column("n_runs", "runs", kind=int),
-    Column("n_refused", "refused", kind=int),
-    Column("n_failed", "failed", kind=int),
+    Column("n_refused", "refused cases", kind=int, narrow="refused"),
+    Column("n_failed", "failed cases", kind=int, narrow="failed"),
 )
 """What is shown of a ranking."""
 
