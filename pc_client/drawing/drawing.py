@@ -1,4 +1,4 @@
-"""A recording made ready for an arm: placed, joined, slowed down as far as needed. One call, one record."""
+"""A recording prepared for an arm: placed, joined, slowed down as far as needed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["Drawing", "make_drawing", "spatial"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
-    """A drawing as the arm shall do it.
+    """A drawing as the arm executes it.
 
     Attributes:
         extraction: the recording as strokes.

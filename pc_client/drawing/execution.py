@@ -3,8 +3,8 @@
 The similarity and the scaling of time are undone exactly; nothing is shifted or fitted. Of each part that
 moves there are two signals: the positions at the robot's own time stamps, as they were reported, for
 signal-to-noise ratios; and the same on the grid of the recording, low-passed, for everything that is
-differentiated. That low-pass takes the encoders' noise and no more: it is twice as high as the one that the
-recording went through, since that one would blunt the speed profiles a second time.
+differentiated. That low-pass removes only the encoders' noise: its cut-off is twice that of the recording's
+low-pass, which would flatten the speed profiles a second time.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def executed(drawing: Drawing, run: MeasuredRun, shift: float = 0.0) -> Executio
 
 
 def _less_noise(p: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
-    """Positions (n, 3) at a uniform rate, Hz of the hand, without what no hand does."""
+    """Positions (n, 3) at a uniform rate, Hz of the hand, without frequencies above those of a hand."""
     sections = butter(_ORDER, NOISE_HZ, fs=rate, output="sos")
     padding = min(len(p) - 1, round(_MARGIN_S * rate))
     smooth: NDArray[np.float64] = sosfiltfilt(sections, p, axis=0, padtype="odd", padlen=padding)

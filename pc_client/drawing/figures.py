@@ -102,7 +102,7 @@ def _arrow(p: Array, half: float) -> Array:
 
 
 def _numbers(shown: Shown, half: float) -> list[tuple[Array, str]]:
-    """The order of the marks, where there are several, beside their begins."""
+    """The order of the marks, where there are several, beside their starts."""
     marks = shown.drawing.marks
     begins = dict(
         zip(shown.moving, (part.p[: 1 + len(part.p) // 8] for part in shown.parts["human"]), strict=True)

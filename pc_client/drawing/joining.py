@@ -1,6 +1,6 @@
 """All marks of a drawing in one movement, with the pen lifted between them.
 
-The sum of strokes does not care who made them, so marks and lifts stand in one chain of target points:
+Strokes of marks and of lifts add up alike, so all stand in one chain of target points:
 
     lowered pen   one stroke from above the start of the first mark
     mark 1        its own strokes

@@ -1,4 +1,4 @@
-"""How near a reconstruction, a plan and its execution come to the person, in figures.
+"""How well a reconstruction, a plan and its execution agree with the person, in figures.
 
     SNR_v  10 log10( sum |v|^2 / sum |v - v'|^2 )              velocity vectors
     SNR_t  10 log10( sum |p - mean p|^2 / sum |p - p'|^2 )     positions, mean p of each part by itself

@@ -3,7 +3,7 @@
 Slowed down by a factor a, on the same path, joint speeds fall by a and joint accelerations by a^2; so one
 plan gives the factor that each moment needs. Marks come first: they are what is drawn. A pen-up move
 that would need a larger factor than they do gets more time instead, and the marks behind it come later. The
-factor itself is then found by bisection, with planning's own checks as the judge.
+factor itself is then found by bisection, by the checks of planning.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _EASY_SPEED = 0.3
 
 
 class StretchedMovement:
-    """A trajectory as planning wants it, slowed down.
+    """A trajectory in the form that planning takes, slowed down.
 
     Args:
         name: for messages.

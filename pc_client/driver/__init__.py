@@ -1,4 +1,4 @@
-"""The only part of the client with sockets and a clock; nothing in it knows what stands at the other end.
+"""The only part of the client with sockets and a clock; a robot, an emulator and a test are alike to it.
 
 transport        connections as a tiny interface: TCP here, memory in tests
 realtime_client  frames of port 30003: newest first, heartbeats, lost and late frames

@@ -1,6 +1,6 @@
 """What answers at an address: every port, the rhythm of the frames, and what the robot reports of itself.
 
-Looks only; sends nothing that could move an arm.
+It only reads; it sends nothing that could move an arm.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Frames of the realtime port: in order, decoded, each known to be new or a heartbeat.
 
 A heartbeat is a frame that repeats the last time stamp: the robot's time stands still while it waits for us.
-Frames are never dropped here; the caller decides what late ones are worth.
+Frames are never dropped here; the caller decides what to do with late ones.
 """
 
 from __future__ import annotations

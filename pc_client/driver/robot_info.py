@@ -60,7 +60,7 @@ class RobotInfo:
 
 
 def read_robot_info(network: Network, host: str, dashboard_port: int, primary: PackageStream) -> RobotInfo:
-    """Ask the robot who it is; what it does not answer stays unknown.
+    """Ask the robot for its identity; what it does not answer stays unknown.
 
     Args:
         network: makes the connection.
@@ -92,7 +92,7 @@ def read_robot_info(network: Network, host: str, dashboard_port: int, primary: P
 def _is_simulated(
     serial: SerialNumber | None, configuration: ConfigurationData | None, kinematics: KinematicsInfo | None
 ) -> bool | None:
-    """Whether the robot is a simulated one; None when it neither says so nor proves the contrary."""
+    """Whether the robot is a simulated one; None when neither is certain."""
     if configuration is not None and configuration.masterboard_version == SIMULATED_MASTERBOARD:
         return True
     if kinematics is not None and set(kinematics.checksum) == {SIMULATOR_CHECKSUM}:

@@ -99,9 +99,8 @@ class PortTakenError(DriverError):
 class TcpTransport:
     """A connected TCP socket without Nagle's delay.
 
-    A robot that answers within a fraction of a millisecond, as an emulated one in lockstep does, is waited
-    for by looking again and again: going to sleep and being woken would take longer than the answer. Whether
-    that pays is found out by trying; see `EagerWait`.
+    A robot that answers within a fraction of a millisecond, as an emulated one in lockstep, is polled:
+    a blocking wait would take longer than the answer. `EagerWait` measures whether polling helps.
     """
 
     __slots__ = ("_eager", "_name", "_socket")
@@ -178,7 +177,7 @@ class TcpTransport:
 
 
 class EagerWait:
-    """Finds out whether looking again and again pays: after each failure it is not tried for longer."""
+    """Measures whether polling helps: after each failure the next try comes later."""
 
     __slots__ = ("_pause", "_skip")
 

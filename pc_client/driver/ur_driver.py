@@ -1,6 +1,6 @@
 """A session with one robot: connect, stream, and always leave the arm stopped.
 
-Works by the real protocol only. Whatever moves the arm is streamed, so that the program on the robot stops it
+It uses the real protocol only. Whatever moves the arm is streamed, so that the program on the robot stops it
 when commands stop. Every end of a motion (done, refused, Ctrl-C, lost robot) goes through
 `stop`: first the stop word to the program, then a program of our own that stops the arm.
 """
@@ -204,7 +204,7 @@ class UrDriver:
         return report
 
     def stop(self, reverse: Transport | None) -> None:
-        """Bring the arm to rest, by all means we have.
+        """Bring the arm to rest, by every available method.
 
         Args:
             reverse: connection to the receiver program, when one runs.
@@ -233,9 +233,9 @@ class UrDriver:
         return True
 
     def _end_paused_program(self) -> None:
-        """End the program that a safety stop has paused, lest somebody lets it go on without us.
+        """End the program that a safety stop has paused, so that it cannot be resumed without this client.
 
-        A robot that does not listen keeps it; nothing moves meanwhile, and the next run will say so.
+        A robot that does not answer keeps it; nothing moves meanwhile, and the next run reports it.
         """
         with suppress(DriverError):
             self._scripts.send_program(STOP_WORD)
@@ -244,7 +244,7 @@ class UrDriver:
     def _send_stop_program(self) -> None:
         """Replace whatever runs by a program that stops the arm.
 
-        On new connections: those we have may be what broke.
+        It uses new connections: the present ones may be broken.
         """
         for connection in (self._scripts, self._frames):
             connection.close()

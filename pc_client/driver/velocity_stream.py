@@ -2,8 +2,8 @@
 
 Paced by frames alone. A heartbeat (repeated time stamp) is neither answered nor logged; when several new
 frames wait, we were late: all are logged, the newest is answered. So at most one command is in flight.
-Where we were silent for so long that the robot's program has given us up, the run is over: what the arm does
-next is not decided on frames from before.
+A pause so long that the robot's program has ended also ends the run: no command is computed from frames
+before it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from protocol.velocity_stream import VelocityMode, encode_velocity
 
 
 class Step(Protocol):
-    """What a source made of one frame."""
+    """What a source returns for one frame."""
 
     @property
     def qd_cmd(self) -> list[float]:
@@ -108,7 +108,7 @@ class StreamReport:
 
 
 class VelocityStream:
-    """Streams velocities to a program that has just said hello.
+    """Streams velocities to a program that has just connected.
 
     Args:
         frames: the realtime port.
@@ -287,7 +287,7 @@ def collector_paused() -> Iterator[None]:
 
 
 def check_command(qd: Sequence[float], limits: Sequence[float]) -> None:
-    """The last look at a command before it goes out.
+    """The last check of a command before it is sent.
 
     Args:
         qd: (6,) velocities [rad/s].

@@ -1,6 +1,6 @@
 """Waiting for something to show in the frames. Looks at every single frame, so that no short state is missed.
 
-Time-outs count by our clock, while we run: in a world faster than real time it is the patient one. Where the
+Time-outs count the running time of this process: with a box faster than real time they are longer. Where the
 robot's time waits for its clients they are longer, since it may wait for another one that is stopped.
 """
 

@@ -33,7 +33,7 @@ _HOW_TO_GO_ON = {
 
 
 class ProgramEndedError(RobotStoppedError):
-    """The program that follows our velocities runs no more."""
+    """The program that follows our velocities does not run any more."""
 
 
 def software(version: SoftwareVersion) -> Condition:
@@ -96,7 +96,7 @@ def speed_slider(fraction: float | None) -> Condition:
 
 
 def speed_scaling(frame: RealtimeFrame) -> Condition:
-    """The controller does not slow the arm down; 0 without a program is no speed at all, and all right."""
+    """The controller does not slow the arm down; 0 without a program is allowed."""
     scaling = frame.speed_scaling
     return Condition(
         "speed scaling",
@@ -142,7 +142,7 @@ def check_slider(fraction: float | None) -> None:
 
 
 def check_angles(frame: RealtimeFrame) -> None:
-    """Refuse joint angles that are none.
+    """Refuse joint angles that are not finite.
 
     Raises:
         DriverError: one is not a number, or more than any joint turns.

@@ -6,10 +6,10 @@
     approach_run    the slow approach to a start, streamed like everything that moves the arm
     identification  the loop of this session, and the margins on it
     repetitions     what runs of one movement hand on, and when it may be used
-    command_check   the last look at a whole run of commands, before it is sent
+    command_check   the last check of a whole run of commands, before it is sent
     runner          approach, stream, record, for every movement and repetition
     observer        what the runner reports while it works
     progress        shows it on the terminal
 
-Knows the driver only as a session; opens no socket and reads no clock itself.
+It uses the driver only as a session; it opens no socket and reads no clock itself.
 """

@@ -35,7 +35,7 @@ _RETURN_TOLERANCE = 2e-3
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """What is known of the loop, and what the controller makes of it.
+    """What is known of the loop, and what the controller uses of it.
 
     Attributes:
         estimate: dead time and lag as one delay.

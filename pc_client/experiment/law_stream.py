@@ -1,6 +1,6 @@
 """A velocity law of a user on the arm: six velocities for each frame, under the watchdog of every motion.
 
-Nobody has planned where such a motion leads. So before a velocity is sent, the posture in which the arm would
+Such a motion has no plan. So before a velocity is sent, the posture in which the arm would
 come to rest if it were stopped now is held against joint ranges and clearances, as a plan's postures are.
 """
 
@@ -40,7 +40,7 @@ _REST = [0.0] * 6
 
 
 class LawStep(NamedTuple):
-    """What a law made of one frame.
+    """What a law returns for one frame.
 
     Attributes:
         qd_cmd: (6,) velocities to send, or in force [rad/s].

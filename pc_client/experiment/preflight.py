@@ -91,7 +91,7 @@ def arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
 
 
 def tcp_offset(report: RobotReport, model: RobotModel | None) -> Condition:
-    """The TCP is the flange: so plans take it."""
+    """The TCP is the flange, as in plans."""
     offset = report.tcp_offset
     distance, angle = (0.0, 0.0) if offset is None else _size(offset)
     most_distance, most_angle = _OFFSET_TOLERANCE
@@ -122,7 +122,7 @@ def forward_kinematics(report: RobotReport, model: RobotModel | None) -> Conditi
 
 
 def payload(report: RobotReport, model: RobotModel | None) -> Condition:
-    """The controller reckons with the mass that the arm carries."""
+    """The controller is set to the mass that the arm carries."""
     mass, carried = report.payload, (NO_CELL if model is None else model.cell).tool.mass
     return Condition(
         "payload",

@@ -89,7 +89,7 @@ def _kernel(width: float) -> NDArray[np.float64]:
 
 
 def _gains(left: NDArray[np.float64], kernel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Energy that the kernel, centred at each sample, takes away; near the ends a cut kernel, rescaled."""
+    """Energy that the kernel, centred at each sample, explains; near the ends a cut kernel, rescaled."""
     n, reach = len(left), len(kernel) // 2
     power = np.convolve(np.ones(n), kernel**2)[reach : reach + n]
     total = np.zeros(n)

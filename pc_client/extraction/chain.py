@@ -43,7 +43,7 @@ WIDEST = 0.35
 
 
 class Bounds(NamedTuple):
-    """What a stroke may be, each as (least, most).
+    """Bounds of a stroke, each as (least, most).
 
     Attributes:
         sigma: below .08 a lognormal is nearly a Gaussian (skewness .24), and its t0 is undetermined.

@@ -10,7 +10,7 @@ The figures, over all parts of a recording that move, against the recording low-
     lognormality SNR_v / number of strokes
 
 A signal so clean that the strokes could be fitted through the low-pass is judged through it, too: the filter
-blunts fast speed profiles, and so the recording shows them.
+flattens fast speed profiles in the recording, too.
 
 Source: sections 3.1 and 3.3 of the theory notes.
 """

@@ -115,7 +115,7 @@ def _over(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _reconstruction(part: PartExtraction) -> tuple[NDArray[np.float64], Motion]:
-    """The movement of the strokes at up to `_MOST_TIMES` times, worked out a few hundred at a time."""
+    """The movement of the strokes at up to `_MOST_TIMES` times, computed for a few hundred at a time."""
     t = part.t[:: 1 + len(part.t) // _MOST_TIMES]
     blocks = [part.trajectory.evaluate(block) for block in np.array_split(t, 1 + len(t) // 250)]
     return t, Motion(*(np.concatenate(values) for values in zip(*blocks, strict=True)))

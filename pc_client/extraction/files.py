@@ -61,7 +61,7 @@ _UNIT_NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class _Columns:
-    """Where x, y[, z] and t stand in a line, how many columns it has, and the unit of t if it was said."""
+    """Where x, y[, z] and t stand in a line, how many columns it has, and the unit of t if it is given."""
 
     places: tuple[int, ...]
     time: int
@@ -71,7 +71,7 @@ class _Columns:
 
 @dataclass(slots=True)
 class _Table:
-    """What a text holds: its parts, each a list of rows of x, y[, z], t, and what was said about them."""
+    """What a text holds: its parts, each a list of rows of x, y[, z], t, and remarks about them."""
 
     parts: list[list[list[float]]]
     columns: _Columns | None = None

@@ -140,7 +140,7 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
 def left_over(
     chain: Chain, part: SmoothPart, *, through: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What strokes leave of a part's positions and velocities, (n, dim) each.
+    """Residual positions and velocities of a part, (n, dim) each.
 
     Args:
         chain: the strokes.
@@ -172,7 +172,7 @@ def _add(
     wanted: int,
     options: FitOptions,
 ) -> bool:
-    """Add the best candidates to the fits and refine where something was added; False when nothing pays."""
+    """Add the best candidates to the fits and refine those fits; False when none is worth adding."""
     left = [residuals(fit.chain, part.t, part.p, part.v)[1] for fit, part in zip(fits, parts, strict=True)]
     energy = sum(float(np.sum(v**2)) for v in left)
     if energy < scales.v**2 * 10.0 ** (-options.enough_db / 10.0):
@@ -197,7 +197,7 @@ def _add(
 
 
 def _tidy(fit: Fit, fit_target: FitTarget) -> Chain:
-    """The fit's chain without strokes that do nothing; one is kept in any case."""
+    """The fit's chain without strokes of no effect; one is kept in any case."""
     idle = idle_strokes(fit.chain, fit_target.v_scale, float(fit_target.t[1] - fit_target.t[0]), fit.cost)
     if idle.all():
         idle[int(np.argmax(fit.chain.lengths))] = False
@@ -207,7 +207,7 @@ def _tidy(fit: Fit, fit_target: FitTarget) -> Chain:
 def _given_back(fit: Fit, part: SmoothPart, scales: Scales, options: FitOptions) -> Fit:
     """Refine against the signal with what the low-pass takes from these strokes given back to it.
 
-    The low-pass blunts fast speed profiles a little. That is far below the noise of a hand's recording, but
+    The low-pass flattens fast speed profiles a little. That is far below the noise of a hand's recording, but
     strokes fitted to a clean signal would come out too wide by it.
     """
     cost = math.inf

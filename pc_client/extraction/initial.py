@@ -125,7 +125,7 @@ def characteristic_points(t: NDArray[np.float64], speed: NDArray[np.float64]) ->
 
 
 def _arc_angle(part: SmoothPart, path_length: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
-    """Turn of the stroke between two salient points as a vector along its axis, (3,), rad."""
+    """Arc angle of the stroke between two salient points as a vector along its axis, (3,), rad."""
     length = float(path_length[b] - path_length[a])
     if length <= 0.0:
         return np.zeros(3)

@@ -1,7 +1,7 @@
 """Position and velocity of a chain of strokes, and their derivatives by every variable, in closed form.
 
 With u = (t - m) / w, z = ln(1 + sigma u) / sigma, F = Phi(z) and Lambda = dF/dt, a stroke with chord c,
-turn d about the normal n and k = 1 / sinc(d / 2) does
+arc angle d about the normal n and k = 1 / sinc(d / 2) has
 
     v(t) = Lambda k [cos(d (F - 1/2)) c + sin(d (F - 1/2)) n x c]
     p(t) = k [C c + S n x c],   C + i S = integral from 0 to F of exp(i d (f - 1/2)) df
@@ -145,7 +145,7 @@ def _arc_integrals(
     sin: NDArray[np.float64],
     k: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """K C and k S, and k dC/dd and k dS/dd; cos and sin are those of the tangent, times k."""
+    """The integrals k C and k S, and k dC/dd and k dS/dd; cos and sin are those of the tangent, times k."""
     half = 0.5 * arc_angle
     reach = k * done * _sinc(half * done)
     angle = half * done - half

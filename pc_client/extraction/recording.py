@@ -82,9 +82,9 @@ class PenRecording:
 def ordered_part(t: ArrayLike, p: ArrayLike) -> tuple[PenPart | None, tuple[str, ...]]:
     """Make a part of samples as a recorder left them.
 
-    Samples that are not numbers are left out. Of samples with the same time stamp the mean is taken. A sample
-    earlier than one before it is left out: a clock that was set back looks like a mixed-up order,
-    and only leaving out keeps every position that is used at the time that was written beside it.
+    Samples that are not numbers are left out. Samples with the same time stamp are replaced by their mean. A
+    sample earlier than one before it is left out: a clock that was set back looks like a mixed-up order, and
+    only leaving out keeps every position that is used at the time that was written beside it.
 
     Args:
         t: times, (n,), s.

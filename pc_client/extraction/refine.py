@@ -46,7 +46,7 @@ _PINNED = 1e12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitTarget:
-    """What a fit comes as near to as it can.
+    """The signal that a fit approximates, with its scales and bounds.
 
     Attributes:
         t: times, (n,), s, rising.
@@ -96,7 +96,7 @@ class _Equations(NamedTuple):
 
 
 def refine(chain: Chain, fit_target: FitTarget, iterations: int, tolerance: float = 3e-3) -> Fit:
-    """Better the strokes for some iterations, or until one gains less than `tolerance` of the cost.
+    """Improve the strokes for some iterations, or until one gains less than `tolerance` of the cost.
 
     The cost never grows. Every stroke stays inside the bounds of the fit target. The strokes come back sorted
     by their medians.
@@ -265,7 +265,7 @@ def moved(chain: Chain, step: NDArray[np.float64], bounds: Bounds) -> Chain:
 def _bent(
     chain: Chain, arc_angle: NDArray[np.float64], bending: NDArray[np.float64], chords: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Turns and normals after a step: turn x normal is a vector, and bending moves it sideways."""
+    """Arc angles and normals after a step: arc angle x normal is a vector, and bending moves it sideways."""
     sideways = np.cross(chain.normal, chain.chords)
     norms = np.linalg.norm(sideways, axis=1, keepdims=True)
     vector = arc_angle[:, None] * chain.normal + bending[:, None] * sideways / np.where(

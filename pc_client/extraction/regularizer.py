@@ -1,9 +1,9 @@
-"""The regularizer: which of several chains that explain a recording equally well is preferred.
+"""The regularizer: it chooses between chains that explain a recording equally well.
 
 The data leave two things open. For narrow speed profiles sigma is hardly visible; and two neighbouring
-strokes may grow against each other without end, their difference alone being seen. So the cost of a fit has a
-weak regularizer of two terms: ln sigma is near the middle of the values of handwriting, and the peak speed of
-a stroke is not far above the top speed of the part:
+strokes may grow without limit in opposite directions, since only their sum is visible. So the cost of a fit
+has a weak regularizer of two terms: ln sigma is near the middle of the values of handwriting, and the peak
+speed of a stroke is not far above the top speed of the part:
 
     regularizer = weight * sum over strokes of [ (ln(sigma / .2) / .5)^2 + (peak speed / top speed)^2 ]
 

@@ -1,7 +1,7 @@
-"""What an extraction leaves behind: a row of figures for each recording, a row of numbers for each stroke.
+"""The results of an extraction: a row of figures for each recording, a row of numbers for each stroke.
 
 `extraction.json` is a list of rows, one for each recording that could be read, in the order they were given.
-`strokes.csv` holds every stroke as the theory writes it, so that the movement can be had back from it alone.
+`strokes.csv` holds every stroke as the theory writes it, so that the movement can be rebuilt from it alone.
 A stroke runs from (x0, y0, z0) to (x1, y1, z1), in the unit of the recording, turning by `arc_angle` [rad] in
 the plane that `tilt` [rad] chooses (see `pc_client.movements.stroke.arc_frame`); length is D, t0 is in s.
 Parts and strokes count from 1.

@@ -1,4 +1,4 @@
-"""From irregular samples to the signal that the strokes are judged by.
+"""From irregular samples to the signal that the strokes are compared with.
 
 Three steps, in this order:
 
@@ -6,8 +6,8 @@ Three steps, in this order:
     2. a zero-phase low-pass at 12 Hz: a Butterworth filter of order 4, run forwards and backwards,
     3. the derivative of the cubic spline through the result: the velocity.
 
-The hand holds little above 10 Hz; what a recorder adds above (quantised positions, late time stamps) is not
-the strokes' business. The filter must not shift anything in time, hence forwards and backwards. At its ends a
+The movement of a hand has little above 10 Hz; higher frequencies come from the recorder (quantised positions,
+late time stamps). The filter must not shift anything in time, hence forwards and backwards. At its ends a
 part is continued by point reflection, so that the first and the last position stay where they are and a part
 may start and end in full motion.
 

@@ -1,4 +1,4 @@
-"""Which recordings a user means by a file, a folder or an archive."""
+"""The recordings in a file, a folder or an archive."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class PenSource:
 
 
 def pen_sources(paths: Sequence[str | Path]) -> list[PenSource]:
-    """All recordings that are meant by files, folders and .zip archives, in their order.
+    """All recordings in files, folders and .zip archives, in their order.
 
     Raises:
         RecordingError: a folder or an archive that cannot be opened, or holds no recording. Files are only
@@ -82,7 +82,7 @@ def contents(sources: Iterable[PenSource]) -> Iterator[tuple[PenSource, bytes | 
 
 
 def read_recording(given: str | Path, time_unit: str | None = None) -> PenRecording:
-    """The one recording that is meant by a file, or by `ARCHIVE.zip:PATH`.
+    """The one recording in a file, or at `ARCHIVE.zip:PATH`.
 
     Args:
         given: which.

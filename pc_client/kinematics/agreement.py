@@ -1,7 +1,7 @@
 """Whether what a robot reports of its flange is where the nominal arm has it at the reported joint angles.
 
-Asked before anything moves and again all through a stream: angles that drift away from the pose, or a pose
-that drifts away from the angles, mean that one of them is not what the robot measures.
+It is checked before anything moves and in each frame of a stream: angles that drift away from the pose, or a
+pose that drifts away from the angles, mean that one of them is not what the robot measures.
 """
 
 from __future__ import annotations

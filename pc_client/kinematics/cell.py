@@ -1,4 +1,4 @@
-"""What stands around the arm and what it carries: the geometry of a cell, in metres and radians.
+"""The bodies around the arm and its tool: the geometry of a cell, in metres and radians.
 
 The TCP stays at the flange: the tool is a shape that must not touch anything, and a load, not a new TCP.
 """

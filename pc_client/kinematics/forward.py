@@ -1,6 +1,6 @@
 """Forward kinematics of the nominal arm: TCP pose and Jacobian, in UR's base frame.
 
-Thin, typed doors to Pinocchio: frames, order and shapes are fixed here and nowhere else.
+Thin, typed functions on Pinocchio: only this module sets frames, order and shapes.
 """
 
 from __future__ import annotations

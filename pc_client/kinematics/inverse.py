@@ -2,7 +2,7 @@
 
 A damped Newton (Levenberg-Marquardt) iteration on the pose error log6(T_tcp_goal): near a solution the
 damping is zero and convergence quadratic, so a seed from the previous sample of a path needs two steps.
-It finds the solution nearest to the seed; which branch that is, is the caller's business.
+It finds the solution nearest to the seed; the caller chooses the branch by the seed.
 
 Source: paper section III ("an iterative Jacobian solver"); log6 on SE(3) as in Pinocchio's example of inverse
 kinematics.
@@ -124,7 +124,7 @@ def _step(model: RobotModel, q: Array, error: Array, damping: float) -> Array:
 
 
 def _is_small(error: Array) -> bool:
-    """Tell whether a pose error is within both tolerances."""
+    """Return True when a pose error is within both tolerances."""
     x, y, z, rx, ry, rz = error.tolist()
     off_position, off_rotation = x * x + y * y + z * z, rx * rx + ry * ry + rz * rz
     return bool(off_position <= POSITION_TOLERANCE**2 and off_rotation <= ROTATION_TOLERANCE**2)

@@ -1,6 +1,6 @@
 """Where example-robot-data keeps its robots on this machine.
 
-Version 6 of the package ships URDF files and meshes but no Python module, so nothing can be asked: this
+Version 6 of the package ships URDF files and meshes but no Python module, so this
 module looks in the places where pip, conda and ROS put share folders. It reads no robot file itself.
 """
 

@@ -25,7 +25,7 @@ _N_SAMPLES = 2001
 
 
 class Fit(NamedTuple):
-    """A fitted movement and what was done to it; `stretch` is how many times as slow it became (1: not)."""
+    """A fitted movement and its changes; `stretch` is the factor by which it became slower (1: none)."""
 
     movement: Movement
     similarity: Similarity

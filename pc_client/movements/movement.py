@@ -1,7 +1,7 @@
-"""`Movement`: a named path of the TCP in time, whatever model made it.
+"""`Movement`: a named trajectory of the TCP, made by any model.
 
-This is what planning, running and analysis know of a movement. Files are read and written by `files.py`; new
-ones are made by `generate.py`.
+Planning, running and analysis use a movement through this class only. Files are read and written by
+`files.py`; new ones are made by `generate.py`.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def check_name(name: str) -> None:
 
 
 def check_duration(duration: float, whose: str) -> None:
-    """Refuse a time that no movement lasts.
+    """Refuse a duration outside the range of movements.
 
     Raises:
         MovementError: saying what is allowed.

@@ -133,7 +133,7 @@ def _faults(points: NDArray[np.float64]) -> Iterator[tuple[int, str]]:
 
 
 def _checked(values: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Finite numbers in a shape, or an error that says what was wanted."""
+    """Finite numbers in a shape, or an error that says what is needed."""
     wanted = "a list of [x, y, z] in m" if len(shape) == 2 else "a list of times in s, one a stroke"
     try:
         array = np.asarray(values, dtype=np.float64)

@@ -8,7 +8,7 @@ in space. A straight piece or an inflection has no curvature, where the bare law
 the largest radius, bounds it by V. Torsion is undefined there; kappa^2 tau / (kappa^2 + 1/R^2) is taken for
 it, which tends to 0. r(t) rises from 0 to 1 at the start and falls to 0 at the end.
 
-How it becomes a function of time: with w = integral of ds / (speed / (V r)), a length, the law says dw/dt =
+As a function of time: with w = integral of ds / (speed / (V r)), a length, the law says dw/dt =
 V r(t). Its right side is a smoothed square wave, so w(t) is a closed form; where on the path the TCP is at
 w comes from a table that is made once.
 

@@ -3,9 +3,9 @@
     1. target points at random in a box of the size of a hand's movement
     2. between each two of them a stroke: D, mu and sigma by Eq. 6 to 9, in windows that abut
     3. the straight lines between the points, resampled with the speed of the strokes ("2.5 dimensions")
-    4. moved, scaled and rotated into the robot's box, slowed down to a speed that the robot can do
+    4. moved, scaled and rotated into the robot's box, slowed down to a speed that the robot can reach
 
-What follows which sentence of the paper, and what the paper leaves open, is said in `docs/movements.md`.
+`docs/movements.md` says which sentence of the paper each step follows, and what the paper leaves open.
 
 Source: sections II.B and IV.A.
 """
