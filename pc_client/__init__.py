@@ -7,8 +7,10 @@
     run = arm.run(plan, ur.Controller.preview())
     print(run.snr, run.t, run.q)
 
-The client treats an emulator and a robot alike; only the address differs. What is public is in `__all__`.
-Names are loaded when they are first asked for, so that importing the package costs nothing.
+A program needs no other import: what is public is in `__all__`, `dir()` shows it, and docs/api/client.md is
+its reference. The modules below serve these names and the commands; they change without notice.
+Emulated and real robots are treated alike; only the address differs. Names are loaded when they are first
+used, so importing the package costs no time.
 """
 
 from __future__ import annotations

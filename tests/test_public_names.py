@@ -1,11 +1,14 @@
 """What is public: `__all__` of each package, what `dir()` shows, and what the reference has."""
 
+import ast
 import importlib
+import re
 from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).parents[1] / "docs"
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 PAGES = {"pc_client": "client", "ur_emulator": "emulator", "urscript": "urscript"}
 
 
@@ -37,3 +40,35 @@ def test_every_public_name_has_a_docstring(name):
         if not public.startswith("_") and callable(value) and not (value.__doc__ or "").strip()
     ]
     assert bare == []
+
+
+def test_what_only_its_own_module_uses_has_an_underscore():
+    """Functions and values of a module; types may be what a public function returns."""
+    texts = {
+        path: path.read_text(encoding="utf-8")
+        for folder in ("pc_client", "ur_emulator", "docs", "examples", "tests", "bench")
+        for pattern in ("*.py", "*.md", "*.ipynb")
+        for path in (ROOT / folder).rglob(pattern)
+    }
+    words = {path: set(re.findall(r"\w+", text)) for path, text in texts.items()}
+    wrong = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in texts
+        if path.suffix == ".py" and path.is_relative_to(ROOT / "pc_client") and path.stem != "__init__"
+        for name in module_names(ast.parse(texts[path]))
+        if not name.startswith("_") and not any(name in words[other] for other in texts if other != path)
+    ]
+    assert wrong == []
+
+
+def module_names(tree):
+    """Functions without a decorator (that would register them) and values at the top of a module."""
+    for node in tree.body:
+        match node:
+            case ast.FunctionDef(name=name, decorator_list=[]):
+                yield name
+            case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                if not ast.unparse(value).startswith("TypeVar("):
+                    yield name
+            case ast.AnnAssign(target=ast.Name(id=name)):
+                yield name

@@ -36,7 +36,6 @@ __all__ = [
     "budget_figure",
     "definitions_figure",
     "movement_sheet",
-    "path_curve",
     "signals_sheet",
     "speed_curve",
     "table_figure",
@@ -52,7 +51,7 @@ def speed_curve(
     return Curve(np.c_[_step_times(run), 1e3 * v], colour, label, width)
 
 
-def path_curve(run: MeasuredRun, colour: str, *, desired: bool = False, width: float = 0.9) -> Curve:
+def _path_curve(run: MeasuredRun, colour: str, *, desired: bool = False, width: float = 0.9) -> Curve:
     """Path of the TCP over the movement, base frame [mm]."""
     p = run.track.p_ref if desired else run.track.p_actual
     return Curve(1e3 * p[run.track.movement], colour, width=width, opacity=0.6 if desired else 1.0)
@@ -194,11 +193,11 @@ def budget_figure(table: Table) -> Figure:
 def _path_panel(box: Box, coloured: Mapping[str, MeasuredRun]) -> Panel:
     first = next(iter(coloured.values()))
     targets = 1e3 * np.array(first.provenance.target_points, dtype=np.float64).reshape(-1, 3)
-    desired = path_curve(first, REFERENCE_GREY, desired=True, width=3.0)
+    desired = _path_curve(first, REFERENCE_GREY, desired=True, width=3.0)
     circles = Curve(targets, "#000000", width=0.0, marker="o", hollow=True)
     return Panel(
         box,
-        (desired, *(path_curve(run, colour) for colour, run in coloured.items()), circles),
+        (desired, *(_path_curve(run, colour) for colour, run in coloured.items()), circles),
         "TCP path and target points, base frame",
         ("x [mm]", "y [mm]", "z [mm]"),
         cube_around(np.vstack([desired.points, targets])),

@@ -35,11 +35,11 @@ from pc_client.recording.layout import Phase
 
 Array = NDArray[np.float64]
 
-LEAST_STEPS = 30
+_LEAST_STEPS = 30
 """Differences at rest from which C is worth estimating: its diagonal is good to 25 % then."""
 
 
-def rest_steps(run: MeasuredRun) -> Array:
+def _rest_steps(run: MeasuredRun) -> Array:
     """Return one-cycle differences (n, 6) [rad] of the reported joints at rest, each stretch less its mean.
 
     The half of each settling phase that is farther from the movement counts, as in `metrics.rest_noise`.
@@ -58,9 +58,9 @@ def rest_steps(run: MeasuredRun) -> Array:
 
 
 def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
-    """Return C (6, 6) [rad2] of all runs of one arm together; None with fewer than `LEAST_STEPS` steps."""
-    steps = np.concatenate([rest_steps(run) for run in runs])
-    if len(steps) < LEAST_STEPS:
+    """Return C (6, 6) [rad2] of all runs of one arm together; None with fewer than `_LEAST_STEPS` steps."""
+    steps = np.concatenate([_rest_steps(run) for run in runs])
+    if len(steps) < _LEAST_STEPS:
         return None
     # The mean of n differences is the last value less the first over n: taking it away costs 1 / n^2 of the
     # noise, not 1 / n as of independent values.
@@ -68,7 +68,7 @@ def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
     return covariance
 
 
-def floor_power(run: MeasuredRun, covariance: Array, model: RobotModel) -> float:
+def _floor_power(run: MeasuredRun, covariance: Array, model: RobotModel) -> float:
     """Return P_floor [(m/s)2] of one run's movement.
 
     Args:
@@ -91,7 +91,7 @@ def floor_db(run: MeasuredRun, covariance: Array | None) -> float | None:
     name = run.provenance.robot_model.lower()
     if covariance is None or name not in ROBOTS:
         return None
-    power = floor_power(run, covariance, robot_model(name))
+    power = _floor_power(run, covariance, robot_model(name))
     signal = run.budget.signal_power
     return 10.0 * math.log10(signal / power) if power > 0.0 < signal else None
 

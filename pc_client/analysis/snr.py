@@ -31,7 +31,7 @@ from pc_client.errors import RecordingError
 # Where the best shift is looked for; loops on a UR arm lag 10-100 ms, a good preview can be slightly early.
 MIN_LAG_S, MAX_LAG_S = -0.1, 0.4
 
-VelocityOf = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+_VelocityOf = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +69,8 @@ def measure_snr(track: TcpTrack) -> Snr:
         snr_db(f(track.t, track.p_ref)[steps], f(track.t, track.p_actual)[steps]) for f in (speed, velocity)
     ]
     reference = ShiftedReference(track)
-    speed_lag = best_lag(track, reference, speed)
-    velocity_lag = best_lag(track, reference, velocity)
+    speed_lag = _best_lag(track, reference, speed)
+    velocity_lag = _best_lag(track, reference, velocity)
     return Snr(
         speed_db=raw[0],
         speed_shifted_db=snr_db(*shifted_pair(track, reference, speed_lag, speed)),
@@ -81,7 +81,7 @@ def measure_snr(track: TcpTrack) -> Snr:
     )
 
 
-def best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: VelocityOf) -> float:
+def _best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: _VelocityOf) -> float:
     """Return the delay in s of the reference that leaves the least square error.
 
     A scan in steps of one control cycle finds the valley, a bounded search its bottom, far below one cycle.
@@ -107,7 +107,7 @@ def best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: Velocity
 
 
 def shifted_pair(
-    track: TcpTrack, reference: ShiftedReference, lag_s: float, velocity_of: VelocityOf
+    track: TcpTrack, reference: ShiftedReference, lag_s: float, velocity_of: _VelocityOf
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return reference and actual over the movement, both taken `lag_s` later at the robot.
 

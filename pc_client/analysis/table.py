@@ -76,7 +76,7 @@ class Table:
     @property
     def means(self) -> pl.DataFrame:
         """A row a movement: the mean of each of `MeasuredRun.figures` over its runs."""
-        return frame_of_runs(self.all_runs).group_by("name", "kind", maintain_order=True).mean()
+        return _frame_of_runs(self.all_runs).group_by("name", "kind", maintain_order=True).mean()
 
     @property
     def all_runs(self) -> list[MeasuredRun]:
@@ -167,7 +167,7 @@ def with_means(frame: pl.DataFrame, *figures: str) -> pl.DataFrame:
     return both.sort(pl.col("kind").cast(pl.Enum(means["kind"])), "is_mean", maintain_order=True)
 
 
-def frame_of_runs(runs: Sequence[MeasuredRun]) -> pl.DataFrame:
+def _frame_of_runs(runs: Sequence[MeasuredRun]) -> pl.DataFrame:
     """A row a run: `MeasuredRun.figures`."""
     return pl.DataFrame([run.figures for run in runs], infer_schema_length=None)
 
@@ -196,7 +196,7 @@ def build_table(runs: Sequence[MeasuredRun]) -> Table:
     by_name = {name: tuple(group) for name, group in groupby(ordered, lambda run: run.provenance.movement)}
     # The encoders are the same in all runs; the more of them are at rest, the better their noise is known.
     covariance = step_covariance(runs)
-    frame = frame_of_runs(ordered).group_by("name", maintain_order=True).agg(_FIGURES)
+    frame = _frame_of_runs(ordered).group_by("name", maintain_order=True).agg(_FIGURES)
     levels = {
         "noise_floor_db": [floor_db(group[0], covariance) for group in by_name.values()],
         "unrepeatable_db": [_unrepeatable_db(group) for group in by_name.values()],

@@ -7,7 +7,6 @@ connection is open.
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -17,15 +16,14 @@ from typing import Self
 
 import numpy as np
 
+from pc_client.api.confirmation import Confirm, ask_at_terminal, experiment_description
 from pc_client.api.signals import Run, Signals
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller
-from pc_client.driver.condition import conditions_text
 from pc_client.driver.robot_report import RobotReport, read_report
 from pc_client.driver.transport import TcpNetwork
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import ClientError, ControllerError
 from pc_client.experiment.approach_run import run_approach
-from pc_client.experiment.experiment_text import experiment_text
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
 from pc_client.experiment.observer import Observer
 from pc_client.experiment.preflight import model_of, preflight, require
@@ -35,36 +33,11 @@ from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.kinematics.robot_model import RobotModel, robot_model
 from pc_client.planning.approach import plan_approach
-from pc_client.planning.plan_text import approach_text
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 from ur_hil.records import checked
 
-__all__ = ["Arm", "Confirm", "connect", "plan"]
-
-Confirm = Callable[[str], bool]
-"""Is shown what an arm is going to do that is not known to be simulated; returns whether it may."""
-
-_NO_TERMINAL = (
-    "there is no terminal to ask at whether the arm may move: run this at one, or give "
-    "connect(..., confirm=lambda text: True) where somebody has made sure"
-)
-QUESTION = "The arm is going to move. Is the space around it free, and the emergency stop at hand?"
-
-
-def ask_at_terminal(text: str) -> bool:
-    """Show what is going to happen and ask at the terminal.
-
-    Raises:
-        ClientError: there is no terminal to ask at.
-    """
-    if sys.stdin is None or sys.stdin.closed:
-        raise ClientError(_NO_TERMINAL)
-    print(text)
-    try:
-        return input(f"{QUESTION} [y/N]: ").strip().lower() in ("y", "yes")
-    except EOFError:
-        raise ClientError(_NO_TERMINAL) from None
+__all__ = ["Arm", "connect", "plan"]
 
 
 def connect(
@@ -157,7 +130,7 @@ class Arm:
         Raises:
             DriverError: it does not answer.
         """
-        return read_report(TcpNetwork(), self._host, self._ports).frame
+        return self._report_now().frame
 
     def run(
         self,
@@ -275,7 +248,10 @@ class Arm:
         Raises:
             ClientError: the answer was no, there is no terminal, or no clear path to the start.
         """
-        self._ask(lambda: self._text_of(wanted))
+        self._ask(lambda: experiment_description(self._host, self._report_now(), self.model, wanted))
+
+    def _report_now(self) -> RobotReport:
+        return read_report(TcpNetwork(), self._host, self._ports)
 
     def _session(self) -> UrDriver:
         return UrDriver(self._host, self._ports, reverse_port=self._reverse_port)
@@ -284,16 +260,3 @@ class Arm:
         """Ask whether an arm may move, unless it says itself that it is simulated."""
         if self.simulated is not True and not self._confirm(text()):
             raise ClientError("the arm was not moved: the answer was no")
-
-    def _text_of(self, wanted: Experiment) -> str:
-        """What an experiment is going to do, for people beside the arm."""
-        report = read_report(TcpNetwork(), self._host, self._ports)
-        approach = plan_approach(wanted.planned[0].joints, report.frame.actual_q, model=self.model)
-        return "\n".join(
-            (
-                f"robot at {self._host}: {report.info}",
-                conditions_text(preflight(report, self.model)),
-                experiment_text(wanted),
-                approach_text(approach),
-            )
-        )

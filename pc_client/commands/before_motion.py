@@ -43,7 +43,7 @@ def _ask(text: str) -> bool:
     """
     import sys
 
-    from pc_client.api.arm import QUESTION
+    from pc_client.api.confirmation import QUESTION
 
     say(text)
     if sys.stdin is None or sys.stdin.closed:

@@ -1,8 +1,8 @@
 """How a command moves the arm: one record, and the options that all such commands share, declared once.
 
 A command that moves an arm has a keyword parameter `settings: RunSettings` and stands under
-`@takes_run_settings`; the options of `read_settings` are then its own. A new option is a parameter of
-`read_settings` and, if it says how to move, a field of the record.
+`@takes_run_settings`; the options of `_read_settings` are then its own. A new option is a parameter of
+`_read_settings` and, if it says how to move, a field of the record.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class RunSettings:
     yes: bool
 
 
-def read_settings(
+def _read_settings(
     controller: ControllerOption = DEFAULT,
     gain_p: GainPOption = None,
     gain_i: GainIOption = None,
@@ -82,18 +82,18 @@ def read_settings(
 
 
 def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of `read_settings` in place of its keyword parameter `settings`.
+    """Give a command the options of `_read_settings` in place of its keyword parameter `settings`.
 
     Typer reads a command's options from its signature: the two signatures are put together here.
     """
-    shared = inspect.signature(read_settings, eval_str=True).parameters
+    shared = inspect.signature(_read_settings, eval_str=True).parameters
     own = dict(inspect.signature(command, eval_str=True).parameters)
     del own["settings"]
     together = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in (*own.values(), *shared.values())]
 
     @wraps(command)
     def with_options(**given: Any) -> None:
-        settings = read_settings(**{name: given.pop(name) for name in shared})
+        settings = _read_settings(**{name: given.pop(name) for name in shared})
         command(**given, settings=settings)
 
     vars(with_options)["__signature__"] = inspect.Signature(together)

@@ -18,7 +18,7 @@ BRISK_PULSE = 0.12
 """The same displacement in less time: 0.28 rad/s, 7 rad/s2. It separates lag from delay; with
 slow pulses friction, which delays the start of a joint, looks like a lag."""
 
-N_PAIRS = 2
+_N_PAIRS = 2
 """Pairs of a pulse out and a pulse back."""
 
 # Neighbouring joints turn against each other, so that the TCP moves less than any joint alone would move it.
@@ -42,7 +42,7 @@ class Excitation:
     @property
     def duration(self) -> float:
         """Length of the excitation [s]."""
-        return 2 * N_PAIRS * self._pulse
+        return 2 * _N_PAIRS * self._pulse
 
     def at(self, t: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Positions (6,) [rad] and velocities (6,) [rad/s] at time t [s]; at rest outside the excitation."""

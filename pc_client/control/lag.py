@@ -17,7 +17,7 @@ from pc_client.errors import DriverError
 
 Array = NDArray[np.float64]
 
-LONGEST_LAG = 0.06
+_LONGEST_LAG = 0.06
 """Lags up to this are looked for [s]: a drive of 2.6 Hz."""
 
 _LEAST_DISPLACEMENT = 2e-3
@@ -56,7 +56,7 @@ def identify_loop(t: Array, qd_cmd: Array, q: Array, period: float) -> LoopModel
     fit = least_squares(
         unexplained,
         [0.7 * total, 0.3 * total],
-        bounds=([0.0, 0.0], [LONGEST_DELAY, LONGEST_LAG]),
+        bounds=([0.0, 0.0], [LONGEST_DELAY, _LONGEST_LAG]),
         x_scale=1e-3,
         diff_step=1e-3,
     )

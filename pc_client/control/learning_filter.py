@@ -22,13 +22,13 @@ from pc_client.control.stability import sensitivity
 
 Array = NDArray[np.float64]
 
-WORST_MISMATCH = 0.5
+_WORST_MISMATCH = 0.5
 """Largest |1 - P / P_model| at the cut-off: at least half of what repeats is gone after each run."""
 
-NOISE_SHARE = 0.10
+_NOISE_SHARE = 0.10
 """Share of the noise of the differenced position that may be learned: costs 10 log10(1.1) = 0.4 dB."""
 
-ROLL_OFF = 0.25
+_ROLL_OFF = 0.25
 """Q falls from 1 to 0 between (1 - this) and (1 + this) times the cut-off."""
 
 
@@ -51,7 +51,7 @@ class LearningFilter:
 
     def weight(self, hertz: Array) -> Array:
         """Q at frequencies (m,) [Hz], (m,)."""
-        low, high = (1.0 - ROLL_OFF) * self.cut_off, (1.0 + ROLL_OFF) * self.cut_off
+        low, high = (1.0 - _ROLL_OFF) * self.cut_off, (1.0 + _ROLL_OFF) * self.cut_off
         x = np.clip((hertz - low) / (high - low), 0.0, 1.0)
         weight: Array = 0.5 * (1.0 + np.cos(pi * x))
         return weight
@@ -76,10 +76,10 @@ def design_filter(
     model = frequency_response(loop, period, hertz)
     ratios = [frequency_response(real, period, hertz) / model for real in loop.corners()]
     mismatch = np.max([np.abs(1.0 - ratio) for ratio in ratios], axis=0)
-    beyond = np.flatnonzero(mismatch > WORST_MISMATCH)
+    beyond = np.flatnonzero(mismatch > _WORST_MISMATCH)
     by_loop = float(hertz[beyond[0]]) if len(beyond) else float(hertz[-1])
     shares = np.array([noise_share_below(x, period) for x in hertz])
-    by_noise = float(np.interp(NOISE_SHARE, shares, hertz))
+    by_noise = float(np.interp(_NOISE_SHARE, shares, hertz))
     cut_off = min(by_loop, by_noise)
     unchecked = LearningFilter(cut_off, "loop" if by_loop < by_noise else "noise", 1.0, 1.0)
     weight = unchecked.weight(hertz)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from pc_client.control.controller import Controller
 
-N_JOINTS = 6
+_N_JOINTS = 6
 
 
 @dataclass(slots=True)
@@ -22,8 +22,8 @@ class PiState:
         qd_cmd: (6,) last command [rad/s].
     """
 
-    integral: list[float] = field(default_factory=lambda: [0.0] * N_JOINTS)
-    qd_cmd: list[float] = field(default_factory=lambda: [0.0] * N_JOINTS)
+    integral: list[float] = field(default_factory=lambda: [0.0] * _N_JOINTS)
+    qd_cmd: list[float] = field(default_factory=lambda: [0.0] * _N_JOINTS)
 
 
 def step_pi(

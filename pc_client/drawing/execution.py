@@ -22,10 +22,10 @@ from pc_client.errors import RecordingError
 from pc_client.extraction.smoothing import CUTOFF_HZ, RATE_HZ, velocity
 from pc_client.movements.geometry import read_only
 
-__all__ = ["NOISE_HZ", "ExecutedPart", "Execution", "executed"]
+__all__ = ["ExecutedPart", "Execution", "executed"]
 
 #: Cut-off of the low-pass, Hz in the time of the hand, and its order; it runs forwards and backwards.
-NOISE_HZ = 2.0 * CUTOFF_HZ
+_NOISE_HZ = 2.0 * CUTOFF_HZ
 _ORDER = 4
 #: This much of the movement (s of the hand) before and after a part goes through the low-pass with it.
 _MARGIN_S = 0.25
@@ -97,7 +97,7 @@ def executed(drawing: Drawing, run: MeasuredRun, shift: float = 0.0) -> Executio
 
 def _less_noise(p: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
     """Positions (n, 3) at a uniform rate, Hz of the hand, without frequencies above those of a hand."""
-    sections = butter(_ORDER, NOISE_HZ, fs=rate, output="sos")
+    sections = butter(_ORDER, _NOISE_HZ, fs=rate, output="sos")
     padding = min(len(p) - 1, round(_MARGIN_S * rate))
     smooth: NDArray[np.float64] = sosfiltfilt(sections, p, axis=0, padtype="odd", padlen=padding)
     return smooth

@@ -11,7 +11,7 @@ REPLY_TIMEOUT = 60.0
 """A server that takes the connection answers within milliseconds; one that is stopped is waited for, or the
 recording would call the serial number unknown."""
 
-LINE_TIMEOUT = 5.0
+_LINE_TIMEOUT = 5.0
 """Once its first byte is there, the rest of a line comes within this [s]."""
 
 LONGEST_LINE = 4096
@@ -80,11 +80,12 @@ class _Lines:
         """
         begun = Patience()
         while b"\n" not in self._pending:
-            late = bool(self._pending) and begun.spent(self._network.now()) > LINE_TIMEOUT
+            late = bool(self._pending) and begun.spent(self._network.now()) > _LINE_TIMEOUT
             if late or len(self._pending) > LONGEST_LINE:
                 raise _NoLineError(
                     f"the dashboard server sends {len(self._pending)} bytes without the end of a line; one "
-                    f"has at most {LONGEST_LINE}, and comes within {LINE_TIMEOUT:g} s: is this a control box?"
+                    f"has at most {LONGEST_LINE}, and comes within {_LINE_TIMEOUT:g} s: "
+                    "is this a control box?"
                 )
             data = self._connection.receive(LONGEST_STEP if self._pending else REPLY_TIMEOUT)
             if data == b"" or (data is None and not self._pending):

@@ -19,11 +19,11 @@ from protocol.ur_types import ProgramState
 FRAME_TIMEOUT = 1.0
 """Without a frame for this long [s] the robot counts as gone (125 frames of a CB3 box)."""
 
-STOPPED_TIMEOUT = 120.0
+_STOPPED_TIMEOUT = 120.0
 """The same for a robot whose time waits for its clients [s]: its arm does not move unattended, so a box that
 is stopped or gets no processor is sat out. Longer than the box itself has patience with others."""
 
-LATEST_STAMP = 1e9
+_LATEST_STAMP = 1e9
 """No controller has been on for longer [s]: 30 years."""
 
 _STEP = 0.5 * LONGEST_STEP
@@ -109,7 +109,7 @@ class RealtimeClient:
 
     def patience(self, timeout: float) -> float:
         """How long to wait for what a robot whose time runs by itself does within `timeout` [s]."""
-        return max(timeout, STOPPED_TIMEOUT) if self.time_waits else timeout
+        return max(timeout, _STOPPED_TIMEOUT) if self.time_waits else timeout
 
     def drain(self) -> Arrival | None:
         """Take what has already arrived, without waiting; None when nothing has.
@@ -173,10 +173,10 @@ class RealtimeClient:
         while raw is not None:
             frame = layout.decode(raw)
             stamp: float = frame.timestamp
-            if not 0.0 <= stamp <= LATEST_STAMP:  # NaN is not
+            if not 0.0 <= stamp <= _LATEST_STAMP:  # NaN is not
                 raise DriverError(
-                    f"the robot's frame has the time stamp {stamp:g} s, allowed are 0 to {LATEST_STAMP:g} s: "
-                    "restart the control box"
+                    f"the robot's frame has the time stamp {stamp:g} s, allowed are "
+                    f"0 to {_LATEST_STAMP:g} s: restart the control box"
                 )
             if stamp != self.last_stamp:
                 new.append(frame)

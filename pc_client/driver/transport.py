@@ -14,7 +14,7 @@ from typing import Protocol
 
 from pc_client.errors import DriverError
 
-RECEIVE_SIZE = 16384
+_RECEIVE_SIZE = 16384
 """Bytes taken at once: more than ten realtime frames, so one call shows all that is waiting."""
 
 
@@ -23,13 +23,13 @@ MOST_WAITING = 16 << 20
 sender. A peer that sends more while it is read without a pause floods us."""
 
 
-EAGER_TIME = 300e-6
+_EAGER_TIME = 300e-6
 """How long to look again and again before sleeping [s]: twice a cycle of an emulated box in lockstep."""
 
 _LONGEST_PAUSE = 32
 """Most waits in a row that are not tried eagerly: on a real arm that leaves one try in a quarter second."""
 
-SEND_TIMEOUT = 5.0
+_SEND_TIMEOUT = 5.0
 """A peer that takes nothing for this long [s] is gone."""
 
 
@@ -146,10 +146,10 @@ class TcpTransport:
         receive = self._socket.recv
         try:
             if timeout > 0.0 and self._eager.pays:
-                end = time.perf_counter() + EAGER_TIME
+                end = time.perf_counter() + _EAGER_TIME
                 while True:
                     try:
-                        data = receive(RECEIVE_SIZE)
+                        data = receive(_RECEIVE_SIZE)
                     except BlockingIOError:
                         if time.perf_counter() > end:
                             self._eager.failed()
@@ -159,7 +159,7 @@ class TcpTransport:
                         return data
             if timeout > 0.0:
                 select.select((self._socket,), (), (), timeout)
-            return receive(RECEIVE_SIZE)
+            return receive(_RECEIVE_SIZE)
         except BlockingIOError:
             return None
         except OSError as error:
@@ -171,7 +171,7 @@ class TcpTransport:
 
     def _send_later(self, data: bytes) -> int:
         """Wait until the peer takes something; returns how many bytes it took."""
-        if not select.select((), (self._socket,), (), SEND_TIMEOUT)[1]:
+        if not select.select((), (self._socket,), (), _SEND_TIMEOUT)[1]:
             raise TimeoutError
         return self._socket.send(data)
 

@@ -49,7 +49,7 @@ from protocol.ur_types import Ports
 from protocol.velocity_stream import VelocityMode, encode_velocity
 
 CONNECT_TIMEOUT = 5.0
-START_TIMEOUT = 5.0
+_START_TIMEOUT = 5.0
 """A program that does not show as running within this [s] was not accepted."""
 
 
@@ -286,7 +286,7 @@ class UrDriver:
         self._scripts.send_program(text)
         self._wait(
             lambda frame: not is_stopped(frame),
-            START_TIMEOUT,
+            _START_TIMEOUT,
             "the robot did not start the program in time: is it in local control?",
         )
 

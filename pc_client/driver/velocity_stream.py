@@ -66,7 +66,7 @@ class CommandSource(Protocol[S_co]):
 RowSink = Callable[[RealtimeFrame, S], None]
 """Takes every new frame with what the source made of it."""
 
-LONGEST_STANDSTILL = 5.0
+_LONGEST_STANDSTILL = 5.0
 """Seconds of our clock that the robot's time may stand still: a command must have been lost. Longer where
 time waits for clients: it may wait for another one that is stopped."""
 
@@ -224,7 +224,7 @@ class VelocityStream:
 
     def _wait_for_new(self, report: StreamReport) -> list[RealtimeFrame]:
         """Skip heartbeats until time goes on."""
-        waited, longest = Patience(), self._frames.patience(LONGEST_STANDSTILL)
+        waited, longest = Patience(), self._frames.patience(_LONGEST_STANDSTILL)
         while True:
             arrival = self._frames.receive()
             report.heartbeats += arrival.n_heartbeats

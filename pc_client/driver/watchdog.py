@@ -9,7 +9,7 @@ from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersi
 
 RUNNING = float(RobotMode.RUNNING)
 PLAYING = float(ProgramState.PLAYING)
-SAFE_MODES = (float(SafetyMode.NORMAL), float(SafetyMode.REDUCED))
+_SAFE_MODES = (float(SafetyMode.NORMAL), float(SafetyMode.REDUCED))
 
 _FARTHEST = 100.0
 """No joint angle is larger [rad]; joints turn by two turns at most."""
@@ -58,7 +58,7 @@ def safety_mode(frame: RealtimeFrame) -> Condition:
         _name(SafetyMode, value),
         "NORMAL or REDUCED",
         remedy or "look at the pendant",
-        value in SAFE_MODES,
+        value in _SAFE_MODES,
     )
 
 
@@ -163,7 +163,7 @@ def check_streaming(frame: RealtimeFrame) -> None:
         ProgramEndedError: its program has ended.
         DriverError: the robot slows the arm down.
     """
-    if frame.safety_mode in SAFE_MODES and frame.robot_mode == RUNNING and frame.runtime_state == PLAYING:
+    if frame.safety_mode in _SAFE_MODES and frame.robot_mode == RUNNING and frame.runtime_state == PLAYING:
         if not is_at_full_speed(frame):
             raise DriverError(speed_scaling(frame).complaint)
         return
@@ -185,7 +185,7 @@ def is_stopped(frame: RealtimeFrame) -> bool:
 
 def has_ended(frame: RealtimeFrame) -> bool:
     """Return True when nothing moves the arm: no program, or a safety stop, which may only pause it."""
-    return is_stopped(frame) or frame.safety_mode not in SAFE_MODES or frame.robot_mode != RUNNING
+    return is_stopped(frame) or frame.safety_mode not in _SAFE_MODES or frame.robot_mode != RUNNING
 
 
 def is_at_rest(frame: RealtimeFrame) -> bool:

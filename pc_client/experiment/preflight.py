@@ -75,7 +75,7 @@ def model_of(report: RobotReport, cell: Cell) -> RobotModel | None:
     return robot_model(name, cell) if name in ROBOTS else None
 
 
-def arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
+def _arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
     """Dashboard server and configuration data name the arm that the plan was made for."""
     name, configured = report.info.model, report.configured
     differ = configured is not None and name not in (UNKNOWN, configured)
@@ -104,7 +104,7 @@ def tcp_offset(report: RobotReport, model: RobotModel | None) -> Condition:
     )
 
 
-def forward_kinematics(report: RobotReport, model: RobotModel | None) -> Condition:
+def _forward_kinematics(report: RobotReport, model: RobotModel | None) -> Condition:
     """The model puts the flange where the robot reports it: same arm, same generation, good calibration."""
     frame = report.frame
     if model is None:
@@ -133,7 +133,7 @@ def payload(report: RobotReport, model: RobotModel | None) -> Condition:
     )
 
 
-def joint_angles(report: RobotReport, model: RobotModel | None) -> Condition:
+def _joint_angles(report: RobotReport, model: RobotModel | None) -> Condition:
     """Every joint stands within the range that plans use."""
     if model is None:
         return Condition("joint angles", "", "within the arm's range", "plan for the arm that answers", None)
@@ -151,16 +151,16 @@ def joint_angles(report: RobotReport, model: RobotModel | None) -> Condition:
 
 
 CONDITIONS: tuple[Check, ...] = (
-    arm_type,
+    _arm_type,
     lambda report, model: safety_mode(report.frame),
     lambda report, model: robot_mode(report.frame),
     lambda report, model: program_state(report.frame),
     lambda report, model: speed_slider(report.slider),
     lambda report, model: speed_scaling(report.frame),
     tcp_offset,
-    forward_kinematics,
+    _forward_kinematics,
     payload,
-    joint_angles,
+    _joint_angles,
 )
 """What a CB3 must fulfil, in the order in which it is shown: what explains the others comes first."""
 

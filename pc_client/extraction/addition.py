@@ -19,7 +19,7 @@ from pc_client.extraction.chain import Chain
 __all__ = ["Candidate", "best_candidates", "idle_strokes"]
 
 #: Widths (s) of the lognormals that are tried: of the strokes of handwriting, from hasty to calm.
-TRIED_WIDTHS_S = (0.02, 0.032, 0.05)
+_TRIED_WIDTHS_S = (0.02, 0.032, 0.05)
 _REACH = 3.0
 
 
@@ -41,7 +41,7 @@ def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: 
     """
     step = float(t[1] - t[0])
     left = np.array(v_left)
-    kernels = [_kernel(width / step) for width in TRIED_WIDTHS_S]
+    kernels = [_kernel(width / step) for width in _TRIED_WIDTHS_S]
     found: list[Candidate] = []
     gains = np.stack([_gains(left, kernel) for kernel in kernels])
     for _ in range(count):
@@ -49,7 +49,7 @@ def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: 
         energy = float(gains[which, at])
         if energy <= 0.0:
             break
-        found.append(Candidate(float(t[at]), TRIED_WIDTHS_S[which], energy))
+        found.append(Candidate(float(t[at]), _TRIED_WIDTHS_S[which], energy))
         _subtract(left, kernels[which], int(at))
         # Only the neighbourhood has changed; no second candidate is wanted in the first one's core.
         reach = 2 * max(len(kernel) for kernel in kernels)
@@ -60,7 +60,7 @@ def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: 
                 low - max(0, low - reach) :
             ][: high - low]
         gains[blocked] = -1.0
-        core = max(1, round(TRIED_WIDTHS_S[which] / step))
+        core = max(1, round(_TRIED_WIDTHS_S[which] / step))
         gains[:, max(0, int(at) - core) : int(at) + core + 1] = -1.0
     return found
 

@@ -20,7 +20,7 @@ from pc_client.extraction.results import Row, figures_of, strokes_of
 from pc_client.extraction.sources import PenSource, contents
 from ur_hil.input_files import MIB
 
-__all__ = ["Job", "Outcome", "extract_many", "run_job"]
+__all__ = ["Job", "Outcome", "extract_many"]
 
 _IN_FLIGHT = 128
 """Jobs handed over and not yet done; enough for many workers."""
@@ -69,7 +69,7 @@ class Outcome:
     error: str | None = None
 
 
-def run_job(job: Job) -> Outcome:
+def _run_job(job: Job) -> Outcome:
     """Read, extract, and draw where it is wanted."""
     try:
         recording = parse_pen(job.content, job.name, job.time_unit)
@@ -127,7 +127,7 @@ def extract_many(
             keep(index, Outcome(source.name, error=str(content)))
             continue
         job = Job(source.name, content, options or ExtractOptions(), time_unit, index < n_pictures)
-        running[executor.submit(run_job, job)] = (index, job)
+        running[executor.submit(_run_job, job)] = (index, job)
         while (
             len(running) >= _IN_FLIGHT
             or sum(len(job.content) for _, job in running.values()) > _BYTES_IN_FLIGHT

@@ -39,7 +39,7 @@ __all__ = [
 
 
 #: Most width of a stroke over the duration of its part; a stroke that fills it has 1/6.
-WIDEST = 0.35
+_WIDEST = 0.35
 
 
 class Bounds(NamedTuple):
@@ -59,7 +59,7 @@ class Bounds(NamedTuple):
     def of(cls, duration: float) -> Bounds:
         """Bounds for a part of this duration, s: a much wider stroke would be an invented drift."""
         least, most = cls().width
-        return cls(width=(least, min(most, max(2.0 * least, WIDEST * duration))))
+        return cls(width=(least, min(most, max(2.0 * least, _WIDEST * duration))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

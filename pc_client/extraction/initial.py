@@ -32,7 +32,7 @@ __all__ = ["initial_chain", "salient_points"]
 
 #: Peaks that stand out by less than this share of the top speed are ripples on their neighbours at first;
 #: strokes for those that deserve one are added where the refined residual is worst.
-RIPPLE = 0.05
+_RIPPLE = 0.05
 #: Sigma of a speed profile whose shape says nothing: the middle of what is found in handwriting.
 TYPICAL_SIGMA = 0.2
 #: Peak speed times width over length of a speed profile, 1 / sqrt(2 pi), nearly for every sigma.
@@ -44,7 +44,7 @@ _MAX_FIRST_TURN = 2.5
 def salient_points(part: SmoothPart) -> NDArray[np.intp]:
     """Indices (n_intervals + 1,) that divide a part: its first sample, the speed minima, its last sample."""
     speed = part.speed
-    peaks, _ = find_peaks(speed, prominence=RIPPLE * float(speed.max()))
+    peaks, _ = find_peaks(speed, prominence=_RIPPLE * float(speed.max()))
     minima = [a + int(np.argmin(speed[a:b])) for a, b in pairwise(peaks)]
     return np.array([0, *minima, len(speed) - 1])
 

@@ -30,7 +30,6 @@ from pc_client.movements.geometry import read_only
 
 __all__ = [
     "CUTOFF_HZ",
-    "PROMINENCE",
     "RATE_HZ",
     "SmoothPart",
     "low_passed",
@@ -45,12 +44,12 @@ RATE_HZ = 200.0
 #: Cut-off of the low-pass, Hz. Run forwards and backwards the filter halves the amplitude there (-6 dB).
 CUTOFF_HZ = 12.0
 #: A local maximum of the speed is a peak when it stands out by this share of the part's top speed.
-PROMINENCE = 0.01
+_PROMINENCE = 0.01
 #: A part shorter than this, s, holds no movement that a 12 Hz signal could distinguish from a touch.
-MIN_DURATION_S = 0.02
+_MIN_DURATION_S = 0.02
 
 #: A part smaller than this stands still, even if its unit is the metre.
-MIN_EXTENT = 1e-5
+_MIN_EXTENT = 1e-5
 
 _ORDER = 4
 #: The impulse response has decayed (to 1e-6) after this time, s.
@@ -95,7 +94,7 @@ class SmoothPart:
 
 def moves(part: PenPart) -> bool:
     """Whether a part holds a movement; a touch, a dot or a single sample does not."""
-    return len(part.t) >= 2 and part.duration >= MIN_DURATION_S and part.extent > MIN_EXTENT
+    return len(part.t) >= 2 and part.duration >= _MIN_DURATION_S and part.extent > _MIN_EXTENT
 
 
 def smooth_part(part: PenPart) -> SmoothPart:
@@ -115,11 +114,11 @@ def smooth_part(part: PenPart) -> SmoothPart:
 def speed_peaks(part: SmoothPart) -> NDArray[np.intp]:
     """Indices of the local maxima of the speed inside a part, (n_peaks,).
 
-    All of them count that rise by more than `PROMINENCE` of the part's top speed above the higher of the two
+    All of them count that rise by more than `_PROMINENCE` of the part's top speed above the higher of the two
     valleys beside them. The first and the last sample are no maxima, however high.
     """
     speed = part.speed
-    peaks, _ = find_peaks(speed, prominence=PROMINENCE * float(speed.max()))
+    peaks, _ = find_peaks(speed, prominence=_PROMINENCE * float(speed.max()))
     found: NDArray[np.intp] = peaks
     return found
 

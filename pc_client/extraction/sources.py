@@ -18,12 +18,12 @@ from ur_hil.input_files import MIB
 __all__ = ["PenSource", "contents", "pen_sources", "read_recording"]
 
 #: Files that are taken for recordings in a folder or an archive; a file that is named itself is always.
-SUFFIXES = (".csv", ".tsv", ".txt")
+_SUFFIXES = (".csv", ".tsv", ".txt")
 
 MOST_MEMBERS = 100_000
 """Files in one archive: three times those of Omniglot."""
 
-MOST_UNPACKED = 1024 * MIB
+_MOST_UNPACKED = 1024 * MIB
 """What the recordings of one archive say they are unpacked [bytes]; Omniglot's have some 200 MiB."""
 
 _BROKEN_ARCHIVE = (
@@ -128,10 +128,10 @@ def _sources(given: str | Path) -> Iterator[PenSource]:
     path = Path(given)
     if path.is_dir():
         inside = sorted(
-            file for file in path.rglob("*") if file.suffix.lower() in SUFFIXES and file.is_file()
+            file for file in path.rglob("*") if file.suffix.lower() in _SUFFIXES and file.is_file()
         )
         if not inside:
-            raise RecordingError(f"{given}: no {', '.join(SUFFIXES)} file in this folder")
+            raise RecordingError(f"{given}: no {', '.join(_SUFFIXES)} file in this folder")
         yield from (PenSource(str(file), file) for file in inside)
     elif path.suffix.lower() == ".zip":
         yield from (PenSource(member, path, member) for member in _members(path))
@@ -148,17 +148,17 @@ def _members(path: Path) -> list[str]:
     except _BROKEN_ARCHIVE as error:
         raise RecordingError(f"{path}: no .zip archive ({error})") from error
     unpacked = sum(file.file_size for file in files)
-    if len(files) > MOST_MEMBERS or unpacked > MOST_UNPACKED:
+    if len(files) > MOST_MEMBERS or unpacked > _MOST_UNPACKED:
         raise RecordingError(
             f"{path}: {len(files)} files of {unpacked / MIB:.0f} MiB in all; allowed are {MOST_MEMBERS} "
-            f"files of {MOST_UNPACKED / MIB:.0f} MiB: unpack what is needed"
+            f"files of {_MOST_UNPACKED / MIB:.0f} MiB: unpack what is needed"
         )
     # macOS packs a shadow of every file beside it.
     members = sorted(
         name
         for name in dict.fromkeys(file.filename for file in files)
-        if PurePosixPath(name).suffix.lower() in SUFFIXES and "__MACOSX" not in PurePosixPath(name).parts
+        if PurePosixPath(name).suffix.lower() in _SUFFIXES and "__MACOSX" not in PurePosixPath(name).parts
     )
     if not members:
-        raise RecordingError(f"{path}: no {', '.join(SUFFIXES)} file in this archive")
+        raise RecordingError(f"{path}: no {', '.join(_SUFFIXES)} file in this archive")
     return members

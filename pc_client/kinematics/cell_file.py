@@ -20,7 +20,7 @@ Name = Annotated[str, text_field(60)]
 # No size and no distance is longer than 100 m: the number was probably meant in millimetres.
 Length = Annotated[float, number(-100.0, 100.0, "m")]
 Size = Annotated[float, number(1e-6, 100.0, "m")]
-Angle = Annotated[float, number(-2.0 * pi, 2.0 * pi, "rad")]
+_Angle = Annotated[float, number(-2.0 * pi, 2.0 * pi, "rad")]
 Point = tuple[Length, Length, Length]
 
 
@@ -79,7 +79,7 @@ class _Wall:
 class _Body:
     name: Name
     centre: Point
-    rpy: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+    rpy: tuple[_Angle, _Angle, _Angle] = (0.0, 0.0, 0.0)
 
 
 @record

@@ -20,13 +20,13 @@ from pc_client.kinematics.robot_model import RobotModel
 
 Array = NDArray[np.float64]
 
-POSITION_TOLERANCE = 1e-11
+_POSITION_TOLERANCE = 1e-11
 """Largest position error of a solution [m]; a hundredth of the accuracy of plans, far above rounding."""
 
 ROTATION_TOLERANCE = 1e-11
 """Largest rotation error of a solution [rad]."""
 
-MAX_ITERATIONS = 60
+_MAX_ITERATIONS = 60
 """Enough from any seed in reach; paths need 2-3. Out of reach it bounds the work (~1 ms)."""
 
 # Levenberg-Marquardt: damping starts at nothing, is brought in when a step makes things worse, and forgotten
@@ -58,7 +58,7 @@ class IkSolution(NamedTuple):
 
 
 def solve_ik(
-    model: RobotModel, T_base_tcp: ArrayLike, q_seed: ArrayLike, *, max_iterations: int = MAX_ITERATIONS
+    model: RobotModel, T_base_tcp: ArrayLike, q_seed: ArrayLike, *, max_iterations: int = _MAX_ITERATIONS
 ) -> IkSolution:
     """Find joint angles that bring the TCP to T_base_tcp, starting from q_seed.
 
@@ -78,7 +78,7 @@ def solve_ik(
 
 
 def solve_ik_se3(
-    model: RobotModel, T_base_goal: Any, q_seed: Array, max_iterations: int = MAX_ITERATIONS
+    model: RobotModel, T_base_goal: Any, q_seed: Array, max_iterations: int = _MAX_ITERATIONS
 ) -> IkSolution:
     """Do as `solve_ik` for a goal that is already a pin.SE3: the inner call of path following."""
     q = q_seed
@@ -127,7 +127,7 @@ def _is_small(error: Array) -> bool:
     """Return True when a pose error is within both tolerances."""
     x, y, z, rx, ry, rz = error.tolist()
     off_position, off_rotation = x * x + y * y + z * z, rx * rx + ry * ry + rz * rz
-    return bool(off_position <= POSITION_TOLERANCE**2 and off_rotation <= ROTATION_TOLERANCE**2)
+    return bool(off_position <= _POSITION_TOLERANCE**2 and off_rotation <= ROTATION_TOLERANCE**2)
 
 
 def _solution(q: Array, error: Array, iterations: int, *, converged: bool) -> IkSolution:

@@ -18,12 +18,12 @@ from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.results.panels import Box, Curve, Panel, Range, Sheet, boxes
 from pc_client.results.theme import BLUE, PAPER_GREY, RED
 
-__all__ = ["library_sheet"]
+__all__ = []
 
 _TOP = 0.30
 
 
-def library_sheet(set_name: str = DEFAULT_SET) -> Sheet:
+def _library_sheet(set_name: str = DEFAULT_SET) -> Sheet:
     """The five pairs of a set."""
     names = library_names(set_name)
     size = (13.0, 15.0)
@@ -79,5 +79,5 @@ def _paths(box: Box, human: Movement, robot: Movement, title: str) -> Panel:
 if __name__ == "__main__":
     from pc_client.results.static import draw, image_bytes
 
-    picture = image_bytes(draw(library_sheet(*sys.argv[2:3])))
+    picture = image_bytes(draw(_library_sheet(*sys.argv[2:3])))
     Path(sys.argv[1] if len(sys.argv) > 1 else "movements.png").write_bytes(picture)

@@ -16,10 +16,10 @@ from pc_client.errors import MovementError
 from pc_client.movements.geometry import UR3_BOX, Box, Similarity
 from pc_client.movements.movement import Movement
 
-__all__ = ["Fit", "Rotate", "fit_movement"]
+__all__ = ["Fit", "fit_movement"]
 
 #: Which rotations may be used: none, about the vertical, or any.
-Rotate = Literal["none", "yaw", "any"]
+_Rotate = Literal["none", "yaw", "any"]
 
 _N_SAMPLES = 2001
 
@@ -36,7 +36,7 @@ def fit_movement(
     movement: Movement,
     box: Box = UR3_BOX,
     *,
-    rotate: Rotate = "yaw",
+    rotate: _Rotate = "yaw",
     max_scale: float = math.inf,
     max_speed: float | None = None,
     may_slow_down: bool = False,
@@ -83,7 +83,7 @@ def fit_movement(
     return Fit(fitted, similarity, stretch)
 
 
-def _candidates(path: NDArray[np.float64], box: Box, rotate: Rotate) -> list[NDArray[np.float64]]:
+def _candidates(path: NDArray[np.float64], box: Box, rotate: _Rotate) -> list[NDArray[np.float64]]:
     if rotate == "none":
         return [np.eye(3)]
     if rotate == "yaw":

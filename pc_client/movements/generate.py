@@ -22,7 +22,7 @@ from pc_client.movements.twins import GENERATORS, robotic_twin
 __all__ = ["generate_library", "generate_movement", "write_library"]
 
 #: First seed of each set; its five pairs take this and the next four. Chosen once, never searched.
-LIBRARY_SEED = 1
+_LIBRARY_SEED = 1
 #: For each set, what makes the human-like movement of a pair from number of target points, seed and name; and
 #: what its names in recordings and tables begin with, for only one set may have the names of Table I.
 _SETS: Mapping[str, tuple[Callable[[int, int, str], Movement], str]] = MappingProxyType(
@@ -59,7 +59,7 @@ def generate_movement(
     return GENERATORS[kind].make(human, seed, name)
 
 
-def generate_library(set_name: str, seed: int = LIBRARY_SEED) -> dict[str, Movement]:
+def generate_library(set_name: str, seed: int = _LIBRARY_SEED) -> dict[str, Movement]:
     """The ten movements of a set by their library names, made afresh.
 
     Args:

@@ -27,7 +27,7 @@ from ur_hil.records import Field, Finite, Items, checked, fields_of, number, rec
 
 __all__ = ["movement_text", "parse_movement", "toml_value"]
 
-MOST_POINTS = 1000
+_MOST_POINTS = 1000
 """Most target points of a file: a page of handwriting has some 500."""
 
 _Seconds = Annotated[float, number(unit="s")]
@@ -35,7 +35,7 @@ _Metres = Annotated[float, number(unit="m")]
 _Coordinate = Annotated[float, number(unit="m, robot base frame")]
 _Angle = Annotated[float, number(unit="rad")]
 _Ramps = Annotated[tuple[_Seconds, ...], Items(1, 100)]
-_Durations = Annotated[tuple[_Seconds, ...], Items(1, MOST_POINTS)]
+_Durations = Annotated[tuple[_Seconds, ...], Items(1, _MOST_POINTS)]
 _FACTS = [{"type": kind, "strict": True} for kind in ("str", "int", "float")]
 _Fact = Annotated[Any, Field("a text or a number", object, {"type": "union", "choices": _FACTS})]
 
@@ -47,7 +47,7 @@ class _File:
     kind: str
     duration: Annotated[float, number(0.0, LONGEST_DURATION, "s")]
     stroke_durations: _Durations | None = None
-    target_points: Annotated[tuple[tuple[_Coordinate, _Coordinate, _Coordinate], ...], Items(2, MOST_POINTS)]
+    target_points: Annotated[tuple[tuple[_Coordinate, _Coordinate, _Coordinate], ...], Items(2, _MOST_POINTS)]
     provenance: Mapping[str, _Fact] = field(default_factory=dict)
 
 
@@ -67,7 +67,7 @@ class _Stroke:
 
 @record
 class _LognormalFile(_File):
-    strokes: Annotated[tuple[_Stroke, ...], Items(1, MOST_POINTS)]
+    strokes: Annotated[tuple[_Stroke, ...], Items(1, _MOST_POINTS)]
 
 
 @record

@@ -27,7 +27,7 @@ __all__ = ["Corners", "PathMotion", "RoboticTrajectory", "SmoothedSquareWave"]
 #: between two levels.
 Corners = Literal["stop", "blend"]
 #: Of a boxcar [s]; the speed divides by products of two.
-SHORTEST_RAMP = 1e-6
+_SHORTEST_RAMP = 1e-6
 
 
 class PathMotion(NamedTuple):
@@ -146,11 +146,11 @@ class RoboticTrajectory:
 
 
 def check_ramps(ramps: tuple[float, ...]) -> None:
-    """Refuse ramps that are not one or two boxcar widths of `SHORTEST_RAMP` at least."""
-    if len(ramps) not in (1, 2) or not all(math.isfinite(ramp) and ramp >= SHORTEST_RAMP for ramp in ramps):
+    """Refuse ramps that are not one or two boxcar widths of `_SHORTEST_RAMP` at least."""
+    if len(ramps) not in (1, 2) or not all(math.isfinite(ramp) and ramp >= _SHORTEST_RAMP for ramp in ramps):
         raise MovementError(
             f"ramps {list(ramps)} s: give one boxcar width (trapezoids) or two (S-curves), "
-            f"{SHORTEST_RAMP:g} s at least"
+            f"{_SHORTEST_RAMP:g} s at least"
         )
 
 

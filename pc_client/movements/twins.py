@@ -29,8 +29,6 @@ __all__ = [
     "RAMPS",
     "SETBACK",
     "Generator",
-    "minimum_jerk_twin",
-    "power_law_twin",
     "retimed_twin",
     "robotic_trajectory",
     "robotic_twin",
@@ -83,7 +81,7 @@ def robotic_twin(
     return Movement(name, trajectory, movement.stroke_durations, _facts(movement))
 
 
-def minimum_jerk_twin(movement: Movement, name: str, passing: Passing = "stop") -> Movement:
+def _minimum_jerk_twin(movement: Movement, name: str, passing: Passing = "stop") -> Movement:
     """The minimum-jerk movement to the same target points with the same stroke durations.
 
     Args:
@@ -95,7 +93,7 @@ def minimum_jerk_twin(movement: Movement, name: str, passing: Passing = "stop") 
     return Movement(name, trajectory, movement.stroke_durations, _facts(movement))
 
 
-def power_law_twin(movement: Movement, name: str, *, torsion: bool = False) -> Movement:
+def _power_law_twin(movement: Movement, name: str, *, torsion: bool = False) -> Movement:
     """The power-law movement through the same target points in the same total time.
 
     Args:
@@ -181,20 +179,20 @@ GENERATORS: Mapping[str, Generator] = MappingProxyType(
         ),
         "duplicate": Generator(_duplicate, "lognormal, varied as between repetitions", same_targets=False),
         "minimum_jerk": Generator(
-            lambda human, _, name: minimum_jerk_twin(human, name),
+            lambda human, _, name: _minimum_jerk_twin(human, name),
             "minimum jerk, at rest at every target point",
             True,
         ),
         "minimum_jerk_via": Generator(
-            lambda human, _, name: minimum_jerk_twin(human, name, "via"),
+            lambda human, _, name: _minimum_jerk_twin(human, name, "via"),
             "minimum jerk through the target points",
             True,
         ),
         "power_law": Generator(
-            lambda human, _, name: power_law_twin(human, name), "two-thirds power law on a smooth path"
+            lambda human, _, name: _power_law_twin(human, name), "two-thirds power law on a smooth path"
         ),
         "power_law_3d": Generator(
-            lambda human, _, name: power_law_twin(human, name, torsion=True),
+            lambda human, _, name: _power_law_twin(human, name, torsion=True),
             "power law with the factor of torsion",
         ),
         "uniform": Generator(

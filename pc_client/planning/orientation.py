@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-TCP_RPY = (0.0, 0.75 * pi, 0.0)
+_TCP_RPY = (0.0, 0.75 * pi, 0.0)
 """Roll, pitch, yaw of the TCP in `base` [rad]. Source: paper section III, "RPY(0, 3/4 pi, 0)"."""
 
 
@@ -29,4 +29,4 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float
 
 def fixed_tcp_rotation() -> NDArray[np.float64]:
     """Return R_base_tcp of the experiment: tool z = (.7071, 0, -.7071), forward and 45 deg down."""
-    return rotation_from_rpy(*TCP_RPY)
+    return rotation_from_rpy(*_TCP_RPY)

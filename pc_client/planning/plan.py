@@ -25,11 +25,11 @@ from pc_client.planning.refusal import PathNames
 
 Array = NDArray[np.float64]
 
-DEFAULT_DT = 0.004
+_DEFAULT_DT = 0.004
 """Time between samples of a plan [s]: half a control cycle; the spline between is then good to < 1 um."""
 
 
-Rotations = Callable[[Array], Array | None]
+_Rotations = Callable[[Array], Array | None]
 """R_base_tcp (n, 3, 3) at times (n,) [s]; None: fixed."""
 
 
@@ -140,10 +140,10 @@ def plan_movement(
     movement: PlannableMovement,
     *,
     model: RobotModel | None = None,
-    dt: float = DEFAULT_DT,
+    dt: float = _DEFAULT_DT,
     limits: PlanLimits | None = None,
     q_branch: ArrayLike | None = None,
-    rotations: Rotations | None = None,
+    rotations: _Rotations | None = None,
 ) -> JointPlan:
     """Plan a movement of the TCP.
 
@@ -180,7 +180,7 @@ def plan_joints(
     trajectory: PlannableJoints,
     *,
     model: RobotModel,
-    dt: float = DEFAULT_DT,
+    dt: float = _DEFAULT_DT,
     limits: PlanLimits | None = None,
 ) -> JointPlan:
     """Plan a motion that is given in joint angles: a clamped cubic spline through them, checked as all plans.

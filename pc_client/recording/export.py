@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from pc_client.errors import RecordingError
 from pc_client.recording.loader import Recording
 
-ExportFormat = Literal["csv", "parquet"]
+_ExportFormat = Literal["csv", "parquet"]
 
 
-def export(recording: Recording, path: Path | str, format: ExportFormat = "csv") -> Path:
+def export(recording: Recording, path: Path | str, format: _ExportFormat = "csv") -> Path:
     """Write all rows of a recording into one table.
 
     Args:
@@ -38,9 +38,9 @@ def export(recording: Recording, path: Path | str, format: ExportFormat = "csv")
     import polars
 
     path = Path(path)
-    if format not in get_args(ExportFormat):
-        raise RecordingError(f"cannot export to {format!r}; use one of {', '.join(get_args(ExportFormat))}")
-    table, units, content = polars.DataFrame(flat_columns(recording)), column_units(recording), BytesIO()
+    if format not in get_args(_ExportFormat):
+        raise RecordingError(f"cannot export to {format!r}; use one of {', '.join(get_args(_ExportFormat))}")
+    table, units, content = polars.DataFrame(flat_columns(recording)), _column_units(recording), BytesIO()
     if format == "csv":
         table.rename({name: f"{name} [{unit}]" for name, unit in units.items()}).write_csv(content)
     else:
@@ -58,7 +58,7 @@ def flat_columns(recording: Recording) -> dict[str, NDArray[np.float64]]:
     return split_columns({signal.name: recording.column(signal.name) for signal in recording.signals})
 
 
-def column_units(recording: Recording) -> dict[str, str]:
+def _column_units(recording: Recording) -> dict[str, str]:
     """Return the unit of every column of `flat_columns` that has one."""
     names = iter(flat_columns(recording))
     units = (unit for signal in recording.signals for unit in signal.units)

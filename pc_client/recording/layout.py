@@ -79,7 +79,7 @@ COMMAND_SIGNALS = (Signal("cmd_qd", 6, "rad/s"), Signal("phase", 1, "enum", "uin
 ROW_TOPICS = STATE_TOPIC, REFERENCE_TOPIC, COMMAND_TOPIC = "/robot_state", "/reference", "/command"
 PROVENANCE_RECORD, UNITS_RECORD, SUMMARY_RECORD = "provenance", "units", "summary"
 
-MOST_NUMBERS = 2000
+_MOST_NUMBERS = 2000
 """Most numbers in a row: ten times those of the largest frame."""
 
 _COUNTS = {column.name: column.count for column in COLUMNS}
@@ -154,9 +154,9 @@ def check_row(signals: Sequence[Signal]) -> None:
     """
     names = [signal.name for signal in signals]
     n_numbers = sum(signal.count for signal in signals)
-    if len(set(names)) < len(names) or not 0 < n_numbers <= MOST_NUMBERS:
+    if len(set(names)) < len(names) or not 0 < n_numbers <= _MOST_NUMBERS:
         raise RecordingError(
-            f"{len(names)} signals of {n_numbers} numbers; give each once, at most {MOST_NUMBERS}"
+            f"{len(names)} signals of {n_numbers} numbers; give each once, at most {_MOST_NUMBERS}"
         )
     for signal in signals:
         if signal.count != _COUNTS.get(signal.name, signal.count) or not signal.count:

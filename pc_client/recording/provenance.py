@@ -16,10 +16,10 @@ from pc_client.errors import RecordingError
 from pc_client.recording.origin import Origin, origin_of
 from ur_hil.records import Finite, Flag, Items, checked, record, text, whole
 
-MOST_LETTERS = 200
+_MOST_LETTERS = 200
 """Longest name in a provenance: movement, controller, robot."""
 
-Word = Annotated[str, text(MOST_LETTERS)]
+_Word = Annotated[str, text(_MOST_LETTERS)]
 
 
 @record
@@ -48,17 +48,17 @@ class Provenance:
         cell_text: the file of the surroundings and the tool, as it was read; empty where none was given.
     """
 
-    movement: Word
-    kind: Word
+    movement: _Word
+    kind: _Word
     repetition: Annotated[int, whole(1, 1 << 31)]
-    controller: Word
-    robot_model: Word
-    firmware: Word
-    serial: Word
+    controller: _Word
+    robot_model: _Word
+    firmware: _Word
+    serial: _Word
     simulated: Flag | None
     seed: Annotated[int, whole(-(1 << 63), (1 << 63) - 1)] | None
-    pace: Word
-    client_version: Word
+    pace: _Word
+    client_version: _Word
     cycle_time_s: Finite = 0.008
     identified_delay_s: Finite | None = None
     controller_config: Mapping[str, Finite | Flag | str | None] = field(default_factory=dict)

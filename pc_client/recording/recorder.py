@@ -43,7 +43,7 @@ ROWS_PER_CHUNK = 64  # half a second at 125 Hz
 # Rows that are kept in memory after the disk failed: two minutes at 125 Hz, 30 MB.
 MAX_HELD_ROWS = 240 * ROWS_PER_CHUNK
 
-LATEST = 2.0**31
+_LATEST = 2.0**31
 """No controller has run this long [s]; seconds of ROS time are 32-bit numbers."""
 
 _REFERENCE = Struct("<4sd6d6d3d3d")
@@ -207,7 +207,7 @@ class Recorder:
 
     def _log_time(self, stamp: float) -> int:
         """The log time [ns] of the controller's time [s]; 0 for one that no controller has."""
-        since_start = round(stamp * 1e9) if 0.0 <= stamp < LATEST else 0
+        since_start = round(stamp * 1e9) if 0.0 <= stamp < _LATEST else 0
         if self._now is not None and self.n_rows == 0:
             self._epoch = self._now() - since_start
         return self._epoch + since_start

@@ -19,7 +19,7 @@ from pc_client.results.theme import PLOTLY_MARK, plotly_template
 __all__ = ["plotly_figure", "plotly_script", "thinned"]
 
 #: Points of a curve at most: a screen is hardly wider, and a long recording shall not make a large page.
-MOST_POINTS = 1500
+_MOST_POINTS = 1500
 #: Pixels for a point of print, on a page that is as wide as the figure.
 _PIXELS = 1.33
 
@@ -94,7 +94,7 @@ def plotly_figure(sheet: Sheet) -> dict[str, Any]:
     return {"data": data, "layout": layout | {"annotations": [note for note in notes if note["text"]]}}
 
 
-def thinned(points: NDArray[np.float64], most: int = MOST_POINTS) -> NDArray[np.float64]:
+def thinned(points: NDArray[np.float64], most: int = _MOST_POINTS) -> NDArray[np.float64]:
     """At most so many points (n, dim) of a curve: of each stretch those that are extreme in a coordinate.
 
     No peak is lost: first and last point stay, and of every coordinate the smallest and the largest value of

@@ -29,7 +29,7 @@ from ur_hil.records import Flag, Items, checked, nearest, record, text, whole, w
 FIDELITIES = ("exact", "ideal", "typical", "poor")
 """What `ur-emulator serve --fidelity` knows."""
 
-MOST_CASES = 100_000
+_MOST_CASES = 100_000
 """More than this is a slip of the pen: weeks on a large cluster."""
 
 Text = Annotated[str, text()]
@@ -162,9 +162,9 @@ def read_config(path: Path) -> SweepConfig:
     )
     if problem := repeated([movement.name for movement in config.movements]):
         raise SweepError(f"{path}: movements: {problem}")
-    if config.n_cases > MOST_CASES:
+    if config.n_cases > _MOST_CASES:
         raise SweepError(
-            f"{path}: {config.n_cases} cases, at most {MOST_CASES} are allowed; make the lists shorter"
+            f"{path}: {config.n_cases} cases, at most {_MOST_CASES} are allowed; make the lists shorter"
         )
     return config
 

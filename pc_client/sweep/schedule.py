@@ -13,8 +13,8 @@ from pc_client.sweep.outcome import Outcome, failed
 from pc_client.sweep.result_store import ResultStore
 
 Job = Callable[[Case], Outcome]
-Outcomes = Iterator[tuple[Case, Outcome]]
-Runner = Callable[[Sequence[Case]], Outcomes]
+_Outcomes = Iterator[tuple[Case, Outcome]]
+_Runner = Callable[[Sequence[Case]], _Outcomes]
 
 
 class Sweep:
@@ -40,7 +40,7 @@ class Sweep:
         )
         self._advance()
 
-    def run(self, run: Runner) -> Generator[Outcome, None, None]:
+    def run(self, run: _Runner) -> Generator[Outcome, None, None]:
         """Run and settle what is not settled.
 
         The first failure of a robot that is there ends the sweep: somebody has to look at the arm before it
@@ -73,13 +73,13 @@ class Sweep:
         self.waiting = []
 
 
-def in_turn(job: Job) -> Runner:
+def in_turn(job: Job) -> _Runner:
     """One case after the other in this process, as one robot must."""
     return lambda cases: ((case, job(case)) for case in cases)
 
 
 @contextmanager
-def side_by_side(job: Job, *, workers: int | None, dask: str | None) -> Iterator[Runner]:
+def side_by_side(job: Job, *, workers: int | None, dask: str | None) -> Iterator[_Runner]:
     """Cases over processes of this machine or a Dask cluster, which are started with the first case.
 
     When a worker process dies (out of memory, killed), the others are lost with it. Those cases that may have
@@ -94,7 +94,7 @@ def side_by_side(job: Job, *, workers: int | None, dask: str | None) -> Iterator
     n_begun = 1 + (usable_cores() if workers is None else workers)
     executors: list[Executor] = []
 
-    def run(cases: Sequence[Case]) -> Outcomes:
+    def run(cases: Sequence[Case]) -> _Outcomes:
         waiting = list(cases)
         while waiting:
             if not executors:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from optuna.distributions import BaseDistribution
     from optuna.samplers import BaseSampler
 
-MOST_TRIALS = 100_000
+_MOST_TRIALS = 100_000
 
 _KEY = ("controller", *FIELDS)
 """The columns that distinguish all settings."""
@@ -37,7 +37,7 @@ class Search:
         seed: of the sampler.
     """
 
-    trials: Annotated[int, whole(1, MOST_TRIALS)]
+    trials: Annotated[int, whole(1, _MOST_TRIALS)]
     batch: Annotated[int, whole(1, 1000)] = 8
     sampler: Annotated[str, word(("tpe", "random"))] = "tpe"
     seed: Annotated[int, whole(0, 2**32 - 1)] = 0
