@@ -33,7 +33,7 @@ ControllerOption = Annotated[
         "--controller",
         metavar="NAME|FILE.toml",
         help="paper (as published), preview (ahead by the loop delay) or best (makes up for the drives' lag "
-        "and the gears' waves, and learns from one run of a movement to the next), or a file with numbers.",
+        "and the gears' waves, and uses ILC between runs of a movement), or a file with numbers.",
         show_default=True,
     ),
 ]

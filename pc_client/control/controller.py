@@ -169,7 +169,7 @@ _PREVIEW = Controller(
 )
 
 # All that the identified loop allows: its lag made up for as well, the waves of the gears once a movement has
-# shown them, and each repetition of a movement learns from the one before. The feedback is that of `preview`:
+# shown them, and each repetition of a movement uses ILC. The feedback is that of `preview`:
 # it has little left to do.
 _BEST = replace(_PREVIEW, name="best", compensates_lag=True, compensates_gear=True, uses_ilc=True)
 

@@ -78,7 +78,7 @@ def identify_loop(t: Array, qd_cmd: Array, q: Array, period: float) -> LoopModel
 
 
 def _delayed(t: Array, knots: Array, commands: Array, dead_time: float, lag: float) -> tuple[Array, Array]:
-    """Way and velocity (n, j) that the model expects at the stamps t (n,)."""
+    """Displacement and velocity (n, j) that the model expects at the stamps t (n,)."""
     displacement, velocity = lagged_displacement(knots, commands, lag)
     at = np.clip(t - dead_time, knots[0], knots[-1])
     k = np.minimum(np.searchsorted(knots, at, side="right") - 1, len(commands) - 1)

@@ -126,7 +126,7 @@ def lagged_displacement(knots: Array, commands: Array, lag: float) -> tuple[Arra
 
 
 def _displacement_after_step(t: Array, lag: float) -> Array:
-    """Way at times t since a velocity step of 1 began, behind the lag: t - lag (1 - exp(-t / lag))."""
+    """Displacement at times t since a velocity step of 1, after the lag: t - lag (1 - exp(-t / lag))."""
     since = np.maximum(t, 0.0)
     if lag < NO_LAG:
         return since

@@ -54,7 +54,7 @@ def speeds_sheet(shown: Shown) -> Sheet:
 
 
 def _profile(shown: Shown, name: str) -> list[Curve]:
-    """One signal, with the strokes that it is made of or with what the arm does while the pen is up."""
+    """One signal, with its strokes or with the movement of the arm while the pen is up."""
     curves = []
     if name == "reconstructed":
         for index, part in zip(shown.moving, shown.drawing.extraction.parts, strict=True):

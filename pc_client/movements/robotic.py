@@ -1,6 +1,6 @@
 """A robot-like movement: constant speed on every stroke, smoothed to ramps, along straight lines.
 
-The speed is a square wave convolved with one boxcar (trapezoids) or two (S-curves). Way, speed and
+The speed is a square wave convolved with one boxcar (trapezoids) or two (S-curves). Length, speed and
 acceleration are piecewise polynomials written down in closed form; the convolution has area 1, so the length
 of every stroke is kept exactly. `path.py` defines the path.
 
@@ -31,7 +31,7 @@ _SHORTEST_RAMP = 1e-6
 
 
 class PathMotion(NamedTuple):
-    """Way along the path (m), speed (m/s) and acceleration along the path (m/s^2), each (n,)."""
+    """Length along the path (m), speed (m/s) and acceleration along the path (m/s^2), each (n,)."""
 
     s: NDArray[np.float64]
     v: NDArray[np.float64]
@@ -59,7 +59,7 @@ class SmoothedSquareWave:
         object.__setattr__(self, "levels", read_only(self.levels, (-1,)))
 
     def evaluate(self, t: ArrayLike) -> PathMotion:
-        """Way, speed and acceleration at the times t (n,), s."""
+        """Length, speed and acceleration at the times t (n,), s."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))[:, None]
         up = _smoothed_step(times - self.windows[:, 0], self.ramps)
         down = _smoothed_step(times - self.windows[:, 1], self.ramps)

@@ -1,8 +1,8 @@
 """The slow approach from where the arm is to where a plan begins.
 
 All joints move together on a straight line in joint space, whatever stands there; so the line is checked
-here, posture by posture, before the arm moves. Two rules keep it short and harmless: of the
-start postures that differ by whole turns the nearest is taken (the plan is shifted to match), and when the
+here, posture by posture, before the arm moves. Two rules keep it short and safe: the
+nearest of the start postures that differ by whole turns is used (the plan is shifted to match), and when the
 direct line is not clear, routes over raised postures are tried: up, turn, and down.
 """
 

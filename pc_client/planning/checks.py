@@ -1,7 +1,7 @@
 """Every limit that a planned motion must keep, checked before anything moves.
 
-Measures first, all of them, then judges: the report of a good plan and the refusal of a bad one come from
-the same numbers. Limits are in planning.limits, the arm's own in kinematics.robot_model.
+All quantities are measured before any is judged, so the report of a good plan and the refusal of a bad one
+have the same numbers. Limits are in planning.limits, the arm's own in kinematics.robot_model.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def check_motion(
     spline: JointSpline,
     limits: PlanLimits,
 ) -> PlanReport:
-    """Measure a planned motion and hold it against its limits.
+    """Measure a planned motion and compare it with its limits.
 
     Args:
         model: nominal arm.

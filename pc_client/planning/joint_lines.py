@@ -1,4 +1,4 @@
-"""Straight lines in joint space over time, as an approach travels them: at rest at each posture."""
+"""Straight lines in joint space over time, for approaches: at rest at each posture."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class JointLines:
         return distance / v + v / a if distance >= v * v / a else 2.0 * sqrt(distance / a)
 
     def _on_line(self, t: float, distance: float) -> tuple[float, float]:
-        """Way [rad] and speed [rad/s] of the leading joint, t [s] after its line begins."""
+        """Distance [rad] and speed [rad/s] of the leading joint, t [s] after its line begins."""
         a = self._a
         duration = self._line_duration(distance)
         ramp = min(self._v / a, duration / 2.0)

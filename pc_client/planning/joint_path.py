@@ -1,7 +1,7 @@
 """Inverse kinematics along a whole path, on one continuous branch.
 
 Each sample is solved from a linear prediction by the samples before it, so the solution stays on the branch
-that the first sample was put on; leaving it, coming near a singularity or out of reach is refused.
+of the first sample; leaving it, coming near a singularity or out of reach is refused.
 """
 
 from __future__ import annotations

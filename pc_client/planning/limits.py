@@ -1,7 +1,7 @@
-"""What a plan may ask of an arm: limits and margins, stated once.
+"""Limits and margins of plans, defined once.
 
-What the arm itself can do belongs to the arm (kinematics.robot_model); here stands how much of it a plan
-uses, and which distances it keeps.
+The limits of the arm itself are in kinematics.robot_model; here is the share that a plan uses,
+and the distances that it keeps.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The orientation that the TCP keeps during every movement that says nothing else."""
+"""The orientation of the TCP during a movement without orientations of its own."""
 
 from __future__ import annotations
 

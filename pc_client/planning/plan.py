@@ -1,4 +1,4 @@
-"""From a movement to a joint plan: sample, solve, spline, check. The door to this package."""
+"""From a movement to a joint plan: sample, solve, spline, check. The entry of this package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a plan was checked for, as one record and as lines for people."""
+"""The checked figures of a plan, as one record and as lines of text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a plan is going to do, in words, for someone who must say yes to it."""
+"""A plan in words, for the person who confirms it."""
 
 from __future__ import annotations
 

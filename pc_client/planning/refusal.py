@@ -1,4 +1,4 @@
-"""How a plan says no: one line with movement, sample, time, point, joint, what is wrong and what to do."""
+"""The refusal of a plan: one line with movement, sample, time, point, joint, what is wrong and what to do."""
 
 from __future__ import annotations
 

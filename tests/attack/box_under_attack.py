@@ -168,7 +168,7 @@ class BoxUnderAttack:
         return f"a traceback on stderr: {' / '.join(told.split(chr(10))[-8:])}" if is_there else ""
 
     def stop(self) -> float:
-        """Tell the box to end; return how long that takes [s], infinity if it must be killed."""
+        """Request the end of the box; return how long that takes [s], infinity if it must be killed."""
         began = time.monotonic()
         self.is_stopped = True
         self.process.send_signal(signal.SIGTERM)

@@ -23,7 +23,7 @@ PERIOD = 0.008  # s
 
 
 def is_free(host, port):
-    """Tell whether a box could listen there; Modbus needs privileges and may be missing."""
+    """Return whether a box could listen there; Modbus needs privileges and may be missing."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

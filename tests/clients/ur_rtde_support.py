@@ -98,12 +98,12 @@ class Arm(SimpleNamespace):
         self.until(lambda r: r.getTimestamp() >= start + seconds - 1e-4)
 
     def is_at(self, q):
-        """Tell whether the arm comes to rest at these joint angles."""
+        """Return whether the arm comes to rest at these joint angles."""
         self.still()
         return np.allclose(self.receive.getActualQ(), q, rtol=0, atol=CLOSE_Q)
 
     def is_at_pose(self, pose):
-        """Tell whether the arm comes to rest at this pose."""
+        """Return whether the arm comes to rest at this pose."""
         self.still()
         return np.allclose(self.receive.getActualTCPPose(), pose, rtol=0, atol=CLOSE_X)
 

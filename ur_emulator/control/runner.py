@@ -80,7 +80,7 @@ class OperationRunner:
         return {**(result or {}), "tick": access.snapshot.tick}
 
     def close(self) -> None:
-        """Tell all threads that wait, after the steps have ended, that the box has ended."""
+        """Inform all threads that wait, after the steps have ended, that the box has ended."""
         with self._lock:
             self._is_closed = True
             awaited = tuple(self._awaited)

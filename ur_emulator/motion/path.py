@@ -72,7 +72,7 @@ class PoseLine:
 
     @property
     def length_rate(self) -> float:
-        """Way of the tool per unit of s; below 1 where the line is mainly a rotation."""
+        """Path length of the tool per unit of s; below 1 where the line is mainly a rotation."""
         return _norm(self._twist)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:

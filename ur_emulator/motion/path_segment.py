@@ -39,7 +39,7 @@ class PathSegment:
 
     @property
     def length(self) -> float:
-        """Way in units of the chain."""
+        """Length in units of the chain."""
         return (self.end - self.begin) * self.scale
 
     def cut(self, *, begin: float | None = None, end: float | None = None) -> PathSegment:

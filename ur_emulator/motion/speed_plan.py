@@ -63,7 +63,7 @@ class Phase(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SpeedPlan:
-    """Way and speed over time.
+    """Length and speed over time.
 
     Attributes:
         phases: in order.

@@ -1,6 +1,6 @@
 """The error barrier: an error ends what has caused it, and nothing else.
 
-Whoever registers a callback names the function that gets an error in it. An error in that function
+The code that registers a callback names the function that gets an error in it. An error in that function
 has no owner any more: it ends the loop.
 """
 

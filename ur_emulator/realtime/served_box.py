@@ -146,8 +146,8 @@ class ServedBox:
     def readers_full(self) -> bool:
         """True while a client has frames waiting that it has not read, unless it was given up.
 
-        Nobody is waited for while the arm only settles: a client that waits for rest would take the frames
-        that are repeated meanwhile for the last ones. They are few and find room in the outbox.
+        There is no waiting for clients while the arm only settles: a client that waits for rest would take
+        the frames that are repeated meanwhile for the last ones. They are few and find room in the outbox.
         """
         if not self.backlog:
             self._given_up.clear()

@@ -29,7 +29,7 @@ from ur_emulator.realtime.worker_process import (
     take_process,
 )
 
-# Told of what has come of a task: its result and None, or None and what it raised.
+# Gets the result of a task and None, or None and what it raised.
 TaskDone = Callable[[Any, Exception | None], None]
 
 

@@ -115,7 +115,7 @@ class Scheduler:
             namespace: The globals of the compiled program.
             meter: Counts what its threads do.
             budget: Statements of a time slice.
-            thread_ended: Told of every end.
+            thread_ended: Called at every end.
         """
         self._namespace = namespace
         self._meter = meter

@@ -96,7 +96,7 @@ class BufferedSocket(ABC):
         """The outbox is empty again."""
 
     def _watch(self) -> None:
-        """Tell the loop what the socket waits for at present."""
+        """Register with the loop what the socket waits for at present."""
         assert self._sock is not None
         events = selectors.EVENT_READ if self._wants_data else 0
         if self._outbox:
