@@ -46,7 +46,6 @@ _EXTRAS = {
     "polars": "client",
     "matplotlib": "report",
     "jinja2": "report",
-    "pyarrow": "export",
     "distributed": "cluster",
     "optuna": "search",
 }

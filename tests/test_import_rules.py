@@ -16,7 +16,7 @@ MAY_IMPORT = {
     "urscript": {"ur_hil", "protocol", "lark", "numpy", "typer", "rich"},
     "ur_emulator": {"ur_hil", "urscript", "protocol", "mujoco", "numpy", "h11", "typer", "rich", "pytest"},
     "pc_client": {
-        "ur_hil", "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "markupsafe", "plotly", "pyarrow", "polars", "distributed", "optuna",
+        "ur_hil", "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "markupsafe", "plotly", "polars", "distributed", "optuna",
     },
 }  # fmt: skip
 # Modules of the standard library that a layer must not touch, and the folders in which it may.

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -44,20 +44,19 @@ def sweep(
     workers: WorkersOption = None,
     dask: DaskOption = None,
     format: Annotated[
-        str, typer.Option("--format", metavar="parquet|csv", help="Of the table's file.")
+        Literal["parquet", "csv"],
+        typer.Option("--format", metavar="parquet|csv", help="Of the table's file."),
     ] = "parquet",
     yes: YesOption = False,
 ) -> None:
     """Run every combination of gains, arms and movements; a second call goes on where the first ended."""
     from pc_client.sweep.case import GivenRobot
     from pc_client.sweep.config import read_config
-    from pc_client.sweep.result_store import FORMATS, ResultStore
+    from pc_client.sweep.result_store import ResultStore
     from pc_client.sweep.run_case import run_case
     from pc_client.sweep.schedule import Sweep, in_turn, side_by_side
 
     check_workers(workers, dask)
-    if format not in FORMATS:
-        raise typer.BadParameter(f"no table format {format!r}: give one of {', '.join(FORMATS)}")
     plan = read_config(config)
     host, port_base = plan.file.robot, plan.file.port_base or 0
     if host is not None and (workers is not None or dask is not None):

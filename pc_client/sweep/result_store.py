@@ -19,6 +19,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import polars as pl
 
@@ -28,9 +29,6 @@ from pc_client.results.tables import frame_of, to_csv
 from pc_client.sweep.case import Case
 from pc_client.sweep.columns import COLUMNS
 from pc_client.sweep.outcome import Outcome
-
-FORMATS = ("parquet", "csv")
-"""Of the table's file."""
 
 # A part of a file that is older [s] belongs to a sweep that was killed.
 _LONGEST_WRITE = 60.0
@@ -112,11 +110,11 @@ class ResultStore:
             COLUMNS,
         )
 
-    def write_table(self, format: str) -> Path:
+    def write_table(self, format: Literal["parquet", "csv"]) -> Path:
         """Write the table; the same rows give the same bytes.
 
         Args:
-            format: one of `FORMATS`. A Parquet file carries the texts of `COLUMNS` as its metadata.
+            format: of the file; Parquet carries the texts of `COLUMNS` as its metadata.
 
         Raises:
             SweepError: it cannot be written.

@@ -229,7 +229,7 @@ def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, ca
     [
         (GRID, ["--workers", "0"], 2, "workers"),
         (GRID, ["--workers", "2", "--dask", "tcp://x:1"], 2, "only one"),
-        (GRID, ["--format", "xlsx"], 2, "parquet, csv"),
+        (GRID, ["--format", "xlsx"], 2, "'parquet', 'csv'"),
         (GRID + "gain_d = 3", [], 1, "did you mean gain_"),
         ('movements = ["uniform_4_1"]\nrobot = "127.0.0.1"', ["--workers", "2"], 2, "one robot"),
         ('movements = ["uniform_4_1"]\nrobot = "no.such.invalid"', ["--yes"], 1, "cannot be looked up"),
