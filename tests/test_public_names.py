@@ -72,3 +72,13 @@ def module_names(tree):
                     yield name
             case ast.AnnAssign(target=ast.Name(id=name)):
                 yield name
+
+
+def test_the_glossary_has_one_line_a_term_in_alphabetical_order():
+    rows = [
+        line for line in (DOCS / "glossary.md").read_text(encoding="utf-8").splitlines() if line[:1] == "|"
+    ]
+    terms = [row.split("|")[1].strip().lower() for row in rows[2:]]
+    assert len(set(terms)) == len(terms) > 50
+    assert terms == sorted(terms)
+    assert [row for row in rows if row.count("|") != 3] == []

@@ -18,7 +18,26 @@ from ur_emulator.realtime.loop_runner import LoopRunner
 
 
 class ControlBox(Box, LoopRunner):
-    """A control box on a loop of its own; its arguments are those of `Box`."""
+    """A control box on a loop of its own, for one `with`.
+
+    What can be done to it while it runs is on docs/control.md: `push`, `wait_until`, `state`, `log` ...
+
+    Args:
+        robot: type of the arm: "ur3", "ur5" or "ur10".
+        version: software, such as "3.4.0"; None is the usual one of the arm's generation.
+        host: address to listen on.
+        pace: "realtime", or "lockstep": as fast as the processor allows, and repeatable.
+        speed: times as fast as real time, in pace "realtime" only.
+        seed: which specimen of the arm: calibration, gear phases, delays, noise.
+        fidelity: "exact", "ideal", "typical" or "poor", or a file (docs/fidelity.md).
+        port_base: added to all standard ports; None takes free ports.
+        programs: folder that the dashboard loads programs from; None has none.
+        control_port: port of the control API over HTTP; 0 is any free one, None opens none.
+        control_token: what a client of the control API must show.
+
+    Raises:
+        EmulatorError: an argument is not among the allowed ones, or a port is taken.
+    """
 
     @staticmethod
     def many(count: int, **options: Unpack[BoxOptions]) -> BoxRack:
