@@ -71,7 +71,7 @@ def test_without_gears_no_wave_is_believed(noise):
         assert observer.model() is None
 
 
-def test_an_order_that_a_short_way_leaves_open_is_not_believed():
+def test_an_order_that_a_short_range_leaves_open_is_not_believed():
     # One wave of order 80 passes: it is seen, but a gear of order 75 would fit as well.
     t = np.linspace(0, 1, 400)
     motor = 0.04 * (1 - np.cos(2 * np.pi * t))

@@ -149,7 +149,7 @@ def test_friction_with_hysteresis_follows_the_path_not_the_speed():
     angle, size = 1e-3, np.full(6, 2.0)
 
     def loop(n):
-        """Torque along a way out and back, in n steps each."""
+        """Torque along a path out and back, in n steps each."""
         q, torque = np.zeros(6), np.zeros(6)
         friction = Presliding(angle, q, torque)
         seen = []
