@@ -1,17 +1,14 @@
-"""Plot desired and actual TCP speed of recordings like the paper's figures 4 and 5: the README's picture."""
+"""Plot desired and actual TCP speed of recordings, like figures 4 and 5 of the paper."""
 
 import argparse
 from pathlib import Path
 
-import matplotlib as mpl
-import numpy as np
-
+from pc_client.analysis.figures import speed_curve
 from pc_client.analysis.run import analyse_run
-from pc_client.recording.layout import Phase
 from pc_client.recording.loader import load_recording
-
-mpl.use("agg")
-import matplotlib.pyplot as plt
+from pc_client.results.panels import Panel, Sheet, boxes
+from pc_client.results.static import draw, image_bytes
+from pc_client.results.theme import BLUE, REFERENCE_GREY, WIDTH
 
 
 def main():
@@ -19,35 +16,23 @@ def main():
     parser.add_argument("recordings", nargs="+", type=Path)
     parser.add_argument("--out", type=Path, default=Path("speed.png"))
     options = parser.parse_args()
-    figure, axes = plt.subplots(
-        len(options.recordings), 1, figsize=(9, 2.6 * len(options.recordings)), squeeze=False
-    )
-    for axis, path in zip(axes[:, 0], options.recordings, strict=True):
-        plot(axis, path)
-    axes[-1, 0].set_xlabel("time since the movement began [s]")
-    figure.tight_layout()
-    figure.savefig(options.out, dpi=130)
+    runs = [analyse_run(load_recording(path)) for path in options.recordings]
+    height = 0.6 + 2.6 * len(runs)
+    grid = boxes((WIDTH, height), [1], [1] * len(runs), margins=(0.8, 0.2, 0.6, 0.6), gaps=(0.0, 0.6))
+    panels = [panel(box, run, run is runs[-1]) for (box,), run in zip(grid, runs, strict=True)]
+    options.out.write_bytes(image_bytes(draw(Sheet(height, panels, runs[0].provenance.origin.mark))))
     print(f"written to {options.out}")
 
 
-def plot(axis, path):
-    recording = load_recording(path)
-    rows = recording.rows_of(Phase.MOVEMENT)
-    t = recording.column("ref_t")[rows]
-    desired, actual = (
-        np.linalg.norm(np.diff(recording.column(name)[rows][:, :3], axis=0), axis=1) / np.diff(t) * 1e3
-        for name in ("ref_tcp_position", "actual_TCP_pose")
+def panel(box, run, last):
+    curves = (
+        speed_curve(run, REFERENCE_GREY, "desired", desired=True, width=4.0),
+        speed_curve(run, BLUE, "actual"),
     )
-    axis.plot(t[1:], desired, color="0.45", linewidth=3.0, label="desired")
-    axis.plot(t[1:], actual, color="#0072b2", linewidth=0.9, label="actual")
-    run = analyse_run(recording)
-    provenance = recording.provenance
-    mark = provenance.origin.mark and f", {provenance.origin.mark}"
-    title = f"{provenance.movement}, {provenance.controller}: SNR {run.snr.speed_db:.1f} dB{mark}"
-    axis.set_title(title, loc="left", fontsize=10)
-    axis.set_ylabel("TCP speed [mm/s]")
-    axis.grid(alpha=0.3)
-    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), frameon=False, ncols=2)
+    title = f"{run.provenance.movement}, {run.provenance.controller}: SNR {run.snr.speed_db:.1f} dB"
+    labels = ("time since the movement began [s]" if last else "", "TCP speed [mm/s]")
+    span = (-0.2, run.track.t_end - run.track.t_start + 0.3)
+    return Panel(box, curves, title, labels, (span, (0.0, None)), "above")
 
 
 if __name__ == "__main__":

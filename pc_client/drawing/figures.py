@@ -40,7 +40,7 @@ def _paths_sheet(shown: Shown) -> Sheet:
     # A path in space is shown from where it is widest.
     across, up = ("x [mm]", "y [mm]") if shown.drawing.flat else ("widest [mm]", "second widest [mm]")
     targets = np.abs(shown.on_page(_targets(shown))).max(axis=1)
-    outside = f"; {n} targets outside" if (n := int(np.count_nonzero(targets > half))) else ""
+    outside = f"; targets outside: {n}" if (n := int(np.count_nonzero(targets > half))) else ""
     titles = {
         "human": ("human", across),
         "reconstructed": (
@@ -51,7 +51,7 @@ def _paths_sheet(shown: Shown) -> Sheet:
         "executed": ("executed", across),
     }
     height = 3.75
-    places = boxes((SHEET_WIDTH, height), [1] * 4, [1], margins=(0.7, 0.1, 0.6, 0.6), gaps=(0.2, 0.0))[0]
+    places = boxes((SHEET_WIDTH, height), [1] * 4, [1], margins=(0.7, 0.2, 0.6, 0.6), gaps=(0.3, 0.0))[0]
     page = ((-half, half), (-half, half))
     panels = [
         Panel(
@@ -112,7 +112,7 @@ def _numbers(shown: Shown, half: float) -> list[tuple[Array, str]]:
         path = shown.on_page(begins.get(index, mark.first[None]))
         away = path[0] - path[-1]
         length = float(np.linalg.norm(away))
-        numbers.append((path[0] + (0.09 * half * away / length if length else 0.0), str(index + 1)))
+        numbers.append((path[0] + (0.11 * half * away / length if length else 0.0), str(index + 1)))
     return numbers
 
 
@@ -166,12 +166,12 @@ def _space(box: Box, shown: Shown) -> Panel:
     return Panel(
         box,
         curves,
-        "TCP path",
+        "",
         ("x [mm]", "y [mm]", "z [mm]"),
         cube_around(np.vstack([curve.points for curve in curves]), least=0.35, margin=0.1),
         "above",
         texts=((p[0], "begin"),),
-        zoom=1.15,
+        zoom=1.3,
         view=_VIEWS.get(shown.drawing.placement.plane, (24.0, -60.0)),
     )
 

@@ -40,6 +40,9 @@ _LEGENDS: dict[str, tuple[float, dict[str, str]]] = {
 }
 
 
+_CENTRED = {"xanchor": "center", "yanchor": "middle"}
+
+
 def plotly_script() -> str:
     """The text of plotly.js.
 
@@ -70,7 +73,7 @@ def plotly_figure(sheet: Sheet) -> dict[str, Any]:
                 for begin, end in panel.shaded.tolist()
             ]
             notes += [
-                _note(text, *point.tolist()) | {"xref": "x" + number, "yref": "y" + number, "xshift": 5}
+                _note(text, *point.tolist()) | {"xref": "x" + number, "yref": "y" + number, **_CENTRED}
                 for point, text in panel.texts
             ]
         notes.append(_note(panel.title, left, bottom + height, bold=True))

@@ -67,7 +67,7 @@ class Panel:
         ranges: of its axes; panels of a sheet with the same range of x are zoomed together.
         legend: where it stands; "inside": at the top, for which the axis gets room.
         columns: of the legend.
-        texts: beside points (2,) or (3,).
+        texts: around points (2,), in space at the right of points (3,).
         shaded: (n, 2) begins and ends on x.
         ticks: texts by place on x, where they are not numbers.
         slower: a second scale of y at the right is so many times smaller, where 1 none; figures that are

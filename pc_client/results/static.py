@@ -77,8 +77,12 @@ def draw(sheet: Sheet) -> Figure:
                 _draw_space(axes, panel)
             else:
                 _draw_plane(axes, panel)
+            outline = [withStroke(linewidth=2.5, foreground="white")]
             for point, text in panel.texts:
-                axes.text(*point, f"  {text}", path_effects=[withStroke(linewidth=2.5, foreground="white")])
+                if panel.in_space:
+                    axes.text(*point, f"  {text}", path_effects=outline)
+                else:
+                    axes.text(*point, text, ha="center", va="center", path_effects=outline)
             _draw_legend(axes, panel)
     return page
 
@@ -104,8 +108,9 @@ def _draw_plane(axes: Any, panel: Panel) -> None:
     for begin, end in panel.shaded:
         axes.axvspan(begin, end, color=SHADE, lw=0, zorder=0)
     x = panel.ranges[0]
-    axes.set_xlim(*x, auto=None in x)  # a fixed range of x could not be widened for equal scales
-    axes.set_ylim(*panel.upwards)
+    for between, limit in ((x, axes.set_xlim), (panel.upwards, axes.set_ylim)):
+        if between != (None, None):
+            limit(*between)
     axes.set(xlabel=panel.labels[0], ylabel=panel.labels[1])
     axes.tick_params(labelbottom=bool(panel.labels[0]), labelleft=bool(panel.labels[1]))
     if panel.equal:
@@ -138,7 +143,9 @@ def _draw_space(axes: Any, panel: Panel) -> None:
     if not any(panel.labels):
         axes.set(xticklabels=(), yticklabels=(), zticklabels=())
         return
-    axes.set(xlabel=panel.labels[0], ylabel=panel.labels[1], zlabel=panel.labels[2])
+    axes.set(xlabel=panel.labels[0], ylabel=panel.labels[1])
+    axes.zaxis.set_rotate_label(False)
+    axes.set_zlabel(panel.labels[2], rotation=90)
     axes.tick_params(labelsize=mpl.rcParams["font.size"] - 2.0, pad=-1)
     for axis, length in zip((axes.xaxis, axes.yaxis, axes.zaxis), shape, strict=True):
         axis.set_major_locator(MaxNLocator(4 if length > 0.6 else 2))
