@@ -11,10 +11,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from drawing_samples import two_parts_and_a_dot
+from page_support import check_needs_nothing
+from recording_samples import provenance
 
 from pc_client.drawing.drawing import make_drawing
 from pc_client.drawing.execution import executed
-from pc_client.drawing.figures import FIGURES, draw
+from pc_client.drawing.figures import FIGURES, sheets_of
 from pc_client.drawing.judgement import judge, signals
 from pc_client.drawing.page import render_page
 from pc_client.drawing.placement import PlacementOptions
@@ -22,7 +24,7 @@ from pc_client.drawing.shown import Shown
 from pc_client.drawing.table import COLUMNS, Entry, drawings_json, drawings_markdown, table_of
 from pc_client.errors import RecordingError
 from pc_client.kinematics.robot_model import robot_model
-from pc_client.recording.provenance import Provenance
+from pc_client.results.static import draw, svg_text
 from pc_client.results.tables import cells
 
 CYCLE = 0.008
@@ -46,11 +48,10 @@ def run_of(drawing, late=0.0, offset=(0.0, 0.0, 0.0), cut=0.0):
         p_actual=drawing.movement.sample(ref_t - late).p + np.array(offset),
     )
     recording = SimpleNamespace(column={"ref_t": ref_t}.__getitem__, path=Path("x.mcap"))
-    provenance = Provenance(
-        "sample", "lognormal", 1, "preview", "UR3", "3.15.8", "20993000007", True, 7, "lockstep", "1"
-    )
     snr = SimpleNamespace(velocity_lag_s=late, speed_db=30.0)
-    return SimpleNamespace(recording=recording, track=track, provenance=provenance, snr=snr)
+    return SimpleNamespace(
+        recording=recording, track=track, provenance=provenance(movement="sample"), snr=snr
+    )
 
 
 def test_a_perfect_arm_gives_the_plan_itself(drawing):
@@ -117,13 +118,13 @@ def entry(drawing):
 
 
 def test_pictures_are_svg_and_say_that_the_arm_is_simulated(entry):
-    pictures = draw(Shown.of(entry.drawing, entry.executions[0], entry.verdict))
-    assert list(pictures) == [name for name, _, _, _ in FIGURES]
-    for text in pictures.values():
+    sheets = sheets_of(Shown.of(entry.drawing, entry.executions[0], entry.verdict))
+    assert list(sheets) == list(FIGURES)
+    for sheet in sheets.values():
+        text = svg_text(draw(sheet))
         assert ET.fromstring(text).tag.endswith("svg")
         assert "SIMULATED" in text
-    again = draw(Shown.of(entry.drawing, entry.executions[0], entry.verdict))
-    assert again == pictures
+        assert svg_text(draw(sheet)) == text
 
 
 def test_what_is_drawn_lies_on_the_page_and_dots_are_drawn(entry):
@@ -137,10 +138,10 @@ def test_what_is_drawn_lies_on_the_page_and_dots_are_drawn(entry):
 
 
 def test_the_page_needs_no_network_and_holds_every_figure(entry):
-    pictures = {"sample": draw(Shown.of(entry.drawing, entry.executions[0], entry.verdict))}
-    page = render_page([entry], pictures)
-    assert page.count("data:image/svg+xml;base64,") == len(FIGURES)
-    assert "http" not in page
+    sheets = {"sample": sheets_of(Shown.of(entry.drawing, entry.executions[0], entry.verdict))}
+    page = render_page([entry], sheets)
+    assert page.count('class="zoom"') == len(FIGURES)
+    check_needs_nothing(page)
     assert "SIMULATED" in page
     assert "seed 7" in page
     for row in cells(table_of(entry.verdict), COLUMNS):
