@@ -24,14 +24,7 @@ _MOST_POINTS = 1500
 _PIXELS = 1.33
 
 _DASHES = {"-": "solid", "--": "dash", ":": "dot", "-.": "dashdot"}
-_SYMBOLS = {
-    "o": "circle",
-    "s": "square",
-    "^": "triangle-up",
-    "D": "diamond",
-    "v": "triangle-down",
-    "P": "cross",
-}
+_SYMBOLS = {"o": "circle", "s": "square", "^": "triangle-up", "D": "diamond"}
 #: Where a legend stands: place on the panel from left to right, and which corner of the legend is there.
 _LEGENDS: dict[str, tuple[float, dict[str, str]]] = {
     "above": (1.0, {"orientation": "h", "xanchor": "right", "yanchor": "bottom"}),
@@ -139,7 +132,7 @@ def _trace(curve: Curve) -> dict[str, Any]:
         trace["hoverinfo"] = "skip"
     if curve.marker:
         trace["marker"] = {
-            "symbol": _SYMBOLS.get(curve.marker, curve.marker),
+            "symbol": _SYMBOLS[curve.marker],
             "size": _PIXELS * curve.size,
             "color": "white" if curve.hollow else curve.colour,
             "line": {"color": curve.colour, "width": 1.3},

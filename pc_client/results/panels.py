@@ -47,7 +47,7 @@ class Curve:
     label: str = ""
     width: float = 1.0
     style: Literal["-", "--", ":", "-."] = "-"
-    marker: Literal["", "o", "s", "^", "D", "v", "P", "x"] = ""
+    marker: Literal["", "o", "s", "^", "D"] = ""
     size: float = 5.0
     hollow: bool = False
     opacity: float = 1.0
