@@ -6,6 +6,8 @@ STAMP := $(VENV)/.installed
 # A file is one process's; those with slow tests come first (tests/conftest.py), so that no core waits at the end.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
+PAGES := README.md SECURITY.md CONTRIBUTING.md CHANGELOG.md docs examples
+
 # The tests start some hundred processes: they shall find compiled modules, whatever the environment says.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -45,6 +47,7 @@ attack: $(STAMP) ## attack a served box in every way, into docs/security.md (a q
 check-static: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mdformat --check $(PAGES)
 	$(BIN)/mypy
 
 check: check-static ## lint, types, fast tests
@@ -58,6 +61,7 @@ soak: $(STAMP) ## an hour (or SOAK_MINUTES) under load, with an attack every min
 
 format: $(STAMP) ## put the code into its canonical layout
 	$(BIN)/ruff format .
+	$(BIN)/mdformat $(PAGES)
 	$(BIN)/ruff check --fix .
 
 docs: $(STAMP) ## rewrite the generated pages, build the documentation site into out/site
