@@ -1,7 +1,7 @@
 """`connect` and `Arm`: a robot, real or emulated, that runs plans and velocity laws.
 
-An emulator and a robot are treated alike; only the address differs. Each motion opens a session, holds
-the robot against its model, streams under the watchdog and leaves the arm at rest; between motions no
+An emulator and a robot are treated alike; only the address differs. Each motion opens a session, compares
+the robot with its model, streams under the watchdog and leaves the arm at rest; between motions no
 connection is open.
 """
 
@@ -48,17 +48,17 @@ def connect(
     reverse_port: int | None = None,
     confirm: Confirm = ask_at_terminal,
 ) -> Arm:
-    """Ask a robot what it is and hold it against its model; it stays as it is.
+    """Read the state of a robot and compare it with the model of its arm. Nothing moves.
 
     Args:
-        host: its name or address.
+        host: name or address of the robot.
         ports: its ports; the standard ones by default.
-        cell: what stands around it and what it carries: a record or a file (docs/real-arm.md).
-        reverse_port: where its programs dial back; 31000 by default.
-        confirm: is asked before a motion of an arm that is not known to be simulated.
+        cell: surroundings and tool of the arm: a record or a file (docs/real-arm.md).
+        reverse_port: port of this computer to which the robot's program connects; 31000 by default.
+        confirm: called before a motion of an arm that is not known to be simulated.
 
     Raises:
-        ClientError: it does not answer, does not report which arm it is, or is not as it must be.
+        ClientError: the robot does not answer, does not report its type, or does not meet a condition.
     """
     surroundings = load_cell(cell) if isinstance(cell, str | Path) else cell or NO_CELL
     numbers = ports or Ports.standard()
@@ -76,19 +76,19 @@ def plan(motion: Motion, arm: Arm | str = "ur3", cell: Cell = NO_CELL) -> Plan:
     Args:
         motion: a movement of the TCP, or a `JointTrajectory`.
         arm: a connected one, or the name of a model, such as "ur3".
-        cell: what stands around a named model and what it carries; a connected arm has its own.
+        cell: surroundings and tool of a named model; a connected arm has its own cell.
 
     Raises:
-        PlanningError: the arm cannot do it; names the sample, its time and point, and the joint.
+        PlanningError: the arm cannot execute it; names the sample, its time and point, and the joint.
     """
     return make_plan(motion, robot_model(arm, cell) if isinstance(arm, str) else arm.model)
 
 
 class Arm:
-    """A robot that is as its model expects; made by `connect`. Use as a context manager or not.
+    """A robot that agrees with its model; made by `connect`. It may be used as a context manager.
 
     Attributes:
-        report: what it reported when it was connected.
+        report: of the robot at the time of `connect`.
         model: the nominal model of its arm in its cell.
     """
 
@@ -121,14 +121,14 @@ class Arm:
 
     @property
     def simulated(self) -> bool | None:
-        """True, False, or None where the robot does not report it."""
+        """True, False, or None if the robot does not report it."""
         return self.report.info.simulated
 
     def frame(self) -> RealtimeFrame:
         """The robot's state now: `actual_q`, `actual_TCP_pose` and so on, by RTDE name in lower case.
 
         Raises:
-            DriverError: it does not answer.
+            DriverError: the robot does not answer.
         """
         return self._report_now().frame
 
@@ -139,12 +139,12 @@ class Arm:
         *,
         out: str | Path | None = None,
     ) -> Run:
-        """Move to the start of a plan, identify the loop, follow the plan, and measure what came of it.
+        """Move to the start of a plan, identify the loop, follow the plan, and measure the result.
 
         Args:
-            plan: from `plan`, or what it takes.
-            controller: which velocity controller.
-            out: folder where the recording stays; None: it is not kept.
+            plan: made by `plan`, or a motion that is planned first.
+            controller: the velocity controller.
+            out: folder of the recording; None: the recording is not kept.
 
         Raises:
             ClientError: a check failed or the robot stopped; the arm rests.
@@ -195,10 +195,10 @@ class Arm:
             return ExperimentRunner(driver, wanted, controller, observer).run()
 
     def approach(self, plan: Plan) -> Plan:
-        """Move slowly to where a plan begins, on a checked path.
+        """Move slowly to the start of a plan, on a checked path.
 
         Returns:
-            The plan in the turns of the joints in which the arm stands now.
+            The plan, with its joint angles shifted by whole turns to those of the arm.
 
         Raises:
             ClientError: there is no clear path, a check failed or the robot stopped; the arm rests.
@@ -211,18 +211,18 @@ class Arm:
         return replace(plan, joints=approach.plan)
 
     def stream(self, law: VelocityLaw, *, acceleration: float = ACCELERATION) -> Signals:
-        """Let a velocity law drive the arm from where it stands, under the watchdog of every motion.
+        """Move the arm by a velocity law from its present posture, under the watchdog of every motion.
 
-        Before each velocity is sent, the posture in which the arm could rest is held against joint ranges
-        and clearances. A law that raises ends the motion; the arm is stopped.
+        Before each velocity is sent, the posture in which the arm could come to rest is checked against joint
+        ranges and clearances. An error in the law ends the motion; the arm is stopped.
 
         Args:
-            law: takes each frame, returns (6,) joint velocities [rad/s], or None to end.
+            law: gets each frame and returns (6,) joint velocities [rad/s], or None to end.
             acceleration: of the robot's `speedj` [rad/s2], .1 to 100.
 
         Raises:
-            ClientError: the acceleration is out of its range, the law gave what cannot be sent, or the robot
-                stopped; the arm rests.
+            ClientError: the acceleration is out of its range, a value of the law cannot be sent, or the
+                robot stopped; the arm rests.
         """
         value = checked(FIELDS["speedj_acceleration"], acceleration, "acceleration", ControllerError)
         source = LawStream(law, self.model)
@@ -257,6 +257,6 @@ class Arm:
         return UrDriver(self._host, self._ports, reverse_port=self._reverse_port)
 
     def _ask(self, text: Callable[[], str]) -> None:
-        """Ask whether an arm may move, unless it says itself that it is simulated."""
+        """Ask whether an arm may move, unless it reports itself as simulated."""
         if self.simulated is not True and not self._confirm(text()):
             raise ClientError("the arm was not moved: the answer was no")

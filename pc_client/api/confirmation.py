@@ -23,12 +23,12 @@ Confirm = Callable[[str], bool]
 QUESTION = "The arm is going to move. Is the space around it free, and the emergency stop at hand?"
 _NO_TERMINAL = (
     "there is no terminal to ask at whether the arm may move: run this at one, or give "
-    "connect(..., confirm=lambda text: True) where somebody has made sure"
+    "connect(..., confirm=lambda text: True) after a person has checked the arm"
 )
 
 
 def ask_at_terminal(text: str) -> bool:
-    """Show what is going to happen and ask at the terminal.
+    """Show the description of a motion and ask at the terminal.
 
     Raises:
         ClientError: there is no terminal to ask at.
@@ -43,7 +43,7 @@ def ask_at_terminal(text: str) -> bool:
 
 
 def experiment_description(host: str, report: RobotReport, model: RobotModel, wanted: Experiment) -> str:
-    """Return what an experiment is going to do, for people beside the arm.
+    """Describe the motion of an experiment, for the people beside the arm.
 
     Raises:
         ClientError: there is no clear path to the start.

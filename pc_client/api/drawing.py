@@ -1,4 +1,4 @@
-"""`drawing`: what a hand drew, as strokes, placed and slowed down for an arm."""
+"""`drawing`: a human drawing as strokes, placed and slowed down for an arm."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ def drawing(
     Args:
         source: a file of pen samples (docs/extraction.md), or its parts: for each time that the pen was down,
             times (n,) [s] and positions (n, 2) or (n, 3) in any unit.
-        arm: who shall do it.
+        arm: that shall execute it.
         name: of the movement.
         plane: of the sheet: "vertical", "horizontal" or "inclined".
         size: longest side of the drawing [m]; never larger than the workspace.
-        slower: times slower than the limits of the arm ask, >= 1.
+        slower: factor of time beyond the limits of the arm, >= 1.
 
     Returns:
         The drawing; `arm.run(drawing.movement)` executes it.
 
     Raises:
-        ClientError: the file or the samples make no sense, or the arm cannot do it.
+        ClientError: the file or the samples are not valid, or the arm cannot execute it.
     """
     recording = read_recording(source) if isinstance(source, str | Path) else _recording(name, source)
     options = PlacementOptions(plane=plane, size=size, box=WORKING_BOXES[arm.model.name])

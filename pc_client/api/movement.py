@@ -49,7 +49,7 @@ class Movement(movement.Movement):
             setback: of blended corners [m].
 
         Raises:
-            MovementError: points, durations or choices make no sense.
+            MovementError: points, durations or options are not valid.
         """
         return cls._of(through(points, style, durations, name=name, corners=corners, setback=setback))
 
@@ -57,7 +57,7 @@ class Movement(movement.Movement):
     def from_samples(
         cls, t: ArrayLike, points: ArrayLike, rotations: ArrayLike | None = None, *, name: str = "samples"
     ) -> Self:
-        """A movement given as samples; a spline goes through them, nothing is smoothed.
+        """A movement given as samples; a spline interpolates them, nothing is smoothed.
 
         Args:
             t: (n,) increasing times [s], n >= 4.
@@ -67,7 +67,7 @@ class Movement(movement.Movement):
             name: as in recordings and tables.
 
         Raises:
-            MovementError: shapes or values make no sense.
+            MovementError: shapes or values are not valid.
         """
         turns = None if rotations is None else rotations_of(rotations)
         trajectory = SampledTrajectory(
@@ -80,7 +80,7 @@ class Movement(movement.Movement):
         """A movement from a table of samples: x, y, z, t, or with orientations; see docs/movements.md.
 
         Raises:
-            MovementError: the file cannot be read or makes no sense; names the line.
+            MovementError: the file cannot be read or is not valid; names the line.
         """
         return cls._of(load_movement(Path(path)))
 
@@ -89,7 +89,7 @@ class Movement(movement.Movement):
         """A movement from a file of its parameters.
 
         Raises:
-            MovementError: the file cannot be read or makes no sense; names the field.
+            MovementError: the file cannot be read or is not valid; names the field.
         """
         return cls._of(load_movement(Path(path)))
 
@@ -98,7 +98,7 @@ class Movement(movement.Movement):
         """A movement of the library, such as "lognorm_4_1"; `ur-client movements list` names all.
 
         Raises:
-            MovementError: there is none of that name.
+            MovementError: no movement has that name.
         """
         return cls._of(load_movement(name))
 

@@ -1,4 +1,4 @@
-"""What an arm did, as numpy arrays with names, as a table (polars), and as a figure (matplotlib)."""
+"""The signals of a motion, as named numpy arrays, as a table (polars), and as a figure (matplotlib)."""
 
 from __future__ import annotations
 
@@ -82,17 +82,17 @@ class Signals:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run(Signals):
-    """A run of a plan: what was wanted, what the arm did, and the figures by which the paper judges it.
+    """A run of a plan: reference, signals of the arm, and the figures of the paper.
 
     Attributes:
-        measured: the recording with everything that was measured on it.
+        measured: the recording with all figures measured on it.
     """
 
     measured: MeasuredRun
 
     @classmethod
     def from_file(cls, path: Path | str) -> Run:
-        """The run that a recording holds; rows that repeat a time stamp are left out.
+        """The run of a recording; rows that repeat a time stamp are left out.
 
         Raises:
             RecordingError: it cannot be read, or holds too little.
@@ -123,12 +123,12 @@ class Run(Signals):
 
     @property
     def ref_q(self) -> Array:
-        """(n, 6) wanted joint positions [rad]."""
+        """(n, 6) joint positions of the reference [rad]."""
         return self.measured.recording.column("ref_q")[self.measured.track.rows]
 
     @property
     def ref_tcp_position(self) -> Array:
-        """(n, 3) wanted TCP position [m]."""
+        """(n, 3) TCP position of the reference [m]."""
         return self.measured.track.p_ref
 
     def columns(self) -> Mapping[str, Array]:
@@ -138,7 +138,7 @@ class Run(Signals):
         return {"t": self.t, "tcp_speed": self.tcp_speed, **recorded}
 
     def plot(self) -> Figure:
-        """The figure of the report: TCP speed wanted and actual, its error, path, joints and their errors."""
+        """The figure of the report: TCP speed desired and actual, its error, path, joints and their errors."""
         from pc_client.analysis.figures import movement_sheet
         from pc_client.results.static import draw
 
