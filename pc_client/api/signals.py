@@ -138,7 +138,7 @@ class Run(Signals):
         return {"t": self.t, "tcp_speed": self.tcp_speed, **recorded}
 
     def plot(self) -> Figure:
-        """The figure of the report: TCP speed desired and actual, its error, path, joints and their errors."""
+        """The figure of the report: desired and actual TCP speed, error, path, joints and their errors."""
         from pc_client.analysis.figures import movement_sheet
         from pc_client.results.static import draw
 
