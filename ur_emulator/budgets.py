@@ -191,6 +191,10 @@ class Budgets:
     node_depth: int = _budget(50, "levels", "the nodes of a program", "it is not loaded")
     subprograms: int = _budget(200, "sub-programs", "a program", "it is not loaded")
     external_control_nodes: int = _budget(20, "nodes of External Control", "a program", "it is not loaded")
+    # Real installations have up to a hundred of each.
+    installation_entries: int = _budget(
+        2_000, "TCPs, features, named lines, signals; variables", "an installation", "it is not loaded"
+    )
     # A program of 10,000 references among 500 nodes has half of it.
     reference_steps: int = _budget(
         10_000_000, "elements led past", "the references of a program", "it is not loaded"

@@ -15,7 +15,7 @@ from ur_emulator.errors import ProgramFileError
 from ur_emulator.models.cb3 import CB3
 from ur_emulator.programs.compiling import load_and_compile
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import load_installation
+from ur_emulator.programs.installation_files import load_installation
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.remote_procedures import ProgramRemotes
 from ur_emulator.servers.scripts.loop_network import LoopNetwork

@@ -16,7 +16,8 @@ from protocol.primary.messages import KeyMessage, PopupMessage, RuntimeException
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import EmulatorError, FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import ExternalControlPc, load_installation
+from ur_emulator.programs.installation import ExternalControlPc
+from ur_emulator.programs.installation_files import load_installation
 from ur_emulator.programs.loading import load_program, split_header
 from ur_emulator.programs.script_text import as_one_program
 

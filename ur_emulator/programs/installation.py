@@ -1,26 +1,19 @@
-"""Installations: the settings that programs need.
+"""Installation: what an installation file of PolyScope declares, as a frozen record.
 
-Only the PC of External Control is read; tool, payload, safety settings and names of lines are not.
-`default.installation` always exists, perhaps without settings, as on a new box.
+`installation_reader` makes it of a file. Names are those of PolyScope.
 """
 
 from __future__ import annotations
 
-import posixpath
-from dataclasses import dataclass
-from pathlib import PurePosixPath
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.programs.folder import WIRE_ROOTS, FoundFile, ProgramFolder
-from ur_emulator.programs.reading import ProgramReader
-from ur_emulator.programs.xml_tree import XmlTree
+from ur_emulator.controller.io.modbus_signals import SignalType
+from ur_emulator.controller.io.run_states import RunState
+from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6
 
-SUFFIX = ".installation"
-DEFAULT_NAME = "default" + SUFFIX
-# Contributor of a part of an installation. Source: a public generator of installations for CB3.
-_OWNER = "com.fzi.externalcontrol"
-# Longest name of a host. Source: RFC 1035.
-_MAX_HOST = 253
+STANDARD_GRAVITY = 9.82
+"""Acceleration of gravity that PolyScope writes [m/s^2]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,75 +34,153 @@ class ExternalControlPc:
 
 
 @dataclass(frozen=True, slots=True)
+class DeclaredPayload:
+    """The payload that is active when a program starts.
+
+    Attributes:
+        mass: [kg].
+        cog: centre of gravity in the flange frame [m]; None: not given, the controller takes the TCP.
+    """
+
+    mass: float = 0.0
+    cog: Vector3 | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """A pose or a plane that was taught.
+
+    Attributes:
+        pose: in the base frame [m, rotation vector in rad].
+        is_variable: programs have it as a global variable of its name.
+    """
+
+    pose: Vector6
+    is_variable: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OutputRule:
+    """An output that follows the program.
+
+    Attributes:
+        group: as in the names of builtins: "standard_digital", "configurable_digital", "tool_digital",
+            "standard_analog", "gp_boolean", "gp_integer", "gp_float".
+        index: of the output in its group.
+        state: what it does.
+    """
+
+    group: str
+    index: int
+    state: RunState
+
+
+@dataclass(frozen=True, slots=True)
+class DeclaredSignal:
+    """A Modbus signal of another unit.
+
+    Attributes:
+        name: as programs call it.
+        host: address of its unit.
+        slave: number of the unit behind that address.
+        address: of the coil or register.
+        type: what it is.
+        frequency: how often it is refreshed [Hz]; None: not given.
+        rule: what an output does when programs start and stop.
+        sequential: the unit takes one request at a time.
+    """
+
+    name: str
+    host: str
+    slave: int
+    address: int
+    type: SignalType
+    frequency: float | None = None
+    rule: RunState = RunState.KEEP
+    sequential: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SafetySettings:
+    """Limits of the safety configuration; None where the file gives none.
+
+    Attributes:
+        joint_speed: [rad/s].
+        reduced_joint_speed: in reduced mode [rad/s].
+        q_min: lower ends of the joint ranges [rad]; minus infinity where a joint has no limit.
+        q_max: upper ends [rad].
+    """
+
+    joint_speed: Vector6 | None = None
+    reduced_joint_speed: Vector6 | None = None
+    q_min: Vector6 | None = None
+    q_max: Vector6 | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StartUp:
+    """What the box does when it is switched on.
+
+    Attributes:
+        program: path of the program to load, from the programs folder on; "" for none.
+        start_line: name of the line that starts it; "" for none.
+        start_level: level of that line.
+    """
+
+    program: str = ""
+    start_line: str = ""
+    start_level: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Installation:
-    """An installation.
+    """An installation; without other values it is that of a new box.
 
     Attributes:
         wire_path: its name on the wire.
         pc: for External Control nodes that do not name one themselves.
+        pc_name: name of that PC, as the labels of its nodes show it.
+        tcps: name of each TCP -> its pose in the flange frame [m, rotation vector in rad].
+        active_tcp: name of the TCP that is active when a program starts.
+        payload: active when a program starts.
+        gravity: direction that is up, times the acceleration of gravity, in the base frame [m/s^2].
+        tool_voltage: supply of the tool [V].
+        analog_in_domains: of the standard inputs 0 and 1 and the tool's 0 and 1: 0 current, 1 voltage.
+        analog_out_domains: of the standard outputs 0 and 1.
+        input_actions: (group of inputs as in the names of builtins, index, action).
+        output_rules: outputs that follow the program.
+        transition_hardness: of safety transitions: 0 hard, 1 soft.
+        lines: name that somebody gave a line -> its own name, such as `digital_out[2]`.
+        features: by name, in the order of the file; base and tool are not among them.
+        variables: name -> value as a literal of URScript, in the order of the file.
+        modbus: signals of other units.
+        safe_home: joint angles [rad]; None if there are none.
+        safety: limits.
+        start_up: what the box does when it is switched on.
     """
 
     wire_path: str
-    pc: ExternalControlPc
+    pc: ExternalControlPc = ExternalControlPc()
+    pc_name: str = ""
+    tcps: Mapping[str, Vector6] = field(default_factory=dict)
+    active_tcp: str = ""
+    payload: DeclaredPayload = DeclaredPayload()
+    gravity: Vector3 = (0.0, 0.0, STANDARD_GRAVITY)
+    tool_voltage: int = 0
+    analog_in_domains: tuple[int, ...] = (1, 1, 1, 1)
+    analog_out_domains: tuple[int, ...] = (0, 0)
+    input_actions: tuple[tuple[str, int, str], ...] = ()
+    output_rules: tuple[OutputRule, ...] = ()
+    transition_hardness: int = 1
+    lines: Mapping[str, str] = field(default_factory=dict)
+    features: Mapping[str, Feature] = field(default_factory=dict)
+    variables: Mapping[str, str] = field(default_factory=dict)
+    modbus: tuple[DeclaredSignal, ...] = ()
+    safe_home: Vector6 | None = None
+    safety: SafetySettings = SafetySettings()
+    start_up: StartUp = StartUp()
 
-
-def load_installation(folder: ProgramFolder, name: str) -> Installation:
-    """Read an installation by the name that a client gives it.
-
-    Raises:
-        FileMissingError: there is none of that name.
-        ProgramFileError: it is not an installation.
-    """
-    return _read_installation(ProgramReader(folder), name)
-
-
-def _read_installation(reader: ProgramReader, name: str) -> Installation:
-    try:
-        file = reader.folder.find(name)
-    except FileMissingError:
-        if name.rpartition("/")[2].strip('"') != DEFAULT_NAME:
-            raise
-        return Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME), ExternalControlPc())
-    if file.inside.suffix != SUFFIX:
-        raise ProgramFileError(f"{file.name} is not an installation: its name must end in {SUFFIX}")
-    tree = reader.xml(file)
-    data: dict[str, str] = {}
-    for part in tree.root.iter("Contributed"):
-        if part.get("ownerId") == _OWNER:
-            data |= {item.get("key", ""): item.get("value", "") for item in part.iter("data")}
-    return Installation(file.wire_path, pc_from(data, tree.name))
-
-
-def installation_of(reader: ProgramReader, tree: XmlTree, program: FoundFile) -> Installation:
-    """Read the installation of a program: at its path from the program's folder, else by its name.
-
-    Raises:
-        ProgramFileError: there is none of that name, or the file is not an installation.
-    """
-    given = tree.root.get("installationRelativePath") or tree.root.get("installation") or ""
-    path = given.replace("\\", "/").removesuffix(SUFFIX) + SUFFIX if given else DEFAULT_NAME
-    for place in (PurePosixPath(program.wire_path).parent, WIRE_ROOTS[0]):
-        name = posixpath.normpath(place / path)
-        if reader.folder.has(name):
-            return _read_installation(reader, name)
-        path = PurePosixPath(path).name
-    if path == DEFAULT_NAME:
-        return _read_installation(reader, DEFAULT_NAME)
-    raise ProgramFileError(f"{tree.name} needs the installation {path}: put it beside the program")
-
-
-def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
-    """Return the PC in the data of a node or an installation. Keys: the source text of the URCap.
-
-    Raises:
-        ProgramFileError: the host is too long for a name, or the port is not a port number.
-    """
-    host = data.get("host_ip", "")
-    if len(host) > _MAX_HOST:
-        raise ProgramFileError(
-            f"{file_name}: the host of External Control has more than {_MAX_HOST} characters"
-        )
-    port = data.get("port_nr", "")
-    if port and not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 1 << 16):
-        raise ProgramFileError(f"{file_name}: port {port[:20]!r} of External Control is none of 1 to 65535")
-    return ExternalControlPc(host, int(port or 0))
+    @property
+    def tcp_offset(self) -> Vector6:
+        """Pose of the active TCP in the flange frame; the flange if there is none of that name."""
+        return self.tcps.get(self.active_tcp, ZERO6)

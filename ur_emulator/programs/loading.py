@@ -9,11 +9,8 @@ from pathlib import PurePosixPath
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import (
-    ExternalControlPc,
-    Installation,
-    installation_of,
-)
+from ur_emulator.programs.installation import ExternalControlPc, Installation
+from ur_emulator.programs.installation_files import installation_of
 from ur_emulator.programs.reading import ProgramReader
 from ur_emulator.programs.script_text import as_one_program
 from ur_emulator.programs.script_writer import Gap
@@ -119,4 +116,6 @@ def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
     if folder.has(saved) and not uses_external_control(tree):
         script = as_one_program(reader.script(folder.find(saved)), program_name)
         return LoadedProgram(file.wire_path, installation, (script,))
-    return LoadedProgram(file.wire_path, installation, make_script(file, tree, program_name, reader))
+    return LoadedProgram(
+        file.wire_path, installation, make_script(file, tree, program_name, reader, installation)
+    )

@@ -30,14 +30,30 @@ class ProgramReader:
         Raises:
             ProgramFileError: it cannot be read, is not XML, or the program becomes too large with it.
         """
+        return self.parsed(file.name, self.unpacked(file))
+
+    def unpacked(self, file: FoundFile) -> bytes:
+        """Read a file, packed or not.
+
+        Raises:
+            ProgramFileError: it cannot be read, or the program becomes too large with it.
+        """
         data = unpack(file.name, self.folder.read(file, self._bytes_left), self._bytes_left)
         self._bytes_left -= len(data)
+        return data
+
+    def parsed(self, name: str, data: bytes) -> XmlTree:
+        """Return the tree of an XML file.
+
+        Raises:
+            ProgramFileError: it is not XML, or the program becomes too large with it.
+        """
         self._marks_left -= count_marks(data)
         if self._marks_left < 0:
             raise ProgramFileError(
-                f"{file.name}: the program has more than {BUDGETS.program_marks} tags and attributes"
+                f"{name}: the program has more than {BUDGETS.program_marks} tags and attributes"
             )
-        return parse_xml(file.name, data, self._take_steps)
+        return parse_xml(name, data, self._take_steps)
 
     def script(self, file: FoundFile) -> str:
         """Read a text file, UTF-8 or else Latin-1.

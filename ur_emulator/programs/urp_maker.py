@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import FoundFile
+from ur_emulator.programs.installation import Installation
 from ur_emulator.programs.reading import ProgramReader
 from ur_emulator.programs.script_writer import ScriptWriter
 from ur_emulator.programs.urp_values import identifier
@@ -45,6 +46,7 @@ class Shared:
     Attributes:
         nodes: what writes each kind of node.
         reader: reads the files of the program.
+        installation: of the program: its TCPs, features, names of lines.
         writer: takes the script.
         subprograms: by the element that defines each, in the order of the first calls.
         names: of variables, functions and threads, so that each is unique; with the number tried last.
@@ -52,6 +54,7 @@ class Shared:
 
     nodes: Mapping[str, NodeWriter]
     reader: ProgramReader
+    installation: Installation
     writer: ScriptWriter = field(default_factory=ScriptWriter)
     subprograms: dict[Element, SubProgram] = field(default_factory=dict)
     names: dict[str, int] = field(default_factory=dict)

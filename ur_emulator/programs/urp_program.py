@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from ur_emulator.programs import urp_flow, urp_moves, urp_statements
 from ur_emulator.programs.folder import FoundFile
+from ur_emulator.programs.installation import Installation
 from ur_emulator.programs.reading import ProgramReader
 from ur_emulator.programs.script_writer import Gap
 from ur_emulator.programs.urp_maker import NodeWriter, Shared, UrpMaker
@@ -60,7 +61,9 @@ def uses_external_control(tree: XmlTree) -> bool:
     )
 
 
-def make_script(file: FoundFile, tree: XmlTree, name: str, reader: ProgramReader) -> tuple[str | Gap, ...]:
+def make_script(
+    file: FoundFile, tree: XmlTree, name: str, reader: ProgramReader, installation: Installation
+) -> tuple[str | Gap, ...]:
     """Return the script of a program and the gaps in it that are filled when it is played.
 
     Args:
@@ -68,11 +71,12 @@ def make_script(file: FoundFile, tree: XmlTree, name: str, reader: ProgramReader
         tree: its content.
         name: of the program in the script.
         reader: reads files that it refers to.
+        installation: of the program.
 
     Raises:
         ProgramFileError: a part of it is not known.
     """
-    maker = UrpMaker(file, tree, Shared(NODES, reader))
+    maker = UrpMaker(file, tree, Shared(NODES, reader, installation))
     writer = maker.writer
     main = tree.root.find("children/MainProgram")
     if main is None:

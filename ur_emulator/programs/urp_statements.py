@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ur_emulator.errors import FileMissingError
-from ur_emulator.programs.installation import pc_from
+from ur_emulator.programs.installation_reader import pc_from
 from ur_emulator.programs.script_writer import one_line
 from ur_emulator.programs.urp_maker import UrpMaker
 from ur_emulator.programs.urp_values import (

@@ -16,7 +16,8 @@ from ur_emulator.controller.safety.status_bits import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
 from ur_emulator.programs.compiling import Outcome, compile_loaded, load_and_compile
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import ExternalControlPc, Installation, load_installation
+from ur_emulator.programs.installation import ExternalControlPc, Installation
+from ur_emulator.programs.installation_files import load_installation
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.programs.external_control import request_program
 from ur_emulator.servers.steps import Steps

@@ -1,0 +1,203 @@
+"""Installations: what is read from their files, in the shapes of real ones."""
+
+from math import inf, pi
+
+import pytest
+from installation_support import (
+    MOUNTING,
+    NEW_PAYLOAD,
+    SAFETY,
+    TCP,
+    WIDE,
+    installation,
+    listed,
+    plane_feature,
+    pose_feature,
+)
+
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.io.modbus_signals import SignalType
+from ur_emulator.controller.io.run_states import RunState
+from ur_emulator.errors import ProgramFileError
+from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.programs.installation import DeclaredPayload, DeclaredSignal, Feature, OutputRule, StartUp
+from ur_emulator.programs.installation_files import NEW_BOX, load_installation
+
+
+def read(folder, *parts, variables=None):
+    (folder / "cell.installation").write_bytes(installation(*parts))
+    if variables is not None:
+        (folder / "cell.variables").write_bytes(variables)
+    return load_installation(ProgramFolder(folder), "cell.installation")
+
+
+def test_an_empty_installation_is_that_of_a_new_box(tmp_path):
+    empty = read(tmp_path)
+    assert empty.wire_path == "/programs/cell.installation"
+    assert (empty.payload, empty.gravity, empty.safety) == (NEW_BOX.payload, NEW_BOX.gravity, NEW_BOX.safety)
+    assert empty.tcp_offset == (0.0,) * 6
+
+
+def test_tcps_and_payload(tmp_path):
+    cell = read(tmp_path, TCP)
+    assert list(cell.tcps) == ["TCP", "Gripper"]
+    assert cell.tcp_offset == (0.0, 0.0, 0.12, 0.0, 0.0, 0.5)
+    assert cell.payload == DeclaredPayload(1.25, (0.0, 0.01, 0.05))
+    assert read(tmp_path, TCP, NEW_PAYLOAD).payload == DeclaredPayload(0.75, (0.0, 0.0, 0.04))
+    old = TCP.replace("TCPSettings", "com.ur.view.tcp.domain.TCPSettingsImpl").replace(
+        ' centerOfGravity="0.0, 0.01, 0.05"', ""
+    )
+    assert read(tmp_path, old).tcp_offset == cell.tcp_offset
+    assert read(tmp_path, old).payload == DeclaredPayload(1.25)
+
+
+def test_mounting(tmp_path):
+    assert read(tmp_path, f"<Features>{MOUNTING}</Features>").gravity == pytest.approx((0.0, 0.0, -9.82))
+    tilted = MOUNTING.replace(f'tiltAngle="{pi}"', f'tiltAngle="{pi / 2}"')
+    share = 9.82 / 2**0.5
+    assert read(tmp_path, f"<Features>{tilted}</Features>").gravity == pytest.approx(
+        (share, -share, 0.0), abs=1e-12
+    )
+
+
+def test_names_of_lines(tmp_path):
+    cell = read(
+        tmp_path,
+        "<IOs>",
+        listed("DigitalOutputNames", "", "", "pump", "", "", "", "", ""),
+        listed("ConfigurableInputNames", "door", *[""] * 7),
+        listed("ToolAnalogInputNames", "", "distance"),
+        "</IOs>",
+    )
+    assert cell.lines == {"pump": "digital_out[2]", "door": "config_in[0]", "distance": "analog_in[3]"}
+
+
+def test_actions_domains_and_tool(tmp_path):
+    cell = read(
+        tmp_path,
+        '<ToolCommSettings toolOutputVoltage="TWENTY_FOUR"/><SmoothTransitionSettings transitionHardness="HARD"/><IOs>',
+        listed("analogInputRange", 0, 1, 1, 0),
+        listed("analogOutputDomain", 1, 0),
+        listed("ToolDigitalInputActions", "NONE", "FREEDRIVE"),
+        listed("DigitalOutputActions", "NONE", "LOW_WHEN_PROGRAM_STOPPED", "PROGRAM_RUNNING"),
+        "</IOs>",
+    )
+    assert (cell.tool_voltage, cell.transition_hardness) == (24, 0)
+    assert (cell.analog_in_domains, cell.analog_out_domains) == ((0, 1, 1, 0), (1, 0))
+    assert cell.input_actions == (("tool_digital", 1, "FREEDRIVE"),)
+    assert cell.output_rules == (
+        OutputRule("standard_digital", 1, RunState.LOW_WHEN_STOPPED),
+        OutputRule("standard_digital", 2, RunState.HIGH_WHEN_RUNNING),
+    )
+
+
+@pytest.mark.parametrize(
+    "container",
+    ["Features", "GeomFeatures"],
+    ids=["as in most files", "as in 3.5, 3.12, 5.1, 5.7"],
+)
+def test_features(tmp_path, container):
+    table, corner = (0.3, -0.2, 0.1, 0.0, 0.0, 1.5), (0.1, 0.2, 0.3, 0.0, 0.0, 0.0)
+    # P1 to P2 is along the base's x, P3 in its x-y plane: y of the plane is x, z is up, x is y cross z.
+    points = ((0.1, 0.2, 0.3), (0.4, 0.2, 0.3), (0.1, 0.9, 0.3))
+    nodes = (
+        pose_feature("Table", table, is_variable=True)
+        + f"<SetupFeatureContainerNode>{pose_feature('Corner', corner)}</SetupFeatureContainerNode>"
+        + plane_feature("Plane", points)
+        + plane_feature("Below", points, has_points=True)
+    )
+    cell = read(tmp_path, f'<{container}><BaseView name="Base"/>{nodes}</{container}>')
+    assert list(cell.features) == ["Table", "Corner", "Plane", "Below"]
+    assert cell.features["Table"] == Feature(table, is_variable=True)
+    assert cell.features["Corner"] == Feature(corner)
+    assert cell.features["Plane"].pose == pytest.approx((0.1, 0.2, 0.3, 0.0, 0.0, pi / 2 - pi))
+    half_turn = pi / 2**0.5
+    assert cell.features["Below"].pose[:3] == (0.1, 0.2, 0.3)
+    assert cell.features["Below"].pose[3:] == pytest.approx((half_turn, half_turn, 0.0))
+
+
+def test_modbus_signals(tmp_path):
+    signal = (
+        '<ModbusSignal class="ModbusSignal" name="{}" type="{}" slaveAddress="255" updateFrequency="{}" '
+        'signalAddress="7" {}/>'
+    )
+    cell = read(
+        tmp_path,
+        '<ModbusUnits><Unit ipAddress="10.0.0.9" sequentialMode="false">',
+        signal.format("LAMP", "DIGITAL_OUTPUT", 5, 'setLowAtProgramStop="true"'),
+        signal.format("COUNT", "REGISTER_INPUT", -1, 'inputAction="NONE"'),
+        "</Unit></ModbusUnits>",
+    )
+    lamp, count = SignalType.DIGITAL_OUTPUT, SignalType.REGISTER_INPUT
+    assert cell.modbus == (
+        DeclaredSignal("LAMP", "10.0.0.9", 255, 7, lamp, 5.0, RunState.LOW_WHEN_STOPPED),
+        DeclaredSignal("COUNT", "10.0.0.9", 255, 7, count),
+    )
+
+
+def test_safety_limits(tmp_path):
+    safety = read(tmp_path, f"<SafetySettings>{SAFETY}</SafetySettings>").safety
+    assert safety.joint_speed[0] == 3.3415927
+    assert safety.reduced_joint_speed == (1.5, 1.5, 1.5, 3.0, 3.0, 3.0)
+    assert safety.q_max == pytest.approx((*(5 * [WIDE]), inf), abs=1e-6)
+    assert safety.q_min == pytest.approx((*(5 * [-WIDE]), -inf), abs=1e-6)
+
+
+def test_start_up_and_safe_home(tmp_path):
+    node = '<DefaultProgramSettings autoLoad="{}" fileName="sub/x.urp" nameOfSensorToAutoStartProgram="digital_in[6]" triggerValueToStartProgram="false"/>'
+    home = '<SafeHomeSettings enabled="true"><position value="0.0, -1.5, 0.0, -1.5, 0.0, 0.0"/></SafeHomeSettings>'
+    cell = read(tmp_path, node.format("true"), home)
+    assert cell.start_up == StartUp("sub/x.urp", "digital_in[6]", start_level=False)
+    assert cell.safe_home == (0.0, -1.5, 0.0, -1.5, 0.0, 0.0)
+    assert read(tmp_path, node.format("false")).start_up.program == ""
+
+
+def test_external_control(tmp_path):
+    node = (
+        '<Contributed ownerId="com.fzi.externalcontrol"><data key="host_ip" value="10.1.2.3"/>'
+        '<data key="port_nr" value="50010"/><data key="name" value="my pc"/></Contributed>'
+    )
+    cell = read(tmp_path, node)
+    assert (cell.pc.host, cell.pc.port, cell.pc_name) == ("10.1.2.3", 50010, "my pc")
+
+
+PROPERTIES = (
+    b"#\n#Tue Mar 02 10:11:12 CET 2021\ncount=7\nplace=p[0.1, 0.2, 0.3, 0, 3.14, 0]\nis\\u005fon=True\n"
+)
+VARIABLES = b'<InstallationVariables timestamp="1"><variable name="count" value="7" favourite="false"/><variable name="place" value="p[0.1, 0.2, 0.3, 0, 3.14, 0]"/><variable name="is_on" value="True"/></InstallationVariables>'
+
+
+@pytest.mark.parametrize("data", [PROPERTIES, VARIABLES], ids=["properties", "XML"])
+def test_variables(tmp_path, data):
+    cell = read(tmp_path, variables=data)
+    assert list(cell.variables.items()) == [
+        ("count", "7"),
+        ("place", "p[0.1, 0.2, 0.3, 0, 3.14, 0]"),
+        ("is_on", "True"),
+    ]
+
+
+MANY = "".join(f"v{i}=1\n" for i in range(BUDGETS.installation_entries + 1))
+SECTION = "[SafetyLimits Normal Joints]\nmaxJointSpeed = [1, 2]\n"
+
+
+@pytest.mark.parametrize(
+    ("parts", "variables", "problem"),
+    [
+        ([TCP.replace("0.0, 0.0, 0.12", "0.0, 0.12")], None, "offset of a TCP has 5 values, it needs 6"),
+        ([TCP.replace("1.25", "heavy")], None, "mass of the payload is 'heavy', a number is needed"),
+        ([listed("analogInputRange", 0, 1)], None, r"<analogInputRange> is \['0', '1'\], 4 of 0 and 1 are needed"),
+        ([f"<Features>{plane_feature('P', [(0, 0, 0)] * 3)}</Features>"], None, "points of a plane lie on a line"),
+        ([f"<SafetySettings>{SECTION}</SafetySettings>"], None, "maxJointSpeed of the safety settings has not six"),
+        ([], b"7a=1\n", "'7a' is not the name of a variable"),
+        ([], b"a=\n", "the value of a is not one line of text"),
+        ([], b"a=1\\n2\n", "the value of a is not one line of text"),
+        ([], MANY.encode(), "has 2001 variables of 2001 characters: at most 2000"),
+        ([], b"<Other/>", "is a <Other>, not <InstallationVariables>"),
+        ([listed("DigitalInputNames", *range(2001))], None, "more than 2000 TCPs, features, lines and signals"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_one_line(tmp_path, parts, variables, problem):
+    with pytest.raises(ProgramFileError, match=problem) as error:
+        read(tmp_path, *parts, variables=variables)
+    assert "\n" not in str(error.value)

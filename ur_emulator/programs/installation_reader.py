@@ -1,0 +1,362 @@
+"""From the tree of an installation file to the record.
+
+What a file does not give keeps the value of a new box. Source of all names and shapes: real installations of
+software 3.5 to 5.26.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from protocol.pose import T_to_pose
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.io.modbus_signals import SignalType
+from ur_emulator.controller.io.run_states import RunState
+from ur_emulator.errors import ProgramFileError
+from ur_emulator.models.robot_model import Vector3, Vector6, six
+from ur_emulator.programs.installation import (
+    STANDARD_GRAVITY,
+    DeclaredPayload,
+    DeclaredSignal,
+    ExternalControlPc,
+    Feature,
+    Installation,
+    OutputRule,
+    StartUp,
+)
+from ur_emulator.programs.safety_text import safety_settings
+from ur_emulator.programs.urp_values import number
+from ur_emulator.programs.xml_tree import XmlTree
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+# Contributor of a part of an installation. Source: the source text of the URCap.
+_EXTERNAL_CONTROL = "com.fzi.externalcontrol"
+# Longest name of a host. Source: RFC 1035.
+_MAX_HOST = 253
+# Element with the names of lines -> their own name, the index of the first.
+_LINE_NAMES = {
+    "DigitalInputNames": ("digital_in", 0),
+    "DigitalOutputNames": ("digital_out", 0),
+    "ConfigurableInputNames": ("config_in", 0),
+    "ConfigurableOutputNames": ("config_out", 0),
+    "ToolDigitalInputNames": ("tool_in", 0),
+    "ToolDigitalOutputNames": ("tool_out", 0),
+    "AnalogInputNames": ("analog_in", 0),
+    "ToolAnalogInputNames": ("analog_in", 2),
+    "AnalogOutputNames": ("analog_out", 0),
+    "GeneralPurposeBooleanRegisterInputNames": ("GP_bool_in", 0),
+    "GeneralPurposeBooleanRegisterOutputNames": ("GP_bool_out", 0),
+    "GeneralPurposeIntRegisterInputNames": ("GP_int_in", 0),
+    "GeneralPurposeIntRegisterOutputNames": ("GP_int_out", 0),
+    "GeneralPurposeFloatRegisterInputNames": ("GP_float_in", 0),
+    "GeneralPurposeFloatRegisterOutputNames": ("GP_float_out", 0),
+}
+# Element with the actions of inputs -> group in the names of builtins, number of lines.
+_INPUT_ACTIONS = {
+    "DigitalInputActions": ("standard_digital", 8),
+    "ConfigurableInputActions": ("configurable_digital", 8),
+    "ToolDigitalInputActions": ("tool_digital", 2),
+    "GeneralPurposeBooleanRegisterInputActions": ("gp_boolean", 64),
+}
+# Element with the actions of outputs -> group in the names of builtins, number of lines.
+_OUTPUT_ACTIONS = {
+    "DigitalOutputActions": ("standard_digital", 8),
+    "ConfigurableOutputActions": ("configurable_digital", 8),
+    "ToolDigitalOutputActions": ("tool_digital", 2),
+    "AnalogOutputActions": ("standard_analog", 2),
+    "GeneralPurposeBooleanRegisterOutputActions": ("gp_boolean", 64),
+    "GeneralPurposeIntRegisterOutputActions": ("gp_integer", 24),
+    "GeneralPurposeFloatRegisterOutputActions": ("gp_float", 24),
+}
+_RUN_STATES = {
+    "LOW_WHEN_PROGRAM_STOPPED": RunState.LOW_WHEN_STOPPED,
+    "HIGH_WHEN_PROGRAM_STOPPED": RunState.HIGH_WHEN_STOPPED,  # inferred
+    "PROGRAM_RUNNING": RunState.HIGH_WHEN_RUNNING,
+}
+_VOLTAGES = {"ZERO": 0, "TWELVE": 12, "TWENTY_FOUR": 24}
+_SIGNAL_TYPES = {kind.name: kind for kind in SignalType}
+
+
+def read_installation(tree: XmlTree, wire_path: str) -> Installation:
+    """Return what an installation file declares; its variables stand in another file.
+
+    Args:
+        tree: of the file.
+        wire_path: its name on the wire.
+
+    Raises:
+        ProgramFileError: a value makes no sense, or there are too many.
+    """
+    reader = _Reader(tree)
+    pc, pc_name = reader.external_control()
+    tcps, active_tcp = reader.tcps()
+    installation = Installation(
+        wire_path,
+        pc,
+        pc_name,
+        tcps,
+        active_tcp,
+        reader.payload(),
+        reader.gravity(),
+        reader.tool_voltage(),
+        reader.domains("analogInputRange", (1, 1, 1, 1)),
+        reader.domains("analogOutputDomain", (0, 0)),
+        reader.input_actions(),
+        reader.output_rules(),
+        0 if reader.attribute("SmoothTransitionSettings", "transitionHardness") == "HARD" else 1,
+        reader.line_names(),
+        dict(reader.features()),
+        {},
+        tuple(reader.signals()),
+        reader.safe_home(),
+        safety_settings(tree.name, reader.first["SafetySettings"].itertext())
+        if "SafetySettings" in reader.first
+        else Installation(wire_path).safety,
+        reader.start_up(),
+    )
+    entries = len(tcps) + len(installation.features) + len(installation.lines) + len(installation.modbus)
+    if entries > BUDGETS.installation_entries:
+        raise ProgramFileError(
+            f"{tree.name} has more than {BUDGETS.installation_entries} TCPs, features, lines and signals"
+        )
+    return installation
+
+
+def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
+    """Return the PC in the data of a node or an installation. Keys: the source text of the URCap.
+
+    Raises:
+        ProgramFileError: the host is too long for a name, or the port is not a port number.
+    """
+    host = data.get("host_ip", "")
+    if len(host) > _MAX_HOST:
+        raise ProgramFileError(
+            f"{file_name}: the host of External Control has more than {_MAX_HOST} characters"
+        )
+    port = data.get("port_nr", "")
+    if port and not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 1 << 16):
+        raise ProgramFileError(f"{file_name}: port {port[:20]!r} of External Control is none of 1 to 65535")
+    return ExternalControlPc(host, int(port or 0))
+
+
+class _Reader:
+    """Looks up the parts of one file.
+
+    Attributes:
+        first: the first element of each kind.
+    """
+
+    def __init__(self, tree: XmlTree) -> None:
+        self._tree = tree
+        self.first: dict[str, Element] = {}
+        for element in tree.root.iter():
+            self.first.setdefault(element.tag.rpartition(".")[2], element)
+
+    def attribute(self, kind: str, name: str) -> str:
+        """Return an attribute of the first element of a kind; "" without one."""
+        return self.first[kind].get(name, "") if kind in self.first else ""
+
+    def external_control(self) -> tuple[ExternalControlPc, str]:
+        data: dict[str, str] = {}
+        for part in self._tree.root.iter("Contributed"):
+            if part.get("ownerId") == _EXTERNAL_CONTROL:
+                data |= {item.get("key", ""): item.get("value", "") for item in part.iter("data")}
+        return pc_from(data, self._tree.name), data.get("name", "")
+
+    def tcps(self) -> tuple[dict[str, Vector6], str]:
+        settings = self.first.get("TCPSettings", self.first.get("TCPSettingsImpl"))
+        if settings is None:
+            return {}, ""
+        tcps = {
+            tcp.get("name", ""): self._six(tcp.get("offset"), "offset of a TCP")
+            for tcp in settings.iter("tcp")
+            if tcp.get("name")
+        }
+        return tcps, settings.get("activePose", "")
+
+    def payload(self) -> DeclaredPayload:
+        for payload in self._tree.root.iter("Payload"):
+            if payload.get("defaultPayload") == "true":
+                mass, cog = payload.get("mass"), payload.get("centerOfGravity")
+                break
+        else:
+            settings = self.first.get("TCPSettings", self.first.get("TCPSettingsImpl"))
+            if settings is None:
+                return DeclaredPayload()
+            mass, cog = settings.get("toolPayload"), settings.get("centerOfGravity")
+        return DeclaredPayload(
+            self._number(mass, "mass of the payload") if mass else 0.0,
+            self._three(cog, "centre of gravity") if cog else None,
+        )
+
+    def gravity(self) -> Vector3:
+        mounting = self.first.get("WorldtoMarshal")
+        if mounting is None:
+            return (0.0, 0.0, STANDARD_GRAVITY)
+        base = self._number(mounting.get("baseAngle", "0"), "angle of the base")
+        tilt = self._number(mounting.get("tiltAngle", "0"), "tilt of the base")
+        # The sign of y is seen; which of sine and cosine belongs to x is open: both were equal.
+        level = STANDARD_GRAVITY * math.sin(tilt)
+        return (level * math.cos(base), -level * math.sin(base), STANDARD_GRAVITY * math.cos(tilt))
+
+    def tool_voltage(self) -> int:
+        given = self.attribute("ToolCommSettings", "toolOutputVoltage")
+        return _VOLTAGES.get(given or self._tree.root.get("toolOutputVoltage", ""), 0)
+
+    def domains(self, kind: str, usual: tuple[int, ...]) -> tuple[int, ...]:
+        given = self._list(kind)
+        if not given:
+            return usual
+        if len(given) != len(usual) or not set(given) <= {"0", "1"}:
+            raise ProgramFileError(
+                f"{self._tree.name}: <{kind}> is {given[:8]}, {len(usual)} of 0 and 1 are needed"
+            )
+        return tuple(map(int, given))
+
+    def input_actions(self) -> tuple[tuple[str, int, str], ...]:
+        return tuple(
+            (group, index, action)
+            for kind, (group, count) in _INPUT_ACTIONS.items()
+            for index, action in enumerate(self._list(kind)[:count])
+            if action not in ("", "NONE")
+        )
+
+    def output_rules(self) -> tuple[OutputRule, ...]:
+        return tuple(
+            OutputRule(group, index, _RUN_STATES[action])
+            for kind, (group, count) in _OUTPUT_ACTIONS.items()
+            for index, action in enumerate(self._list(kind)[:count])
+            if action in _RUN_STATES
+        )
+
+    def line_names(self) -> dict[str, str]:
+        names: dict[str, str] = {}
+        for kind, (own, start) in _LINE_NAMES.items():
+            for index, name in enumerate(self._list(kind), start):
+                if name:
+                    names.setdefault(name, f"{own}[{index}]")
+        return names
+
+    def signals(self) -> Iterator[DeclaredSignal]:
+        for unit in self._tree.root.iter("Unit"):
+            for signal in unit.iter("ModbusSignal"):
+                kind = _SIGNAL_TYPES.get(signal.get("type", ""))
+                if kind is None:
+                    continue
+                frequency = self._number(signal.get("updateFrequency", "-1"), "frequency of a signal")
+                rule = _RUN_STATES.get(signal.get("outputAction", ""), RunState.KEEP)
+                if signal.get("setLowAtProgramStop") == "true":
+                    rule = RunState.LOW_WHEN_STOPPED
+                yield DeclaredSignal(
+                    signal.get("name", ""),
+                    unit.get("ipAddress", ""),
+                    int(self._number(signal.get("slaveAddress", "255"), "slave of a signal")),
+                    int(self._number(signal.get("signalAddress", "0"), "address of a signal")),
+                    kind,
+                    frequency if frequency >= 0.0 else None,
+                    rule,
+                    unit.get("sequentialMode") == "true",
+                )
+
+    def safe_home(self) -> Vector6 | None:
+        settings = self.first.get("SafeHomeSettings")
+        position = "" if settings is None else self._value(settings, "position")
+        return self._six(position, "safe home") if position else None
+
+    def start_up(self) -> StartUp:
+        settings = self.first.get("DefaultProgramSettings")
+        if settings is None:
+            return StartUp()
+        return StartUp(
+            settings.get("fileName", "") if settings.get("autoLoad") == "true" else "",
+            settings.get("nameOfSensorToAutoStartProgram", ""),
+            settings.get("triggerValueToStartProgram", "true") == "true",
+        )
+
+    # --- features
+
+    def features(self) -> Iterator[tuple[str, Feature]]:
+        container = self.first.get("Features", self.first.get("GeomFeatures"))
+        if container is not None:
+            yield from self._features_in(container, "", is_variable=False)
+
+    def _features_in(self, node: Element, name: str, *, is_variable: bool) -> Iterator[tuple[str, Feature]]:
+        """Yield the features in a node; a feature may stand in another node that has its name."""
+        for given in node:
+            child = self._tree.resolve(given)
+            inner_name = child.get("name") or name
+            variable = child.get("isVariable") == "true" or (is_variable and not child.get("isVariable"))
+            pose = self._pose_of(child)
+            if pose is not None and inner_name:
+                yield inner_name, Feature(pose, variable)
+            elif pose is None and given is child:
+                yield from self._features_in(child, inner_name, is_variable=variable)
+
+    def _pose_of(self, node: Element) -> Vector6 | None:
+        """Return the pose of a feature; None for a node that is none."""
+        if node.tag.endswith("GeomPlaneNode") and node.find("firstPoint") is not None:
+            return self._plane(node)
+        if not node.tag.endswith("GeomPoseNode"):
+            return None
+        position = self._value(node, "toolPosition")
+        if not position:
+            return None
+        return (
+            *self._three(position, "position of a feature"),
+            *self._three(self._value(node, "toolAxisAngle"), "rotation of a feature"),
+        )
+
+    def _plane(self, node: Element) -> Vector6:
+        p1, p2, p3 = (self._point(node, name) for name in ("firstPoint", "secondPoint", "thirdPoint"))
+        y, normal = p2 - p1, np.cross(p2 - p1, p3 - p1)
+        length, area = float(np.linalg.norm(y)), float(np.linalg.norm(normal))
+        if not (length > 0.0 and area > 0.0):
+            raise ProgramFileError(f"{self._tree.name}: the points of a plane lie on a line")
+        y, z = y / length, normal / (-area if node.get("userHasPoints") == "true" else area)
+        T_base_plane = np.eye(4)
+        T_base_plane[:3, :4] = np.column_stack((np.cross(y, z), y, z, p1))
+        return six(T_to_pose(T_base_plane))
+
+    def _point(self, node: Element, name: str) -> np.ndarray:
+        point = node.find(name)
+        inner = None if point is None else self._tree.resolve(point)
+        for element in () if inner is None else inner.iter():
+            position = self._value(element, "toolPosition")
+            if position:
+                return np.array(self._three(position, "point of a plane"))
+        raise ProgramFileError(f"{self._tree.name}: a plane has no <{name}>")
+
+    # --- values
+
+    def _value(self, element: Element, name: str) -> str:
+        """Return a list of an element: of its attribute, or of the child of that name."""
+        child = element.find(name)
+        if child is None:
+            return element.get(name, "")
+        return self._tree.resolve(child).get("value", "")
+
+    def _list(self, kind: str) -> list[str]:
+        given = self.attribute(kind, "value")
+        return [item.strip() for item in given.split(",")] if given else []
+
+    def _number(self, text: str | None, what: str) -> float:
+        return number(self._tree, text, what)
+
+    def _numbers(self, text: str | None, count: int, what: str) -> list[float]:
+        parts = (text or "").split(",")
+        if len(parts) != count:
+            raise ProgramFileError(f"{self._tree.name}: {what} has {len(parts)} values, it needs {count}")
+        return [self._number(part, what) for part in parts]
+
+    def _three(self, text: str | None, what: str) -> Vector3:
+        x, y, z = self._numbers(text, 3, what)
+        return (x, y, z)
+
+    def _six(self, text: str | None, what: str) -> Vector6:
+        return six(self._numbers(text, 6, what))
