@@ -1,8 +1,9 @@
-"""Warnings about arguments that a builtin refuses: constants of a wrong type, length or range."""
+"""Warnings about constant arguments: a type, length or range that a builtin refuses, or a wrong unit."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -11,11 +12,13 @@ from urscript.catalogue import Catalogue
 from urscript.catalogue.argument_checks import compile_check, fits, type_error
 from urscript.catalogue.types import Builtin, Param
 from urscript.errors import ScriptRuntimeError
-from urscript.lint.names import expressions_read
+from urscript.lint.names import Variable, expressions_read, owner
 from urscript.lint.rules import REFUSED_ARGUMENT, ScriptWarning
-from urscript.names.scopes import ResolvedProgram
+from urscript.lint.units import wrong_unit
+from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression
+from urscript.syntax.walk import all_statements
 from urscript.values import Pose
 
 
@@ -33,6 +36,7 @@ class KnownValue(NamedTuple):
 
 def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
     """Everything this module warns about, in no order; pure functions check their arguments themselves."""
+    constants = _constants(program)
     for scope, call in expressions_read(program):
         if not isinstance(call, nodes.Call) or scope.find_function(call.function) is not None:
             continue
@@ -40,9 +44,44 @@ def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterato
         if builtin is None or builtin.name in PURE:
             continue
         for param, argument in _arguments(call, builtin, catalogue):
-            message = _refused(builtin, param, argument)
+            known = _known_value(_value_of(argument, scope, constants))
+            if known is None:
+                continue
+            message = _refused(builtin, param, known)
             if message:
                 yield ScriptWarning(REFUSED_ARGUMENT, message, argument.span, program.source)
+            elif found := wrong_unit(param, known.value):
+                rule, text, hint = found
+                yield ScriptWarning(rule, f"{builtin.name}: {text}", argument.span, program.source, hint)
+
+
+def _constants(program: ResolvedProgram) -> dict[Variable, Expression]:
+    """The values of variables that are assigned once, with their elements."""
+    values: dict[Variable, Expression] = {}
+    assigned: Counter[Variable] = Counter()
+    for scope in program.scopes():
+        parameters = scope.node.parameters if scope.node is not None else ()
+        assigned.update((scope, parameter.name) for parameter in parameters)
+        for statement in all_statements(scope.body):
+            if not isinstance(statement, nodes.Assign):
+                continue
+            target: Expression = statement.target
+            while isinstance(target, (nodes.Subscript, nodes.Attribute)):
+                target = target.target
+            if isinstance(target, nodes.Name):
+                variable = (None, target.name) if statement.scope == "global" else owner(target.name, scope)
+                assigned[variable] += 1
+                values[variable] = statement.value
+    return {variable: value for variable, value in values.items() if assigned[variable] == 1}
+
+
+def _value_of(
+    expression: Expression, scope: FunctionScope, constants: Mapping[Variable, Expression]
+) -> Expression:
+    """The value of a variable that has only one; any other expression as it is."""
+    if isinstance(expression, nodes.Name):
+        return constants.get(owner(expression.name, scope), expression)
+    return expression
 
 
 def _arguments(
@@ -59,10 +98,7 @@ def _arguments(
             yield param, named[slot[1]]
 
 
-def _refused(builtin: Builtin, param: Param, argument: Expression) -> str | None:
-    known = _known_value(argument)
-    if known is None:
-        return None
+def _refused(builtin: Builtin, param: Param, known: KnownValue) -> str | None:
     if known.whole:
         try:
             compile_check(replace(builtin, params=(param,)))([known.value])

@@ -78,6 +78,16 @@ CALL_WITHOUT_HANDLE: Final = Rule(
 REFUSED_ARGUMENT: Final = Rule(
     "W116", "a builtin gets an argument that it refuses", "the call fails when it is reached"
 )
+DEGREES: Final = Rule(
+    "W117",
+    "an angle is too large for radians",
+    "angles are in radians and speeds of joints in rad/s; d2r(90) converts degrees",
+)
+MILLIMETRES: Final = Rule(
+    "W118",
+    "a length is too large for metres",
+    "positions are in metres and speeds of the tool in m/s; no arm reaches 3 m",
+)
 
 RULES: Final = (
     UNUSED_GLOBAL,
@@ -96,6 +106,8 @@ RULES: Final = (
     UNUSED_VALUE,
     CALL_WITHOUT_HANDLE,
     REFUSED_ARGUMENT,
+    DEGREES,
+    MILLIMETRES,
 )
 
 
