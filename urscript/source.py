@@ -36,6 +36,21 @@ def as_bytes(text: str) -> str:
     return text
 
 
+def program_text(content: bytes, name: str) -> str:
+    """Text of a program file as a controller receives it, without a byte order mark.
+
+    Args:
+        content: Of the file.
+        name: Of the file, for the message.
+
+    Raises:
+        ValueError: The file is UTF-16, as some editors of Windows save it; a controller cannot read that.
+    """
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")) or content[:2].count(0) == 1:
+        raise ValueError(f"{name} is UTF-16 text: a controller reads UTF-8, save it as that")
+    return content.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
+
+
 def as_utf8(text: str) -> str:
     """Text of a program for display: UTF-8 bytes are decoded."""
     try:

@@ -180,7 +180,7 @@ def test_the_log_goes_to_stderr_if_asked_for(tmp_path):
         "INFO Program: Starting program: f",
         "INFO Program: hello",
         "INFO Program: Program stopped: f",
-        "FAULT Program: Compile error: name 'nowhere' is not defined",
+        "FAULT Program: Compile error: name 'nowhere' is not defined (line 2, column 7)",
     ]
 
 

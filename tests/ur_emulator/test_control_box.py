@@ -298,13 +298,22 @@ def test_a_protective_stop_on_request(box):
 
 
 def test_a_program_that_does_not_compile_says_where(box):
-    with pytest.raises(ArgumentError, match="does not compile") as caught:
+    with pytest.raises(ArgumentError, match=r"does not compile.*\(line 2, column 7\)") as caught:
         box.run_program("def f():\n  x = = 1\nend\n")
     assert "\n" not in str(caught.value)
     with pytest.raises(ArgumentError, match="either"):
         box.run_program()
     with pytest.raises(ArgumentError, match="either"):
         box.run_program(MOVE, file="move")
+
+
+def test_a_program_file_in_utf_16_is_refused_as_that(box, tmp_path):
+    path = tmp_path / "windows.script"
+    path.write_text(MOVE, encoding="utf-16")
+    with pytest.raises(ArgumentError, match="is UTF-16 text"):
+        box.run_program(path)
+    path.write_text(MOVE, encoding="utf-8-sig")
+    box.run_program(path)
 
 
 def test_a_program_is_paused_resumed_and_stopped(box):

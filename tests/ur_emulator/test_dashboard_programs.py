@@ -114,10 +114,11 @@ def test_a_script_file_is_one_program(text, program):
     ("data", "problem"),
     [
         (b"x = 1\0", "is not text"),
+        ("x = 1".encode("utf-16"), "is UTF-16 text: a controller reads UTF-8, save it as that"),
         (b"#" * (5 << 20), "more than 4194304 bytes"),
         (b"#" * (40 << 20), "more than 4194304 bytes"),
     ],
-    ids=["zeros", "long", "huge"],
+    ids=["zeros", "utf-16", "long", "huge"],
 )
 def test_script_files_that_are_none(tmp_path, data, problem):
     (tmp_path / "p.script").write_bytes(data)

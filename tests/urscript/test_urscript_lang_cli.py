@@ -73,6 +73,16 @@ def test_wrong_use_exits_with_2(call, words):
     assert call(*words).exit_code == 2
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("command", ["check", "run", "fmt"])
+def test_a_file_in_utf_16_is_refused_as_that(tmp_path, command, encoding):
+    path = tmp_path / "windows.script"
+    path.write_text(GOOD, encoding=encoding)
+    result = CliRunner().invoke(app, [command, str(path)])
+    assert result.exit_code == 2
+    assert result.stderr == f"{path} is UTF-16 text: a controller reads UTF-8, save it as that\n"
+
+
 def test_the_software_version_decides_which_names_exist(call):
     late = "set_target_payload(1, [0,0,0])\n"
     assert call("check", late=late).exit_code == 1

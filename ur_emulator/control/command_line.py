@@ -19,6 +19,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.parameters import Kind, Parameter
 from ur_emulator.control.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
 from ur_emulator.control.operations import OPERATIONS, make
+from ur_emulator.control.program_run import read_script
 from ur_emulator.control.token import TOKEN_VARIABLE, check_token
 from ur_emulator.errors import ControlError, EmulatorError
 
@@ -120,7 +121,7 @@ def _arguments(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
     arguments: dict[str, Any] = {}
     for parameter in OPERATIONS[name].parameters:
         if (path := given.get(f"{parameter.name}_file")) is not None:
-            arguments[parameter.name] = Path(path).read_text(encoding="utf-8")
+            arguments[parameter.name] = read_script(Path(path))
         elif parameter.name in given:
             value = given[parameter.name]
             arguments[parameter.name] = parameter.parse(value if isinstance(value, str) else " ".join(value))

@@ -38,7 +38,7 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
-from ur_emulator.control.program_run import RunProgram
+from ur_emulator.control.program_run import RunProgram, read_script
 from ur_emulator.control.reading import AddToLog, ReadIdentity, ReadLog, ReadState
 from ur_emulator.control.waiting import WaitUntil
 from ur_emulator.errors import ArgumentError
@@ -56,7 +56,7 @@ def method(operation: Callable[P, Operation[R]]) -> Callable[Concatenate[BoxOper
         bound.apply_defaults()
         # Read here: the box must not wait for a disk.
         given = {
-            name: value.read_text(encoding="utf-8") if isinstance(value, Path) else value
+            name: read_script(value) if isinstance(value, Path) else value
             for name, value in bound.arguments.items()
         }
         result: Any = box._perform(call.__name__, given)

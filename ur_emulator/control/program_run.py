@@ -15,6 +15,21 @@ if TYPE_CHECKING:
     from ur_emulator.servers.steps import Steps
 
 
+def read_script(path: Path) -> str:
+    """Return the text of a program file of this machine.
+
+    Raises:
+        ArgumentError: it is UTF-16.
+        OSError: it cannot be read.
+    """
+    from urscript.source import as_utf8, program_text
+
+    try:
+        return as_utf8(program_text(path.read_bytes(), str(path)))
+    except ValueError as error:
+        raise ArgumentError(str(error)) from None
+
+
 class RunProgram(StepOperation[int]):
     """Run a program in place of the one that runs.
 

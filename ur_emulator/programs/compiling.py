@@ -38,7 +38,9 @@ def compile_text(
     except ScriptError as error:
         # Arguments are counted when the call runs, so that of a `sec` is one of its exceptions.
         secondary = is_secondary and isinstance(error, ScriptTypeError)
-        return ScriptFailed(error.line, error.column, error.wire_text, secondary, error.log_text)
+        # The log of a controller has the text only; people also want the place.
+        log_text = f"{error.log_text} (line {error.line}, column {error.column})"
+        return ScriptFailed(error.line, error.column, error.wire_text, secondary, log_text)
     compiled = program.compiled
     for count, limit, what in (
         (len(compiled.code), BUDGETS.program_code, "bytes when compiled"),

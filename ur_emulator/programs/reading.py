@@ -7,8 +7,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import FoundFile, ProgramFolder
 from ur_emulator.programs.xml_tree import XmlTree, count_marks, parse_xml, unpack
-
-_BYTE_ORDER_MARK = "\ufeff"
+from urscript.source import as_utf8, program_text
 
 
 class ProgramReader:
@@ -63,13 +62,13 @@ class ProgramReader:
         """
         data = self.folder.read(file, min(MAX_PROGRAM, self._bytes_left))
         self._bytes_left -= len(data)
-        if b"\0" in data:
-            raise ProgramFileError(f"{file.name} is not text: it has zero bytes")
         try:
-            text = data.decode("utf-8")
-        except UnicodeDecodeError:
-            text = data.decode("latin-1")
-        return text.removeprefix(_BYTE_ORDER_MARK).replace("\r\n", "\n")
+            text = program_text(data, file.name)
+        except ValueError as error:
+            raise ProgramFileError(str(error)) from None
+        if "\0" in text:
+            raise ProgramFileError(f"{file.name} is not text: it has zero bytes")
+        return as_utf8(text).replace("\r\n", "\n")
 
     def _take_steps(self, name: str, count: int) -> None:
         """Count elements that references have led past."""

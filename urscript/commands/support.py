@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from urscript.catalogue import Catalogue, catalogue_for
-from urscript.source import as_utf8
+from urscript.source import as_utf8, program_text
 
 STANDARD_INPUT: Final = Path("-")
 
@@ -37,11 +37,13 @@ def shown_name(file: Path) -> str:
 def read_program(file: Path) -> str:
     """A program as bytes are on the wire; a byte order mark is dropped."""
     try:
-        text = sys.stdin.buffer.read() if file == STANDARD_INPUT else file.read_bytes()
+        content = sys.stdin.buffer.read() if file == STANDARD_INPUT else file.read_bytes()
+        return program_text(content, shown_name(file))
     except OSError as error:
         typer.echo(f"cannot read {file}: {error.strerror}", err=True)
-        raise typer.Exit(2) from None
-    return text.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
+    except ValueError as error:
+        typer.echo(str(error), err=True)
+    raise typer.Exit(2)
 
 
 def echo_json(**document: Any) -> None:
