@@ -9,7 +9,9 @@ from dashboard_support import expression, external_control, script_line, urp
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc
+from ur_emulator.programs.installation_files import NEW_BOX
 from ur_emulator.programs.loading import load_program
+from ur_emulator.programs.script_header import header_lines
 from ur_emulator.programs.urp_program import NODES
 from urscript import compile_program
 
@@ -42,10 +44,12 @@ def script_of(folder, data, name="sample.urp"):
 def lines_of(folder, nodes, **options):
     """Return the statements that nodes become, without indentation, labels and comments that fill empty blocks."""
     lines = [line.strip() for line in script_of(folder, urp(nodes, **options)).splitlines()]
+    header = [line.strip() for line in header_lines(NEW_BOX)]
     assert (lines[0], lines[-1]) == ("def sample():", "end")
+    assert lines[1 : 1 + len(header)] == header
     return [
         line
-        for line in lines[1:-1]
+        for line in lines[1 + len(header) : -1]
         if not line.startswith("$") and line not in ("# nothing", "# sub-program")
     ]
 
@@ -197,6 +201,7 @@ def test_the_program_has_the_form_that_polyscope_gives_it(tmp_path):
     )
     assert script_of(tmp_path, urp("<Halt/>", once=False, around=around)).splitlines() == [
         "def sample():",
+        *(f"  {line}" for line in header_lines(NEW_BOX)),
         "  global count = 7",
         "  thread Watch():",
         "    # nothing",

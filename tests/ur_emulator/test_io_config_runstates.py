@@ -92,12 +92,13 @@ def test_euromap_outputs_follow_the_program_too():
     ]
 
 
-def test_listed_outputs_are_high_while_a_program_runs():
+def test_listed_outputs_are_low_while_no_program_runs():
     bench = Bench()
-    bench.start("def p():\n  set_runstate_outputs([1, 9])\n  while True:\n    sync()\n  end\nend\n")
+    both = "  set_standard_digital_out(1, True)\n  set_tool_digital_out(1, True)\n"
+    bench.start(f"def p():\n  set_runstate_outputs([1, 9])\n{both}  while True:\n    sync()\n  end\nend\n")
     assert bench.now.actual_digital_output_bits == 1 << 1 | 1 << 17
     bench.tick(1, StopProgram())
     assert bench.now.actual_digital_output_bits == 0
     bench.run("sec p():\n  set_runstate_outputs([])\nend\n")
-    bench.start(IDLE)
-    assert bench.now.actual_digital_output_bits == 0
+    bench.run(f"def p():\n{both}end\n")
+    assert bench.now.actual_digital_output_bits == 1 << 1 | 1 << 17

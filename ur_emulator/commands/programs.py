@@ -41,6 +41,20 @@ class StartProgram:
             box.programs.pause()
 
 
+@dataclass(frozen=True, slots=True)
+class SetUp:
+    """Run what makes an installation effective; unlike a program it needs no power.
+
+    Attributes:
+        program: a `sec`.
+    """
+
+    program: CompiledProgram
+
+    def apply(self, box: Box) -> None:
+        box.programs.start(self.program)
+
+
 class StopProgram(CommandOperation):
     """End the program, if one runs."""
 

@@ -12,8 +12,10 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import ExternalControlPc
+from ur_emulator.programs.installation import ExternalControlPc, Installation
+from ur_emulator.programs.installation_files import load_installation
 from ur_emulator.programs.loading import LoadedProgram, load_program
+from ur_emulator.programs.script_header import setup_script
 from urscript import CompiledProgram, compile_program
 from urscript.catalogue import Catalogue
 from urscript.errors import ScriptError, ScriptTypeError
@@ -68,12 +70,36 @@ def compile_loaded(
 
 
 def load_and_compile(
-    folder: ProgramFolder, name: str, catalogue: Catalogue
-) -> tuple[LoadedProgram, Outcome | None]:
+    folder: ProgramFolder, name: str, before: Installation, catalogue: Catalogue
+) -> tuple[LoadedProgram, Outcome | None, Outcome | None]:
     """Read a program and its installation, and compile it unless parts of it are fetched when it starts.
+
+    Args:
+        folder: of all programs.
+        name: as a client gives it.
+        before: installation that is effective.
+        catalogue: the builtins of the software.
+
+    Returns:
+        The program, what starts it, and what makes its installation effective; None if it is already.
 
     Raises:
         ProgramFileError: one of the files cannot be used.
     """
     loaded = load_program(folder, name)
-    return loaded, None if loaded.pcs else compile_loaded(loaded, {}, catalogue)
+    ready = None if loaded.pcs else compile_loaded(loaded, {}, catalogue)
+    return loaded, ready, _set_up(loaded.installation or before, before, catalogue)
+
+
+def load_installation_and_compile(
+    folder: ProgramFolder, name: str, before: Installation, catalogue: Catalogue
+) -> tuple[Installation, Outcome | None]:
+    """Read an installation; arguments, result and errors are those of `load_and_compile`."""
+    installation = load_installation(folder, name)
+    return installation, _set_up(installation, before, catalogue)
+
+
+def _set_up(installation: Installation, before: Installation, catalogue: Catalogue) -> Outcome | None:
+    if installation == before:
+        return None
+    return compile_text(setup_script(installation, before), catalogue, "installation", is_secondary=True)

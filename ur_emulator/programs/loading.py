@@ -10,12 +10,14 @@ from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation
-from ur_emulator.programs.installation_files import installation_of
+from ur_emulator.programs.installation_files import NEW_BOX, installation_of
 from ur_emulator.programs.reading import ProgramReader
+from ur_emulator.programs.script_header import header_lines
 from ur_emulator.programs.script_text import as_one_program
-from ur_emulator.programs.script_writer import Gap
+from ur_emulator.programs.script_writer import Gap, Header, Part
 from ur_emulator.programs.urp_program import ROOT, make_script, uses_external_control
 from ur_emulator.programs.urp_values import identifier
+from urscript.values import to_script_text
 
 SCRIPT_SUFFIX = ".script"
 PROGRAM_SUFFIX = ".urp"
@@ -31,12 +33,12 @@ class LoadedProgram:
     Attributes:
         wire_path: how the box calls its file, `/programs/sub/x.urp`.
         installation: of the program; a script file has none.
-        parts: its script, and gaps in it.
+        parts: its script, and places for what is known when it is played.
     """
 
     wire_path: str
     installation: Installation | None
-    parts: tuple[str | Gap, ...]
+    parts: tuple[Part, ...]
 
     @property
     def file_name(self) -> str:
@@ -63,6 +65,11 @@ class LoadedProgram:
         for part in self.parts:
             if isinstance(part, str):
                 texts.append(part)
+                continue
+            if isinstance(part, Header):
+                texts.extend(
+                    f"  {to_script_text(line)}" for line in header_lines(self.installation or NEW_BOX)
+                )
                 continue
             header, lines = split_header(received(part.pc))
             if part.pc not in headed:

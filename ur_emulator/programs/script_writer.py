@@ -26,15 +26,23 @@ class Gap:
     indent: str
 
 
+@dataclass(frozen=True, slots=True)
+class Header:
+    """A place for what the installation declares; its variables change while a program is loaded."""
+
+
+Part = str | Gap | Header
+
+
 class ScriptWriter:
     """The script so far.
 
     Attributes:
-        parts: texts of whole lines and gaps, in order.
+        parts: texts of whole lines, and places for others, in order.
     """
 
     def __init__(self) -> None:
-        self.parts: list[str | Gap] = []
+        self.parts: list[Part] = []
         self._depth = 0
         self._labels = 0
         self._size = 0

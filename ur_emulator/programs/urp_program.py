@@ -17,7 +17,7 @@ from ur_emulator.programs import urp_flow, urp_moves, urp_statements
 from ur_emulator.programs.folder import FoundFile
 from ur_emulator.programs.installation import Installation
 from ur_emulator.programs.reading import ProgramReader
-from ur_emulator.programs.script_writer import Gap
+from ur_emulator.programs.script_writer import Header, Part
 from ur_emulator.programs.urp_maker import NodeWriter, Shared, UrpMaker
 from ur_emulator.programs.urp_values import expression_text, variable_name
 from ur_emulator.programs.xml_tree import XmlTree
@@ -63,7 +63,7 @@ def uses_external_control(tree: XmlTree) -> bool:
 
 def make_script(
     file: FoundFile, tree: XmlTree, name: str, reader: ProgramReader, installation: Installation
-) -> tuple[str | Gap, ...]:
+) -> tuple[Part, ...]:
     """Return the script of a program and the gaps in it that are filled when it is played.
 
     Args:
@@ -82,6 +82,7 @@ def make_script(
     if main is None:
         raise maker.error("there is no <MainProgram> in it")
     with writer.block(f"def {name}():"):
+        writer.parts.append(Header())
         _write_first_values(maker)
         begin = len(writer.parts)
         threads = [urp_flow.write_thread(maker, node) for node in tree.root.findall("children/Thread")]
@@ -102,7 +103,7 @@ def make_script(
     return tuple(_joined(writer.parts))
 
 
-def _joined(parts: list[str | Gap]) -> Iterator[str | Gap]:
+def _joined(parts: list[Part]) -> Iterator[Part]:
     """Yield the texts between gaps whole."""
     for is_text, group in groupby(parts, lambda part: isinstance(part, str)):
         if is_text:

@@ -5,15 +5,23 @@ Software up to 5.12 writes Java properties, later software XML. Values are liter
 
 from __future__ import annotations
 
+import gzip
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from pathlib import PurePosixPath
+from typing import Any
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs.folder import FoundFile
+from ur_emulator.programs.folder import FoundFile, ProgramFolder
 from ur_emulator.programs.reading import ProgramReader
+from ur_emulator.programs.xml_tree import XmlTree, unpack
+from urscript.values import Pose
 
 SUFFIX = ".variables"
+# Source: files that boxes have written.
+_DECIMALS = 5
+_MOST_ITEMS, _DEEPEST = 64, 1
 _ROOT = "InstallationVariables"
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 # A key, then the first `=` or `:` that is not escaped. Source: java.util.Properties.
@@ -46,6 +54,46 @@ def read_variables(reader: ProgramReader, file: FoundFile) -> dict[str, str]:
     return variables
 
 
+def write_variables(folder: ProgramFolder, installation: str, values: Mapping[str, str]) -> None:
+    """Write values into the file beside an installation; its form and its other content stay.
+
+    Args:
+        folder: of all programs.
+        installation: its name on the wire.
+        values: name -> literal.
+
+    Raises:
+        ProgramFileError: the file cannot be read or written.
+    """
+    file = folder.find(str(PurePosixPath(installation).with_suffix(SUFFIX)))
+    raw = folder.read(file, BUDGETS.program_bytes)
+    data = unpack(file.name, raw, BUDGETS.program_bytes)
+    if data.lstrip().startswith(b"<"):
+        new = _new_xml(ProgramReader(folder).parsed(file.name, data), values)
+    else:
+        new = _new_properties(data, values)
+    folder.write(file.inside, new if data is raw else gzip.compress(new, mtime=0))
+
+
+def literal(value: Any, depth: int = 0) -> str:
+    """Return a value of a program as it stands in a file of variables; "" for what has no place there.
+
+    Numbers have five decimals, as in real files. Lists of more than 64 items or nested deeper than lists of
+    poses have no place: chosen, so that this takes little time.
+    """
+    if isinstance(value, float):
+        return repr(round(value, _DECIMALS))
+    if isinstance(value, bool | int):
+        return str(value)
+    if isinstance(value, str):
+        text = value.encode("latin-1").decode("utf-8", "replace")
+        return f'"{text}"' if text.isprintable() else ""
+    if isinstance(value, list | Pose) and len(value) <= _MOST_ITEMS and depth <= _DEEPEST:
+        items = [literal(item, depth + 1) for item in value]
+        return f"{'p' if isinstance(value, Pose) else ''}[{', '.join(items)}]" if all(items) else ""
+    return ""
+
+
 def _xml_items(reader: ProgramReader, file: FoundFile, data: bytes) -> Iterator[tuple[str, str]]:
     root = reader.parsed(file.name, data).root
     if root.tag != _ROOT:
@@ -62,4 +110,35 @@ def _properties(data: bytes) -> Iterator[tuple[str, str]]:
 
 
 def _unescaped(text: str) -> str:
-    return _ESCAPE.sub(lambda m: chr(int(m[1], 16)) if m[1] else _CONTROLS.get(m[2], m[2]), text)
+    plain = _ESCAPE.sub(lambda m: chr(int(m[1], 16)) if m[1] else _CONTROLS.get(m[2], m[2]), text)
+    return plain.encode("utf-16", "surrogatepass").decode("utf-16", "replace")  # pairs become characters
+
+
+def _new_xml(tree: XmlTree, values: Mapping[str, str]) -> bytes:
+    from xml.etree import ElementTree  # a slow import, which few boxes need
+
+    for variable in tree.root.iter("variable"):
+        variable.set("value", values.get(variable.get("name", ""), variable.get("value", "")))
+    data: bytes = ElementTree.tostring(tree.root, encoding="utf-8")
+    return data
+
+
+def _new_properties(data: bytes, values: Mapping[str, str]) -> bytes:
+    lines: list[str] = []
+    for line in data.decode("latin-1").splitlines():
+        match = None if line.lstrip().startswith(("#", "!")) else _PROPERTY.fullmatch(line)
+        name = _unescaped(match[1]) if match else ""
+        lines.append(f"{name}={_escaped(values[name])}" if name in values else line)
+    return "".join(f"{line}\n" for line in lines).encode("latin-1")
+
+
+def _escaped(text: str) -> str:
+    return "".join(
+        char if char.isascii() and char != "\\" else "".join(f"\\u{unit:04x}" for unit in _utf_16(char))
+        for char in text
+    )
+
+
+def _utf_16(char: str) -> Iterator[int]:
+    data = char.encode("utf-16-be", "replace")
+    return (int.from_bytes(data[i : i + 2]) for i in range(0, len(data), 2))

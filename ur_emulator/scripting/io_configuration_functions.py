@@ -96,7 +96,7 @@ def _runstates(configuration: IoConfiguration) -> dict[str, Function]:
                 raise ScriptRuntimeError(f"{builtin}: outputs are numbers from 0 to {len(names) - 1}")
             for i, (kind, index) in enumerate(names):
                 configuration.set_rule(
-                    kind, index, RunState.HIGH_WHEN_RUNNING if i in outputs else RunState.KEEP
+                    kind, index, RunState.LOW_WHEN_STOPPED if i in outputs else RunState.KEEP
                 )
 
         return set_list

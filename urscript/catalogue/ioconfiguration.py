@@ -141,7 +141,7 @@ _UNDOCUMENTED: tuple[Builtin, ...] = tuple(
         "None",
         "which outputs follow the program",
         support=APPROXIMATE,
-        note="listed outputs are high while a program runs",
+        note="listed outputs go low when the program stops; chosen: the others follow nothing",
         undocumented=(Generation.CB3, Generation.E_SERIES),
         source=source,
     )

@@ -6,18 +6,25 @@ Every action is done in steps (see `servers.steps`). What cannot be done is refu
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, NoReturn
 
 from protocol.ur_types import ProgramState, RobotMode
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetUp, StartProgram, StopProgram
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.safety.modes import MOVING_MODES
 from ur_emulator.controller.safety.status_bits import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
-from ur_emulator.programs.compiling import Outcome, compile_loaded, load_and_compile
+from ur_emulator.programs.compiling import (
+    Outcome,
+    compile_loaded,
+    load_and_compile,
+    load_installation_and_compile,
+)
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation
-from ur_emulator.programs.installation_files import load_installation
+from ur_emulator.programs.installation_files import NEW_BOX
+from ur_emulator.programs.variables_file import literal, write_variables
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.programs.external_control import request_program
 from ur_emulator.servers.steps import Steps
@@ -46,14 +53,14 @@ class ProgramPlayer:
     Attributes:
         folder: of all programs.
         loaded: the program, as it was in its file when it was loaded.
-        installation: the one that was loaded last; None is that of a new box.
+        installation: the one that was loaded last.
     """
 
     def __init__(self, access: BoxAccess, folder: ProgramFolder) -> None:
         self._access = access
         self.folder = folder
         self.loaded: LoadedProgram | None = None
-        self.installation: Installation | None = None
+        self.installation = NEW_BOX
         self._ready: Outcome | None = None
         self._catalogue = access.identity.software.catalogue
 
@@ -81,14 +88,14 @@ class ProgramPlayer:
         what = f"load {name}"
         self._must_be_stopped(what)
         try:
-            loaded, ready = yield from self._access.in_worker(
-                load_and_compile, self.folder, name, self._catalogue
+            loaded, ready, set_up = yield from self._access.in_worker(
+                load_and_compile, self.folder, name, self.installation, self._catalogue
             )
         except (EmulatorError, OSError) as error:
             self._refuse(what, error)
         self.loaded, self._ready = loaded, ready
-        self.installation = loaded.installation or self.installation
         self._access.note(f"Loaded program: {loaded.wire_path}")
+        yield from self._use(loaded.installation or self.installation, set_up)
         if isinstance(ready, ScriptFailed):
             self._access.note(f"{loaded.file_name} will not start: {ready.log_text or ready.text}")
 
@@ -97,10 +104,13 @@ class ProgramPlayer:
         what = f"load installation {name}"
         self._must_be_stopped(what)
         try:
-            self.installation = yield from self._access.in_worker(load_installation, self.folder, name)
+            installation, set_up = yield from self._access.in_worker(
+                load_installation_and_compile, self.folder, name, self.installation, self._catalogue
+            )
         except (EmulatorError, OSError) as error:
             self._refuse(what, error)
-        self._access.note(f"Loaded installation: {self.installation.wire_path}")
+        self._access.note(f"Loaded installation: {installation.wire_path}")
+        yield from self._use(installation, set_up)
 
     def play(self, client: str) -> Steps[None]:
         """Let a paused program go on, or start the loaded one from the top.
@@ -127,6 +137,8 @@ class ProgramPlayer:
         if self.is_paused:
             self._refuse("play", "a program is paused")
         yield from self._access.apply(StartProgram(program))
+        if self.installation.variables:
+            self._access.start_alone(self._keep_variables())
 
     def pause(self) -> Steps[None]:
         """Pause the program that plays, and end when the arm rests."""
@@ -152,6 +164,46 @@ class ProgramPlayer:
             yield
 
     # --- how
+
+    def _use(self, installation: Installation, set_up: Outcome | None) -> Steps[None]:
+        """Make an installation effective, and end when it is."""
+        self._declare(installation)
+        if isinstance(set_up, ScriptFailed):
+            text = set_up.log_text or set_up.text
+            self._access.note(f"{installation.wire_path} has no effect: {text}")
+        elif set_up is not None:
+            yield from self._access.apply(SetUp(set_up))
+
+    def _declare(self, installation: Installation) -> None:
+        """Take an installation; the loaded program begins with what it declares from the next start on."""
+        self.installation = installation
+        loaded = self.loaded
+        if loaded is not None and loaded.installation not in (None, installation):
+            self.loaded = replace(loaded, installation=installation)
+            self._ready = None
+
+    def _keep_variables(self) -> Steps[None]:
+        """Wait for the end of the program, then keep the values of the installation's variables."""
+        programs, installation = self._access.controller.programs, self.installation
+        run = programs.latest
+        while programs.is_running and programs.latest is run:
+            yield
+        if run is None or self.installation is not installation:
+            return
+        declared = set(run.program.declared_globals)
+        values = {
+            name: (literal(run.read_global(name)) if name in declared else "") or old
+            for name, old in installation.variables.items()
+        }
+        if values == installation.variables:
+            return
+        self._declare(replace(installation, variables=values))
+        try:
+            yield from self._access.in_worker(write_variables, self.folder, installation.wire_path, values)
+        except (EmulatorError, OSError) as error:
+            self._access.note(f"the variables of {installation.wire_path} are not saved: {error}")
+        else:
+            self._access.note(f"Saved the variables of {installation.wire_path}")
 
     def _must_be_stopped(self, what: str) -> None:
         if self._access.controller.programs.is_running:
@@ -179,9 +231,7 @@ class ProgramPlayer:
         if self._ready is not None:
             return self._ready
         received: dict[ExternalControlPc, str] = {}
-        default = ExternalControlPc(client, SCRIPT_SENDER_PORT)
-        if self.installation is not None:
-            default = self.installation.pc.over(default)
+        default = self.installation.pc.over(ExternalControlPc(client, SCRIPT_SENDER_PORT))
         for pc in loaded.pcs:
             received[pc] = yield from request_program(self._access.network, pc.over(default))
         return (yield from self._access.in_worker(compile_loaded, loaded, received, self._catalogue))

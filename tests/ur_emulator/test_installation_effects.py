@@ -1,0 +1,183 @@
+"""Installations: what they do to the box, to scripts that come of nodes, and what programs leave in them."""
+
+import gzip
+
+import pytest
+from box_support import MessageReader, connect
+from dashboard_support import Dashboard, script_line, urp
+from installation_support import TCP, installation, listed, pose_feature
+
+from protocol.primary.messages import TextMessage
+from ur_emulator.controller.io.modbus_signals import SignalType
+from ur_emulator.controller.io.run_states import RunState
+from ur_emulator.emulator import ControlBox
+from ur_emulator.models.robot_model import ZERO6
+from ur_emulator.programs.installation import (
+    DeclaredPayload,
+    DeclaredSignal,
+    Feature,
+    Installation,
+    OutputRule,
+)
+from ur_emulator.programs.script_header import header_lines, setup_script
+from urscript import compile_program
+
+LAMP = DeclaredSignal("LAMP", "10.0.0.9", 255, 7, SignalType.DIGITAL_OUTPUT, 5.0, RunState.LOW_WHEN_STOPPED)
+CELL = Installation(
+    "/programs/cell.installation",
+    tcps={"Gripper": (0.0, 0.0, 0.12, 0.0, 0.0, 0.5)},
+    active_tcp="Gripper",
+    payload=DeclaredPayload(1.25, (0.0, 0.01, 0.05)),
+    tool_voltage=24,
+    input_actions=(("tool_digital", 1, "FREEDRIVE"), ("standard_digital", 0, "START")),
+    output_rules=(
+        OutputRule("standard_digital", 1, RunState.LOW_WHEN_STOPPED),
+        OutputRule("standard_digital", 2, RunState.HIGH_WHEN_RUNNING),
+    ),
+    features={
+        "table": Feature((0.1, 0.2, 0.3, 0.0, 0.0, 0.0), is_variable=True),
+        "Box": Feature(ZERO6, is_variable=True),
+        "fixed": Feature(ZERO6),
+    },
+    variables={"count": "7", "names": '["a", "b"]'},
+    modbus=(LAMP,),
+)
+
+
+@pytest.fixture
+def box(tmp_path):
+    with ControlBox(pace="lockstep", port_base=None, seed=7, programs=tmp_path) as box:
+        yield box
+
+
+@pytest.fixture
+def dashboard(box):
+    with Dashboard(box) as dashboard:
+        yield dashboard
+
+
+def test_the_header_has_what_polyscope_writes():
+    lines = list(header_lines(CELL))
+    counter = next(line for line in lines if line.startswith("step_count_")).removesuffix(" = 0.0")
+    thread = "Step_Counter_Thread_" + counter.removeprefix("step_count_")
+    assert lines == [
+        "set_standard_analog_input_domain(0, 1)",
+        "set_standard_analog_input_domain(1, 1)",
+        "set_tool_analog_input_domain(0, 1)",
+        "set_tool_analog_input_domain(1, 1)",
+        "set_analog_outputdomain(0, 0)",
+        "set_analog_outputdomain(1, 0)",
+        "set_tool_voltage(24)",
+        "set_input_actions_to_default()",
+        'set_tool_digital_input_action(1, "freedrive")',
+        "set_runstate_standard_digital_outputs([1])",
+        "set_runstate_standard_digital_output_to_value(1, 1)",
+        "set_runstate_standard_digital_output_to_value(2, 3)",
+        "set_safety_mode_transition_hardness(1)",
+        "set_tcp(p[0.0, 0.0, 0.12, 0.0, 0.0, 0.5])",
+        "set_payload(1.25, [0.0, 0.01, 0.05])",
+        "set_gravity([0.0, 0.0, 9.82])",
+        f"{counter} = 0.0",
+        f"thread {thread}():",
+        "  while (True):",
+        f"    {counter} = {counter} + 1.0",
+        "    sync()",
+        "  end",
+        "end",
+        f"run {thread}()",
+        'modbus_add_signal("10.0.0.9", 255, 7, 1, "LAMP", False)',
+        'modbus_set_signal_update_frequency("LAMP", 5)',
+        'modbus_set_runstate_dependent_choice("LAMP",1)',
+        "global count=7",
+        'global names=["a", "b"]',
+        "global Box=p[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]",
+        "global table=p[0.1, 0.2, 0.3, 0.0, 0.0, 0.0]",
+    ]
+    compile_program("def p():\n" + "\n".join(lines) + "\nend\n")
+
+
+def test_an_installation_takes_back_what_the_one_before_has_set_up():
+    text = setup_script(Installation("/programs/default.installation"), CELL)
+    assert "  set_runstate_standard_digital_output_to_value(2, 0)\n" in text
+    assert '  modbus_delete_signal("LAMP")\n' in text
+    compile_program(text)
+
+
+@pytest.mark.parametrize("power", ["on", "off"])
+def test_an_installation_is_effective_when_it_is_loaded(box, dashboard, tmp_path, power):
+    (tmp_path / "cell.installation").write_bytes(
+        installation(TCP, "<IOs>", listed("DigitalOutputActions", "NONE", "PROGRAM_RUNNING"), "</IOs>")
+    )
+    if power == "off":
+        dashboard.ask("power off")
+    assert (
+        dashboard.ask("load installation cell.installation")
+        == "Loading installation: /programs/cell.installation"
+    )
+    state = box._box.controller.snapshot
+    assert (state.tcp_offset, state.payload, state.payload_cog) == (
+        (0.0, 0.0, 0.12, 0.0, 0.0, 0.5),
+        1.25,
+        (0.0, 0.01, 0.05),
+    )
+
+
+def test_a_program_takes_the_installation_that_it_names(box, dashboard, tmp_path):
+    (tmp_path / "cell.installation").write_bytes(
+        installation(
+            TCP, "<Features>", pose_feature("table", (0.5, 0, 0, 0, 0, 0), is_variable=True), "</Features>"
+        )
+    )
+    (tmp_path / "p.urp").write_bytes(urp(script_line("textmsg(table)"), installation="cell"))
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        assert dashboard.ask_all("load p.urp", "play") == [
+            "Loading program: /programs/p.urp",
+            "Starting program",
+        ]
+        assert reader.message(TextMessage).text == "p[0.5,0,0,0,0,0]"
+
+
+def test_an_installation_that_the_arm_cannot_bear_is_said(box, dashboard, tmp_path):
+    (tmp_path / "heavy.installation").write_bytes(installation(TCP.replace("1.25", "8.5")))
+    dashboard.ask("load installation heavy.installation")
+    dashboard.ask("running")
+    assert any("a payload of 8.5 kg is out of range" in entry.text for entry in box.log)
+
+
+# --- variables
+
+PROPERTIES = (
+    "#\n#Tue Mar 02 10:11:12 CET 2021\ncount=7\nplace=p[0.1, 0.2, 0.3, 0.0, 0.0, 0.0]\nother=[1, 2]\n"
+)
+XML = (
+    '<InstallationVariables timestamp="1"><variable name="count" value="7" favourite="false" />'
+    '<variable name="place" value="p[0.1, 0.2, 0.3, 0.0, 0.0, 0.0]" /><variable name="other" value="[1, 2]" />'
+    "</InstallationVariables>"
+)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("text", [PROPERTIES, XML], ids=["properties", "XML"])
+def test_variables_survive_a_run(box, dashboard, tmp_path, text, packed):
+    file = tmp_path / "cell.variables"
+    file.write_bytes(gzip.compress(text.encode()) if packed else text.encode())
+    (tmp_path / "cell.installation").write_bytes(installation())
+    nodes = script_line("count = count + 1") + script_line("place[0] = 1 / 3") + script_line("textmsg(count)")
+    (tmp_path / "p.urp").write_bytes(urp(nodes, installation="cell"))
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        dashboard.ask_all("load p.urp", "play")
+        assert reader.message(TextMessage).text == "8"
+        dashboard.until("programState", "STOPPED p.urp")
+        dashboard.until("play", "Starting program")
+        assert reader.message(TextMessage).text == "9"
+        dashboard.until("programState", "STOPPED p.urp")
+    expected = text.replace("7", "9").replace("0.1, 0.2", "0.33333, 0.2")
+    for _ in range(20_000):  # the worker process writes it
+        if sum("Saved the variables" in entry.text for entry in box.log) == 2:
+            break
+        dashboard.ask("running")
+    data = file.read_bytes()
+    saved = (gzip.decompress(data) if packed else data).decode()
+    assert saved == expected
