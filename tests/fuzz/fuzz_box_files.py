@@ -15,7 +15,7 @@ from ur_emulator.errors import ProgramFileError
 from ur_emulator.models.cb3 import CB3
 from ur_emulator.programs.compiling import load_and_compile
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation_files import load_installation
+from ur_emulator.programs.installation_files import NEW_BOX, load_installation
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.remote_procedures import ProgramRemotes
 from ur_emulator.servers.scripts.loop_network import LoopNetwork
@@ -44,7 +44,7 @@ def _in_folder(name, read):
 
 
 def _load_program(folder, name):
-    load_and_compile(folder, name, _CATALOGUE)
+    load_and_compile(folder, name, NEW_BOX, _CATALOGUE)
 
 
 class _Answers:
