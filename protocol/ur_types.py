@@ -179,7 +179,19 @@ class SoftwareVersion(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """TCP ports of one control box. Source: UR remote control overview; clients hard-code these numbers."""
+    """TCP ports of one control box. Source: UR remote control overview; clients hard-code these numbers.
+
+    Attributes:
+        modbus: Modbus TCP; 0 if it is not open.
+        dashboard: commands for programs, power and stops, a line each.
+        primary: states and all messages, ten a second; takes scripts.
+        secondary: states, ten a second; takes scripts.
+        realtime: frames, one a control cycle; takes scripts.
+        rtde: the variables that a client asks for, up to one package a control cycle.
+        primary_ro: as primary; takes nothing.
+        secondary_ro: as secondary; takes nothing.
+        realtime_ro: as realtime; takes nothing.
+    """
 
     modbus: int = 502
     dashboard: int = 29999

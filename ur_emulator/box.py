@@ -14,7 +14,7 @@ from protocol.primary.messages import ReportLevel
 from protocol.ur_types import RobotMode, simulated_serial
 from ur_emulator.box_log import LogEntry
 from ur_emulator.box_options import check_options, parse_pace, standard_ports
-from ur_emulator.control.operations import BoxOperations
+from ur_emulator.control.operations import BoxOperations, make
 from ur_emulator.control.runner import ENDED, OperationRunner
 from ur_emulator.control.step_operation import Context
 from ur_emulator.controller.command import Command, Done
@@ -179,7 +179,7 @@ class Box(BoxOperations):
             "seed": seed,
             "fidelity": fidelity,
         }
-        context = Context(self._access, player, time.monotonic, self._identity_now)
+        context = Context(self._access, player, time.monotonic, self._identity_now, make)
         self._operations = OperationRunner(self._loop, context)
         self._wanted_control_port = control_port
         if control_port is not None:

@@ -65,6 +65,8 @@ class Budgets:
 
     # --- control API ---
 
+    scheduled_commands: int = _budget(1000, "operations", "wait for their time in a box", "it is refused")
+
     control_clients: int = _budget(32, "clients", "a control port", "the most silent one is closed")
     # 64 KiB of JSON take up to 1 ms to be read; the longest program in the field has 50 kB.
     body_bytes: int = _budget(64 * KIB, "bytes", "a body", "it is refused with status 413")

@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
+import inspect
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
 from typing import Any
 
+from protocol.ur_types import Ports
+from ur_emulator.box import Box
 from ur_emulator.budgets import BUDGETS, KIB
 from ur_emulator.commands.operation import Operation
 from ur_emulator.commands.parameters import Kind, Parameter
+from ur_emulator.control.box_state import BoxState, Question
 from ur_emulator.control.http_client import DEFAULT_PORT
 from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.control.reading import ReadState
 from ur_emulator.control.token import TOKEN_VARIABLE
+
+
+def _attributes(described: type, names: Iterable[str]) -> Iterator[str]:
+    """The rows of a table of attributes, as the docstring of their class describes them."""
+    section = (inspect.getdoc(described) or "").partition("Attributes:\n")[2].partition("\n\n")[0]
+    texts = dict(re.findall(r"^    (\w+): (.*(?:\n     .*)*)", section, re.MULTILINE))
+    for name in names:
+        yield f"| `{name}` | {' '.join(texts[name].split()).rstrip('.')} |"
+
+
+def _fields(described: type[Any]) -> str:
+    """A table of all fields of a dataclass."""
+    rows = _attributes(described, (field.name for field in fields(described)))
+    return "\n".join(("| field | is |", "| -- | -- |", *rows))
+
 
 _INTRODUCTION = f"""\
 # The control API
@@ -33,13 +56,43 @@ In lockstep, time stands still while the box is not active. An operation still g
 effect that needs time (a push without duration, a wait for a condition) waits for a program or a
 move.
 
+`time.sleep` in a test has no meaning for a box in lockstep: an idle robot stands still during it, and
+a program may run for minutes of robot time. `wait_until` with a `time` lets the box go on until
+then, also an idle one. `at` does an operation in an exact cycle, so that every run of a test is the
+same; it lets no time pass, so several can be asked for before a program begins:
+
+```python
+def test_a_hand_in_the_way_stops_the_arm(ur_box):
+    begin = ur_box.state.time  # robot time, in seconds
+    ur_box.at(begin + 0.8, "push", {{"force": (0, 0, 250), "duration": 0.5}})
+    ur_box.run_program("movej([0.5, -1.5, -1.8, 0, 1.2, 1.5])\\n")
+    ur_box.wait_until(safety_mode="PROTECTIVE_STOP", steady=True)
+    stopped = ur_box.state.time
+    ur_box.wait_until(time=stopped + 6.0)  # a stop can be unlocked after five seconds
+    ur_box.unlock_protective_stop()
+```
+
 ## Python
 
 Methods raise `ArgumentError` for wrong arguments, `RefusedError` if the state of the box does not
 allow the operation (`WaitTimeoutError`, also a `TimeoutError`, if a wait times out), and
 `NotRunningError` if the box does not run. All are `EmulatorError`s with one line that says what to
 do. The methods return the number of the cycle.
-`box.log` is a tuple of all entries that are kept.
+`box.log` is a tuple of all entries that are kept. Beside the operations a box has:
+
+{
+    chr(10).join(
+        (
+            "| attribute | is |",
+            "| -- | -- |",
+            *_attributes(Box, ("host", "ports", "control_port", "port_base", "serial_number")),
+        )
+    )
+}
+
+The fields of `box.ports`:
+
+{_fields(Ports)}
 
 ## HTTP
 
@@ -99,6 +152,8 @@ def _section(name: str, operation: type[Operation[Any]]) -> str:
         lines += [_row(parameter) for parameter in operation.parameters]
         lines.append("")
     lines.append(f"Returns {operation.result}.\n")
+    if operation is ReadState:
+        lines += [_fields(BoxState), "\nEach of `questions`:\n", _fields(Question), ""]
     return "\n".join(lines)
 
 

@@ -9,6 +9,7 @@ from box_support import TIMEOUT, Bench, connect
 from control_support import control_box
 
 from ur_emulator import ControlBox
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.inputs import SetAnalogInput, SetDigitalInput
 from ur_emulator.commands.obstacles import RemoveObstacle
 from ur_emulator.commands.operator import AnswerRequest
@@ -514,3 +515,78 @@ def test_in_real_time_operations_work_as_well():
 def test_a_control_port_that_is_none_is_refused(port):
     with pytest.raises(EmulatorError, match=str(port)):
         ControlBox(control_port=port)
+
+
+# --- robot time
+
+
+def test_in_lockstep_time_passes_until_the_time_that_is_waited_for(box):
+    begin = box.state
+    assert box.wait_until(time=begin.time + 1.0).tick == begin.tick + 125
+    assert box.wait_until(time=begin.time).tick == begin.tick + 125  # has been
+    assert box.state.tick == begin.tick + 125
+
+
+def test_an_operation_acts_in_the_cycle_of_its_time(box):
+    now = box.state
+    level = {"group": "standard", "n": 3, "level": True}
+    tick = box.at(now.time + 0.5, "set_digital_input", level)
+    assert tick == now.tick + 63  # 62.5 cycles on
+    program = """def watch():
+  while not get_standard_digital_in(3):
+    sync()
+  end
+  textmsg("seen")
+end
+"""
+    box.run_program(program)
+    box.wait_until(log="seen")
+    assert [entry.tick for entry in box.log if entry.text == "seen"] == [tick]
+    assert box.wait_until(time=now.time + 0.5).digital_inputs["standard"][3]
+    assert f"set_digital_input at {now.time + 0.5:g} s: done" in [entry.text for entry in box.log]
+
+
+def test_operations_of_one_cycle_act_in_the_order_in_which_they_were_asked_for(box):
+    time = box.state.time + 0.1
+    for fraction in (0.1, 0.7, 0.4):
+        box.at(time, "set_speed", {"fraction": fraction})
+    assert box.wait_until(time=time).speed == 0.4
+
+
+def test_the_cycle_of_an_operation_does_not_depend_on_the_speed_of_the_machine():
+    def run():
+        with control_box(control_port=None) as box:
+            box.at(box.state.time + 0.6, "protective_stop")
+            box.run_program(MOVE)
+            return box.wait_until(safety_mode="PROTECTIVE_STOP", steady=True).q
+
+    assert run() == run()
+
+
+def test_an_operation_that_is_refused_at_its_time_stands_in_the_log(box):
+    time = box.state.time + 0.1
+    box.at(time, "resume_program")
+    box.wait_until(time=time)
+    (text,) = [entry.text for entry in box.log if "resume_program at" in entry.text]
+    assert "refused: there is no program to resume" in text
+
+
+def test_times_and_operations_that_cannot_be_are_refused_at_once(box):
+    now = box.state.time
+    for time, name, arguments, problem in (
+        (now, "protective_stop", None, "the time has passed"),
+        (now + 1, "dance", None, "there is no operation 'dance'"),
+        (now + 1, "wait_until", {"steady": True}, "does not act within one cycle"),
+        (now + 1, "push", {"force": 3}, "force 3 given"),
+        (now + 1, "push", {}, "push needs force"),
+    ):
+        with pytest.raises(ControlError, match=problem):
+            box.at(time, name, arguments)
+    with pytest.raises(RefusedError, match="too far ahead"):
+        box.wait_until(time=now + 4000)
+    assert box.state.time == now
+    for _ in range(BUDGETS.scheduled_commands):
+        tick = box.at(now + 1, "close_popups")
+    with pytest.raises(RefusedError, match="no more are taken"):
+        box.at(now + 1, "close_popups")
+    assert box.wait_until(time=now + 1).tick == tick

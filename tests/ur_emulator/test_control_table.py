@@ -23,7 +23,7 @@ from ur_emulator.plant.obstacles import SHAPES
 ROOT = Path(__file__).parents[2]
 EVERY = pytest.mark.parametrize("name", OPERATIONS)
 # A value of each kind that must fit, beside ranges.
-FITTING = {Kind.BOOLEAN: True, Kind.TEXT: "text", Kind.SCRIPT: "text", Kind.ANSWER: 7}
+FITTING = {Kind.BOOLEAN: True, Kind.TEXT: "text", Kind.SCRIPT: "text", Kind.ANSWER: 7, Kind.OBJECT: {"x": 1}}
 
 
 def fitting(parameter):
@@ -74,7 +74,7 @@ def test_no_method_is_without_an_operation():
 
 def test_conditions_are_those_of_wait_until():
     names = {p.name for p in OPERATIONS["wait_until"].parameters}
-    assert names == set(CONDITIONS) | {"log", "after", "timeout"}
+    assert names == set(CONDITIONS) | {"time", "log", "after", "timeout"}
 
 
 def test_the_shapes_of_obstacles_are_those_of_the_plant():

@@ -30,6 +30,7 @@ class Kind(Enum):
     SCRIPT = "URScript"
     VECTOR = "numbers"
     ANSWER = "true, false, number or text"
+    OBJECT = "JSON object"
 
 
 # Kinds of parameters by the type of their field, beside those that `_details_of` takes apart.
@@ -127,6 +128,8 @@ class Parameter:
                 return _or_text(int, text)
             case Kind.VECTOR:
                 return [_or_text(float, word) for word in text.replace(",", " ").split()]
+            case Kind.OBJECT:
+                return _or_text(json.loads, text)
             case Kind.ANSWER:
                 value = _or_text(json.loads, text)
                 return value if isinstance(value, bool | int | float | str) else text
@@ -151,6 +154,9 @@ class Parameter:
             case Kind.ANSWER:
                 fits = isinstance(value, bool) or _is_number(value) or _is_text(value, _LENGTHS[Kind.TEXT])
                 return value if fits else None
+            case Kind.OBJECT:
+                is_object = isinstance(value, Mapping) and all(isinstance(name, str) for name in value)
+                return dict(value) if is_object else None
 
     def _is_in_range(self, value: Any) -> bool:
         low, high = -inf if self.low is None else self.low, inf if self.high is None else self.high
@@ -202,6 +208,8 @@ def _details_of(annotation: Any) -> dict[str, Any]:
         return {"kind": Kind.VECTOR, "lengths": (len(arguments), len(arguments))}
     if origin is Sequence:
         return {"kind": Kind.VECTOR}
+    if origin is Mapping:
+        return {"kind": Kind.OBJECT}
     return {"kind": _KINDS[annotation]}
 
 

@@ -21,7 +21,13 @@ Levels = dict[str, tuple[bool, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question of a program: its number, the type of the answer (RequestedType), its text."""
+    """A question of a program.
+
+    Attributes:
+        id: its number, for `answer`.
+        kind: type of the answer: BOOLEAN, INTEGER, FLOAT, STRING, POSE or JOINT_VECTOR.
+        text: what is asked.
+    """
 
     id: int
     kind: str
@@ -35,13 +41,13 @@ class BoxState:
     Attributes:
         tick: number of the cycle.
         time: seconds since controller start.
-        robot_mode: name of a RobotMode.
-        safety_mode: name of a SafetyMode.
-        program_state: name of a ProgramState.
+        robot_mode: a name that `wait_until` lists, such as RUNNING.
+        safety_mode: a name that `wait_until` lists, such as NORMAL.
+        program_state: a name that `wait_until` lists, such as PLAYING.
         program: name of the program that runs, "" without one.
-        joint_modes: names of the JointModes.
+        joint_modes: of the six joints, such as RUNNING, IDLE or POWER_OFF.
         steady: nothing moves the arm and it stands still.
-        q: measured joint angles [rad].
+        q: measured joint angles, base to wrist 3 [rad].
         qd: measured joint speeds [rad/s].
         target_q: where the joints are asked to be [rad].
         tcp_pose: measured [m, rotation vector in rad].
@@ -50,8 +56,8 @@ class BoxState:
         speed: the speed slider, 0 to 1.
         payload: mass that the controller believes in [kg].
         payload_cog: its centre of gravity in the flange frame [m].
-        digital_inputs: levels by group.
-        digital_outputs: levels by group.
+        digital_inputs: levels of the groups standard (8), configurable (8) and tool (2).
+        digital_outputs: as digital_inputs.
         analog_inputs: of the box [V or A].
         analog_outputs: of the box [V or A].
         tool_analog_inputs: [V or A].

@@ -40,6 +40,7 @@ from ur_emulator.commands.safety import (
 )
 from ur_emulator.control.program_run import RunProgram, read_script
 from ur_emulator.control.reading import AddToLog, ReadIdentity, ReadLog, ReadState
+from ur_emulator.control.scheduling import At
 from ur_emulator.control.waiting import WaitUntil
 from ur_emulator.errors import ArgumentError
 
@@ -119,6 +120,7 @@ class BoxOperations:
     log = Reading(ReadLog, lambda box: box._log_entries())
     identity = Reading(ReadIdentity)
     wait_until = method(WaitUntil)
+    at = method(At)
     # --- inputs
     set_digital_input = method(SetDigitalInput)
     set_analog_input = method(SetAnalogInput)
@@ -167,11 +169,13 @@ for _name, _member in vars(BoxOperations).items():
 
 
 def make(name: str, arguments: Mapping[str, Any]) -> Operation[Any]:
-    """Return an operation as it was asked for; one of `OPERATIONS`.
+    """Return an operation as it was asked for.
 
     Raises:
-        ArgumentError: an argument does not fit, is missing, or has an unknown name.
+        ArgumentError: there is none of that name; an argument does not fit, is missing, or is not known.
     """
+    if name not in OPERATIONS:
+        raise ArgumentError(f"there is no operation {ascii(name)[:60]}: choose from {', '.join(OPERATIONS)}")
     rows = OPERATIONS[name].parameters
     known = [row.name for row in rows]
     for given in arguments:

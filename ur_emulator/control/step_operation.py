@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,12 +24,14 @@ class Context:
         player: loads and plays program files.
         clock: monotonic seconds.
         identity: returns the result of `identity`.
+        make: makes an operation of the table from its name and arguments; raises ArgumentError.
     """
 
     access: BoxAccess
     player: ProgramPlayer
     clock: Callable[[], float]
     identity: Callable[[], dict[str, Any]]
+    make: Callable[[str, Mapping[str, Any]], Operation[Any]]
 
 
 class StepOperation(Operation[R_co]):

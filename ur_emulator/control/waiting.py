@@ -39,13 +39,16 @@ CONDITIONS: dict[str, Callable[[Controller], object]] = {
 class WaitUntil(StepOperation[BoxState]):
     """Wait until all conditions hold at the end of a cycle, and return the state then.
 
-    In lockstep time stands still while nothing goes on: what would only come with time does not come.
+    In lockstep time stands still while nothing goes on: what would only come with time does not come. With
+    `time`, it passes until then.
     The program state is still STOPPED right after a port was sent a program.
 
     Raises:
         WaitTimeoutError: they did not all hold in time.
+        RefusedError: `time` is more than an hour ahead.
     """
 
+    time: float | None = parameter("the time of the robot, as in `state`, is reached", "s", 0.0, default=None)
     robot_mode: str | None = parameter(
         "the robot mode is this", choices=tuple(RobotMode.__members__), default=None
     )
@@ -67,16 +70,20 @@ class WaitUntil(StepOperation[BoxState]):
     def steps(self, context: Context) -> Steps[Any]:
         """Look after every cycle."""
         wanted = {name: value for name in CONDITIONS if (value := getattr(self, name)) is not None}
-        if not wanted and self.log is None:
+        if not wanted and self.log is None and self.time is None:
             raise ArgumentError("wait_until needs a condition, such as program_state STOPPED or steady true")
         log, controller = context.access.log, context.access.controller
         end = context.clock() + self.timeout
         after, seen = self.after, self.log is None
+        begin = 0 if self.time is None else controller.generation.tick_at(self.time)
+        context.access.wake_until(begin)
         while True:
             if not seen:
                 seen = any(str(self.log) in entry.text for entry in log.since(after))
                 after = max(after, log.count)
             missing = _unmet(controller, wanted) + ([] if seen else [f"no log entry with {self.log!r}"])
+            if controller.snapshot.tick < begin:
+                missing.append(f"time is {controller.snapshot.timestamp:g} s, not {self.time:g} s")
             if not missing:
                 return take_state(controller)
             if context.clock() >= end:

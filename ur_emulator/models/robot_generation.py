@@ -6,6 +6,7 @@ and ports and compiler get the tables of a software version from here. This modu
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
@@ -115,6 +116,10 @@ class RobotGeneration:
     def cycles(self, duration: float) -> int:
         """Return the number of cycles nearest to a duration [s]."""
         return round(duration * 1_000_000 / self.period_us)
+
+    def tick_at(self, time: float) -> int:
+        """Return the number of the first cycle that ends at a time of the controller [s], or later."""
+        return math.ceil(round(time * 1_000_000 / self.period_us, 3))
 
     def seconds(self, tick: int) -> float:
         """Return the seconds of so many cycles, without an accumulated rounding error."""

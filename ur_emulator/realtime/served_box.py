@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from functools import partial
+from heapq import heappop, heappush
 from typing import Any, Protocol
 
 from protocol.primary.messages import ReportLevel
@@ -25,6 +26,8 @@ from ur_emulator.realtime.pacing import Pacer, RealtimePacer
 # What was sent before one of these does not begin after it. The same goes for the word that unlocks a
 # protective stop: in it programs are refused, and the arm must not move by one that was too long to compile.
 _STOPS = (StopProgram, PowerOff, PressEmergencyStop)
+# How far ahead somebody may ask for a time [s]: a typing error must not keep a processor busy.
+LONGEST_WAIT = 3600.0
 
 
 class Publisher(Protocol):
@@ -70,6 +73,10 @@ class ServedBox:
         self._listeners: tuple[Callable[[Event], None], ...] = ()
         # By the name that replaces them, or by something that nothing else has.
         self._commands: dict[object, Command] = {}
+        # What is to act in a later cycle: its number, then the order in which they came.
+        self._scheduled: list[tuple[int, int, Command, Done]] = []
+        self._n_scheduled = 0
+        self._awake_until = 0
         self.stops = 0
         self.backlog: set[Any] = set()
         self._on_failure = on_failure
@@ -110,6 +117,36 @@ class ServedBox:
         self._commands.pop(name, None)
         self._commands[name] = Submitted(command, done or self._report_error)
 
+    def schedule(self, tick: int, command: Command, done: Done) -> None:
+        """Take a command for the cycle of that number; in lockstep it is no reason for time to pass.
+
+        Raises:
+            RefusedError: the cycle has passed, or too many commands wait.
+        """
+        now = self.controller.snapshot
+        if tick <= now.tick:
+            raise RefusedError(f"the time has passed: the robot is at {now.timestamp:g} s")
+        if len(self._scheduled) >= BUDGETS.scheduled_commands:
+            raise RefusedError(
+                f"{BUDGETS.scheduled_commands} operations wait for their time: no more are taken"
+            )
+        self._n_scheduled += 1
+        heappush(self._scheduled, (tick, self._n_scheduled, command, done))
+
+    def wake_until(self, tick: int) -> None:
+        """Let time pass until the cycle of that number, also in lockstep with nothing to do.
+
+        Raises:
+            RefusedError: it is too far ahead.
+        """
+        now, ahead = self.controller.snapshot, self.controller.generation.seconds(tick)
+        if ahead > now.timestamp + LONGEST_WAIT:
+            raise RefusedError(
+                f"{ahead:g} s is too far ahead: the robot is at {now.timestamp:g} s, "
+                f"{LONGEST_WAIT:g} s more are possible"
+            )
+        self._awake_until = max(self._awake_until, tick)
+
     def announce(self, event: Event) -> None:
         """Publish an event at once, outside of a cycle."""
         self.log.note(event, self.controller.snapshot.tick)
@@ -135,7 +172,12 @@ class ServedBox:
     @property
     def is_active(self) -> bool:
         """True while there is a reason for time to pass."""
-        return bool(self._commands) or self.controller.is_active
+        return bool(self._commands) or self._is_awake or self.controller.is_active
+
+    @property
+    def _is_awake(self) -> bool:
+        """True while somebody waits for a later cycle."""
+        return self.controller.snapshot.tick < self._awake_until
 
     @property
     def waits_outside(self) -> bool:
@@ -153,7 +195,8 @@ class ServedBox:
             self._given_up.clear()
             return False
         self._given_up &= self.backlog
-        return len(self._given_up) < len(self.backlog) and (bool(self._commands) or self.controller.is_busy)
+        wants_cycles = bool(self._commands) or self._is_awake or self.controller.is_busy
+        return len(self._given_up) < len(self.backlog) and wants_cycles
 
     def give_up_readers(self) -> None:
         """Wait no longer for clients that are behind, until they have caught up."""
@@ -180,6 +223,7 @@ class ServedBox:
             self._is_held = False
             self._publish(self.controller.snapshot, now)
         elif self._pacer.may_tick(now, self):
+            self._submit_due()
             commands, self._commands = self._commands, {}
             snapshot = self.controller.tick(commands.values())
             if now < self._pacer.publish_at:
@@ -197,6 +241,13 @@ class ServedBox:
         if self._repeats and now - self._last_frame >= self.controller.period_s:
             self._publish(self.controller.snapshot, now)
         return self._pacer.next_call(now)
+
+    def _submit_due(self) -> None:
+        """Add the commands that are scheduled for the cycle that begins."""
+        tick = self.controller.snapshot.tick + 1
+        while self._scheduled and self._scheduled[0][0] <= tick:
+            _, _, command, done = heappop(self._scheduled)
+            self.submit(command, done)
 
     def failed(self, error: Exception) -> None:
         """End this box after an error in a cycle; the loop may have others."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from ur_emulator.box_log import BoxLog
-from ur_emulator.controller.command import Command
+from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
@@ -77,6 +77,22 @@ class BoxAccess:
     def submit(self, command: Command) -> None:
         """Ask for something in the next cycle."""
         self._box.submit(command)
+
+    def schedule(self, tick: int, command: Command, done: Done) -> None:
+        """Ask for something in the cycle of that number.
+
+        Raises:
+            RefusedError: the cycle has passed, or too many commands wait.
+        """
+        self._box.schedule(tick, command, done)
+
+    def wake_until(self, tick: int) -> None:
+        """Let time pass until the cycle of that number, also in lockstep with nothing to do.
+
+        Raises:
+            RefusedError: it is too far ahead.
+        """
+        self._box.wake_until(tick)
 
     def announce(self, event: Event) -> None:
         """Publish an event that needs no cycle."""
