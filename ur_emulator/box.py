@@ -38,6 +38,7 @@ from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder
 from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.programs.player import ProgramPlayer
+from ur_emulator.servers.programs.start_up import start_up
 from ur_emulator.servers.realtime_port import RealtimePort
 from ur_emulator.servers.rtde_port import RtdePort
 from ur_emulator.servers.scripts.closed_ports import close_to_scripts, give_back
@@ -139,7 +140,8 @@ class Box(BoxOperations):
         self._intake = ProgramIntake(self._loop.tasks, software.catalogue, self._box)
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
-        player = ProgramPlayer(self._access, ProgramFolder(None if programs is None else Path(programs)))
+        folder = ProgramFolder(None if programs is None else Path(programs))
+        self._player = player = ProgramPlayer(self._access, folder)
         self._reports = ReportFolder(player.folder)
         states = StateEncoder(software, controller.state.arm)
         realtime, realtime_ro = (RealtimePort(software.realtime, intake) for intake in (self._intake, None))
@@ -247,6 +249,8 @@ class Box(BoxOperations):
         self.ports = dataclasses.replace(self.ports, **{MODBUS: 0, **numbers})
         self._loop.add(self._box)
         self._loop.tasks.start()
+        begin = start_up(self._access, self._player)
+        self._loop.call_soon_threadsafe(lambda: self._access.start_alone(begin), self._fail)
 
     def _wanted_numbers(self) -> dict[str, int]:
         """Numbers of the ports to open by name; 0 takes a free one."""

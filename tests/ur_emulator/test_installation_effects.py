@@ -181,3 +181,42 @@ def test_variables_survive_a_run(box, dashboard, tmp_path, text, packed):
     data = file.read_bytes()
     saved = (gzip.decompress(data) if packed else data).decode()
     assert saved == expected
+
+
+# --- start-up
+
+
+def start_up(line="digital_in[6]", level="true"):
+    return (
+        f'<DefaultProgramSettings autoLoad="true" fileName="sub/p.urp" nameOfSensorToAutoStartProgram="{line}" '
+        f'triggerValueToStartProgram="{level}"/>'
+    )
+
+
+@pytest.mark.parametrize(("line", "level"), [("digital_in[6]", True), ("digital_in[6]", False), ("go", True)])
+def test_the_default_installation_loads_a_program_that_a_line_starts(tmp_path, line, level):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "p.urp").write_bytes(urp(script_line('textmsg("started")')))
+    names = listed("DigitalInputNames", *[""] * 6, "go", "")
+    (tmp_path / "default.installation").write_bytes(installation(start_up(line, str(level).lower()), names))
+    with (
+        ControlBox(pace="lockstep", port_base=None, programs=tmp_path) as box,
+        Dashboard(box) as dashboard,
+        connect(box, "primary") as sock,
+    ):
+        reader = MessageReader(sock)
+        dashboard.until("get loaded program", "Loaded program: /programs/sub/p.urp")
+        for state in (not level, level):
+            box.set_digital_input("standard", 6, state)
+            dashboard.ask_all("running", "running")
+        assert reader.message(TextMessage).text == "started"
+
+
+def test_a_start_line_that_is_no_input_is_said(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "p.urp").write_bytes(urp(script_line("x = 1")))
+    (tmp_path / "default.installation").write_bytes(installation(start_up("digital_in[9]")))
+    with ControlBox(pace="lockstep", port_base=None, programs=tmp_path) as box, Dashboard(box) as dashboard:
+        dashboard.until("get loaded program", "Loaded program: /programs/sub/p.urp")
+        dashboard.ask("running")
+        assert any("'digital_in[9]': it is no digital input" in entry.text for entry in box.log)
