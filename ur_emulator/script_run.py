@@ -87,7 +87,7 @@ class ScriptBox:
     def run(self, program: CompiledProgram, limit: float, report: Callable[[Report], None]) -> RunEnd:
         """Run a program to its end and the arm to rest; see urscript.robot.ScriptRobot."""
         run = _Run(self._controller, self._loop, self._answers, limit, report)
-        run.submit(StartProgram(program))
+        run.submit(StartProgram(program, loaded=True))
         self._loop.add(run)
         try:
             self._loop.run()

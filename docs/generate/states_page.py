@@ -31,12 +31,14 @@ _P = ProgramState
 # What `scripting.program_slot` does; a test takes every transition.
 PROGRAM_TRANSITIONS: tuple[ProgramTransition, ...] = (
     ProgramTransition(_P.STOPPED, "a program is started", _P.PLAYING),
-    ProgramTransition(_P.PLAYING, "pause, protective stop, safeguard stop", _P.PAUSING),
+    ProgramTransition(_P.PLAYING, "pause, safeguard stop; protective stop, if it was loaded", _P.PAUSING),
     ProgramTransition(_P.PAUSING, "the arm rests", _P.PAUSED),
     ProgramTransition(_P.PAUSED, "resume, safeguard closed", _P.RESUMING),
     ProgramTransition(_P.PAUSING, "resume, safeguard closed", _P.RESUMING),
     ProgramTransition(_P.RESUMING, "the arm is on its path", _P.PLAYING),
-    ProgramTransition(_P.PLAYING, "end, stop, emergency stop, violation, fault, in motion", _P.STOPPING),
+    ProgramTransition(
+        _P.PLAYING, "end, stop, emergency or protective stop, violation, fault, in motion", _P.STOPPING
+    ),
     ProgramTransition(_P.PLAYING, "any of them at rest, power off", _P.STOPPED),
     ProgramTransition(_P.PAUSING, "stop, emergency stop, violation, fault, in motion", _P.STOPPING),
     ProgramTransition(_P.PAUSING, "any of them at rest, power off", _P.STOPPED),
@@ -110,8 +112,9 @@ _PROGRAM = """
 ## Program state
 
 A program is started or resumed only while the robot is RUNNING and in NORMAL, REDUCED or RECOVERY;
-otherwise a runtime exception on port 30001 gives the reason and the remedy. A program that was
-paused by a protective stop stays paused after the stop is unlocked.
+otherwise a runtime exception on port 30001 gives the reason and the remedy. A protective stop ends
+a program that came through a socket, and closes the program's sockets. It pauses a program that was
+loaded and played; that one stays paused after the stop is unlocked.
 """
 
 

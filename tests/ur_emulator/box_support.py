@@ -127,8 +127,8 @@ class Bench:
             self.events += self.controller.state.events.take()
         return self.now
 
-    def start(self, text):
-        return self.tick(1, StartProgram(compile_program(text)))
+    def start(self, text, *, loaded=False):
+        return self.tick(1, StartProgram(compile_program(text), loaded=loaded))
 
     def run(self, text, limit=5000):
         """Run a program to its end and the arm to rest; return the texts it printed."""

@@ -61,7 +61,7 @@ class ChunkRun:
             if cycle < 0:
                 self._tick_if(act(self.bench, self.catalogue, action))
         actions = [action for action in actions if action[0] >= 0]
-        self._tick(0, [StartProgram(program)])
+        self._tick(0, [StartProgram(program, loaded=self.chunk.loaded)])
         if actions and actions[0][0] == 0:
             raise AssertionError(f"{self.chunk}: use #do for what comes before the program")
         self.cycles = 1

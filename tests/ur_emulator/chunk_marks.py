@@ -24,6 +24,7 @@ Chunks stand apart by a line `---`; lines count from the first of the chunk. A l
     what the box is and what is done to it
     #fidelity typical   ideal, if not given
     #seed 3             7, if not given
+    #loaded             the program was loaded from a file; otherwise it came through a socket
     #do ACTION          before the program starts
     #at 5 ACTION        before cycle 5 of the program
     #then PROGRAM       a one-line program that runs after the last one has ended
@@ -44,8 +45,8 @@ from ast import literal_eval
 from dataclasses import dataclass, field
 
 _MARK = re.compile(
-    r"#(\d*>|!|sec!|~|event|life|cycles|paused|state|sent|called|modbus|custom|fidelity|seed|do|at|then|answer|peer|reply"
-    r"|rpc|software)(?: (.*))?$"
+    r"#(\d*>|!|sec!|~|event|life|cycles|paused|state|sent|called|modbus|custom|fidelity|seed|loaded|do|at|then|answer|peer"
+    r"|reply|rpc|software)(?: (.*))?$"
 )
 
 
@@ -70,6 +71,7 @@ class BoxChunk:
     custom: list[str] = field(default_factory=list)
     fidelity: str = "ideal"
     seed: int = 7
+    loaded: bool = False
     actions: list[tuple[int, str]] = field(default_factory=list)
     then: list[str] = field(default_factory=list)
     answers: list[str] = field(default_factory=list)
@@ -144,6 +146,8 @@ def _take(chunk, kind, rest):
             chunk.fidelity = rest
         case "seed":
             chunk.seed = int(rest)
+        case "loaded":
+            chunk.loaded = True
         case "do":
             chunk.actions.append((-1, rest))
         case "at":

@@ -18,7 +18,7 @@ SECOND = RobotGeneration(
     major=5,
     default_version="5.1.0",
     builds=((SoftwareVersion(5, 0), 77, datetime(2031, 2, 3)),),
-    limits=SafetyLimits(reduced_share=0.25, recovery_speed=0.1, acceleration=55.0),
+    limits=SafetyLimits(reduced_share=0.25, recovery_speed=0.1, speed_margin=0.1, acceleration=55.0),
     fidelities=tuple(
         replace(it, dead_time=it.dead_time + 0.004, force_sigma=0.15)
         for it in CB3.fidelities

@@ -64,10 +64,10 @@ ENTRY = {
 }
 
 
-def moving(**kwargs):
+def moving(*, loaded=False, **kwargs):
     """A bench whose arm is moving for ever."""
     bench = Bench(**kwargs)
-    bench.start(ENDLESS)
+    bench.start(ENDLESS, loaded=loaded)
     bench.tick(60)
     assert any(bench.now.target_qd)
     return bench

@@ -333,12 +333,19 @@ def test_a_program_is_paused_resumed_and_stopped(box):
     box.stop_program()
 
 
-def test_a_paused_program_stays_so_while_the_robot_is_stopped(box):
-    box.run_program(LOOP)
-    box.protective_stop()
-    box.wait_until(program_state="PAUSED")
-    with pytest.raises(RefusedError, match="stays paused"):
-        box.resume_program()
+def test_a_program_that_is_played_is_paused_by_a_protective_stop_and_one_that_is_sent_ends(tmp_path):
+    (tmp_path / "loop.script").write_text(LOOP)
+    with control_box(programs=tmp_path) as box:
+        box.run_program(file="loop.script")
+        box.protective_stop()
+        box.wait_until(program_state="PAUSED")
+        with pytest.raises(RefusedError, match="stays paused"):
+            box.resume_program()
+        box.stop_program()
+        box.unlock_protective_stop()
+        box.run_program(LOOP)
+        box.protective_stop()
+        box.wait_until(program_state="STOPPED")
 
 
 def test_a_secondary_program_runs_beside_the_other(box):

@@ -153,7 +153,7 @@ def test_a_velocity_beyond_the_joint_limit_is_a_protective_stop(bench):
     bench.start("def f():\n  while True:\n    speedj([50,0,0,0,0,0], 40.0, get_steptime())\n  end\nend\n")
     bench.tick(60)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
-    assert bench.now.runtime_state == ProgramState.PAUSED
+    assert bench.now.runtime_state == ProgramState.STOPPED
     assert max(abs(s.target_qd[0]) for s in bench.snapshots) < 3.6
     assert bench.now.target_qd == (0.0,) * 6
     assert any(isinstance(e, ErrorReported) and e.code == 204 for e in bench.events)

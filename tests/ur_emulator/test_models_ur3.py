@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from math import hypot, pi
+from math import hypot, pi, radians
 
 import mujoco
 import numpy as np
@@ -26,8 +26,11 @@ def test_moving_mass_is_that_of_the_vendor_table():
 def test_limits_are_the_published_ones():
     assert UR3.tau_max == (56, 56, 28, 12, 12, 12)
     assert UR3.qd_max == (pi, pi, pi, 2 * pi, 2 * pi, 2 * pi)
-    assert UR3.q_min == (-2 * pi,) * 6
-    assert UR3.q_max == (2 * pi,) * 6
+    assert UR3.qd_safety == pytest.approx([radians(191.5)] * 3 + [radians(371.5)] * 3, abs=1e-3)
+    assert UR3.q_max[:5] == pytest.approx([radians(363)] * 5)
+    assert UR3.q_min[:5] == pytest.approx([-radians(363)] * 5)
+    assert UR3.q_max[5] > 1e9  # wrist 3 turns without end
+    assert UR3.q_min[5] < -1e9
     assert (UR3.robot_type, UR3.generation.robot_subtype, UR3.box_type) == (3, 2, 6)
 
 

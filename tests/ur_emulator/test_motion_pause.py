@@ -101,7 +101,9 @@ def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_as
     assert TOOL.pose(motion.target.q) == pytest.approx(at(0.06, 0.05, -0.03, 0.2, 0.1, 0.3), abs=1e-9)
 
 
-@pytest.mark.parametrize("stream", [SpeedJ((0.5,) * 6, 2.0), ServoJ((0.5, *HOME[1:]), 0.1, 300.0)])
+@pytest.mark.parametrize(
+    "stream", [SpeedJ((0.5,) * 6, 2.0), ServoJ((0.5, *HOME[1:]), 0.1, 300.0, (3.0,) * 6)]
+)
 def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(stream):
     motion = ArmMotion(HOME, 20.0)
     motion.command("me", stream)

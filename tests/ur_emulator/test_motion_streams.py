@@ -15,6 +15,8 @@ from ur_emulator.motion.servo_j import LOST_DECELERATION, ServoJ
 from ur_emulator.motion.speed_l import SpeedL, StopL
 from ur_emulator.motion.target import JointTarget
 
+FAST = (math.inf,) * 6  # no joint is too slow
+
 twists = st.tuples(*[st.floats(-0.1, 0.1)] * 3, *[st.floats(-0.3, 0.3)] * 3)
 
 
@@ -25,13 +27,25 @@ def run(generator, target, cycles, scale=1.0):
     return targets
 
 
+def test_servoj_follows_a_goal_that_is_too_fast_at_the_rated_speed_and_arrives():
+    """As the maker's tests do: a cubic that peaks above the rated speed, streamed to its end."""
+    goals = [1.5 * (3 * s**2 - 2 * s**3) for s in np.linspace(0.0, 1.0, 75)] + [1.5] * 100
+    targets = [JointTarget(ZERO6)]
+    for goal in goals:
+        targets.append(ServoJ((goal,) * 6, 0.03, 2000.0, (3.0,) * 6).step(targets[-1], DT, 1.0))
+    assert max(np.diff(goals)) / DT > 3.5
+    assert max(target.qd[0] for target in targets) == pytest.approx(3.0)
+    assert max(np.diff([target.q[0] for target in targets])) <= 3.0 * DT * (1 + 1e-9)
+    assert targets[-1].q[0] == pytest.approx(1.5, abs=1e-4)
+
+
 @pytest.mark.parametrize(("lookahead", "gain"), [(0.1, 300), (0.1, 2000), (0.05, 1000), (0.2, 300)])
 def test_servoj_follows_a_slow_sine_with_the_lag_of_its_lookahead_time(lookahead, gain):
     omega = 2 * math.pi * 0.5
     targets = [JointTarget(ZERO6)]
     for k in range(1000):
         goal = math.sin(omega * k * DT)
-        targets.append(ServoJ((goal,) * 6, lookahead, gain).step(targets[-1], DT, 1.0))
+        targets.append(ServoJ((goal,) * 6, lookahead, gain, FAST).step(targets[-1], DT, 1.0))
     times = np.arange(250, 1001) * DT
     q = np.array([t.q[0] for t in targets])[250:]
     sine, cosine = (2 * np.mean(q[:750] * f(omega * times[:750])) for f in (np.sin, np.cos))
@@ -48,7 +62,7 @@ def test_servoj_follows_a_slow_sine_with_the_lag_of_its_lookahead_time(lookahead
 @settings(max_examples=30)
 @given(st.floats(0.03, 0.2), st.floats(100, 2000), st.floats(-1, 1))
 def test_servoj_settles_at_its_goal_for_every_gain_and_lookahead(lookahead, gain, goal):
-    targets = run(ServoJ((goal,) * 6, lookahead, gain), JointTarget(ZERO6), 800)
+    targets = run(ServoJ((goal,) * 6, lookahead, gain, FAST), JointTarget(ZERO6), 800)
     assert targets[-1].q == pytest.approx((goal,) * 6, abs=1e-3)
     for before, after in itertools.pairwise(targets):
         assert after.q[0] - before.q[0] == pytest.approx(0.5 * DT * (before.qd[0] + after.qd[0]), abs=1e-12)
@@ -56,15 +70,15 @@ def test_servoj_settles_at_its_goal_for_every_gain_and_lookahead(lookahead, gain
 
 def test_a_long_lookahead_prevents_overshoot():
     def highest(lookahead):
-        return max(t.q[0] for t in run(ServoJ((1.0,) * 6, lookahead, 300), JointTarget(ZERO6), 300))
+        return max(t.q[0] for t in run(ServoJ((1.0,) * 6, lookahead, 300, FAST), JointTarget(ZERO6), 300))
 
     assert highest(0.03) > 1.2
     assert highest(0.2) <= 1.0
 
 
 def test_servoj_is_slowed_down_by_the_speed_slider():
-    fast = run(ServoJ((1.0,) * 6, 0.1, 300), JointTarget(ZERO6), 100)
-    slow = run(ServoJ((1.0,) * 6, 0.1, 300), JointTarget(ZERO6), 200, scale=0.5)
+    fast = run(ServoJ((1.0,) * 6, 0.1, 300, FAST), JointTarget(ZERO6), 100)
+    slow = run(ServoJ((1.0,) * 6, 0.1, 300, FAST), JointTarget(ZERO6), 200, scale=0.5)
     assert slow[40].q[0] == pytest.approx(fast[20].q[0], abs=0.03)
 
 
@@ -72,7 +86,7 @@ def test_a_servoj_that_is_not_renewed_stops():
     motion = ArmMotion(ZERO6, 20.0)
     owner = object()
     for _ in range(10):
-        motion.command(owner, ServoJ((0.5,) * 6, 0.1, 300))
+        motion.command(owner, ServoJ((0.5,) * 6, 0.1, 300, FAST))
         motion.step(DT, 1.0)
     before = motion.target.qd[0]
     motion.step(DT, 1.0)

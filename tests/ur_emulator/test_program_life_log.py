@@ -17,10 +17,11 @@ from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
 from ur_emulator.box_log import MAX_ENTRIES, MAX_TEXT, BoxLog, LogEntry
 from ur_emulator.commands.operator import AnswerRequest, ClosePopup
-from ur_emulator.commands.programs import ResumeProgram
+from ur_emulator.commands.programs import ResumeProgram, StartProgram
 from ur_emulator.commands.safety import UnlockProtectiveStop
 from ur_emulator.controller import events
 from ur_emulator.models.cb3 import CB3
+from urscript import compile_program
 
 
 @pytest.fixture
@@ -33,13 +34,13 @@ def texts(entries, source=None):
     return [entry.text for entry in entries if source in (None, entry.source)]
 
 
-def run(box, program, title="PROGRAM_XXX_STOPPED"):
-    """Send a program and wait for its end (or another key message)."""
+def run(box, program):
+    """Send a program and wait for its end."""
     with connect(box, "primary") as sock:
         reader = MessageReader(sock)
         reader.state()
         sock.sendall(program.encode("latin-1"))
-        while reader.message(KeyMessage).title != title:
+        while reader.message(KeyMessage).title != "PROGRAM_XXX_STOPPED":
             pass
 
 
@@ -84,8 +85,9 @@ def test_errors_have_the_words_of_a_log(box, program, line):
 def test_a_protective_stop_and_what_follows(box):
     with connect(box, "realtime") as frames:
         reader = FrameReader(frames)
-        run(box, "def f():\n  protective_stop()\n  sleep(1)\nend\n", "PROGRAM_XXX_PAUSED")
-        reader.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
+        program = compile_program("def f():\n  protective_stop()\n  sleep(1)\nend\n")
+        box.submit(StartProgram(program, loaded=True))
+        reader.until(lambda f: f.runtime_state == ProgramState.PAUSED)
         box.submit(UnlockProtectiveStop())
         reader.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
         box.submit(ResumeProgram())

@@ -1,4 +1,4 @@
-"""A protective stop pauses the program; after the unlocking it goes on, ends or gives way to another one."""
+"""A protective stop pauses a loaded program; after the unlocking it goes on, ends or gives way to another one."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ RESUME, STOP = ResumeProgram(), StopProgram()
 def stopped():
     """A box whose arm was stopped in the middle of a move."""
     bench = Bench(fidelity="ideal")
-    bench.start(MOVE)
+    bench.start(MOVE, loaded=True)
     bench.tick(60)
     assert bench.now.target_qd[0] > 0.3
     bench.tick(80, TRIGGER)
@@ -84,7 +84,8 @@ def test_threads_wait_until_the_arm_is_back_on_its_path(stopped):
     bench = Bench(fidelity="ideal")
     bench.start(
         "def m():\n  thread t():\n    n = 0\n    while True:\n      n = n + 1\n      write_output_integer_register(0, n)\n"
-        f"      sync()\n    end\n  end\n  run t()\n  movej({GOAL}, a=1.4, v=1.0)\nend\n"
+        f"      sync()\n    end\n  end\n  run t()\n  movej({GOAL}, a=1.4, v=1.0)\nend\n",
+        loaded=True,
     )
     bench.tick(60)
     left_at = bench.now.target_q
@@ -152,7 +153,7 @@ def test_it_can_be_ended_during_the_stop(stopped, end):
 
 def test_a_pause_before_the_stop_changes_nothing():
     bench = Bench(fidelity="ideal")
-    bench.start(MOVE)
+    bench.start(MOVE, loaded=True)
     bench.tick(60)
     bench.tick(60, PauseProgram())
     bench.tick(10, TRIGGER)
@@ -166,7 +167,7 @@ def test_a_pause_before_the_stop_changes_nothing():
 @pytest.mark.parametrize("cycles", [1, 4, 10])
 def test_a_stop_on_the_way_into_a_pause_or_out_of_it(cycles):
     bench = Bench(fidelity="ideal")
-    bench.start(MOVE)
+    bench.start(MOVE, loaded=True)
     bench.tick(60)
     bench.tick(cycles, PauseProgram())
     bench.tick(80, TRIGGER)
@@ -186,7 +187,7 @@ def test_a_stop_on_the_way_into_a_pause_or_out_of_it(cycles):
 
 def test_a_program_that_asks_for_a_stop_goes_on_after_it():
     bench = Bench(fidelity="ideal")
-    bench.start('def p():\n  protective_stop()\n  sleep(0.1)\n  textmsg("on")\nend\n')
+    bench.start('def p():\n  protective_stop()\n  sleep(0.1)\n  textmsg("on")\nend\n', loaded=True)
     bench.tick(50)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
     assert bench.now.runtime_state == ProgramState.PAUSED
@@ -208,7 +209,7 @@ def test_a_secondary_program_that_stops_the_arm_gives_one_report():
 
 def test_a_path_that_leads_nowhere_stops_again_when_it_goes_on():
     bench = Bench(fidelity="ideal")
-    bench.start("def f():\n  movel(p[10,0,0,0,0,0])\nend\n")
+    bench.start("def f():\n  movel(p[10,0,0,0,0,0])\nend\n", loaded=True)
     for _ in range(2):
         bench.tick(700)
         assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
@@ -223,7 +224,7 @@ def test_a_path_that_leads_nowhere_stops_again_when_it_goes_on():
 
 def test_an_arm_that_was_pushed_off_its_path_goes_back_to_it():
     bench = Bench()
-    bench.start(MOVE)
+    bench.start(MOVE, loaded=True)
     bench.tick(40)
     bench.controller.plant.push((0.0, 0.0, -400.0))
     bench.tick(200)

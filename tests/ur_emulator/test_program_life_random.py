@@ -59,7 +59,7 @@ NEXT = {
     ProgramResumed: {ProgramPaused, ProgramStopped},
     ProgramStopped: {ProgramStarted},
 }
-QD_MAX = np.array(robot_by_name("ur3").qd_max) * (1 + 1e-6)
+QD_MAX = np.array(robot_by_name("ur3").qd_safety) * (1 + 1e-6)
 
 
 @settings(max_examples=30)

@@ -8,9 +8,10 @@ from protocol.primary.messages import ErrorCodeMessage, KeyMessage, ReportLevel,
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
 from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.servers.primary.robot_state import state_records
+from urscript import compile_program
 
 MOVE = 'def m():\n  movej([0.9,-1.6,-1.9,-0.2,1.2,1.6], a=1.4, v=0.5)\n  textmsg("there")\nend\n'
 COUNT = "def count():\n  n = 0\n  while True:\n    n = n + 1\n    write_output_integer_register(0, n)\n    sync()\n  end\nend\n"
@@ -20,6 +21,11 @@ COUNT = "def count():\n  n = 0\n  while True:\n    n = n + 1\n    write_output_i
 def box():
     with ControlBox(pace="lockstep", port_base=None) as box:
         yield box
+
+
+def play(box, text):
+    """Start a program as one that was loaded."""
+    box.submit(StartProgram(compile_program(text), loaded=True))
 
 
 class Dashboard:
@@ -96,7 +102,7 @@ def test_the_dashboard_pauses_plays_and_stops(box):
 def test_play_is_refused_in_a_protective_stop_and_possible_after_it(box):
     with Dashboard(box) as dashboard, connect(box, "primary") as sock:
         reader = MessageReader(sock)
-        sock.sendall(b'def p():\n  protective_stop()\n  sleep(0.1)\n  textmsg("on")\nend\n')
+        play(box, 'def p():\n  protective_stop()\n  sleep(0.1)\n  textmsg("on")\nend\n')
         dashboard.until("programState", "PAUSED <unnamed>")
         assert dashboard.ask("safetymode") == "Safetymode: PROTECTIVE_STOP"
         assert dashboard.ask("play") == "Failed to execute: play"
@@ -113,7 +119,7 @@ def test_a_paused_program_that_may_not_go_on_is_no_warning(box):
     """A client of the public library ends its script on warnings."""
     with connect(box, "primary") as sock, connect(box, "realtime") as frames:
         reader = MessageReader(sock)
-        sock.sendall(b"def p():\n  protective_stop()\n  sleep(9)\nend\n")
+        play(box, "def p():\n  protective_stop()\n  sleep(9)\nend\n")
         FrameReader(frames).until(lambda f: f.runtime_state == ProgramState.PAUSED)
         assert reader.message(ErrorCodeMessage).code == 209
         sock.sendall(b"resume program\n")

@@ -60,13 +60,18 @@ class WatchedBox(Box):
         for vector in (now.target_q, now.target_qd, now.actual_q, now.actual_qd, now.actual_tcp_pose):
             assert all(map(math.isfinite, vector)), vector
         limits = zip(
-            now.target_q, before.target_q, self.robot.qd_max, self.robot.q_min, self.robot.q_max, strict=True
+            now.target_q,
+            before.target_q,
+            self.robot.qd_safety,
+            self.robot.q_min,
+            self.robot.q_max,
+            strict=True,
         )
         for q, q_before, speed, low, high in limits:
             assert low <= q <= high
             if not self._placed(before, now):
                 assert abs(q - q_before) <= speed * 0.008 * TOLERANCE + 1e-12
-        for qd, speed in zip(now.target_qd, self.robot.qd_max, strict=True):
+        for qd, speed in zip(now.target_qd, self.robot.qd_safety, strict=True):
             assert abs(qd) <= speed * TOLERANCE
 
     def _placed(self, before, now):

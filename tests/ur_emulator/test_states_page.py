@@ -43,9 +43,9 @@ ENDS = [
 START = StartProgram(compile_program(ENDLESS))
 
 
-def transitions_of(*commands):
+def transitions_of(*commands, loaded=True):
     """States that a moving program passes when these commands come, one every 100 cycles but for (n, command)."""
-    bench = moving()
+    bench = moving(loaded=loaded)
     seen = [P(bench.now.runtime_state)]
     for item in commands:
         ticks, command = item if isinstance(item, tuple) else (100, item)
@@ -63,6 +63,7 @@ def test_every_transition_of_the_page_is_taken_and_no_other():
     for end in [*ENDS, PowerOff()]:
         for before in ([], [PauseProgram()], [(3, PauseProgram())]):
             taken.update(transitions_of(*before, end))
+    taken.update(transitions_of(TriggerProtectiveStop(), loaded=False))
     taken.update(transitions_of(PauseProgram(), ResumeProgram()))
     taken.update(transitions_of((3, PauseProgram()), ResumeProgram()))
     taken.update(transitions_of(SafeguardStop(True), SafeguardStop(False)))

@@ -231,7 +231,7 @@ def test_programs_and_resuming_are_refused_while_the_safeguard_is_open():
 
 
 def test_a_push_in_a_safeguard_stop_is_a_protective_stop():
-    bench = moving()
+    bench = moving(loaded=True)
     bench.tick(60, OPEN)
     bench.tick(1, TriggerProtectiveStop())
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP

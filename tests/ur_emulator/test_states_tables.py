@@ -93,8 +93,8 @@ def test_what_lies_under_a_mode_comes_back():
 # --- the box in each mode
 
 
-def enter(mode):
-    bench = moving(fidelity="ideal")
+def enter(mode, *, loaded=False):
+    bench = moving(fidelity="ideal", loaded=loaded)
     entry = ENTRY[mode]
     if mode is M.RECOVERY:
         bench.controller.safety.handle(E.RANGE_LEFT)
@@ -118,9 +118,10 @@ def test_commands_lead_where_the_table_says(mode, event):
     assert bench.now.safety_mode == then
 
 
+@pytest.mark.parametrize("loaded", [False, True])
 @pytest.mark.parametrize("mode", [mode for mode in FROM if mode is not RC])
-def test_what_a_mode_does_to_arm_program_and_power(mode):
-    bench = enter(mode)
+def test_what_a_mode_does_to_arm_program_and_power(mode, loaded):
+    bench = enter(mode, loaded=loaded)
     bench.tick(BRAKING)
     row, now = ROW[mode], bench.now
     rests = now.target_qd == (0.0,) * 6
@@ -129,7 +130,9 @@ def test_what_a_mode_does_to_arm_program_and_power(mode):
     assert {
         "runs": ProgramState.PLAYING,
         "paused, goes on when the mode ends": ProgramState.PAUSED,
-        "paused until somebody resumes it": ProgramState.PAUSED,
+        "a loaded one paused until somebody resumes it, one from a socket ended": (
+            ProgramState.PAUSED if loaded else ProgramState.STOPPED
+        ),
         "ended": ProgramState.STOPPED,
     }[row.program.value] == now.runtime_state
     bench.start("def other():\n  movej([0,-1.5,1,0,0,0])\nend\n")

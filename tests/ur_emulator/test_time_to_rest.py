@@ -35,10 +35,10 @@ START = {
 class Turning(Bench):
     """An arm that the client's program turns about one joint, at the fastest speed that the client asks for."""
 
-    def __init__(self, robot, joint, *, acceleration=40.0, **options):
+    def __init__(self, robot, joint, *, acceleration=40.0, loaded=False, **options):
         super().__init__(robot=robot, **options)
         self.run(f"def m():\n  movej({START[joint]})\nend\n")
-        self.start(receiver_script("10.0.0.1", 50123, acceleration=acceleration))
+        self.start(receiver_script("10.0.0.1", 50123, acceleration=acceleration), loaded=loaded)
         self.tick(3)
         (self.client,) = self.network.sockets
         fastest = ROBOTS[robot].limits.qd_max[joint]
@@ -121,7 +121,7 @@ def test_a_speed_slider_that_was_moved_does_not_make_the_stop_longer():
 
 
 def test_what_is_resumed_on_the_pendant_while_the_client_is_frozen_comes_to_rest_in_time_too():
-    arm = Turning("ur3", 0)
+    arm = Turning("ur3", 0, loaded=True)
     arm.tick(1, TriggerProtectiveStop())
     arm.tick(800)
     assert arm.now.runtime_state == ProgramState.PAUSED

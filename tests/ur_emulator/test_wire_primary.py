@@ -277,6 +277,6 @@ def test_configuration_is_that_of_the_model(name, robot_type, box_type):
     assert configuration.robot_type == robot_type
     assert configuration.controller_box_type == box_type
     assert configuration.robot_sub_type == 2
-    assert configuration.joint_max_speed == robot.qd_max
+    assert configuration.joint_max_speed == robot.qd_safety
     assert configuration.dh_a == tuple(row.a for row in robot.dh)
     assert configuration.dh_d == tuple(row.d for row in robot.dh)

@@ -25,10 +25,12 @@ class StartProgram:
     Attributes:
         program: compiled.
         pauses: it begins with a pause.
+        loaded: it was loaded from a file and played; otherwise it came through a socket.
     """
 
     program: CompiledProgram
     pauses: bool = False
+    loaded: bool = False
 
     def apply(self, box: Box) -> None:
         obstacle = _why_not_running(box.state)
@@ -36,7 +38,7 @@ class StartProgram:
             text = f"program {self.program.name} not started: {obstacle}"
             box.state.events.append(ScriptFailed(1, 1, text))
             raise RefusedError(text)
-        box.programs.start(self.program)
+        box.programs.start(self.program, loaded=self.loaded)
         if self.pauses:
             box.programs.pause()
 

@@ -53,8 +53,8 @@ class Programs(Protocol):
         """Line of the primary program's main thread as sent, 1 being the first; 0 without a program."""
         ...
 
-    def start(self, program: CompiledProgram) -> None:
-        """Start a program; a primary one replaces the one that runs."""
+    def start(self, program: CompiledProgram, *, loaded: bool = False) -> None:
+        """Start a program; a primary one replaces the one that runs. `loaded`: it is played from a file."""
         ...
 
     def stop(self) -> None:
@@ -65,8 +65,11 @@ class Programs(Protocol):
         """Pause the primary program; the arm comes to rest on its path, at least this fast [rad/s^2]."""
         ...
 
-    def interrupt(self, deceleration: float) -> None:
-        """Stop the arm without regard for its path [rad/s^2]; a program that runs is paused."""
+    def interrupt(self) -> None:
+        """Stop the arm without regard for its path.
+
+        A program that was loaded is paused, one that came through a socket ends.
+        """
         ...
 
     def resume(self) -> None:

@@ -126,7 +126,7 @@ class SafetySystem:
                     self.cut_power()
         elif row.arm is ArmEffect.STOP:
             self._is_waiting = False
-            self._programs.interrupt(state.robot.stop_deceleration)
+            self._programs.interrupt()
         elif row.arm is ArmEffect.PATH_STOP:
             if row.program is ProgramEffect.PAUSE_FOR_A_WHILE and row_before.may_move:
                 self._wait()

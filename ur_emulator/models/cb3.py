@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from math import radians
+from math import pi, radians
 
 from protocol.dashboard.commands import COMMANDS
 from protocol.primary.layout import SUB_PACKAGES
@@ -22,6 +22,11 @@ _BUILDS: Builds = (
     (SoftwareVersion(3, 15), 106339, datetime(2021, 11, 30)),  # 3.15.8; date of its manual, time chosen
 )
 
+# Ends of the joint ranges [rad]; safety blocks of real installations: +-363 degrees.
+RANGE_END = 2.0 * pi + radians(3.0)
+# Ends where the installation sets no position limit: the least and the greatest number of revolutions.
+FIRST_TURN, LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
+
 CB3 = RobotGeneration(
     name=Generation.CB3.value,
     period_us=round(STEP_TIME[Generation.CB3] * 1e6),
@@ -32,6 +37,7 @@ CB3 = RobotGeneration(
     limits=SafetyLimits(
         reduced_share=0.5,  # chosen: the manual's defaults were not at hand
         recovery_speed=radians(30.0),  # UR3 and UR5/CB3 user manuals
+        speed_margin=0.2,  # safety blocks of real installations: 191.5 and 371.5 deg/s
         acceleration=40.0,  # not known; that of a UR5e capture
     ),
     fidelities=FIDELITIES,

@@ -36,11 +36,13 @@ class SafetyLimits:
     Attributes:
         reduced_share: joint speeds of reduced mode, as a share of the rated ones.
         recovery_speed: joint speed of recovery mode [rad/s].
+        speed_margin: how far a joint may exceed its rated speed before the safety system stops it [rad/s].
         acceleration: largest joint acceleration that the configuration data announce [rad/s^2].
     """
 
     reduced_share: float
     recovery_speed: float
+    speed_margin: float
     acceleration: float
 
 

@@ -85,9 +85,9 @@ class RobotModel:
         links: six moving links.
         base_hull: capsules of the fixed base in the base frame.
         tau_max: largest joint torque [Nm].
-        qd_max: largest joint speed [rad/s].
-        q_min: lower end of the joint range [rad].
-        q_max: upper end of the joint range [rad].
+        qd_max: rated joint speed, which moves are planned with [rad/s].
+        q_min: lower end of the joint range of the safety system [rad].
+        q_max: upper end of the joint range of the safety system [rad].
         armature: rotor and gear inertia as felt at the joint [kg m²].
         viscous: viscous friction [Nm s/rad].
         coulomb: Coulomb friction at speed [Nm].
@@ -131,3 +131,8 @@ class RobotModel:
     robot_type: int
     box_type: int
     home_q: Vector6
+
+    @property
+    def qd_safety(self) -> Vector6:
+        """Joint speed at which the safety system stops the arm [rad/s]."""
+        return six([speed + self.generation.limits.speed_margin for speed in self.qd_max])

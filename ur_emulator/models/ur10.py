@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from math import pi
 
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.cb3 import CB3, RANGE_END
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
 
 UR10 = RobotModel(
@@ -75,8 +75,8 @@ UR10 = RobotModel(
     base_hull=(Capsule((0.0, 0.0, 0.01), (0.0, 0.0, 0.03), 0.095),),
     tau_max=(330.0, 330.0, 150.0, 56.0, 56.0, 56.0),  # C
     qd_max=(2 * pi / 3, 2 * pi / 3, pi, pi, pi, pi),  # C: 120 and 180 deg/s
-    q_min=(-2 * pi,) * 6,  # C
-    q_max=(2 * pi,) * 6,
+    q_min=(-RANGE_END,) * 6,  # safety blocks of real installations
+    q_max=(RANGE_END,) * 6,
     armature=(2.5, 2.5, 1.1, 0.45, 0.45, 0.45),  # H
     viscous=(12.0, 12.0, 7.6, 5.0, 5.0, 5.0),  # H
     coulomb=(16.0, 16.0, 8.5, 4.3, 4.3, 4.3),  # H

@@ -10,13 +10,14 @@ Sources, cited by letter below:
  E  UR3/CB3 user manual 3.10, stopping times and distances of category 0 (183 deg/s, arm stretched, 3 kg).
  F  UR5 friction set in kejianhong/UR5-External-Force-Estimation: friction falls towards standstill.
  G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
+ H  Safety blocks of six real installations (3.5, 3.13, 3.15.8, 5.11).
 """
 
 from __future__ import annotations
 
 from math import pi
 
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.cb3 import CB3, FIRST_TURN, LAST_TURN, RANGE_END
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
 
 UR3 = RobotModel(
@@ -74,8 +75,8 @@ UR3 = RobotModel(
     base_hull=(Capsule((0.0, 0.0, 0.06), (0.0, 0.0, 0.075), 0.06),),
     tau_max=(56.0, 56.0, 28.0, 12.0, 12.0, 12.0),  # C
     qd_max=(pi, pi, pi, 2 * pi, 2 * pi, 2 * pi),  # C: 180 and 360 deg/s
-    q_min=(-2 * pi,) * 6,  # C; the machine lets wrist 3 turn without end
-    q_max=(2 * pi,) * 6,
+    q_min=(*(-RANGE_END,) * 5, FIRST_TURN),  # H: wrist 3 has no position limit
+    q_max=(*(RANGE_END,) * 5, LAST_TURN),
     armature=(0.45, 0.45, 0.20, 0.08, 0.08, 0.08),  # D
     viscous=(5.0, 5.0, 2.0, 0.9, 0.9, 0.9),  # D
     coulomb=(4.5, 4.2, 1.7, 0.6, 0.6, 0.6),  # D

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from math import pi
 
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.cb3 import CB3, RANGE_END
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
 
 UR5 = RobotModel(
@@ -76,8 +76,8 @@ UR5 = RobotModel(
     base_hull=(Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.01), 0.075),),
     tau_max=(150.0, 150.0, 150.0, 28.0, 28.0, 28.0),  # C
     qd_max=(pi,) * 6,  # C: 180 deg/s
-    q_min=(-2 * pi,) * 6,  # C
-    q_max=(2 * pi,) * 6,
+    q_min=(-RANGE_END,) * 6,  # safety blocks of real installations
+    q_max=(RANGE_END,) * 6,
     armature=(1.1, 1.1, 1.1, 0.20, 0.20, 0.20),  # H
     viscous=(6.24, 4.81, 7.65, 1.05, 1.59, 1.11),  # D
     coulomb=(7.23, 8.55, 8.47, 2.10, 2.02, 2.33),  # D

@@ -3,7 +3,8 @@
 Source: URScript manual CB3 3.15, servoj: `gain` is "the proportional gain for following the target position",
 and `lookahead_time` "projects the current position forward in time with the current velocity"; a long one
 "prevents overshoot". As an equation: qdd = gain (q_goal - (q + lookahead qd)). Its lag behind a moving goal
-is the lookahead time, which users measure (plus the delay of the arm).
+is the lookahead time, which users measure (plus the delay of the arm). Where a goal moves faster than a joint
+can, the joint follows at its rated speed: the maker's tests stream such goals and expect the arm to arrive.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ LOST_DECELERATION = 20.0
 class ServoJ(Streamed):
     """Move the joints towards `q`; it never ends by itself."""
 
-    def __init__(self, q: Vector6, lookahead: float, gain: float) -> None:
-        """Take the goal [rad], the lookahead time [s] and the gain [1/s^2]."""
+    def __init__(self, q: Vector6, lookahead: float, gain: float, qd_max: Vector6) -> None:
+        """Take the goal [rad], the lookahead time [s], the gain [1/s^2] and the rated speeds [rad/s]."""
         self._q = q
+        self._qd_max = qd_max
         self._lookahead = min(max(lookahead, LOOKAHEAD[0]), LOOKAHEAD[1])
         self._gain = min(max(gain, GAIN[0]), GAIN[1])
         self.done = False
@@ -39,8 +41,8 @@ class ServoJ(Streamed):
         # Speeds before speed scaling.
         before = [v / scale for v in target.qd]
         after = [
-            (v + k * (goal - q - 0.5 * h * v)) / denominator
-            for q, v, goal in zip(target.q, before, self._q, strict=True)
+            min(max((v + k * (goal - q - 0.5 * h * v)) / denominator, -most), most)
+            for q, v, goal, most in zip(target.q, before, self._q, self._qd_max, strict=True)
         ]
         return JointTarget(
             six([q + 0.5 * h * (v + w) for q, v, w in zip(target.q, before, after, strict=True)]),

@@ -13,7 +13,7 @@ from ur_emulator.motion.generators import StopJ
 from ur_emulator.motion.leg import Leg, move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
 from ur_emulator.motion.path import PoseLine, PosePath, arc_through
-from ur_emulator.scripting.script_arm import Cycles, ScriptArm, floats, require_positive
+from ur_emulator.scripting.script_arm import Cycles, ScriptArm, floats, require_positive, require_range
 from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import NEXT_CYCLE
 from urscript.values import Pose
@@ -95,7 +95,9 @@ def motion_functions(
         a, v = _limits("movej", a, v, t, r, JOINT_DEFAULTS)
 
         def make(start: Vector6, _: ToolPose) -> Leg:
-            return move_j(start, joints_of(q, start), arm.tool, a=a, v=v, t=t, r=r)
+            goal = joints_of(q, start)
+            require_range("movej", goal, arm.robot)
+            return move_j(start, goal, arm.tool, a=a, v=v, t=t, r=r)
 
         return travel(thread, make)
 
@@ -158,11 +160,7 @@ def motion_functions(
         angles = floats(q)
         if motion.is_moving or motion.owner is not None:
             raise ScriptRuntimeError("set_pos: the arm moves, stop it first")
-        for i, (x, low, high) in enumerate(zip(angles, arm.robot.q_min, arm.robot.q_max, strict=True)):
-            if not low <= x <= high:
-                raise ScriptRuntimeError(
-                    f"set_pos: joint {i} cannot be at {x:g} rad; allowed: {low:.4f} to {high:.4f}"
-                )
+        require_range("set_pos", angles, arm.robot)
         if not place_arm(angles):
             raise ScriptRuntimeError(
                 "set_pos: the arm would touch itself or the table there, choose another place"

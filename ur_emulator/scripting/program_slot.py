@@ -48,6 +48,7 @@ class ProgramSlot:
         self._ran = False
         self._phase = ProgramState.PLAYING
         self._phase_since = 0
+        self._is_loaded = False
         self.name = ""
         self.reports_line = False
         self.latest: RunningProgram | None = None
@@ -96,8 +97,13 @@ class ProgramSlot:
 
     # --- commands
 
-    def start(self, program: CompiledProgram) -> None:
-        """Start a program; a primary one replaces the one that runs."""
+    def start(self, program: CompiledProgram, *, loaded: bool = False) -> None:
+        """Start a program; a primary one replaces the one that runs.
+
+        Args:
+            program: compiled.
+            loaded: it was loaded from a file and played; otherwise it came through a socket.
+        """
         if program.kind == "sec":
             if len(self._secondaries) >= BUDGETS.secondary_programs:
                 text = f"{len(self._secondaries)} secondary programs wait already: this one is not started"
@@ -110,6 +116,7 @@ class ProgramSlot:
         self.name = program.name
         self.latest = self._primary = program.start(RobotHost(self._state, self._network), self._work)
         self._phase = ProgramState.PLAYING
+        self._is_loaded = loaded
         self._state.io_configuration.program_started()
         self._state.events.append(ProgramStarted(program.name, self._primary))
 
@@ -130,12 +137,16 @@ class ProgramSlot:
             self._state.motion.pause(deceleration)
             self._enter(ProgramState.PAUSING)
 
-    def interrupt(self, deceleration: float) -> None:
-        """Stop the arm without regard for its path [rad/s^2]; a program that runs is paused."""
-        if self._primary is None:
-            self._state.motion.stop(deceleration)
+    def interrupt(self) -> None:
+        """Stop the arm without regard for its path.
+
+        A loaded program is paused. One that came through a socket ends, and its sockets close: live tests of
+        the maker's client library wait for that, and drivers tell their users to send the program again.
+        """
+        if self._primary is None or not self._is_loaded:
+            self.stop()
             return
-        self._state.motion.interrupt(deceleration)
+        self._state.motion.interrupt(self._state.robot.stop_deceleration)
         if self._phase not in _STANDS_STILL:
             self._enter(ProgramState.PAUSING)
 

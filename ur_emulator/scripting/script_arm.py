@@ -65,6 +65,15 @@ def require_positive(function: str, **limits: float) -> None:
             raise ScriptRuntimeError(f"{function}: {name} must be at least {MIN_LIMIT:g}, got {value:g}")
 
 
+def require_range(function: str, q: Vector6, robot: RobotModel) -> None:
+    """Raise a runtime error for a joint angle [rad] beyond the range of its joint."""
+    for i, (x, low, high) in enumerate(zip(q, robot.q_min, robot.q_max, strict=True)):
+        if not low <= x <= high:
+            raise ScriptRuntimeError(
+                f"{function}: joint {i} cannot be at {x:g} rad; allowed: {low:.4f} to {high:.4f}"
+            )
+
+
 def floats(values: Sequence[float]) -> Vector6:
     """Return six values as floats; a script may write whole numbers."""
     return six(list(map(float, values)))

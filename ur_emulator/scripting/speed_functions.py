@@ -55,7 +55,7 @@ def speed_functions(arm: ScriptArm, step_time: float) -> Mapping[str, Callable[.
         thread: object, q: list[float], a: float, v: float, t: float, lookahead_time: float, gain: float
     ) -> Cycles:
         require_positive("servoj", t=t, lookahead_time=lookahead_time, gain=gain)
-        return stream(thread, ServoJ(floats(q), lookahead_time, gain), t)
+        return stream(thread, ServoJ(floats(q), lookahead_time, gain, arm.robot.qd_max), t)
 
     def stopj(thread: object, a: float) -> Cycles:
         require_positive("stopj", a=a)

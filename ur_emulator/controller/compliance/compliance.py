@@ -222,7 +222,7 @@ def _guided_too_far(robot: RobotModel, sensed: PlantState) -> Violation | None:
     for i, (q, qd) in enumerate(zip(sensed.actual_q, sensed.actual_qd, strict=True)):
         if (q > robot.q_max[i] and qd > 0.0) or (q < robot.q_min[i] and qd < 0.0):
             return _stop(150, i, f"Position close to joint limits: {JOINT_NAMES[i]} at {q:.3f} rad")
-        if abs(qd) > robot.qd_max[i] * SPEED_TOLERANCE:
+        if abs(qd) > robot.qd_safety[i] * SPEED_TOLERANCE:
             return _stop(191, 32 + i, f"Joint speed limit violated: {JOINT_NAMES[i]} at {abs(qd):.3f} rad/s")
     return None
 

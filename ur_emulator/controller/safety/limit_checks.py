@@ -23,7 +23,7 @@ from ur_emulator.plant.plant_state import PlantState
 MAX_POSITION_DEVIATION = 0.15
 # A drive at its torque limit for longer than this cannot follow [s].
 MAX_SATURATION_TIME = 0.1
-# A target above the rated joint speed by more than rounding is an invalid set-point.
+# Rounding of a joint speed.
 SPEED_TOLERANCE = 1.0 + 1e-6
 
 
@@ -60,7 +60,7 @@ class SetpointCheck:
         self._period_s = period_s
         self._braking = 0.5 / robot.stop_deceleration
         # Below these no joint can exceed its own limit: most set-points need no check joint by joint.
-        self._safe_speed = min(robot.qd_max)
+        self._safe_speed = min(robot.qd_safety)
         self._safe_reach = min(*robot.q_max, *(-low for low in robot.q_min))
 
     def find_invalid(self, before: JointTarget, target: JointTarget) -> Violation | None:
@@ -92,7 +92,7 @@ def find_invalid_setpoint(
     """
     braking_time = max(map(abs, target.qd)) / (2.0 * robot.stop_deceleration)
     for i, (q_before, q, qd, limit, low, high) in enumerate(
-        zip(before.q, target.q, target.qd, robot.qd_max, robot.q_min, robot.q_max, strict=True)
+        zip(before.q, target.q, target.qd, robot.qd_safety, robot.q_min, robot.q_max, strict=True)
     ):
         speed = max(abs(qd), abs(q - q_before) / period_s)
         if not speed <= limit * SPEED_TOLERANCE:

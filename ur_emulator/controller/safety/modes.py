@@ -35,7 +35,7 @@ class ProgramEffect(Enum):
 
     NOTHING = "runs"
     PAUSE_FOR_A_WHILE = "paused, goes on when the mode ends"
-    PAUSE = "paused until somebody resumes it"
+    PAUSE_OR_END = "a loaded one paused until somebody resumes it, one from a socket ended"
     END = "ended"
 
 
@@ -100,10 +100,10 @@ MODES: tuple[ModeRow, ...] = (
     ModeRow(
         Mode.PROTECTIVE_STOP,
         _A.STOP,
-        _P.PAUSE,
+        _P.PAUSE_OR_END,
         True,
         "unlock the protective stop, on the dashboard 5 s after it",
-        "stop category 2 D; that it leaves the path C",
+        "stop category 2 D; that it leaves the path C; the program I",
     ),
     ModeRow(
         Mode.SAFEGUARD_STOP,

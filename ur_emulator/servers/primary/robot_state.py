@@ -53,7 +53,7 @@ _TEACH = int(RobotStatusBits.TEACH_BUTTON_PRESSED)
 
 def safety_checksum(robot: RobotModel) -> int:
     """Return a checksum of the safety settings: there is one set of them for each type of arm."""
-    limits = (robot.q_min, robot.q_max, robot.qd_max, robot.tau_max, robot.payload_max)
+    limits = (robot.q_min, robot.q_max, robot.qd_safety, robot.tau_max, robot.payload_max)
     return zlib.crc32(repr(limits).encode())
 
 
@@ -204,7 +204,7 @@ def setup_records(
         ConfigurationData(
             joint_min_limit=robot.q_min,
             joint_max_limit=robot.q_max,
-            joint_max_speed=robot.qd_max,
+            joint_max_speed=robot.qd_safety,
             joint_max_acceleration=(robot.generation.limits.acceleration,) * 6,
             dh_a=tuple(row.a for row in robot.dh),
             dh_d=tuple(row.d for row in robot.dh),

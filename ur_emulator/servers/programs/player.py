@@ -136,7 +136,7 @@ class ProgramPlayer:
         self._must_be_able_to_play()  # it took a while to get here
         if self.is_paused:
             self._refuse("play", "a program is paused")
-        yield from self._access.apply(StartProgram(program))
+        yield from self._access.apply(StartProgram(program, loaded=True))
         if self.installation.variables:
             self._access.start_alone(self._keep_variables())
 
