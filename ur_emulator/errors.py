@@ -5,7 +5,8 @@ EmulatorError
 ├── KinematicsError   arguments of the controller's own kinematics make no sense
 ├── PlantError        the physics cannot go on: a target that is not a number, or a diverged simulation
 ├── ProgramFileError  a program or installation file cannot be used
-│   └── FileMissingError      there is no such file
+│   ├── FileMissingError      there is no such file
+│   └── UnknownNodeError      no script is known for a node of a program
 ├── ControlError      an operation of the control API was not done
 │   ├── ArgumentError         it was given something that it does not take
 │   ├── RefusedError          the state of the box stands against it
@@ -57,6 +58,10 @@ class ProgramFileError(EmulatorError):
 
 class FileMissingError(ProgramFileError):
     """There is no such program or installation file among those that the box may use."""
+
+
+class UnknownNodeError(ProgramFileError):
+    """A program has a node, or something in a node, for which no script is known."""
 
 
 class ControlError(EmulatorError):

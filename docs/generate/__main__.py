@@ -13,6 +13,7 @@ from docs.generate import (
     port_map_page,
     ports_page,
     primary_page,
+    programs_page,
     realtime_page,
     rtde_page,
     scripts_page,
@@ -26,6 +27,7 @@ DOCS = Path(__file__).parents[1]
 _LAYOUT = tomllib.loads((DOCS.parent / ".mdformat.toml").read_text(encoding="utf-8"))
 PAGES: dict[str, Callable[[], str]] = {
     "control.md": control_page.render,
+    "programs.md": programs_page.render,
     "states.md": states_page.render,
     "urscript-coverage.md": coverage_page.render,
     "protocol/README.md": ports_page.render,

@@ -8,7 +8,7 @@ from functools import cache
 import fuzz_mutations as mutations
 from dashboard_support import installation, urp
 from fuzz_cases import Target
-from test_dashboard_urp import SAMPLES as NODES
+from urp_samples import SAMPLES as NODES
 
 from ur_emulator.controller.clock import Clock
 from ur_emulator.errors import ProgramFileError

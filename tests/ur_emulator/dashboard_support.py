@@ -73,8 +73,18 @@ def script_line(text):
     return f'<Script type="Line">{expression(text)}</Script>'
 
 
-def urp(nodes, *, once=True, installation="default", around="", packed=True):
-    """A program file of our own making, in the form that PolyScope 3.15 gives its files.
+def urp(
+    nodes,
+    *,
+    once=True,
+    installation="default",
+    around="",
+    packed=True,
+    name="sample",
+    saved_in="3.15.8.106339",
+    first="",
+):
+    """A program file of our own making, in the form that PolyScope gives its files.
 
     Args:
         nodes: of the main program.
@@ -82,12 +92,15 @@ def urp(nodes, *, once=True, installation="default", around="", packed=True):
         installation: its name without suffix.
         around: nodes beside the main program.
         packed: with gzip, as PolyScope does it.
+        name: of the program.
+        saved_in: version of the software that saved it.
+        first: what is in the node of first values.
     """
     text = (
-        f'<?xml version="1.0" encoding="UTF-8"?>\n<URProgram name="sample" installation="{installation}" '
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<URProgram name="{name}" installation="{installation}" '
         f'installationRelativePath="{installation}" directory="/programs" createdIn="3.15.8.106339" '
-        'lastSavedIn="3.15.8.106339"><kinematics status="NOT_INITIALIZED" validChecksum="false"/>'
-        f'<children><InitVariablesNode/>{around}<MainProgram runOnlyOnce="{str(once).lower()}">'
+        f'lastSavedIn="{saved_in}"><kinematics status="NOT_INITIALIZED" validChecksum="false"/>'
+        f'<children><InitVariablesNode>{first}</InitVariablesNode>{around}<MainProgram runOnlyOnce="{str(once).lower()}">'
         f"<children>{nodes}</children></MainProgram></children></URProgram>"
     )
     return gzip.compress(text.encode(), mtime=0) if packed else text.encode()
@@ -117,7 +130,7 @@ def external_control(host="", port=""):
 def write_programs(folder):
     """Some programs that most tests need."""
     (folder / "wait.urp").write_bytes(urp(WAIT_NODE, once=False))
-    (folder / "hello.urp").write_bytes(urp(script_line('textmsg("hello")')))
+    (folder / "hello.urp").write_bytes(urp(script_line('textmsg("hello")'), name="hello"))
     (folder / "strange.urp").write_bytes(urp("<PalletWizard/>"))
     (folder / "broken.script").write_text("def broken():\n  x = = 1\nend\n")
     (folder / "other.installation").write_bytes(installation("10.1.2.3", "50010"))

@@ -13,10 +13,10 @@ from ur_emulator.programs.installation import ExternalControlPc, Installation
 from ur_emulator.programs.installation_files import NEW_BOX, installation_of
 from ur_emulator.programs.reading import ProgramReader
 from ur_emulator.programs.script_header import header_lines
+from ur_emulator.programs.script_names import identifier
 from ur_emulator.programs.script_text import as_one_program
 from ur_emulator.programs.script_writer import Gap, Header, Part
 from ur_emulator.programs.urp_program import ROOT, make_script, uses_external_control
-from ur_emulator.programs.urp_values import identifier
 from urscript.values import to_script_text
 
 SCRIPT_SUFFIX = ".script"
@@ -123,6 +123,4 @@ def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
     if folder.has(saved) and not uses_external_control(tree):
         script = as_one_program(reader.script(folder.find(saved)), program_name)
         return LoadedProgram(file.wire_path, installation, (script,))
-    return LoadedProgram(
-        file.wire_path, installation, make_script(file, tree, program_name, reader, installation)
-    )
+    return LoadedProgram(file.wire_path, installation, make_script(file, tree, reader, installation).parts)

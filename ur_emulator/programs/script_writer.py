@@ -34,6 +34,19 @@ class Header:
 Part = str | Gap | Header
 
 
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place in a script.
+
+    Attributes:
+        parts: number of parts before it.
+        depth: number of open blocks.
+    """
+
+    parts: int
+    depth: int
+
+
 class ScriptWriter:
     """The script so far.
 
@@ -44,32 +57,45 @@ class ScriptWriter:
     def __init__(self) -> None:
         self.parts: list[Part] = []
         self._depth = 0
-        self._labels = 0
         self._size = 0
         self._gaps = 0
 
     @property
-    def depth(self) -> int:
-        """Number of open blocks."""
-        return self._depth
+    def place(self) -> Place:
+        """The end of the script so far."""
+        return Place(len(self.parts), self._depth)
 
-    def add(self, text: str) -> None:
-        """Write a line, one character a byte; a text of several lines is written as it is, each one indented.
+    def take(self, place: Place) -> list[Part]:
+        """Remove what was written since a place, and return it; it may be put into another place."""
+        taken = self.parts[place.parts :]
+        del self.parts[place.parts :]
+        self._depth = place.depth
+        return taken
+
+    def add(self, *texts: str) -> None:
+        """Write lines, one character a byte; a text of several lines is written as it is, each one indented.
 
         Raises:
             ProgramFileError: the script becomes longer than a box takes.
         """
         indent = "  " * self._depth
-        plain = to_script_text(text).replace("\r\n", "\n").rstrip("\n")
-        self._size += len(plain) + (1 + plain.count("\n")) * (len(indent) + 1)
-        if self._size > MAX_PROGRAM:
-            raise ProgramFileError(f"a script of more than {MAX_PROGRAM} bytes comes of the program")
-        self.parts.append(indent + plain.replace("\n", "\n" + indent))
+        for text in texts:
+            plain = to_script_text(text).replace("\r\n", "\n").rstrip("\n")
+            self._size += len(plain) + (1 + plain.count("\n")) * (len(indent) + 1)
+            if self._size > MAX_PROGRAM:
+                raise ProgramFileError(f"a script of more than {MAX_PROGRAM} bytes comes of the program")
+            self.parts.append(indent + plain.replace("\n", "\n" + indent))
 
-    def label(self, text: str) -> None:
-        """Write the label of a node, with the number and name that PolyScope shows."""
-        self._labels += 1
-        self.add(f'$ {self._labels} "{one_line(text)}"')
+    def label(self, number: int, text: str, mark: str = "") -> None:
+        """Write the label of a node, with the number, the name and the mark that PolyScope shows.
+
+        Args:
+            number: of the node.
+            text: its name.
+            mark: "breakAfter", "noBreak" or nothing.
+        """
+        name = " ".join(text.splitlines()).replace('"', "'")
+        self.add(f'$ {number} "{name}"' + (f' "{mark}"' if mark else ""))
 
     def gap(self, pc: ExternalControlPc) -> None:
         """Add a gap for a program that comes later.
@@ -87,14 +113,14 @@ class ScriptWriter:
     @contextmanager
     def block(self, head: str) -> Iterator[None]:
         """Write a block, `head` being its first line."""
-        self.add(head)
-        with self.indented():
+        with self.branch(head):
             yield
         self.add("end")
 
     @contextmanager
-    def indented(self) -> Iterator[None]:
-        """Indent the lines that are written inside."""
+    def branch(self, head: str) -> Iterator[None]:
+        """Write a branch of a block: `head` and the indented lines, without `end`."""
+        self.add(head)
         self._depth += 1
         yield
         self._depth -= 1

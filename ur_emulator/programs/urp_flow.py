@@ -1,119 +1,182 @@
-"""Nodes that hold others: loops, conditions, folders, sub-programs, threads."""
+"""Nodes that hold others: folders, loops, conditions, calls, threads, events.
+
+Source: program files and the scripts that PolyScope saved beside them.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
-from ur_emulator.programs.urp_maker import UrpMaker
-from ur_emulator.programs.urp_values import expression_text, number, variable_name
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.programs.urp_expressions import expression_of, variable_name
+from ur_emulator.programs.urp_maker import Around, UrpMaker
+from ur_emulator.programs.urp_nodes import Node
+from ur_emulator.programs.urp_values import number_text
 
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
-
-_EMPTY = "# nothing"
-
-
-def write_folder(maker: UrpMaker, element: Element) -> None:
-    """Write what is in a `<Folder>`."""
-    maker.writer.label(element.get("name", "Folder"))
-    maker.write_children(element)
+# Value of the case of a `<Switch>` that is taken when no other one is.
+_DEFAULT_CASE = "2147483647"
 
 
-def write_loop(maker: UrpMaker, element: Element) -> None:
+def write_folder(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write a `<Folder>`: its nodes stand at the same level."""
+    maker.writer.label(node.number, node.get("name") or "Folder", around.mark)
+    maker.write_children(node, around)
+
+
+def write_loop(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Loop>`: without end, a number of times, or while a condition holds."""
-    _not_watched(maker, element)
     writer = maker.writer
-    writer.label("Loop")
-    kind = element.get("type", "")
-    if kind == "Counting":
-        count = number(maker.tree, element.get("count"), "count of a <Loop>")
-        variable = element.find("variable")
-        counter = maker.shared.new_name("Loop") if variable is None else variable_name(maker.tree, variable)
-        writer.add(f"global {counter} = 0")
-        with writer.block(f"while ({counter} < {count:.0f}):"):
-            maker.write_children(element)
-            writer.add(f"{counter} = {counter} + 1")
+    match node.get("type"):
+        case "Forever":
+            writer.label(node.number, "Loop", around.mark)
+            with writer.block("while (True):"):
+                maker.write_children(node, around)
+        case "Counting":
+            count = number_text(node.source.tree, node.get("count"), "count of a <Loop>")
+            variable = node.element.find("loopVariable")
+            counter = maker.program.names.new("Loop") if variable is None else variable_name(node, variable)
+            writer.label(node.number, f"Loop {count} times", around.mark)
+            writer.add(f"{counter} = 0")
+            with writer.block(f"while ({counter} < {count}):"):
+                maker.write_children(node, around)
+                writer.add(f"{counter} = {counter} + 1")
+        case "While" | "Expression":
+            condition = expression_of(maker, node)
+            writer.label(node.number, f"Loop {condition.label}", around.mark)
+            if node.get("checkContinuously") == "true":
+                _write_watched_loop(maker, node, around, condition.script)
+                return
+            with writer.block(f"while ({condition.script}):"):
+                maker.write_children(node, around)
+        case other:
+            raise maker.unknown(node, f"a loop of type {other!r}")
+
+
+def _write_watched_loop(maker: UrpMaker, node: Node, around: Around, condition: str) -> None:
+    """Write a loop in a thread that ends as soon as the condition does not hold."""
+    writer, n = maker.writer, node.number
+    with writer.block(f"thread Thread_while_{n}():"), writer.block("while (True):"):
+        maker.write_children(node, around)
+    with writer.block(f"if ({condition}):"):
+        writer.add(f"global thread_handler_{n}=run Thread_while_{n}()")
+        with writer.block(f"while ({condition}):"):
+            writer.add("sync()")
+        writer.add(f"kill thread_handler_{n}")
+
+
+def write_if(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write an `<If>` with its branches: each stands in the `else` of the one before."""
+    if node.get("type") not in ("", "If"):
+        if node.get("type") in ("ElseIf", "Else"):
+            raise node.source.error(f"an {node.get('type')} node stands behind no If")
+        raise maker.unknown(node, f"an <If> node of type {node.get('type')!r}")
+    if len(node.branches) > BUDGETS.node_depth:
+        raise node.source.error(f"an <If> node has more than {BUDGETS.node_depth} branches")
+    _write_branches(maker, (node, *node.branches), around)
+
+
+def _write_branches(maker: UrpMaker, branches: Sequence[Node], around: Around) -> None:
+    """Write the first branch; the others run if its condition does not hold."""
+    node, others = branches[0], branches[1:]
+    writer, n = maker.writer, node.number
+    if node.get("type") == "Else":
+        writer.label(n, "Else", "noBreak")
+        maker.write_children(node, around)
         return
-    if kind not in ("Forever", "While", "Expression"):
-        raise maker.error(f"a loop of type {kind!r} cannot be turned into a script")
-    condition = "True"
-    if kind != "Forever":
-        condition = expression_text(maker.tree, element.find("expression"), element)
-    with writer.block(f"while ({condition}):"):
-        writer.add(_EMPTY)
-        maker.write_children(element)
+    condition = expression_of(maker, node)
+    writer.label(n, f"{node.get('type') or 'If'} {condition.label}", around.mark)
+    if node.get("checkContinuously") == "true":
+        _write_watched_branch(maker, node, around, condition.script)
+        if others:
+            with writer.block(f"if (thread_flag_{n} == 2):"):
+                _write_branches(maker, others, around)
+        return
+    with writer.branch(f"if ({condition.script}):"):
+        maker.write_children(node, around)
+    if others:
+        with writer.branch("else:"):
+            _write_branches(maker, others, around)
+    writer.add("end")
 
 
-def write_if(maker: UrpMaker, element: Element) -> None:
-    """Write an `<If>`; its `ElseIf` and `Else` follow it in the tree and reopen the block it has closed."""
-    _not_watched(maker, element)
+def _write_watched_branch(maker: UrpMaker, node: Node, around: Around, condition: str) -> None:
+    """Write a branch in a thread that ends as soon as the condition does not hold; its flag is 2 then."""
+    writer, n = maker.writer, node.number
+    writer.add(f"global thread_flag_{n}=0")
+    with writer.block(f"thread Thread_if_{n}():"):
+        maker.write_children(node, around)
+        writer.add(f"thread_flag_{n} = 1")
+    with writer.branch(f"if ({condition}):"):
+        writer.add(f"global thread_handler_{n}=run Thread_if_{n}()")
+        with writer.block(f"while (thread_flag_{n} == 0):"):
+            with writer.branch(f"if not({condition}):"):
+                writer.add(f"kill thread_handler_{n}", f"thread_flag_{n} = 2")
+            with writer.block("else:"):
+                writer.add("sync()")
+    with writer.block("else:"):
+        writer.add(f"thread_flag_{n} = 2")
+
+
+def write_switch(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write a `<Switch>` with its cases; the default case stands behind the others."""
     writer = maker.writer
-    kind = element.get("type", "If")
-    if kind == "If":
-        writer.label("If")
-        head = f"if ({expression_text(maker.tree, element.find('expression'), element)}):"
-    elif kind in ("ElseIf", "Else"):
-        before = maker.previous
-        if before is None or before.tag != "If" or before.get("type", "If") == "Else":
-            raise maker.error(f"an {kind} node stands behind no If")
-        writer.parts.pop()
-        head = "else:"
-        if kind == "ElseIf":
-            head = f"elif ({expression_text(maker.tree, element.find('expression'), element)}):"
-    else:
-        raise maker.error(f"an <If> node of type {kind!r} cannot be turned into a script")
-    with writer.block(head):
-        writer.add(_EMPTY)
-        maker.write_children(element)
-
-
-def write_switch(maker: UrpMaker, element: Element) -> None:
-    """Write a `<Switch>` with its cases."""
-    writer = maker.writer
-    writer.label("Switch")
-    value = expression_text(maker.tree, element.find("expression"), element)
-    variable = maker.shared.new_name("switch_value")
-    writer.add(f"global {variable} = {value}")
-    head = "if"
-    for case in element.findall("children/*"):
-        if case.tag != "Case":
-            raise maker.error(f"<{case.tag}> in a <Switch> cannot be turned into a script")
-        chosen = number(maker.tree, case.get("caseValue"), "value of a <Case>")
-        writer.add(f"{head} ({variable} == {chosen:g}):")
-        with writer.indented():
-            writer.add(_EMPTY)
-            maker.write_children(case)
-        head = "elif"
-    if head == "elif":
+    for case in node.children:
+        if case.kind != "Case":
+            raise maker.unknown(case, f"<{case.kind}> in a <Switch>")
+    value = expression_of(maker, node)
+    maker.switches += 1
+    variable = f"switch_{maker.switches}"
+    writer.label(node.number, f"Switch {value.label}", around.mark)
+    writer.add(f"{variable} = {value.script}")
+    cases = [case for case in node.children if case.get("caseValue") != _DEFAULT_CASE]
+    defaults = [case for case in node.children if case.get("caseValue") == _DEFAULT_CASE]
+    for index, case in enumerate(cases):
+        chosen = number_text(case.source.tree, case.get("caseValue"), "value of a <Case>")
+        if index == 0:  # PolyScope writes the label of the first case before its block
+            writer.label(case.number, f"Case {chosen}", around.mark)
+        with writer.branch(f"{'elif' if index else 'if'} ({chosen} == {variable}):"):
+            if index:
+                writer.label(case.number, f"Case {chosen}", around.mark)
+            maker.write_children(case, around)
+    for case in defaults[:1]:
+        with writer.branch("else:" if cases else "if (True):"):
+            writer.label(case.number, "Default Case", around.mark)
+            maker.write_children(case, around)
+    if cases or defaults:
         writer.add("end")
 
 
-def write_call(maker: UrpMaker, element: Element) -> None:
-    """Write the call of a sub-program."""
-    called = element.find("subprogram")
+def write_call(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write a `<CallSubProgram>`."""
+    called = node.find("subprogram")
     if called is None:
-        raise maker.error("a <CallSubProgram> node names no sub-program")
-    name = maker.name_of_subprogram(called)
-    maker.writer.label(f"Call {name}")
+        raise node.source.error("a <CallSubProgram> node names no sub-program")
+    name = maker.program.functions[called]
+    maker.writer.label(node.number, f"Call {name}", around.mark)
     maker.writer.add(f"{name}()")
 
 
-def write_thread(maker: UrpMaker, element: Element) -> str:
-    """Write a `<Thread>`, which loops unless it says that it runs once; return its name."""
+def write_thread(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write a `<Thread>`, which loops unless it says that it runs once."""
     writer = maker.writer
-    name = maker.shared.new_name(element.get("name") or "Thread")
+    given = node.get("name") or "Thread"
+    name = maker.program.names.new(given)
+    writer.label(node.number, given)
     with writer.block(f"thread {name}():"):
-        writer.add(_EMPTY)
-        if element.get("runOnlyOnce") == "true":
-            maker.write_children(element)
+        if node.get("runOnlyOnce") == "true":
+            maker.write_children(node, around)
         else:
             with writer.block("while (True):"):
-                writer.add(_EMPTY)
-                maker.write_children(element)
-    return name
+                maker.write_children(node, around)
+    writer.add(f"threadId_{name} = run {name}()")
 
 
-def _not_watched(maker: UrpMaker, element: Element) -> None:
-    """Refuse a condition that is checked continuously while its block runs: it would take a thread."""
-    if element.get("checkContinuously") == "true":
-        raise maker.error(f"a <{element.tag}> that is checked continuously cannot be turned into a script")
+def write_events(maker: UrpMaker, events: Sequence[Node], around: Around) -> None:
+    """Write all `<Event>` nodes: one thread looks for them in each cycle."""
+    writer = maker.writer
+    with writer.block("thread EventThread():"), writer.block("while (True):"):
+        for index, node in enumerate(events):
+            with writer.branch(f"{'elif' if index else 'if'} ({expression_of(maker, node).script}):"):
+                maker.write_children(node, around)
+        writer.add("end", "sync()")
+    writer.add("eventThread = run EventThread()")

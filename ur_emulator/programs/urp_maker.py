@@ -1,153 +1,98 @@
-"""UrpMaker: writes the nodes of a file into a script, with the names and the files that they need."""
+"""UrpMaker: what the writers of nodes share while a program file becomes a script."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-from ur_emulator.budgets import BUDGETS
-from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs.folder import FoundFile
+from ur_emulator.errors import ProgramFileError, UnknownNodeError
 from ur_emulator.programs.installation import Installation
 from ur_emulator.programs.reading import ProgramReader
 from ur_emulator.programs.script_writer import ScriptWriter
-from ur_emulator.programs.urp_values import identifier
-from ur_emulator.programs.xml_tree import XmlTree
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
-
-# Elements that give a variable its name.
-_VARIABLES = ("variable", "ProgramVariable")
-
-NodeWriter = Callable[["UrpMaker", "Element"], None]
+from ur_emulator.programs.urp_nodes import Node, ProgramNodes
 
 
 @dataclass(frozen=True, slots=True)
-class SubProgram:
-    """A sub-program that is called somewhere.
+class Around:
+    """What is around a node.
 
     Attributes:
-        name: of its function.
-        maker: of the file that it is written in.
-        body: the element whose children it consists of.
+        move: the `<Move>` that waypoints belong to, if there is one.
+        is_quiet: labels say that the program does not stop at them.
     """
 
-    name: str
-    maker: UrpMaker
-    body: Element
+    move: Node | None = None
+    is_quiet: bool = False
+
+    @property
+    def mark(self) -> str:
+        """Mark of the label of a node."""
+        return "noBreak" if self.is_quiet else ""
+
+
+NodeWriter = Callable[["UrpMaker", Node, Around], None]
 
 
 @dataclass(slots=True)
-class Shared:
-    """What the files of one program share.
-
-    Attributes:
-        nodes: what writes each kind of node.
-        reader: reads the files of the program.
-        installation: of the program: its TCPs, features, names of lines.
-        writer: takes the script.
-        subprograms: by the element that defines each, in the order of the first calls.
-        names: of variables, functions and threads, so that each is unique; with the number tried last.
-    """
-
-    nodes: Mapping[str, NodeWriter]
-    reader: ProgramReader
-    installation: Installation
-    writer: ScriptWriter = field(default_factory=ScriptWriter)
-    subprograms: dict[Element, SubProgram] = field(default_factory=dict)
-    names: dict[str, int] = field(default_factory=dict)
-
-    def new_name(self, wanted: str) -> str:
-        """Return a name like the wanted one that no function or thread has yet."""
-        plain = name = identifier(wanted)
-        while name in self.names:
-            self.names[plain] += 1
-            name = f"{plain}_{self.names[plain]}"
-        self.names[name] = 1
-        return name
-
-
 class UrpMaker:
-    """Writes the nodes of one file.
+    """Writes the nodes of a program.
 
     Attributes:
-        file: of the program.
-        tree: its content.
-        shared: with the files of its sub-programs.
-        move: the `<Move>` node around the one that is being written.
-        previous: the node before it, in the same node.
+        program: all its nodes.
+        installation: of the program.
+        reader: reads files that nodes name.
+        writers: what writes each kind of node.
+        skip_unknown: leaves out what is not known, instead of an error.
+        writer: takes the script.
+        declarations: lines that stand before all nodes, by what they declare, in the order of first use.
+        timers: names, in the order of first use.
+        last_motions: numbers of the motions at which a path of MoveP ends.
+        switches: how many were written.
+        left_out: what is not known and was left out.
     """
 
-    def __init__(self, file: FoundFile, tree: XmlTree, shared: Shared) -> None:
-        self.file = file
-        self.tree = tree
-        self.shared = shared
-        for element in tree.root.iter():
-            if element.tag in _VARIABLES and (name := element.get("name")):
-                shared.names.setdefault(name, 1)
-        self.move: Element | None = None
-        self.previous: Element | None = None
-        self._depth = 0
+    program: ProgramNodes
+    installation: Installation
+    reader: ProgramReader
+    writers: Mapping[str, NodeWriter]
+    skip_unknown: bool = False
+    writer: ScriptWriter = field(default_factory=ScriptWriter)
+    declarations: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    timers: dict[str, None] = field(default_factory=dict)
+    last_motions: set[int] = field(default_factory=set)
+    switches: int = 0
+    left_out: list[str] = field(default_factory=list)
 
-    @property
-    def writer(self) -> ScriptWriter:
-        """Takes the script."""
-        return self.shared.writer
+    def unknown(self, node: Node, what: str) -> ProgramFileError:
+        """Return the error that names what is not known."""
+        return UnknownNodeError(
+            f"{node.source.tree.name}: {what} cannot be turned into a script; "
+            "put the .script that PolyScope saved with the program beside it"
+        )
 
-    def error(self, problem: str) -> ProgramFileError:
-        """Return the error that says what is wrong with this file."""
-        return ProgramFileError(f"{self.tree.name}: {problem}")
-
-    def write(self, element: Element) -> None:
+    def write(self, node: Node, around: Around) -> None:
         """Write one node.
 
         Raises:
-            ProgramFileError: the node is not known.
+            UnknownNodeError: the node, or something in it, is not known.
         """
-        node_writer = self.shared.nodes.get(element.tag)
-        if node_writer is None:
-            raise self.error(
-                f"a <{element.tag}> node cannot be turned into a script; "
-                "put the .script that PolyScope saved with the program beside it"
-            )
-        node_writer(self, element)
+        place = self.writer.place
+        try:
+            write = self.writers.get(node.kind)
+            if write is None:
+                raise self.unknown(node, f"a <{node.kind}> node")
+            write(self, node, around)
+        except UnknownNodeError as error:
+            if not self.skip_unknown:
+                raise
+            self.writer.take(place)
+            self.left_out.append(str(error))
 
-    def write_children(self, element: Element) -> None:
+    def write_children(self, node: Node, around: Around) -> None:
         """Write the nodes inside a node."""
-        self._depth += 1
-        if self._depth > BUDGETS.node_depth:
-            raise self.error(f"nodes are nested more than {BUDGETS.node_depth} deep")
-        outer, self.previous = self.previous, None
-        for child in element.findall("children/*"):
-            self.write(child)
-            self.previous = child
-        self.previous = outer
-        self._depth -= 1
+        for child in node.children:
+            self.write(child, around)
 
-    def name_of_subprogram(self, element: Element) -> str:
-        """Return the name of a sub-program's function, and note that it has to be written.
-
-        Args:
-            element: that defines it, or stands for the one that does.
-        """
-        definition = self.tree.resolve(element)
-        known = self.shared.subprograms.get(definition)
-        if known is not None:
-            return known.name
-        if len(self.shared.subprograms) >= BUDGETS.subprograms:
-            raise self.error(f"there are more than {BUDGETS.subprograms} sub-programs")
-        name = self.shared.new_name(definition.get("name") or "SubProgram")
-        maker, body = self, definition
-        file_name = (definition.findtext("programFile") or "").strip()
-        if file_name and definition.find("children/*") is None:
-            reader = self.shared.reader
-            file = reader.folder.beside(self.file, file_name)
-            maker = UrpMaker(file, reader.xml(file), self.shared)
-            main = maker.tree.root.find("children/MainProgram")
-            if main is None:
-                raise maker.error("there is no <MainProgram> in it")
-            body = main
-        self.shared.subprograms[definition] = SubProgram(name, maker, body)
-        return name
+    def declare(self, what: str, *lines: str) -> None:
+        """Declare something before all nodes, unless it is declared already."""
+        self.declarations.setdefault(what, lines)

@@ -1,25 +1,31 @@
-"""A program file of PolyScope as a script, as far as its nodes are known.
+"""A program file of PolyScope as a script, in the form that PolyScope gives it.
 
-The script has the form of those that PolyScope makes: first values of variables, sub-programs and threads,
-the sequence before the start, then the nodes of the main program, in a loop unless it runs once. Names,
-nesting and meaning of the nodes come from public generators and readers of such files; there is no
-published description of all of them. A node that is not known is an error.
+PolyScope generates a script from the nodes each time a program is played. Its parts stand in this order:
+header, first values of variables, positions and helpers in the order of first use, timers, sub-programs,
+BeforeStart, threads and events, main program. Source: program files and the scripts that PolyScope saved
+beside them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import groupby
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ur_emulator.programs import urp_flow, urp_moves, urp_statements
+from ur_emulator.programs import urp_flow
 from ur_emulator.programs.folder import FoundFile
 from ur_emulator.programs.installation import Installation
 from ur_emulator.programs.reading import ProgramReader
-from ur_emulator.programs.script_writer import Header, Part
-from ur_emulator.programs.urp_maker import NodeWriter, Shared, UrpMaker
-from ur_emulator.programs.urp_values import expression_text, variable_name
+from ur_emulator.programs.script_names import identifier
+from ur_emulator.programs.script_writer import Header, Part, ScriptWriter
+from ur_emulator.programs.urp_expressions import expression_of, variable_name
+from ur_emulator.programs.urp_kinds import KINDS
+from ur_emulator.programs.urp_maker import Around, UrpMaker
+from ur_emulator.programs.urp_moves import last_motions
+from ur_emulator.programs.urp_nodes import Node, read_nodes
+from ur_emulator.programs.urp_statements import EXTERNAL_CONTROL, contributor
 from ur_emulator.programs.xml_tree import XmlTree
 
 if TYPE_CHECKING:
@@ -27,80 +33,87 @@ if TYPE_CHECKING:
 
 ROOT = "URProgram"
 
-NODES: Mapping[str, NodeWriter] = MappingProxyType(
-    {
-        "Assignment": urp_statements.write_assignment,
-        "CallSubProgram": urp_flow.write_call,
-        "Comment": urp_statements.write_comment,
-        "Contributed": urp_statements.write_contributed,
-        "Folder": urp_flow.write_folder,
-        "Halt": urp_statements.write_halt,
-        "If": urp_flow.write_if,
-        "Loop": urp_flow.write_loop,
-        "Move": urp_moves.write_move,
-        "Placeholder": urp_statements.write_nothing,
-        "Popup": urp_statements.write_popup,
-        "Script": urp_statements.write_script,
-        "Set": urp_statements.write_set,
-        "SuppressedNode": urp_statements.write_nothing,
-        "Switch": urp_flow.write_switch,
-        "Wait": urp_statements.write_wait,
-        "Waypoint": urp_moves.write_waypoint,
-        "suppressedNode": urp_statements.write_nothing,
-    }
-)
-"""What writes each kind of node that may stand in a program."""
+
+@dataclass(frozen=True, slots=True)
+class MadeScript:
+    """The script of a program.
+
+    Attributes:
+        parts: texts, and places for what is known when the program is played.
+        left_out: what is not known and was left out; one line each.
+    """
+
+    parts: tuple[Part, ...]
+    left_out: tuple[str, ...]
 
 
 def uses_external_control(tree: XmlTree) -> bool:
     """True for a program with a part that a PC sends when it is played."""
-    return any(
-        urp_statements.EXTERNAL_CONTROL
-        in (node.get("strategyURCapName"), node.get("strategyProgramNodeType"))
-        for node in tree.root.iter("Contributed")
-    )
+    return any(contributor(node) == EXTERNAL_CONTROL for node in tree.root.iter("Contributed"))
 
 
 def make_script(
-    file: FoundFile, tree: XmlTree, name: str, reader: ProgramReader, installation: Installation
-) -> tuple[Part, ...]:
-    """Return the script of a program and the gaps in it that are filled when it is played.
+    file: FoundFile,
+    tree: XmlTree,
+    reader: ProgramReader,
+    installation: Installation,
+    *,
+    skip_unknown: bool = False,
+) -> MadeScript:
+    """Return the script of a program.
 
     Args:
         file: of the program.
         tree: its content.
-        name: of the program in the script.
         reader: reads files that it refers to.
         installation: of the program.
+        skip_unknown: leaves out nodes that are not known, instead of an error.
 
     Raises:
-        ProgramFileError: a part of it is not known.
+        UnknownNodeError: a node is not known.
+        ProgramFileError: something in the file is damaged, or a limit is exceeded.
     """
-    maker = UrpMaker(file, tree, Shared(NODES, reader, installation))
-    writer = maker.writer
-    main = tree.root.find("children/MainProgram")
-    if main is None:
-        raise maker.error("there is no <MainProgram> in it")
+    program = read_nodes(file, tree, reader)
+    writers = {tag: kind.write for tag, kind in KINDS.items()}
+    maker = UrpMaker(program, installation, reader, writers, skip_unknown)
+    writer, main = maker.writer, program.main
+    name = identifier(tree.root.get("name") or file.inside.stem)
+    # Parts are written in the order of their numbers, so that declarations come in the order of first use.
     with writer.block(f"def {name}():"):
         writer.parts.append(Header())
         _write_first_values(maker)
-        begin = len(writer.parts)
-        threads = [urp_flow.write_thread(maker, node) for node in tree.root.findall("children/Thread")]
-        for node in tree.root.findall("children/*"):
-            _check_top_level(maker, node)
-            if node.tag == "SpecialSequence":
-                maker.write_children(node)
-        for thread in threads:
-            writer.add(f"run {thread}()")
-        if main.get("runOnlyOnce") == "true":
-            writer.label("Robot Program")
-            maker.write_children(main)
-        else:
-            with writer.block("while (True):"):
-                writer.label("Robot Program")
-                maker.write_children(main)
-        _write_subprograms(maker, begin)
-    return tuple(_joined(writer.parts))
+        with _part(writer) as before:
+            if program.before_start is not None:
+                _write_section(maker, program.before_start, "BeforeStart")
+        with _part(writer) as body:
+            if main.get("runOnlyOnce") == "true":
+                _write_section(maker, main, "Robot Program")
+            else:
+                with writer.block("while (True):"):
+                    _write_section(maker, main, "Robot Program", is_loop=True)
+        with _part(writer) as others:
+            _write_threads(maker, program.others)
+        with _part(writer) as functions:
+            for sub_program in program.sub_programs:
+                with writer.block(f"def {sub_program.name}():"):
+                    _write_section(maker, sub_program.node, sub_program.name, mark="noBreak")
+        for timer in maker.timers:
+            if f"first value of {timer}" not in maker.declarations:
+                writer.add(f"global {timer}=0")
+        for lines in maker.declarations.values():
+            writer.add(*lines)
+        _write_timers(maker)
+        writer.parts += [*functions, *before, *others, *body]
+    return MadeScript(tuple(_joined(writer.parts)), tuple(maker.left_out))
+
+
+@contextmanager
+def _part(writer: ScriptWriter) -> Iterator[list[Part]]:
+    """Write a part of the script aside; it is in the list then."""
+    place = writer.place
+    part: list[Part] = []
+    yield part
+    part += writer.take(place)
 
 
 def _joined(parts: list[Part]) -> Iterator[Part]:
@@ -112,42 +125,56 @@ def _joined(parts: list[Part]) -> Iterator[Part]:
             yield from group
 
 
-_TOP_LEVEL = {"InitVariablesNode", "MainProgram", "SpecialSequence", "SubProgram", "Thread"}
+def _write_section(maker: UrpMaker, node: Node, name: str, *, is_loop: bool = False, mark: str = "") -> None:
+    """Write the nodes of the main program, of BeforeStart or of a sub-program."""
+    maker.last_motions |= last_motions(node, is_loop=is_loop)
+    maker.writer.label(node.number, name, mark)
+    # Software up to 3.6 has waypoints outside of moves: the program has their parameters.
+    maker.write_children(node, Around(node if node.get("motionType") else None))
 
 
-def _check_top_level(maker: UrpMaker, node: Element) -> None:
-    if node.tag not in _TOP_LEVEL:
-        maker.write(node)
-    elif node.tag == "SpecialSequence" and node.get("type") != "BeforeStart":
-        raise maker.error(f"a sequence of type {node.get('type')!r} cannot be turned into a script")
+def _write_threads(maker: UrpMaker, nodes: Sequence[Node]) -> None:
+    events = [node for node in nodes if node.kind == "Event"]
+    for node in nodes:
+        if node.kind == "Thread":
+            maker.last_motions |= last_motions(node, is_loop=node.get("runOnlyOnce") != "true")
+            urp_flow.write_thread(maker, node, Around())
+        elif node.kind != "Event":
+            maker.write(node, Around())
+    if events:
+        for event in events:
+            maker.last_motions |= last_motions(event, is_loop=False)
+        urp_flow.write_events(maker, events, Around())
 
 
 def _write_first_values(maker: UrpMaker) -> None:
     """Write the values that variables have before anything else; they stand with the names."""
-    for element in maker.tree.root.iter():
+    program = maker.program
+    for element in program.source.tree.root.iter():
         first = element.find("initializeExpression")
         if first is not None and len(first):
-            name = variable_name(maker.tree, element)
-            maker.writer.add(f"global {name} = {expression_text(maker.tree, first, element)}")
+            _declare_first_value(maker, element, first)
+    for variable in () if program.variables is None else program.variables:
+        given = variable.find("expression")
+        if given is not None and len(given):
+            _declare_first_value(maker, variable, given)
 
 
-def _write_subprograms(maker: UrpMaker, place: int) -> None:
-    """Write the functions of all sub-programs that are called, also by each other.
+def _declare_first_value(maker: UrpMaker, variable: Element, value: Element) -> None:
+    name = variable_name(maker.program.main, variable)
+    expression = expression_of(maker, maker.program.main, value)
+    maker.declare(f"first value of {name}", f"global {name}={expression.script}")
 
-    Args:
-        maker: has written everything else.
-        place: where in the script they belong.
-    """
-    writer, shared = maker.writer, maker.shared
-    later = writer.parts[place:]
-    del writer.parts[place:]
-    done = 0
-    while done < len(shared.subprograms):
-        sub_program = tuple(shared.subprograms.values())[done]
-        done += 1
-        with writer.block(f"def {sub_program.name}():"):
-            writer.add("# sub-program")
-            if sub_program.maker is not maker:
-                _write_first_values(sub_program.maker)
-            sub_program.maker.write_children(sub_program.body)
-    writer.parts.extend(later)
+
+def _write_timers(maker: UrpMaker) -> None:
+    """Write the thread that counts all timers up."""
+    if not maker.timers:
+        return
+    writer = maker.writer
+    writer.add(*(f"global {timer}_is_counting=False" for timer in maker.timers))
+    with writer.block("thread Timer_Thread():"), writer.block("while (True):"):
+        for timer in maker.timers:
+            with writer.block(f"if ({timer}_is_counting):"):
+                writer.add(f"{timer} = {timer} + get_steptime()")
+        writer.add("sync()")
+    writer.add("run Timer_Thread()")

@@ -1,21 +1,22 @@
-"""Nodes of a single statement: scripts, lines, waits, popups, variables, nodes of URCaps."""
+"""Nodes of a single statement: scripts, lines, waits, popups, variables, timers, nodes of URCaps.
+
+Source: program files and the scripts that PolyScope saved beside them.
+"""
 
 from __future__ import annotations
 
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from ur_emulator.errors import FileMissingError
 from ur_emulator.programs.installation_reader import pc_from
 from ur_emulator.programs.script_writer import one_line
-from ur_emulator.programs.urp_maker import UrpMaker
-from ur_emulator.programs.urp_values import (
-    digital_level,
-    expression_text,
-    number,
-    pin_read,
-    pin_write,
-    variable_name,
-)
+from ur_emulator.programs.urp_expressions import expression_of, variable_name
+from ur_emulator.programs.urp_lines import Line, line_of
+from ur_emulator.programs.urp_maker import Around, UrpMaker
+from ur_emulator.programs.urp_moves import set_tcp
+from ur_emulator.programs.urp_nodes import Node
+from ur_emulator.programs.urp_values import number_text
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -25,119 +26,200 @@ EXTERNAL_CONTROL = "External Control"
 _COMPARISONS = {"0": "<", "1": ">", "2": "=="}
 # Kind of a popup -> warning, error.
 _POPUPS = {"Message": "False, False", "Warning": "True, False", "Error": "False, True"}
+# Type of a value that the operator gives -> builtin that asks for it; Float is inferred.
+_QUESTIONS = {
+    "Boolean": "request_boolean_from_primary_client",
+    "Integer": "request_integer_from_primary_client",
+    "Float": "request_float_from_primary_client",
+    "String": "request_string_from_primary_client",
+}
+_TIMER_ACTIONS = {"Start": "{t}_is_counting = True", "Stop": "{t}_is_counting = False", "Reset": "{t} = 0"}
 
 
-def write_nothing(maker: UrpMaker, element: Element) -> None:
-    """Write nothing: the node is suppressed, or an empty place."""
+def write_nothing(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write nothing: the node is an empty place."""
 
 
-def write_comment(maker: UrpMaker, element: Element) -> None:
+def write_comment(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Comment>`."""
-    maker.writer.add(f"# {one_line(element.get('comment', ''))}")
+    comment = node.element.get("comment")
+    text = "Comment" if comment is None else f"'{' '.join(comment.splitlines())}'"
+    maker.writer.label(node.number, text, around.mark)
+    maker.writer.add(f"# {text}")
 
 
-def write_halt(maker: UrpMaker, element: Element) -> None:
+def write_halt(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Halt>`."""
-    maker.writer.label("Halt")
+    maker.writer.label(node.number, "Halt", around.mark)
     maker.writer.add("halt")
 
 
-def write_script(maker: UrpMaker, element: Element) -> None:
+def write_script(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Script>`: a line, or the lines of a file, which are also kept in the node."""
-    kind = element.get("type", "")
-    maker.writer.label("Script")
+    kind = node.get("type")
     if kind == "Line":
-        maker.writer.add(expression_text(maker.tree, element.find("expression"), element))
+        line = expression_of(maker, node)
+        maker.writer.label(node.number, line.label, around.mark)
+        maker.writer.add(line.script)
         return
     if kind not in ("File", "Code"):
-        raise maker.error(f"a <Script> of type {kind!r} cannot be turned into a script")
-    content = element.findtext("cachedContents")
-    name = (element.findtext("file") or "").strip()
+        raise maker.unknown(node, f"a <Script> of type {kind!r}")
+    content = node.element.findtext("cachedContents")
+    name = node.text("file")
     if name:
         try:
-            reader = maker.shared.reader
-            content = reader.script(reader.folder.beside(maker.file, name))
+            content = maker.reader.script(maker.reader.folder.beside(node.source.file, name))
         except FileMissingError:
             if content is None:
                 raise
     if content is None:
-        raise maker.error("a <Script> node is empty and names no file")
+        raise node.source.error("a <Script> node is empty and names no file")
+    maker.writer.label(node.number, f"Script: {PurePosixPath(name).name}", around.mark)
     maker.writer.add(content)
 
 
-def write_assignment(maker: UrpMaker, element: Element) -> None:
-    """Write an `<Assignment>`; a variable that the operator is asked for is not known."""
-    source = element.get("valueSource", "Expression")
-    if source != "Expression":
-        raise maker.error(f"an assignment from {source!r} cannot be turned into a script")
-    name = variable_name(maker.tree, element.find("variable"))
-    value = expression_text(maker.tree, element.find("expression"), element)
-    maker.writer.label(f"{name}={value}")
-    maker.writer.add(f"global {name} = {value}")
+def write_assignment(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write an `<Assignment>` of an expression, or of a value that the operator is asked for."""
+    name = variable_name(node, node.element.find("variable"))
+    source = node.get("valueSource") or "Expression"
+    if source == "Expression":
+        value = expression_of(maker, node)
+        maker.writer.label(node.number, f"{name}≔{value.label}", around.mark)
+        maker.writer.add(f"global {name}={value.script}")
+        return
+    question = _QUESTIONS.get(node.get("valueType"))
+    if source != "Operator" or question is None:
+        how = f"{source} {node.get('valueType')}".strip()
+        raise maker.unknown(node, f"an assignment from {how!r}")
+    maker.writer.label(node.number, f"{name}≔{source}", around.mark)
+    maker.writer.add(f'global {name}={question}("{one_line(node.get("message"))}")')
 
 
-def write_set(maker: UrpMaker, element: Element) -> None:
-    """Write a `<Set>` of a digital line; tools and payloads are in the installation, which is not read."""
-    kind = element.get("type", "")
-    maker.writer.label("Set")
+def write_set(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write a `<Set>` of a digital line or of the active TCP."""
+    kind = node.get("type")
+    tcp = node.find("tcp")
     if kind == "DigitalOutput":
-        level = digital_level(maker.tree, element)
-        maker.writer.add(pin_write(maker.tree, element.find("pin"), level))
-        return
-    if kind == "NoAction" and element.find("tcp") is None:
-        return
-    raise maker.error(f"a <Set> of type {kind!r} cannot be turned into a script")
+        line = _line(maker, node)
+        is_high = _is_high(node)
+        statement = line.write(str(is_high))
+        if not statement:
+            raise node.source.error(f"line {line.label!r} is an input: it cannot be set")
+        maker.writer.label(node.number, f"Set {line.label}={'On' if is_high else 'Off'}", around.mark)
+        maker.writer.add(statement)
+    elif kind != "NoAction":
+        raise maker.unknown(node, f"a <Set> of type {kind!r}")
+    else:
+        maker.writer.label(node.number, "Set", around.mark)
+    if tcp is not None:
+        maker.writer.add(set_tcp(maker, node, tcp))
 
 
-def write_wait(maker: UrpMaker, element: Element) -> None:
+def write_wait(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Wait>`: for a time, a line, or a condition."""
-    tree, writer = maker.tree, maker.writer
-    kind = element.get("type", "")
-    writer.label("Wait")
-    match kind:
+    tree, writer, number = node.source.tree, maker.writer, node.number
+    match node.get("type"):
         case "NoWait":
+            writer.label(number, "Wait: 0", around.mark)
             return
         case "Sleep":
-            writer.add(f"sleep({number(tree, element.findtext('waitTime'), 'time of a <Wait>')!r})")
+            time = number_text(tree, node.element.findtext("waitTime"), "time of a <Wait>")
+            writer.label(number, f"Wait: {time}", around.mark)
+            writer.add(f"sleep({time})")
             return
         case "DigitalInput":
-            awaited = f"{pin_read(tree, element.find('pin'))} == {digital_level(tree, element)}"
+            line, is_high = _line(maker, node), _is_high(node)
+            label = f"{line.label}={'HI' if is_high else 'LO'}"
+            condition = f"{line.read} == {not is_high}"
         case "AnalogInput":
-            sign = _COMPARISONS.get((element.findtext("analogComparison") or "").strip())
+            sign = _COMPARISONS.get(node.text("analogComparison"))
             if sign is None:
-                raise maker.error("a <Wait> compares in an unknown way: use 0 (less), 1 (more) or 2 (equal)")
-            level = number(tree, element.findtext("analogValue"), "level of a <Wait>")
-            awaited = f"{pin_read(tree, element.find('pin'))} {sign} {level!r}"
+                raise node.source.error(
+                    "a <Wait> compares in an unknown way: use 0 (less), 1 (more) or 2 (equal)"
+                )
+            level = number_text(tree, node.element.findtext("analogValue"), "level of a <Wait>")
+            line = _line(maker, node)
+            label, condition = f"{line.label}{sign}{level}", f"not({line.read} {sign} {level})"
         case "Condition" | "Expression":
-            awaited = expression_text(tree, element.find("expression"), element)
-        case _:
-            raise maker.error(f"a <Wait> of type {kind!r} cannot be turned into a script")
-    with writer.block(f"while (not ({awaited})):"):
+            awaited = expression_of(maker, node)
+            label, condition = awaited.label, f"not({awaited.script})"
+        case other:
+            raise maker.unknown(node, f"a <Wait> of type {other!r}")
+    writer.label(number, f"Wait {label}", around.mark)
+    with writer.block(f"while ({condition}):"):
         writer.add("sync()")
 
 
-def write_popup(maker: UrpMaker, element: Element) -> None:
-    """Write a `<Popup>`, which waits until it is closed."""
-    kind = element.get("type", "Message")
+def write_popup(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write a `<Popup>` of a text, a variable or an expression; one that halts does not wait to be closed."""
+    kind = node.get("type") or "Message"
     if kind not in _POPUPS:
-        raise maker.error(
+        raise node.source.error(
             f"a popup of type {kind!r} cannot be turned into a script: use {', '.join(_POPUPS)}"
         )
-    message = element.get("message") or element.findtext("message") or ""
-    maker.writer.label("Popup")
-    maker.writer.add(f'popup("{one_line(message)}", "{kind}", {_POPUPS[kind]}, blocking=True)')
-    if element.get("haltProgram") == "true":
+    match node.get("inputType") or "Text":
+        case "Text":
+            text = node.get("message") or node.text("message")
+            shown, label = f'"{one_line(text)}"', f"Popup: {text}"
+        case "Variable":
+            shown, label = f'str_cat("",{variable_name(node, node.element.find("variable"))})', "Popup"
+        case "Expression":
+            shown, label = f'str_cat("",{expression_of(maker, node).script})', "Popup"
+        case other:
+            raise maker.unknown(node, f"a popup of {other!r}")
+    is_halt = node.get("haltProgram") == "true"
+    maker.writer.label(node.number, label, around.mark)
+    maker.writer.add(f'popup({shown}, "{kind}", {_POPUPS[kind]}, blocking={not is_halt})')
+    if is_halt:
         maker.writer.add("halt")
 
 
-def write_contributed(maker: UrpMaker, element: Element) -> None:
+def write_timer(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Write a `<Timer>`: a variable that a thread counts up [s]."""
+    name = variable_name(node, node.element.find("variable"))
+    action = node.get("action")
+    if action not in _TIMER_ACTIONS:
+        raise maker.unknown(node, f"a timer's action {action!r}")
+    maker.timers.setdefault(name)
+    maker.writer.label(node.number, f"{name}: {action}", around.mark)
+    maker.writer.add(_TIMER_ACTIONS[action].format(t=name))
+
+
+def write_contributed(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write the node of a URCap: only External Control is known."""
-    name = element.get("strategyURCapName") or element.get("strategyProgramNodeType") or "?"
+    name = contributor(node.element)
     if name != EXTERNAL_CONTROL:
-        raise maker.error(
-            f"a node of the URCap {name!r} cannot be turned into a script; "
-            "put the .script that PolyScope saved with the program beside it"
-        )
-    maker.writer.label(EXTERNAL_CONTROL)
-    data = {item.get("key", ""): item.get("value", "") for item in element.iter("data")}
-    maker.writer.gap(pc_from(data, maker.tree.name))
+        raise maker.unknown(node, f"a node of the URCap {name!r}")
+    writer = maker.writer
+    data = {item.get("key", ""): item.get("value", "") for item in node.element.iter("data")}
+    pc = pc_from(data, node.source.tree.name)
+    title = one_line(node.get("strategyProgramNodeType") or EXTERNAL_CONTROL)
+    writer.add("# begin: URCap Program Node")
+    writer.add(f"#   Source: {EXTERNAL_CONTROL}, {one_line(node.get('strategyURCapDeveloper'))}".rstrip(", "))
+    writer.add(f"#   Type: {title}")
+    writer.label(node.number, f"Control by {maker.installation.pc_name or pc.host or title}", around.mark)
+    writer.gap(pc)
+    writer.add("# end: URCap Program Node")
+
+
+def contributor(element: Element) -> str:
+    """Return the name of the URCap that a `<Contributed>` node is of."""
+    return element.get("strategyURCapName") or element.get("strategyProgramNodeType") or "?"
+
+
+def _line(maker: UrpMaker, node: Node) -> Line:
+    pin = node.find("pin")
+    name = "" if pin is None else pin.get("referencedName", "")
+    return line_of(maker.installation, name, node.source.tree.name)
+
+
+def _is_high(node: Node) -> bool:
+    """Return the level that a node names.
+
+    Raises:
+        ProgramFileError: it is none.
+    """
+    text = node.text("digitalValue").lower()
+    if text not in ("0", "1", "true", "false"):
+        raise node.source.error(f"a <{node.kind}> node has the level {text[:100]!r}: it is 0 or 1")
+    return text in ("1", "true")

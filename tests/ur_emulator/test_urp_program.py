@@ -1,0 +1,458 @@
+"""Program files as a whole: order, names, numbers, references, positions, and what their installation gives."""
+
+import pytest
+from dashboard_support import expression, script_line, urp
+from hypothesis import given
+from hypothesis import strategies as st
+from urp_samples import (
+    BASE,
+    CONTACT,
+    HALT,
+    JOINTS,
+    POSE_TEXT,
+    POSITION,
+    TOOL,
+    assignment,
+    direction,
+    move,
+    pin,
+    until_distance,
+    variable_waypoint,
+    waypoint,
+)
+from urp_support import NEW_BOX, lines_of, script_of
+
+from protocol.pose import pose_inv, pose_trans
+from ur_emulator.controller.io.modbus_signals import SignalType
+from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.ur5 import UR5
+from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.programs.installation import DeclaredSignal, Feature, Installation
+from ur_emulator.programs.loading import load_program
+from ur_emulator.programs.script_names import identifier, is_identifier
+from ur_emulator.programs.urp_positions import pose_text
+from urscript import compile_program
+from urscript.catalogue import catalogue_for
+
+NEW = "5.11.1.108318"
+Q = tuple(map(float, JOINTS.split(", ")))
+OFFSET = (0.01, 0.0, 0.12, 0.0, 0.3, 0.0)
+TOOL_POSE = ", ".join(map(str, OFFSET))
+KINEMATICS = (
+    '<Kinematics status="NOT_INITIALIZED" validChecksum="false"><deltaTheta value="0.0, 0.0, 0.0, 0.0, 0.0, 0.0"/>'
+    '<a value="0.0, -0.425, -0.39225, 0.0, 0.0, 0.0"/><d value="0.089159, 0.0, 0.0, 0.10915, 0.09465, 0.0823"/>'
+    '<alpha value="1.5707963267948966, 0.0, 0.0, 1.5707963267948966, -1.5707963267948966, 0.0"/>'
+    '<jointChecksum value="0, 0, 0, 0, 0, 0"/></Kinematics>'
+)
+TAUGHT = f'<JointAngles angles="{JOINTS}"/><TCPOffset pose="{TOOL_POSE}"/>{KINEMATICS}'
+FIXED = f"<motionParameters/><position>{TAUGHT}</position>"
+CARTESIAN = 'useActiveTCP="true" positionType="CartesianPose"'
+CELL = Installation(
+    "/programs/cell.installation",
+    tcps={"Gripper": OFFSET},
+    lines={"pump": "digital_out[2]", "part there": "tool_in[0]"},
+    features={"Table": Feature((0.1, 0.2, 0.0, 0.0, 0.0, 1.5), is_variable=True), "Wall": Feature((0.5, 0.0, 0.0, 0.0, 0.0, 0.0))},
+    modbus=(DeclaredSignal("gate", "10.0.0.9", 255, 3, SignalType.DIGITAL_INPUT),),
+    safe_home=Q,
+)  # fmt: skip
+
+
+def feature(name):
+    return f'<feature class="GeomFeatureReference" referencedName="{name}"/>'
+
+
+def compiles(text, *variables):
+    """Whether a script compiles for software 3.15, with variables that the installation would declare."""
+    head, _, rest = text.partition("\n")
+    declared = "".join(f"global {name}=p[0, 0, 0, 0, 0, 0]\n" for name in variables)
+    compile_program(f"{head}\n{declared}{rest}".encode().decode("latin-1"), catalogue=catalogue_for("3.15"))
+    return True
+
+
+# --- order and numbers
+
+
+def test_all_parts_stand_in_the_order_of_polyscope(tmp_path):
+    first = f'<variables><variable name="count">{expression("7")}</variable><variable name="kept"><expression/></variable></variables>'
+    call = f'<CallSubProgram><subprogram name="pick"><children>{move("MoveL", waypoint("Part", FIXED), CARTESIAN)}</children></subprogram></CallSubProgram>'
+    around = (
+        f'<SpecialSequence type="BeforeStart"><children>{assignment("count", "1")}</children></SpecialSequence>'
+        '<Thread name="Watch" runOnlyOnce="false"><children><Wait type="Sleep"><waitTime>1.0</waitTime></Wait></children></Thread>'
+        f'<SuppressedNode><suppressedNode class="Thread"><children>{HALT}</children></suppressedNode></SuppressedNode>'
+        f'<Thread name="Once" runOnlyOnce="true"><children>{HALT}</children></Thread>'
+        f"<Event>{expression('count≟2')}<children>{HALT}</children></Event><Event>{expression('count≟3')}<children/></Event>"
+        '<SubProgram reference="../MainProgram/children/CallSubProgram/subprogram"/>'
+    )
+    nodes = '<Timer action="Start"><variable name="t"/></Timer>' + call
+    nodes += move("MoveJ", waypoint("Home", FIXED), CARTESIAN)
+    text = script_of(
+        tmp_path, urp(nodes, once=False, around=around, first=first, saved_in=NEW, name="7pick V1.2"),
+    )  # fmt: skip
+    pose = pose_text(ArmModel(UR5).fk(Q, OFFSET))
+    assert text.splitlines() == [
+        "def P7pick_V12():",
+        "  global t=0",
+        "  global count=7",
+        f"  global Home_p={pose}",
+        f"  global Home_q=[{JOINTS}]",
+        f"  global Part_p={pose}",
+        f"  global Part_q=[{JOINTS}]",
+        "  global t_is_counting=False",
+        "  thread Timer_Thread():",
+        "    while (True):",
+        "      if (t_is_counting):",
+        "        t = t + get_steptime()",
+        "      end",
+        "      sync()",
+        "    end",
+        "  end",
+        "  run Timer_Thread()",
+        "  def pick():",
+        '    $ 18 "pick" "noBreak"',
+        '    $ 19 "MoveL"',
+        '    $ 20 "Part" "breakAfter"',
+        "    movel(Part_p, a=1.2, v=0.25)",
+        "  end",
+        '  $ 2 "BeforeStart"',
+        '  $ 3 "count≔1"',
+        "  global count=1",
+        '  $ 9 "Watch"',
+        "  thread Watch():",
+        "    while (True):",
+        '      $ 10 "Wait: 1.0"',
+        "      sleep(1.0)",
+        "    end",
+        "  end",
+        "  threadId_Watch = run Watch()",
+        '  $ 13 "Once"',
+        "  thread Once():",
+        '    $ 14 "Halt"',
+        "    halt",
+        "  end",
+        "  threadId_Once = run Once()",
+        "  thread EventThread():",
+        "    while (True):",
+        "      if (count == 2):",
+        '        $ 16 "Halt"',
+        "        halt",
+        "      elif (count == 3):",
+        "      end",
+        "      sync()",
+        "    end",
+        "  end",
+        "  eventThread = run EventThread()",
+        "  while (True):",
+        '    $ 4 "Robot Program"',
+        '    $ 5 "t: Start"',
+        "    t_is_counting = True",
+        '    $ 6 "Call pick"',
+        "    pick()",
+        '    $ 7 "MoveJ"',
+        '    $ 8 "Home" "breakAfter"',
+        "    movej(get_inverse_kin(Home_p, qnear=Home_q), a=1.2, v=0.25)",
+        "  end",
+        "end",
+    ]
+    assert compiles(text)
+
+
+@pytest.mark.parametrize(
+    ("name", "function"),
+    [
+        ("pick place", "pick_place"),
+        ("cell V1.3", "cell_V13"),
+        ("7pick", "P7pick"),
+        ("größe", "gru246u223e"),
+        ("a-b", "a_b"),
+        ("_x", "_x"),
+    ],
+)
+def test_names_of_programs_become_names_of_functions(name, function):
+    assert identifier(name) == function
+
+
+@given(st.text())
+def test_every_name_becomes_one_that_a_script_can_have(name):
+    assert is_identifier(identifier(name))
+
+
+def test_a_suppressed_node_can_hold_what_others_refer_to(tmp_path):
+    nodes = (
+        '<SuppressedNode><suppressedNode class="CallSubProgram"><subprogram name="pick"><children><Halt/></children></subprogram>'
+        '</suppressedNode></SuppressedNode><CallSubProgram><subprogram reference="../../SuppressedNode/suppressedNode/subprogram"/>'
+        '</CallSubProgram><SuppressedNode><suppressedNode class="Assignment"><variable name="part"/></suppressedNode></SuppressedNode>'
+        '<Popup type="Message" inputType="Variable"><variable reference="../../SuppressedNode[2]/suppressedNode/variable"/></Popup>'
+        '<If reference="../Folder/If"/><Folder name="F"><children/><If type="If"><expression>'
+        '<ExpressionChar character="1"/></expression><children><Halt/></children></If></Folder>'
+    )
+    text = script_of(tmp_path, urp(nodes))
+    assert text.splitlines() == [
+        "def sample():",
+        "  def pick():",
+        '    $ 9 "pick" "noBreak"',
+        '    $ 10 "Halt"',
+        "    halt",
+        "  end",
+        '  $ 1 "Robot Program"',
+        '  $ 3 "Call pick"',
+        "  pick()",
+        '  $ 5 "Popup"',
+        '  popup(str_cat("",part), "Message", False, False, blocking=True)',
+        '  $ 6 "If 1"',
+        "  if (1):",
+        '    $ 7 "Halt"',
+        "    halt",
+        "  end",
+        '  $ 8 "F"',
+        "end",
+    ]
+
+
+def test_references_that_grow_without_end_are_refused(tmp_path):
+    nodes = "".join(
+        f'<Folder name="{n}"><children>{"".join(f"<Folder reference={chr(34)}../../../Folder[{n}]{chr(34)}/>" for _ in range(8))}</children></Folder>'
+        for n in range(2, 10)
+    )
+    with pytest.raises(
+        ProgramFileError, match=r"nested more than 50 deep|more than 300000 nodes|lead past more than"
+    ):
+        script_of(tmp_path, urp(nodes + '<Folder name="last"><children/></Folder>'))
+
+
+# --- files
+
+
+def test_sub_programs_in_files_of_their_own(tmp_path):
+    (tmp_path / "cell").mkdir()
+    (tmp_path / "cell" / "grip.urp").write_bytes(urp(script_line('textmsg("grip")')))
+    call = (
+        '<CallSubProgram><subprogram name="grip" keepHidden="true" {}><programFile resolves-to="file">../programs/grip.urp'
+        "</programFile><children>{}</children></subprogram></CallSubProgram>"
+    )
+    empty, kept = call.format("", ""), call.format('keepSynchronizedWithDisk="false"', HALT)
+    fresh = call.format('keepSynchronizedWithDisk="true"', HALT)
+    for node, line in ((empty, 'textmsg("grip")'), (fresh, 'textmsg("grip")'), (kept, "halt")):
+        (tmp_path / "cell" / "main.urp").write_bytes(urp(node))
+        text = load_program(ProgramFolder(tmp_path), "cell/main.urp").script(lambda pc: "")
+        function = text.partition("  def grip():\n")[2].splitlines()[:4]
+        assert function[0] == '    $ 3 "grip" "noBreak"'
+        assert function[2:] == [f"    {line}", "  end"]
+    (tmp_path / "cell" / "grip.urp").unlink()
+    (tmp_path / "cell" / "main.urp").write_bytes(urp(fresh))
+    assert "\n    halt\n" in load_program(ProgramFolder(tmp_path), "cell/main.urp").script(lambda pc: "")
+    (tmp_path / "cell" / "main.urp").write_bytes(urp(empty))
+    with pytest.raises(FileMissingError, match=r"grip\.urp"):
+        load_program(ProgramFolder(tmp_path), "cell/main.urp")
+
+
+def test_a_script_file_of_a_node_is_read_where_it_lies(tmp_path):
+    node = (
+        '<Script type="File"><cachedContents>old()</cachedContents><file resolves-to="file">/ursim/programs/f.script'
+        "</file></Script>"
+    )
+    (tmp_path / "f.script").write_text('textmsg("new")\n')
+    assert lines_of(tmp_path, node) == ['$ 2 "Script: f.script"', 'textmsg("new")']
+
+
+def test_a_file_without_compression_is_read_too(tmp_path):
+    assert lines_of(tmp_path, HALT, packed=False) == ['$ 2 "Halt"', "halt"]
+
+
+# --- positions of e-Series software
+
+
+def test_a_taught_pose_is_that_of_the_angles_and_the_tool(tmp_path):
+    lines = script_of(
+        tmp_path, urp(move("MoveL", waypoint("W", FIXED), CARTESIAN), saved_in=NEW)
+    ).splitlines()
+    assert lines[1].startswith("  global W_p=p[")
+    found = [float(one) for one in lines[1].partition("[")[2].rstrip("]").split(",")]
+    assert found == pytest.approx(ArmModel(UR5).fk(Q, OFFSET), abs=1e-11)
+    assert lines[2] == f"  global W_q=[{JOINTS}]"
+
+
+@pytest.mark.parametrize(
+    ("kind", "attributes", "statement"),
+    [
+        ("MoveJ", CARTESIAN, "movej(get_inverse_kin(W_p, qnear=W_q), a=1.2, v=0.25)"),
+        ("MoveJ", 'positionType="JointAngles"', "movej(W_q, a=1.2, v=0.25)"),
+        ("MoveL", CARTESIAN, "movel(W_p, a=1.2, v=0.25)"),
+        ("MoveP", f'{CARTESIAN} blendRadius="0.025"', "movep(W_p, a=1.2, v=0.25, r=0.0)"),
+    ],
+)
+def test_waypoints_of_e_series_software(tmp_path, kind, attributes, statement):
+    assert lines_of(tmp_path, move(kind, waypoint("W", FIXED), attributes), saved_in=NEW)[-1] == statement
+
+
+def test_a_waypoint_is_declared_once_in_the_order_of_use(tmp_path):
+    nodes = move("MoveL", "".join(waypoint(name, FIXED) for name in ("B", "A", "B")), CARTESIAN)
+    nodes += (
+        '<Assignment><variable name="x"/><expression><ExpressionWaypoint><Waypoint referenceName="A" '
+        'reference="../../../../Move/children/Waypoint[2]"/></ExpressionWaypoint></expression></Assignment>'
+    )
+    text = script_of(tmp_path, urp(nodes, saved_in=NEW))
+    assert [line.split("=")[0] for line in text.splitlines() if "_p=" in line or "_q=" in line] == [
+        "  global B_p",
+        "  global B_q",
+        "  global A_p",
+        "  global A_q",
+    ]
+    assert text.splitlines()[-3:-1] == ['  $ 6 "x≔A"', "  global x=A_p"]
+    assert compiles(text)
+
+
+def test_relative_waypoints_are_steps_of_the_tool(tmp_path):
+    inside = f"<motionParameters/><relativeFromPosition>{TAUGHT}</relativeFromPosition><position>{TAUGHT}</position>"
+    text = script_of(tmp_path, urp(move("MoveL", waypoint("W", inside, "Relative"), CARTESIAN), saved_in=NEW))
+    pose = pose_text(ArmModel(UR5).fk(Q, OFFSET))
+    assert text.splitlines()[1:] == [
+        f"  global W_from_p={pose}",
+        f"  global W_to_p={pose}",
+        '  $ 1 "Robot Program"',
+        '  $ 2 "MoveL"',
+        '  $ 3 "W" "breakAfter"',
+        "  movel(pose_add(get_target_tcp_pose(), pose_sub(W_to_p, W_from_p)), a=1.2, v=0.25)",
+        "end",
+    ]
+
+
+def test_a_path_goes_on_where_the_program_begins_again(tmp_path):
+    path = move("MoveP", waypoint(), 'blendRadius="0.02"')
+    loop = f'<Loop type="Counting" count="2"><loopVariable name="n"/><children>{path}</children></Loop>'
+    for nodes, once, radii in (
+        (path, True, ["0.0"]),
+        (path, False, ["0.02"]),
+        (path + path, True, ["0.02", "0.0"]),
+        (loop + path, False, ["0.0", "0.02"]),
+        (path + move("MoveL", direction(until_distance("0.1"))), False, ["0.0"]),
+    ):
+        lines = lines_of(tmp_path, nodes, once=once)
+        assert [line.split("r=")[1].rstrip(")") for line in lines if line.startswith("movep")] == radii
+
+
+def test_software_up_to_3_6_has_waypoints_outside_of_moves(tmp_path):
+    data = urp(waypoint(), packed=False).decode()
+    main = '<MainProgram motionType="MoveL" speed="0.3" acceleration="1.0" useActiveTCP="true" runOnlyOnce='
+    text = script_of(tmp_path, data.replace("<MainProgram runOnlyOnce=", main).encode())
+    assert text.splitlines()[-2] == f"  movel({POSE_TEXT}, a=1.0, v=0.3)"
+
+
+# --- what the installation gives
+
+
+def test_a_pose_moves_with_a_feature_that_is_a_variable(tmp_path):
+    base = (0.1, 0.2, 0.0, 0.0, 0.0, 1.5)
+    inverse = pose_text(pose_inv(base))
+    taught = FIXED + f'<BaseToFeature pose="{", ".join(map(str, base))}"/>'
+    for name, kind, statement in (
+        ("Table", "MoveL", f"movel(pose_trans(Table, pose_trans({inverse}, W_p)), a=1.2, v=0.25)"),
+        ("Table", "MoveJ", f"movej(get_inverse_kin(pose_trans(Table, pose_trans({inverse}, W_p)), qnear=W_q), a=1.2, v=0.25)"),
+        ("Wall", "MoveL", "movel(W_p, a=1.2, v=0.25)"),
+    ):  # fmt: skip
+        nodes = move(kind, waypoint("W", taught), CARTESIAN, feature(name))
+        assert lines_of(tmp_path, nodes, CELL, saved_in=NEW)[-1] == statement
+    nodes = move("MoveL", variable_waypoint("part"), CARTESIAN, feature("Table"))
+    assert lines_of(tmp_path, nodes, CELL)[-1] == "movel(pose_trans(Table, part), a=1.2, v=0.25)"
+
+
+def test_a_pose_of_cb3_software_is_kept_in_its_feature(tmp_path):
+    inside = (
+        "<motionParameters/>"
+        + POSITION.removesuffix("/>")
+        + '><poseInFeatureCoordinates pose="0.5, 0, 0, 0, 0, 0"/></position>'
+    )
+    lines = lines_of(tmp_path, move("MoveL", waypoint("W", inside), feature=feature("Table")), CELL)
+    half = ", ".join([".500000000000", *[".000000000000"] * 5])
+    assert lines[-1] == f"movel(pose_trans(Table, p[{half}]), a=1.2, v=0.25)"
+    with pytest.raises(ProgramFileError, match="the pose of waypoint 'W' in feature 'Table' is not known"):
+        lines_of(tmp_path, move("MoveL", waypoint(), feature=feature("Table")), CELL)
+
+
+def test_features_are_targets_frames_and_values(tmp_path):
+    target = (
+        '<Waypoint type="Variable" name="W"><motionParameters/><variable featureName="Table"/></Waypoint>'
+    )
+    assert lines_of(tmp_path, move("MoveL", target), CELL)[-2:] == [
+        '$ 3 "Table" "breakAfter"',
+        "movel(Table, a=1.2, v=0.25)",
+    ]
+    value = '<Assignment><variable name="x"/><expression><ExpressionVariable><GeomFeatureVariable featureName="Table"/></ExpressionVariable></expression></Assignment>'
+    assert lines_of(tmp_path, value, CELL) == ['$ 2 "x≔Table"', "global x=Table"]
+    for name, label, frame in (
+        ("Table", "Table X-", "Table"),
+        ("Wall", "Wall X-", pose_text((0.5, 0.0, 0.0, 0.0, 0.0, 0.0))),
+    ):
+        nodes = move(
+            "MoveL",
+            direction(until_distance("0.1"), 'selectedDirection="XMinus"', feature(name)),
+            feature=BASE,
+        )
+        lines = lines_of(tmp_path, nodes, CELL)
+        assert lines[1] == f'$ 3 "Direction: {label}"'
+        assert f"calculate_point_to_move_towards({frame}, [-1.0, 0.0, 0.0], 0.1)" in lines[6]
+    with pytest.raises(ProgramFileError, match="the installation has no feature 'Gone'"):
+        lines_of(tmp_path, move("MoveL", direction(CONTACT, inside=feature("Gone"))), CELL)
+
+
+def test_a_contact_without_a_distance_is_looked_for_far_away(tmp_path):
+    nodes = move("MoveL", direction(CONTACT, 'selectedDirection="ZPlus"', TOOL))
+    lines = lines_of(tmp_path, nodes)
+    assert lines[1] == '$ 3 "Direction: Tool Z+"'
+    assert "towards(get_forward_kin(), [0.0, 0.0, 1.0], 1000.0)" in lines[6]
+
+
+def test_tools_have_the_names_of_the_installation(tmp_path):
+    statement = f"set_tcp(p[{TOOL_POSE}])"
+    named = '<Set type="NoAction"><tcp referencedName="Gripper"/></Set>'
+    assert lines_of(tmp_path, named, CELL) == ['$ 2 "Set"', statement]
+    nodes = move("MoveL", variable_waypoint("a"), 'useActiveTCP="false"', '<tcp referencedName="Gripper"/>')
+    assert lines_of(tmp_path, nodes, CELL)[:2] == ['$ 2 "MoveL"', statement]
+    with pytest.raises(ProgramFileError, match="has no TCP 'Hook': it has Gripper"):
+        lines_of(tmp_path, named.replace("Gripper", "Hook"), CELL)
+
+
+def test_lines_have_the_names_of_the_installation(tmp_path):
+    nodes = (
+        f'<Set type="DigitalOutput">{pin("pump")}<digitalValue>1</digitalValue></Set>'
+        f'<Wait type="DigitalInput">{pin("part there")}<digitalValue>1</digitalValue></Wait>'
+        f'<If type="If"><expression><ExpressionIO>{pin("gate")}</ExpressionIO></expression><children/></If>'
+    )
+    assert lines_of(tmp_path, nodes, CELL) == [
+        '$ 2 "Set pump=On"',
+        "set_standard_digital_out(2, True)",
+        '$ 3 "Wait part there=HI"',
+        "while (get_tool_digital_in(0) == False):",
+        "sync()",
+        "end",
+        '$ 4 "If gate"',
+        'if (modbus_get_signal_status("gate")):',
+        "end",
+    ]
+
+
+def test_safe_home_is_a_position_of_the_installation(tmp_path):
+    node = '<SafeHome positionOptionType="{}" speed="1.0" acceleration="1.4" nextMotionTime="2.0"/>'
+    assert lines_of(tmp_path, node.format("SPEED_AND_ACCELERATION"), CELL) == [
+        '$ 2 "Home"',
+        f"movej([{JOINTS}], a=1.4, v=1.0)",
+    ]
+    assert lines_of(tmp_path, node.format("TIME"), CELL)[-1] == f"movej([{JOINTS}], t=2.0)"
+
+
+def test_the_pc_of_external_control_has_a_name_in_the_installation(tmp_path):
+    node = '<Contributed strategyURCapName="External Control" strategyURCapDeveloper="fzi"><dataModel/></Contributed>'
+    named = Installation(NEW_BOX.wire_path, pc_name="my pc")
+    assert lines_of(tmp_path, node, named) == [
+        "# begin: URCap Program Node",
+        "#   Source: External Control, fzi",
+        "#   Type: External Control",
+        '$ 2 "Control by my pc"',
+        "# gap",
+        "# end: URCap Program Node",
+    ]
+
+
+def test_pose_trans_of_the_inverse_is_the_pose_in_the_feature():
+    base, pose = (0.1, 0.2, 0.0, 0.0, 0.0, 1.5), ArmModel(UR5).fk(Q, OFFSET)
+    assert pose_trans(base, pose_trans(pose_inv(base), pose)) == pytest.approx(pose, abs=1e-12)
