@@ -76,6 +76,7 @@ class Box(BoxOperations):
         programs: str | PathLike[str] | None = None,
         control_port: int | None = None,
         control_token: str | None = None,
+        skip_unknown_nodes: bool = False,
         *,
         loop: EventLoop | None = None,
         phase: float = 0.0,
@@ -98,6 +99,8 @@ class Box(BoxOperations):
             control_port: number of the port for the control API over HTTP (docs/control.md); 0: a free one,
                 None: none.
             control_token: what requests on that port must show; None: nothing, on a loopback address only.
+            skip_unknown_nodes: run programs of PolyScope without the nodes that are not known, those of
+                URCaps above all; the log names each.
             loop: shared with other boxes; None gives the box its own.
             phase: which part of a period its cycles lie after those of the first box of the loop.
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).
@@ -141,7 +144,7 @@ class Box(BoxOperations):
         identity = BoxIdentity(software, model.title, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         folder = ProgramFolder(None if programs is None else Path(programs))
-        self._player = player = ProgramPlayer(self._access, folder)
+        self._player = player = ProgramPlayer(self._access, folder, skip_unknown=skip_unknown_nodes)
         self._reports = ReportFolder(player.folder)
         states = StateEncoder(software, controller.state.arm)
         realtime, realtime_ro = (RealtimePort(software.realtime, intake) for intake in (self._intake, None))

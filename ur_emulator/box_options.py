@@ -31,6 +31,7 @@ class BoxOptions(TypedDict, total=False):
     programs: str | PathLike[str] | None
     control_port: int | None
     control_token: str | None
+    skip_unknown_nodes: bool
 
 
 def check_options(

@@ -68,6 +68,13 @@ def serve(
             help="Folder of programs (.urp, .script) and installations, for the dashboard's load and play."
         ),
     ] = None,
+    skip_unknown_nodes: Annotated[
+        bool,
+        typer.Option(
+            "--skip-unknown-nodes",
+            help="Run .urp programs without the nodes that are not known, as of URCaps.",
+        ),
+    ] = False,
     control_port: Annotated[
         int | None,
         typer.Option(
@@ -117,6 +124,7 @@ def serve(
             programs=programs,
             control_port=control_port,
             control_token=token,
+            skip_unknown_nodes=skip_unknown_nodes,
         )
         for name in _END_SIGNALS:
             signal.signal(name, lambda number, frame: rack.stop())

@@ -10,20 +10,7 @@ from urp_support import lines_of, made
 
 from ur_emulator.errors import FileMissingError, ProgramFileError, UnknownNodeError
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import ExternalControlPc
 from ur_emulator.programs.loading import load_program
-
-
-def test_the_script_that_polyscope_saved_beside_it_is_taken(tmp_path):
-    (tmp_path / "p.script").write_text('def p():\n  textmsg("saved")\nend\n')
-    (tmp_path / "p.urp").write_bytes(urp("<PalletWizard/>"))
-    program = load_program(ProgramFolder(tmp_path), "p.urp")
-    assert program.script(lambda pc: "") == 'def p():\n  textmsg("saved")\nend\n'
-    # What a PC sends is not in a saved script, so that of External Control is made from the nodes.
-    (tmp_path / "p.urp").write_bytes(urp(external_control()))
-    program = load_program(ProgramFolder(tmp_path), "p.urp")
-    assert program.pcs == (ExternalControlPc(),)
-    assert "sent" in program.script(lambda pc: "# sent")
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ that goes in and comes out can be pickled.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.events import ScriptFailed
@@ -66,11 +67,14 @@ def compile_loaded(
         text = loaded.script(received.__getitem__)
     except ProgramFileError as error:
         return ScriptFailed(1, 1, f"{loaded.file_name} cannot be compiled: {error}")
-    return compile_text(text, catalogue, loaded.file_name)
+    outcome = compile_text(text, catalogue, loaded.file_name)
+    if loaded.origin and isinstance(outcome, ScriptFailed):
+        return replace(outcome, log_text=f"{outcome.log_text or outcome.text}; the script is {loaded.origin}")
+    return outcome
 
 
 def load_and_compile(
-    folder: ProgramFolder, name: str, before: Installation, catalogue: Catalogue
+    folder: ProgramFolder, name: str, before: Installation, catalogue: Catalogue, skip_unknown: bool = False
 ) -> tuple[LoadedProgram, Outcome | None, Outcome | None]:
     """Read a program and its installation, and compile it unless parts of it are fetched when it starts.
 
@@ -79,6 +83,7 @@ def load_and_compile(
         name: as a client gives it.
         before: installation that is effective.
         catalogue: the builtins of the software.
+        skip_unknown: leaves out nodes that are not known.
 
     Returns:
         The program, what starts it, and what makes its installation effective; None if it is already.
@@ -86,7 +91,7 @@ def load_and_compile(
     Raises:
         ProgramFileError: one of the files cannot be used.
     """
-    loaded = load_program(folder, name)
+    loaded = load_program(folder, name, skip_unknown=skip_unknown)
     ready = None if loaded.pcs else compile_loaded(loaded, {}, catalogue)
     return loaded, ready, _set_up(loaded.installation or before, before, catalogue)
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 from protocol.script_channel import MAX_PROGRAM
-from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.errors import ProgramFileError, UnknownNodeError
+from ur_emulator.programs.folder import FoundFile, ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation
 from ur_emulator.programs.installation_files import NEW_BOX, installation_of
 from ur_emulator.programs.reading import ProgramReader
@@ -16,11 +16,15 @@ from ur_emulator.programs.script_header import header_lines
 from ur_emulator.programs.script_names import identifier
 from ur_emulator.programs.script_text import as_one_program
 from ur_emulator.programs.script_writer import Gap, Header, Part
+from ur_emulator.programs.twin import is_twin, software_of
 from ur_emulator.programs.urp_program import ROOT, make_script, uses_external_control
+from ur_emulator.programs.xml_tree import XmlTree
 from urscript.values import to_script_text
 
 SCRIPT_SUFFIX = ".script"
 PROGRAM_SUFFIX = ".urp"
+# So many things that are left out are named one by one.
+_MOST_NOTES = 20
 # Marks of the part of a PC's program that is written once, before the rest. Source: External Control URCap.
 _HEADER_BEGIN = "# HEADER_BEGIN"
 _HEADER_END = "# HEADER_END"
@@ -34,11 +38,15 @@ class LoadedProgram:
         wire_path: how the box calls its file, `/programs/sub/x.urp`.
         installation: of the program; a script file has none.
         parts: its script, and places for what is known when it is played.
+        notes: for the log.
+        origin: where the script comes from if not from the file itself.
     """
 
     wire_path: str
     installation: Installation | None
     parts: tuple[Part, ...]
+    notes: tuple[str, ...] = ()
+    origin: str = ""
 
     @property
     def file_name(self) -> str:
@@ -94,12 +102,16 @@ def split_header(text: str) -> tuple[list[str], list[str]]:
     return lines[begin : end + 1], lines[end + 1 :]
 
 
-def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
+def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False) -> LoadedProgram:
     """Read a program and its installation.
+
+    A program file becomes the script that PolyScope makes of its nodes; the script beside it, which PolyScope
+    saved, only if a node is not known.
 
     Args:
         folder: of all programs.
         name: as a client gives it.
+        skip_unknown: leaves out nodes that are not known.
 
     Raises:
         FileMissingError: there is no such program.
@@ -107,10 +119,8 @@ def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
     """
     file = folder.find(name)
     reader = ProgramReader(folder)
-    program_name = identifier(file.inside.stem)
     if file.inside.suffix == SCRIPT_SUFFIX:
-        script = as_one_program(reader.script(file), program_name)
-        return LoadedProgram(file.wire_path, None, (script,))
+        return LoadedProgram(file.wire_path, None, (_script(reader, file),))
     if file.inside.suffix != PROGRAM_SUFFIX:
         raise ProgramFileError(
             f"{file.name} is not a program: its name must end in {PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
@@ -119,8 +129,42 @@ def load_program(folder: ProgramFolder, name: str) -> LoadedProgram:
     if tree.root.tag != ROOT:
         raise ProgramFileError(f"{file.name} is not a program: it is a <{tree.root.tag}>, not a <{ROOT}>")
     installation = installation_of(reader, tree, file)
+    try:
+        made = make_script(file, tree, reader, installation, skip_unknown=skip_unknown)
+    except UnknownNodeError as unknown:
+        return _twin_instead(reader, file, tree, installation, unknown)
+    notes = [f"{_cause(text)}: it is left out" for text in made.left_out[:_MOST_NOTES]]
+    if len(made.left_out) > _MOST_NOTES:
+        notes.append(f"{file.name}: {len(made.left_out)} things are left out in all")
+    return LoadedProgram(file.wire_path, installation, made.parts, tuple(notes))
+
+
+def _twin_instead(
+    reader: ProgramReader,
+    file: FoundFile,
+    tree: XmlTree,
+    installation: Installation,
+    unknown: UnknownNodeError,
+) -> LoadedProgram:
+    """Return the program with the script that PolyScope saved; raise `unknown` if there is none."""
     saved = str(file.inside.with_suffix(SCRIPT_SUFFIX))
-    if folder.has(saved) and not uses_external_control(tree):
-        script = as_one_program(reader.script(folder.find(saved)), program_name)
-        return LoadedProgram(file.wire_path, installation, (script,))
-    return LoadedProgram(file.wire_path, installation, make_script(file, tree, reader, installation).parts)
+    if not reader.folder.has(saved):
+        raise unknown
+    twin = reader.folder.find(saved)
+    text = _script(reader, twin)
+    if not is_twin(text):
+        raise ProgramFileError(f"{_cause(unknown)}, and {twin.name} is not a script that PolyScope saved")
+    if uses_external_control(tree):
+        raise ProgramFileError(f"{_cause(unknown)}, and {twin.name} has what a PC sent when it was saved")
+    origin = f"{twin.name}, saved by software {software_of(text)}"
+    note = f"{_cause(unknown)}: instead of the nodes runs {origin}"
+    return LoadedProgram(file.wire_path, installation, (text,), (note,), origin)
+
+
+def _script(reader: ProgramReader, file: FoundFile) -> str:
+    return as_one_program(reader.script(file), identifier(file.inside.stem))
+
+
+def _cause(error: object) -> str:
+    """Return what is wrong, without what to do."""
+    return str(error).partition(";")[0]

@@ -67,7 +67,8 @@ class UrpMaker:
         """Return the error that names what is not known."""
         return UnknownNodeError(
             f"{node.source.tree.name}: {what} cannot be turned into a script; "
-            "put the .script that PolyScope saved with the program beside it"
+            "put the .script that PolyScope saved with the program beside it, "
+            "or leave it out (--skip-unknown-nodes)"
         )
 
     def write(self, node: Node, around: Around) -> None:

@@ -56,7 +56,15 @@ class ProgramPlayer:
         installation: the one that was loaded last.
     """
 
-    def __init__(self, access: BoxAccess, folder: ProgramFolder) -> None:
+    def __init__(self, access: BoxAccess, folder: ProgramFolder, *, skip_unknown: bool = False) -> None:
+        """Begin with no program.
+
+        Args:
+            access: to the box.
+            folder: of all programs.
+            skip_unknown: nodes that are not known are left out.
+        """
+        self._skip_unknown = skip_unknown
         self._access = access
         self.folder = folder
         self.loaded: LoadedProgram | None = None
@@ -89,12 +97,14 @@ class ProgramPlayer:
         self._must_be_stopped(what)
         try:
             loaded, ready, set_up = yield from self._access.in_worker(
-                load_and_compile, self.folder, name, self.installation, self._catalogue
+                load_and_compile, self.folder, name, self.installation, self._catalogue, self._skip_unknown
             )
         except (EmulatorError, OSError) as error:
             self._refuse(what, error)
         self.loaded, self._ready = loaded, ready
         self._access.note(f"Loaded program: {loaded.wire_path}")
+        for note in loaded.notes:
+            self._access.note(note)
         yield from self._use(loaded.installation or self.installation, set_up)
         if isinstance(ready, ScriptFailed):
             self._access.note(f"{loaded.file_name} will not start: {ready.log_text or ready.text}")
