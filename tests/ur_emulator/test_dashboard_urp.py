@@ -25,6 +25,8 @@ from ur_emulator.programs.loading import load_program
         (move("MoveJ", waypoint("W", '<position><JointAngles angles="1,2,3"/></position>')), "waypoint 'W' has 3 values, it needs 6"),
         (move("MoveJ", waypoint("W", '<position><JointAngles angles="1,2,3,4,5,nan"/></position>')), "waypoint 'W' is 'nan', a number"),
         (move("MoveJ", waypoint("W", "")), "waypoint 'W' has no position"),
+        (move("MoveJ", waypoint("W", f"{ANGLES}<children>{until_distance('1')}</children>")), "what is inside of a waypoint cannot"),
+        (move("MoveJ", waypoint("W", '<position joints="1,2,3,4,5,6" pose="1e308,0,0,0,0,0"/>')), "waypoint 'W' has a number beyond"),
         (move("MoveJ", waypoint("W", "<position/>")), "waypoint 'W' has 0 values"),
         (move("MoveP", "<CircleMove><children/></CircleMove>"), "a <CircleMove> needs two waypoints"),
         (move("MoveL", direction("")), "a direction needs <Until> nodes"),

@@ -441,7 +441,7 @@ SAMPLES = {
     "Wait for a level": (
         f'<Wait type="AnalogInput">{pin("analog_in[2]")}<analogComparison>1</analogComparison><analogValue>4.0</analogValue></Wait>', """
   $ 1 "Robot Program"
-  $ 2 "Wait analog_in[0]>4.0"
+  $ 2 "Wait AI[2]>4.0"
   while (not(get_tool_analog_in(0) > 4.0)):
     sync()
   end

@@ -42,7 +42,6 @@ LINES: Mapping[str, LineKind] = {
     "tool_in": LineKind("TI[{n}]", "get_tool_digital_in({n})"),
     "tool_out": LineKind("TO[{n}]", "get_tool_digital_out({n})", "set_tool_digital_out({n}, {value})"),
     "analog_in": LineKind("AI[{n}]", "get_standard_analog_in({n})"),
-    "tool_analog_in": LineKind("analog_in[{n}]", "get_tool_analog_in({n})"),
     "analog_out": LineKind("AO[{n}]", "get_standard_analog_out({n})"),
     "GP_bool_in": LineKind("GP_bool_in[{n}]", "read_input_boolean_register({n})"),
     "GP_bool_out": LineKind(
@@ -58,6 +57,7 @@ LINES: Mapping[str, LineKind] = {
 _MODBUS = LineKind(
     "{n}", 'modbus_get_signal_status("{n}")', 'modbus_set_output_signal("{n}", {value}, False)'
 )
+_TOOL_ANALOG = LineKind("", "get_tool_analog_in({n})")
 _OWN_NAME = re.compile(r"([A-Za-z_]+)\[(\d{1,3})\]")
 _FIRST_TOOL_ANALOG = 2
 
@@ -101,6 +101,7 @@ def line_of(installation: Installation, name: str, file_name: str) -> Line:
             "use one of its names, or a line's own, such as digital_in[0]"
         )
     kind, n = LINES[match[1]], int(match[2])
+    label = name if name in installation.lines else kind.label.format(n=n)
     if match[1] == "analog_in" and n >= _FIRST_TOOL_ANALOG:
-        kind, n = LINES["tool_analog_in"], n - _FIRST_TOOL_ANALOG
-    return Line(kind, str(n), name if name in installation.lines else kind.label.format(n=n))
+        kind, n = _TOOL_ANALOG, n - _FIRST_TOOL_ANALOG
+    return Line(kind, str(n), label)

@@ -6,8 +6,6 @@ joint space is joint angles. Source: program files and the scripts that PolyScop
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from protocol.pose import pose_inv
@@ -65,6 +63,8 @@ def write_waypoint(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Waypoint>` of the move around it."""
     move = _move_around(node, around)
     builtin = _TYPES[_motion(maker, move)][0]
+    if node.children:
+        raise maker.unknown(node, "what is inside of a waypoint")
     maker.writer.label(node.number, _waypoint_name(node), around.mark or _AFTER)
     target = _target(maker, node, move, builtin)
     maker.writer.add(f"{builtin}({target}, {_motion_parameters(maker, node, node, move)})")
@@ -260,35 +260,3 @@ def _motion_parameters(maker: UrpMaker, motion: Node, waypoint: Node, move: Node
     return ", ".join(
         f"{letter}={number_text(tree, text, f'{letter} of a waypoint')}" for letter, text in given
     )
-
-
-def last_motions(section: Node, *, is_loop: bool) -> set[int]:
-    """Return the numbers of the motions of MoveP behind which no other motion of MoveP comes.
-
-    Args:
-        section: main program, thread or sub-program.
-        is_loop: its first node comes behind its last.
-    """
-    motions = list(_motions(section, section.get("motionType")))
-    behind = motions[0] if motions and is_loop else (0, "")
-    return {
-        number
-        for (number, kind), (_, following) in pairwise([*motions, behind])
-        if kind == "MoveP" and following != "MoveP"
-    }
-
-
-def _motions(node: Node, motion: str) -> Iterator[tuple[int, str]]:
-    """Yield number and type of each motion in the order of the nodes; the end of a loop has no type."""
-    for child in node.children:
-        match child.kind:
-            case "Waypoint" | "CircleMove":
-                yield child.number, motion
-                continue
-            case "SafeHome" | "gui.program.direction.MoveDirectionNode":
-                yield child.number, ""
-        yield from _motions(child, child.get("motionType") if child.kind == "Move" else motion)
-        for branch in child.branches:
-            yield from _motions(branch, motion)
-        if child.kind == "Loop":
-            yield 0, ""

@@ -22,6 +22,7 @@ from ur_emulator.programs.xml_tree import XmlTree
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
+_GREATEST = 1e6
 ZERO_POSE = "p[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]"
 
 
@@ -45,8 +46,16 @@ def pose_of(tree: XmlTree, text: str | None, what: str) -> Pose:
     Raises:
         ProgramFileError: they are not six numbers.
     """
-    x, y, z, rx, ry, rz = map(float, number_texts(tree, text, what))
+    x, y, z, rx, ry, rz = _moderate(tree, number_texts(tree, text, what), what)
     return (x, y, z, rx, ry, rz)
+
+
+def _moderate(tree: XmlTree, texts: list[str], what: str) -> list[float]:
+    """Return numbers that can be computed with: lengths [m] and angles [rad] of a robot."""
+    values = list(map(float, texts))
+    if max(map(abs, values)) > _GREATEST:
+        raise ProgramFileError(f"{tree.name}: {what} has a number beyond {_GREATEST:g}")
+    return values
 
 
 def pose_text(pose: Pose) -> str:
@@ -87,10 +96,8 @@ def _taught_pose(tree: XmlTree, element: Element, joints: list[str], what: str) 
         row = known.find(name)
         rows[name] = pose_of(tree, None if row is None else row.get("value"), f"{name} of {what}")
     flange = np.eye(4)
-    for joint, delta, a, d, alpha in zip(map(float, joints), *rows.values(), strict=True):
+    for joint, delta, a, d, alpha in zip(_moderate(tree, joints, what), *rows.values(), strict=True):
         flange = flange @ _link(joint + delta, a, d, alpha)
-    if not np.isfinite(flange).all():
-        raise ProgramFileError(f"{tree.name}: the kinematics of {what} make no pose")
     return pose_trans(
         T_to_pose(flange), pose_of(tree, tree.resolve(offset).get("pose"), f"the tool of {what}")
     )

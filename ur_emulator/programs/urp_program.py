@@ -23,8 +23,9 @@ from ur_emulator.programs.script_writer import Header, Part, ScriptWriter
 from ur_emulator.programs.urp_expressions import expression_of, variable_name
 from ur_emulator.programs.urp_kinds import KINDS
 from ur_emulator.programs.urp_maker import Around, UrpMaker
-from ur_emulator.programs.urp_moves import last_motions
-from ur_emulator.programs.urp_nodes import Node, read_nodes
+from ur_emulator.programs.urp_node_reader import read_nodes
+from ur_emulator.programs.urp_nodes import Node
+from ur_emulator.programs.urp_paths import last_motions
 from ur_emulator.programs.urp_statements import EXTERNAL_CONTROL, contributor
 from ur_emulator.programs.xml_tree import XmlTree
 

@@ -43,7 +43,7 @@ def write_nothing(maker: UrpMaker, node: Node, around: Around) -> None:
 def write_comment(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Comment>`."""
     comment = node.element.get("comment")
-    text = "Comment" if comment is None else f"'{' '.join(comment.splitlines())}'"
+    text = f"'{' '.join(comment.splitlines())}'" if comment else "Comment"
     maker.writer.label(node.number, text, around.mark)
     maker.writer.add(f"# {text}")
 
