@@ -88,7 +88,7 @@ class Budgets:
     # More than any client sends; each costs the cycle up to 0.5 ms.
     programs_per_cycle: int = _budget(4, "programs", "started or refused in a cycle", "the others wait")
     script_warnings_per_cycle: int = _budget(4, "warnings", "about scripts in a cycle", "no further ones")
-    # A program with this much starts within 10 ms; 10,000 waypoints have room.
+    # A program with this much starts within 10 ms; 10,000 poses have room, or 3,300 waypoints of a .urp.
     program_functions: int = _budget(3_000, "functions", "a program", "it is refused")
     program_values: int = _budget(10_000, "global variables and poses", "a program", "it is refused")
     program_code: int = _budget(4 * MIB, "bytes", "a compiled program", "it is refused")
