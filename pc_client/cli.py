@@ -1,4 +1,4 @@
-"""`ur-client`: the command line. Exit codes: 0 done, 1 it did not work, 2 wrong usage.
+"""`ur-client`: the command line. Exit codes: `ur_hil.command_line`.
 
 Every error that a user can cause is one line on stderr. Heavy libraries are loaded by the commands that
 need them.
@@ -10,34 +10,55 @@ import signal
 import sys
 from collections.abc import Sequence
 
-import typer
-
 from pc_client.commands import compare, doctor, draw, experiment, extract, movements, recordings, sweep
-from pc_client.errors import ClientError, full_message, one_line
+from pc_client.errors import ClientError, InterruptedByUserError, full_message, one_line
 from protocol.errors import ProtocolError
+from ur_hil.command_line import ExitCode, examples, new_app, run_app
 
-app = typer.Typer(
-    name="ur-client",
-    help="Moves a Universal Robots arm, real or emulated, by streaming joint velocities.",
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-app.command()(experiment.experiment)
-app.command()(experiment.run)
+app = new_app("Moves a Universal Robots arm, real or emulated, by streaming joint velocities.")
+for _command, _examples in (
+    (
+        experiment.experiment,
+        (
+            "ur-client experiment --robot 127.0.0.1 --out out/experiment",
+            "ur-client experiment --robot 127.0.0.1 --out out/mine --movements lognorm_4_1 --repeat 1",
+        ),
+    ),
+    (
+        experiment.run,
+        (
+            "ur-client run lognorm_4_1 --robot 127.0.0.1 --out out/run",
+            "ur-client run my_movement.toml --robot 192.168.0.10 --out out/run --controller best --repeat 3",
+        ),
+    ),
+    (sweep.sweep, ("ur-client sweep examples/sweeps/gains.toml --workers 4",)),
+    (
+        extract.extract,
+        (
+            "ur-client extract drawing.txt --out out/strokes",
+            "ur-client extract reaches/ --out out/strokes --time-unit ms",
+        ),
+    ),
+    (draw.draw, ("ur-client draw drawing.txt --robot 127.0.0.1 --out out/draw",)),
+    (
+        compare.compare,
+        (
+            "ur-client compare --out out/compare",
+            "ur-client compare --robot 127.0.0.1 --out out/compare --targets 5",
+        ),
+    ),
+    (recordings.report, ("ur-client report out/run", "ur-client report out/a out/b --out both.html")),
+    (recordings.export, ("ur-client export out/run/lognorm_4_1_r1.mcap --to csv",)),
+    (
+        doctor.doctor,
+        (
+            "ur-client doctor --robot 127.0.0.1",
+            "ur-client doctor --robot 192.168.0.10 --seconds 10",
+        ),
+    ),
+):
+    app.command(epilog=examples(*_examples))(_command)
 app.add_typer(movements.app, name="movements")
-app.command()(sweep.sweep)
-app.command()(extract.extract)
-app.command()(draw.draw)
-app.command()(compare.compare)
-app.command()(recordings.report)
-app.command()(recordings.export)
-app.command()(doctor.doctor)
-
-# typer >= 0.16 carries its own copy of click, older ones import it: the class is found where it is used.
-_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
-
-_INTERRUPTED = 130
 
 _EXTRAS = {
     "pinocchio": "client",
@@ -65,29 +86,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     try:
-        words = sys.argv[1:] if arguments is None else arguments
-        code = app(words or ["--help"], prog_name="ur-client", standalone_mode=False)
-    except _UsageError as error:
-        text = error.format_message() if hasattr(error, "format_message") else str(error)
-        return _complain(f"{text} (see ur-client --help)", 2)
-    except typer.Abort:
-        return _complain("aborted", 1)
-    except KeyboardInterrupt:
-        return _complain("interrupted", 1)
+        return run_app(app, "ur-client", arguments, _complain)
+    except InterruptedByUserError as error:
+        _complain(full_message(error))
+        return ExitCode.INTERRUPTED
     except (ClientError, ProtocolError) as error:
-        return _complain(full_message(error), 1)
+        _complain(full_message(error))
+        return ExitCode.FAILED
     except ModuleNotFoundError as error:
         extra = _EXTRAS.get((error.name or "").partition(".")[0])
         if extra is None:
             raise
-        return _complain(f"this needs {error.name}: run `pip install 'ur-hil[{extra}]'`", 1)
-    except BrokenPipeError:  # the reader of our output went away
-        return 1
-    if code == _INTERRUPTED:  # newer typer turns Ctrl-C into the shell's exit code
-        return _complain("interrupted", 1)
-    return code if isinstance(code, int) else 0
+        _complain(f"this needs {error.name}: run `pip install 'ur-hil[{extra}]'`")
+        return ExitCode.FAILED
 
 
-def _complain(text: str, code: int) -> int:
+def _complain(text: str) -> None:
     print(f"ur-client: {one_line(text)}", file=sys.stderr)
-    return code

@@ -6,8 +6,10 @@ ClientError
 ├── CellError          a cell file makes no sense
 ├── PlanningError      a path leaves reach or limits; nothing has moved
 ├── DriverError        the robot cannot be reached, or the stream broke
+│   ├── UnknownHostError   there is no such name or address
 │   ├── RobotStoppedError  the robot stopped itself (protective stop, program error)
 │   └── GainMarginError    the gains are too large for the delay of the loop; no movement has begun
+├── InterruptedByUserError  Ctrl-C or SIGTERM; the message says what is kept
 ├── RecordingError     a recording cannot be written or read
 └── SweepError         the configuration of a sweep makes no sense, or its folder cannot be used
 
@@ -51,6 +53,10 @@ class DriverError(ClientError):
     """The robot cannot be reached, or the stream to it broke."""
 
 
+class UnknownHostError(DriverError):
+    """The name or address of the robot is not known, so nothing there can be asked."""
+
+
 class RobotStoppedError(DriverError):
     """The robot stopped by itself: protective stop, emergency stop or a program error."""
 
@@ -67,6 +73,10 @@ class GainMarginError(DriverError):
         super().__init__(message)
         self.margin = margin
         self.delay = delay
+
+
+class InterruptedByUserError(ClientError):
+    """The user ended it before it was done; the message says what is kept."""
 
 
 class RecordingError(ClientError):

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 OURS = {"ur_hil", "protocol", "urscript", "ur_emulator", "pc_client"}
 MAY_IMPORT = {
-    "ur_hil": {"pydantic", "pydantic_core"},
+    "ur_hil": {"pydantic", "pydantic_core", "typer"},
     "protocol": {"numpy"},
     "urscript": {"ur_hil", "protocol", "lark", "numpy", "typer", "rich"},
     "ur_emulator": {"ur_hil", "urscript", "protocol", "mujoco", "numpy", "h11", "typer", "rich", "pytest"},

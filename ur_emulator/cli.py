@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from protocol.errors import ProtocolError
+from ur_emulator.box_log import printable
 from ur_emulator.control.token import TOKEN_VARIABLE
+from ur_hil.command_line import ExitCode, examples, new_app, run_app
 
 if TYPE_CHECKING:
     from ur_emulator.box import Box
@@ -24,22 +26,24 @@ if TYPE_CHECKING:
 
 _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
-app = typer.Typer(
-    add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None
+app = new_app("An emulated Universal Robots control box.")
+
+
+@app.command(
+    epilog=examples(
+        "ur-emulator serve",
+        "ur-emulator serve --robot ur5 --software 3.4.0 --pace lockstep --seed 7",
+        "ur-emulator serve --boxes 20 --host 127.0.0.2",
+        "ur-emulator serve --programs my_programs --control-port 29900 --log",
+    )
 )
-
-
-@app.callback()
-def _program() -> None:
-    """An emulated Universal Robots control box."""
-
-
-@app.command()
 def serve(
     robot: Annotated[str, typer.Option(help="Type of the arm.")] = "ur3",
-    version: Annotated[
+    software: Annotated[
         str | None,
         typer.Option(
+            "--software",
+            "--version",
             help="Software the box runs; decides packet layouts and builtins.",
             show_default="the usual one of the arm's generation",
         ),
@@ -114,7 +118,7 @@ def serve(
         rack = ControlBox.many(
             boxes,
             robot=robot,
-            version=version,
+            version=software,
             host=host,
             pace=pace,
             speed=speed,
@@ -126,6 +130,10 @@ def serve(
             control_token=token,
             skip_unknown_nodes=skip_unknown_nodes,
         )
+    except EmulatorError as error:
+        sys.stderr.write(f"ur-emulator: {error}\n")
+        raise typer.Exit(ExitCode.WRONG_USAGE) from None
+    try:
         for name in _END_SIGNALS:
             signal.signal(name, lambda number, frame: rack.stop())
         rack.listen()
@@ -133,13 +141,13 @@ def serve(
             _write_ready_file(ready_file, rack)
     except (EmulatorError, ProtocolError, OSError) as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
-        raise typer.Exit(1) from None
+        raise typer.Exit(ExitCode.FAILED) from None
     out, err = LineWriter(sys.stdout, "this output"), LineWriter(sys.stderr, "the log")
     for notice in _notices(rack):
         err.write(f"ur-emulator: {notice}")
     for k, box in enumerate(rack):
         out.write(
-            f"{robot.upper()} {box.generation.name} {version or box.generation.default_version} "
+            f"{robot.upper()} {box.generation.name} {software or box.generation.default_version} "
             f"ready at {box.host}, {pace}, {fidelity}, "
             f"seed {seed + k}, serial {box.serial_number}: "
             f"dashboard {box.ports.dashboard}, primary {box.ports.primary}, "
@@ -154,7 +162,7 @@ def serve(
         rack.serve_forever()
     except EmulatorError as error:
         err.write(f"ur-emulator: {error}")
-        raise typer.Exit(1) from None
+        raise typer.Exit(ExitCode.FAILED) from None
     finally:
         for name in _END_SIGNALS:
             signal.signal(name, signal.SIG_DFL)
@@ -222,7 +230,11 @@ def _write_ready_file(path: Path, rack: Sequence[Box]) -> None:
 
 def main() -> None:
     """Entry point of the console script."""
-    app(prog_name="ur-emulator")
+    sys.exit(run_app(app, "ur-emulator", None, _complain))
+
+
+def _complain(text: str) -> None:
+    sys.stderr.write(f"ur-emulator: {printable(' '.join(text.split()))}\n")
 
 
 if __name__ == "__main__":

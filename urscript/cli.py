@@ -1,6 +1,6 @@
 """The `urscript` command: `check` programs, `run` them, lay them out (`fmt`).
 
-Exit codes: 0 success, 1 a program has errors, failed or is not in canonical layout, 2 wrong usage.
+Exit codes: `ur_hil.command_line`; 1 also for a program with errors, or that is not in canonical layout.
 docs/urscript-tool.md shows all of it.
 """
 
@@ -15,6 +15,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from ur_hil.command_line import ExitCode, examples, new_app, run_app
 from urscript.advice import check_with_advice, with_advice
 from urscript.commands.run_command import run
 from urscript.commands.support import (
@@ -34,17 +35,26 @@ from urscript.source import Source, as_utf8
 
 _GC_THRESHOLD: Final = (100_000, 20, 100)
 
-app = typer.Typer(
-    help="URScript without a robot.", no_args_is_help=True, add_completion=False, rich_markup_mode=None
-)
+app = new_app("URScript without a robot.")
 
-app.command()(run)
+app.command(
+    epilog=examples(
+        "urscript run my_program.script",
+        "urscript run --robot ur5 --fidelity ideal --seed 3 my_program.script",
+        "urscript run --robot none --trace my_program.script",
+    )
+)(run)
 
 
 # --- check -----------------------------------------------------------------------------------------------
 
 
-@app.command()
+@app.command(
+    epilog=examples(
+        "urscript check my_program.script",
+        "urscript check --software 5.11 --strict --ignore W101,W103 my_program.script",
+    )
+)
 def check(
     files: Annotated[list[Path], typer.Argument(help="Programs to check; - reads one.", show_default=False)],
     software: Software = "3.15",
@@ -68,7 +78,7 @@ def check(
         for _, error in found:
             typer.echo(as_utf8(error.render()))
     if any(strict or not isinstance(error, ScriptWarning) for _, error in found):
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _codes(words: Iterable[str]) -> frozenset[str]:
@@ -84,7 +94,9 @@ def _codes(words: Iterable[str]) -> frozenset[str]:
 # --- fmt -------------------------------------------------------------------------------------------------
 
 
-@app.command()
+@app.command(
+    epilog=examples("urscript fmt my_program.script", "urscript fmt --check --diff my_program.script")
+)
 def fmt(
     files: Annotated[
         list[Path],
@@ -123,7 +135,7 @@ def fmt(
     if as_json:
         echo_json(files=reports, diagnostics=[item._asdict() for item in diagnostics])
     if diagnostics or (only_check and any(report["changes"] for report in reports)):
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _echo_diff(source: Source, formatted: str, silent: bool) -> None:
@@ -137,7 +149,7 @@ def _write(file: Path, text: str) -> None:
         file.write_bytes(text.encode("latin-1"))
     except OSError as error:
         typer.echo(f"cannot write {file}: {error.strerror}", err=True)
-        raise typer.Exit(2) from None
+        raise typer.Exit(ExitCode.WRONG_USAGE) from None
 
 
 def _write_bytes(text: str) -> None:
@@ -153,4 +165,8 @@ def main() -> None:
     """Entry point of the console script."""
     # Trees of long programs are no garbage; the collector would take a third of the time.
     gc.set_threshold(*_GC_THRESHOLD)
-    app()
+    sys.exit(run_app(app, "urscript", None, _complain))
+
+
+def _complain(text: str) -> None:
+    typer.echo(f"urscript: {as_utf8(' '.join(text.split()))}", err=True)

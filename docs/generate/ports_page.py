@@ -45,7 +45,7 @@ Made from `docs/generate/ports_page.py` and `protocol/ur_types.py` by `make docs
 
 `ur-emulator serve` opens these ports, with the numbers of a real control box, which most clients
 have built in. `--port-base N` adds N to all of them. Several boxes can run side by side, each on
-its own loopback address. `--version` sets the software that the box reports, and with it the
+its own loopback address. `--software` sets the software that the box reports, and with it the
 layouts.
 
 All ports accept several clients at once: at most {BUDGETS.clients_of_port} from one address at one

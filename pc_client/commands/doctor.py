@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pc_client.commands.options import CellOption, PortBaseOption, RobotOption, cell_of, ports_of, say
+from ur_hil.command_line import ExitCode
 
 if TYPE_CHECKING:
     from pc_client.driver.probe import FrameRhythm
@@ -44,7 +45,7 @@ def doctor(
         unreported = [condition.name for condition in conditions if condition.holds is None]
     if obstacle:
         say(f"streaming   NOT NOW: {obstacle}")
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
     say(
         "streaming   ready"
         + (f"; not reported by this software: {', '.join(unreported)}" if unreported else "")

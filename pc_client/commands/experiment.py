@@ -19,7 +19,7 @@ from pc_client.commands.options import (
     show_report,
 )
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
-from pc_client.errors import ClientError
+from pc_client.errors import InterruptedByUserError
 
 if TYPE_CHECKING:
     from pc_client.analysis.run import MeasuredRun
@@ -94,7 +94,9 @@ def execute(movements: Sequence[Motion], robot: str, out: Path, repeat: int, set
             report = arm.experiment(plans, repeat, settings.controller, out, progress)
     except KeyboardInterrupt as interrupt:
         doubts = "; ".join(getattr(interrupt, "__notes__", ())) or "the arm rests"
-        raise ClientError(f"interrupted; {doubts}; recordings finished so far are in {out}") from interrupt
+        raise InterruptedByUserError(
+            f"interrupted; {doubts}; recordings finished so far are in {out}"
+        ) from interrupt
     robot_time = sum(stream.robot_time for stream in report.streams)
     wall_time = sum(stream.wall_time for stream in report.streams)
     late = sum(stream.late_frames for stream in report.streams)

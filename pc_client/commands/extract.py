@@ -19,6 +19,7 @@ from pc_client.commands.options import (
 )
 from pc_client.errors import RecordingError, one_line
 from pc_client.file_names import as_file_name
+from ur_hil.command_line import ExitCode
 
 if TYPE_CHECKING:
     from pc_client.extraction.batch import Outcome
@@ -92,7 +93,7 @@ def extract(
         print(f"ur-client: {one_line(error)}", file=sys.stderr)
     say(f"{len(rows)} of {len(rows) + len(errors)} recordings; results in {out}")
     if errors:
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _look_up(files: Sequence[str]) -> tuple[list[PenSource], list[str]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from pc_client.commands.options import SetOption, console, say
+from ur_hil.command_line import examples
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,7 +30,7 @@ _CornersOption = Annotated[
 ]
 
 
-@app.command("list")
+@app.command("list", epilog=examples("ur-client movements list --set arcs"))
 def list_movements(set_name: SetOption = None) -> None:
     """List the movements that come with the package."""
     from pc_client.movements.description import describe
@@ -50,7 +51,7 @@ def list_movements(set_name: SetOption = None) -> None:
     console.print(to_rich(frame_of(rows, columns), columns))
 
 
-@app.command("show")
+@app.command("show", epilog=examples("ur-client movements show lognorm_4_1 --json"))
 def show(
     movement: Annotated[str, typer.Argument(metavar="NAME|FILE")],
     as_json: Annotated[bool, typer.Option("--json", help="Figures of the movement only, as JSON.")] = False,
@@ -72,7 +73,7 @@ def show(
     say(plan_text(plan_movement(loaded)))
 
 
-@app.command("kinds")
+@app.command("kinds", epilog=examples("ur-client movements kinds"))
 def kinds() -> None:
     """List the generators of movements."""
     from pc_client.movements.twins import GENERATORS
@@ -95,7 +96,9 @@ def kinds() -> None:
     console.print(to_rich(frame_of(rows, columns), columns, title=title))
 
 
-@app.command("generate")
+@app.command(
+    "generate", epilog=examples("ur-client movements generate --kind lognormal --seed 3 --out mine.toml")
+)
 def generate(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Movement file to write, .toml.")],
     kind: Annotated[
@@ -111,7 +114,7 @@ def generate(
     _check_and_save(generate_movement(kind, targets, seed, name=out.stem, corners=corners), out)
 
 
-@app.command("new")
+@app.command("new", epilog=examples("ur-client movements new --targets targets.csv --out mine.toml"))
 def new(
     targets: Annotated[
         Path,
@@ -147,7 +150,9 @@ def new(
     _check_and_save(through(points, style, times, name=out.stem, corners=corners), out)
 
 
-@app.command("duplicate")
+@app.command(
+    "duplicate", epilog=examples("ur-client movements duplicate lognorm_4_1 --seed 3 --out other.toml")
+)
 def duplicate(
     movement: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A lognormal movement.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Movement file to write, .toml.")],

@@ -9,6 +9,7 @@ import typer
 
 from pc_client.commands.options import console, say, show_report
 from pc_client.errors import RecordingError, one_line
+from ur_hil.command_line import ExitCode
 
 
 def report(
@@ -31,7 +32,7 @@ def report(
                 f"--out is for several folders: the page of one is {folders[0]}/report.html"
             )
         if show_report(folders[0]).left_out:
-            raise typer.Exit(1)
+            raise typer.Exit(ExitCode.FAILED)
         return
     from pc_client.analysis.report import build_report
     from pc_client.analysis.side_by_side_page import build_side_by_side
@@ -52,7 +53,7 @@ def report(
     console.print(shown.to_rich())
     say(f"report: {page}")
     if left_out:
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def export(

@@ -21,7 +21,8 @@ from pc_client.commands.options import (
     ports_of,
     say,
 )
-from pc_client.errors import ClientError, SweepError
+from pc_client.errors import InterruptedByUserError, SweepError
+from ur_hil.command_line import ExitCode
 
 if TYPE_CHECKING:
     import polars as pl
@@ -81,7 +82,7 @@ def sweep(
             _work(outcomes, plan.n_cases, store.n_settled, live=arm is None)
     except KeyboardInterrupt as interrupt:
         doubts = "".join(f"; {note}" for note in getattr(interrupt, "__notes__", ()))
-        raise ClientError(
+        raise InterruptedByUserError(
             f"interrupted{doubts}; {store.n_settled} of {plan.n_cases} cases are kept in {store.path}, "
             "the same command goes on from there"
         ) from interrupt
@@ -94,7 +95,7 @@ def sweep(
     if work.waiting and (n_left := plan.n_cases - store.n_settled):
         say(f"{n_left} cases have not begun: look at the arm, then give the same command again")
     if (table["status"] == "failed").any():
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _work(outcomes: Iterator[Outcome], n_cases: int, n_settled: int, *, live: bool) -> None:

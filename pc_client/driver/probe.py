@@ -14,7 +14,7 @@ from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
 from pc_client.driver.robot_report import RobotReport, make_report, read_payload
 from pc_client.driver.transport import Network
-from pc_client.errors import DriverError
+from pc_client.errors import DriverError, UnknownHostError
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 
@@ -73,6 +73,9 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
         host: the robot.
         ports: its ports.
         seconds: how long to listen to the frames [s].
+
+    Raises:
+        UnknownHostError: there is no such robot to ask.
     """
     found: dict[str, int] = {}
     absent: dict[str, int] = {}
@@ -81,6 +84,8 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
         try:
             network.connect(host, number, _CONNECT_TIMEOUT).close()
             found[item.name] = number
+        except UnknownHostError:
+            raise
         except DriverError:
             absent[item.name] = number
     info: RobotInfo | None = None

@@ -12,7 +12,7 @@ import socket
 import time
 from typing import Protocol
 
-from pc_client.errors import DriverError
+from pc_client.errors import DriverError, UnknownHostError
 
 _RECEIVE_SIZE = 16384
 """Bytes taken at once: more than ten realtime frames, so one call shows all that is waiting."""
@@ -242,7 +242,11 @@ class TcpNetwork:
         try:
             connected = socket.create_connection((host, port), timeout)
         except UnicodeError as error:  # of the codec for host names
-            raise DriverError(f"{host[:60]!r} is no host name or address") from error
+            raise UnknownHostError(f"{host[:60]!r} is no host name or address") from error
+        except socket.gaierror as error:
+            raise UnknownHostError(
+                f"{host}:{port} cannot be looked up: check the robot's name or address"
+            ) from error
         except OSError as error:
             raise DriverError(f"{host}:{port} {_reason(error)}") from error
         return TcpTransport(connected, f"{host}:{port}")
@@ -276,8 +280,6 @@ class TcpNetwork:
 
 def _reason(error: OSError) -> str:
     """Say in a few words what went wrong and what to look at."""
-    if isinstance(error, socket.gaierror):
-        return "cannot be looked up: check the robot's name or address"
     if isinstance(error, TimeoutError):
         return "does not answer: check the address, the cable and that the robot is switched on"
     if isinstance(error, ConnectionRefusedError):

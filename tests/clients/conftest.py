@@ -14,7 +14,7 @@ def box(tmp_path_factory):
 @pytest.fixture(scope="module")
 def old_box(tmp_path_factory):
     """A CB3 with software 3.4."""
-    with served_box(tmp_path_factory.mktemp("old_box"), "--version", "3.4.0") as served:
+    with served_box(tmp_path_factory.mktemp("old_box"), "--software", "3.4.0") as served:
         yield served
 
 

@@ -113,7 +113,7 @@ def test_a_killed_client_leaves_the_arm_at_rest_and_the_next_one_works(ur_client
 def test_an_interrupted_client_stops_the_arm_and_says_so_in_one_line(standard_box, tmp_path, end):
     with Frames(standard_box) as frames:
         ended = cut_off(standard_box, frames, tmp_path, end)
-        assert ended.code == 1
+        assert ended.code == 130
         assert "interrupted; the arm rests" in ended.complaint()
         assert frames.rest().safety_mode == SafetyMode.NORMAL
 

@@ -38,8 +38,8 @@ def serve(*arguments):
     return command("ur_emulator", "serve", "--port-base", free_port_base(), *arguments)
 
 
-def check_complaint(done, words):
-    assert done.code == 1
+def check_complaint(done, words, code=1):
+    assert done.code == code
     complaint = done.complaint()
     assert complaint.startswith("ur-emulator: ")
     assert words in complaint
@@ -50,7 +50,7 @@ def check_complaint(done, words):
     ("option", "value"),
     [
         ("--robot", "ur9"),
-        ("--version", "5.11.0"),
+        ("--software", "5.11.0"),
         ("--version", "latest"),
         ("--pace", "warp"),
         ("--speed", "0"),
@@ -58,17 +58,20 @@ def check_complaint(done, words):
         ("--speed", "inf"),
         ("--seed", "-1"),
         ("--port-base", "60000"),
-        ("--host", "192.0.2.1"),
-        ("--host", "robot.invalid"),
     ],
 )
-def test_a_mistake_is_one_line_and_exit_1(ur_emulator_command, option, value):
+def test_a_value_that_is_not_allowed_is_one_line_and_exit_2(ur_emulator_command, option, value):
     done = ur_emulator_command("serve", "--port-base", free_port_base(), option, value)
-    check_complaint(done, value.removeprefix("-"))
+    check_complaint(done, value.removeprefix("-"), code=2)
+
+
+@pytest.mark.parametrize("host", ["192.0.2.1", "robot.invalid"])
+def test_an_address_that_is_not_of_this_machine_is_one_line_and_exit_1(ur_emulator_command, host):
+    check_complaint(ur_emulator_command("serve", "--port-base", free_port_base(), "--host", host), host)
 
 
 def test_the_process_leaves_with_that_code_and_line():
-    check_complaint(serve("--fidelity", "perfect"), "perfect")
+    check_complaint(serve("--fidelity", "perfect"), "perfect", code=2)
 
 
 def test_a_ready_file_that_cannot_be_written_is_one_line_and_exit_1():
@@ -155,7 +158,7 @@ def test_ports_are_free_again_at_once(tmp_path):
 
 
 def test_beyond_loopback_a_control_port_demands_a_token_and_the_user_is_warned(tmp_path):
-    check_complaint(serve("--host", "0.0.0.0", "--control-port", "0"), "--token")
+    check_complaint(serve("--host", "0.0.0.0", "--control-port", "0"), "--token", code=2)
     environment = {**os.environ, TOKEN_VARIABLE: "correct-horse"}
     with serving(tmp_path, "--host", "0.0.0.0", "--control-port", "0", env=environment) as box:
         box.process.send_signal(signal.SIGINT)

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 from fake_robot import FakeRobot
 
 import pc_client.api.arm as arm_module
@@ -209,9 +210,9 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, mon
         asked.append(question)
         assert robot.programs == []
         assert set(robot.closed) == set(robot.pipes)
-        raise cli.typer.Abort
+        raise typer.Abort
 
-    monkeypatch.setattr(cli.typer, "confirm", answer)
+    monkeypatch.setattr(typer, "confirm", answer)
     code = cli.run(["run", "uniform_4_1", "--robot", "192.0.2.7", "--out", str(tmp_path / "out")])
     assert code == 1
     assert len(asked) == 1
@@ -226,7 +227,7 @@ def test_yes_skips_the_question(robot, tmp_path, monkeypatch):
     def answer(question, abort):
         raise AssertionError("asked")
 
-    monkeypatch.setattr(cli.typer, "confirm", answer)
+    monkeypatch.setattr(typer, "confirm", answer)
     arguments = ["run", "uniform_4_1", "--robot", "192.0.2.7", "--yes", "--out", str(tmp_path / "out")]
     assert cli.run(arguments) == 0
 
@@ -238,7 +239,7 @@ def test_ctrl_c_is_one_line_and_leaves_the_arm_stopped(robot, tmp_path, capsys):
             raise KeyboardInterrupt
 
     robot.on_tick = interrupt
-    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", str(tmp_path)]) == 1
+    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", str(tmp_path)]) == 130
     err = [line for line in capsys.readouterr().err.splitlines() if line]
     assert err[-1].startswith("ur-client: interrupted")
     assert robot.at_rest

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import typer
 from drawing_samples import one_part, recording_text, two_parts_and_a_dot
 from fake_robot import FakeRobot
 from page_support import check_needs_nothing
@@ -173,9 +174,9 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, file, tmp_path, capsy
 
     def answer(question, abort):
         assert robot.programs == []
-        raise cli.typer.Abort
+        raise typer.Abort
 
-    monkeypatch.setattr(cli.typer, "confirm", answer)
+    monkeypatch.setattr(typer, "confirm", answer)
     out = tmp_path / "out"
     assert cli.run(["draw", str(file), "--robot", "192.0.2.7", "--out", str(out), "--size", "50"]) == 1
     assert robot.programs == []
@@ -204,7 +205,7 @@ def test_ctrl_c_leaves_the_arm_at_rest_and_what_is_recorded(robot, file, tmp_pat
             raise KeyboardInterrupt
 
     robot.on_tick = interrupt
-    assert cli.run(["draw", str(file), "--robot", "127.0.0.1", "--out", str(out), "--size", "50"]) == 1
+    assert cli.run(["draw", str(file), "--robot", "127.0.0.1", "--out", str(out), "--size", "50"]) == 130
     assert [line for line in capsys.readouterr().err.splitlines() if line][-1].startswith(
         "ur-client: interrupted"
     )

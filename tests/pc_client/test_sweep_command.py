@@ -9,6 +9,7 @@ from contextlib import nullcontext
 
 import pytest
 import sweep_samples
+import typer
 from fake_robot import FakeRobot
 from sweep_samples import write
 
@@ -114,7 +115,7 @@ def test_a_changed_configuration_uses_the_cases_that_it_shares(quick_job, tmp_pa
 def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(quick_job, tmp_path, capsys):
     out, path = tmp_path / "out", write(tmp_path, GRID.replace("seeds = [1]", "seeds = [1, 13]"))
     quick_job(sweep_samples.interrupted)
-    assert run(path, out, "--format", "csv") == 1
+    assert run(path, out, "--format", "csv") == 130
     assert "interrupted; 12 of 48 cases are kept" in one_line(capsys)
     assert len(read_csv(out)) == 24
     ran = quick_job(sweep_samples.invented)
@@ -177,7 +178,7 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(quick_job, after, t
         return sweep_samples.invented(case)
 
     quick_job(interrupt)
-    assert run(path, tmp_path / "parts", "--format", "csv") == 1
+    assert run(path, tmp_path / "parts", "--format", "csv") == 130
     ran.clear()
     quick_job(sweep_samples.invented)
     assert run(path, tmp_path / "parts", "--format", "csv") == 0
@@ -283,9 +284,9 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, mon
 
     def answer(question, abort):
         assert robot.programs == []
-        raise cli.typer.Abort
+        raise typer.Abort
 
-    monkeypatch.setattr(cli.typer, "confirm", answer)
+    monkeypatch.setattr(typer, "confirm", answer)
     path = write(tmp_path, GIVEN.replace("HOST", "127.0.0.1"))
     assert run(path, tmp_path / "out") == 1
     assert robot.programs == []

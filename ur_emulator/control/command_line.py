@@ -1,6 +1,6 @@
 """`ur-emulator ctl`: every operation of the table as a sub-command, done by a box that runs.
 
-Exit codes: 0 done; 1 the box refused, or none answers; 2 wrong usage. Errors are one line.
+Exit codes: `ur_hil.command_line`; 1 when the box has refused, or none answers. Errors are one line.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ur_emulator.control.operations import OPERATIONS, make
 from ur_emulator.control.program_run import read_script
 from ur_emulator.control.token import TOKEN_VARIABLE, check_token
 from ur_emulator.errors import ControlError, EmulatorError
+from ur_hil.command_line import ExitCode
 
 PROGRAM = "ur-emulator ctl"
 # Pause between two requests of a log that is followed [s].
@@ -32,13 +33,13 @@ class _Parser(argparse.ArgumentParser):
     """Its errors are one line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{PROGRAM}: {message}; `{self.prog} --help` shows what there is\n")
+        self.exit(ExitCode.WRONG_USAGE, f"{PROGRAM}: {message}; `{self.prog} --help` shows what there is\n")
 
 
 def main(words: Sequence[str]) -> int:
     """Run one command; return the exit code."""
     given = vars(make_parser().parse_args(words))
-    name = given.pop("operation")
+    name = given.pop("command")
     token = given.pop("token", os.environ.get(TOKEN_VARIABLE) or None)
     client = ControlClient(given.pop("host", DEFAULT_HOST), given.pop("control_port", DEFAULT_PORT), token)
     as_json, follow = given.pop("json", False), given.pop("follow", False)
@@ -46,17 +47,17 @@ def main(words: Sequence[str]) -> int:
         check_token(token)
         arguments = _arguments(name, given)
     except (EmulatorError, OSError, UnicodeError) as error:
-        return _complain(error, 2)
+        return _complain(error, ExitCode.WRONG_USAGE)
     try:
         if follow:
             _follow(client, arguments, as_json)
         result = _whole_log(client, arguments) if name == "log" else client.perform(name, arguments)
     except KeyboardInterrupt:
-        return 0
+        return ExitCode.DONE if follow else ExitCode.INTERRUPTED
     except ControlError as error:
-        return _complain(error, 1)
+        return _complain(error, ExitCode.FAILED)
     print(json.dumps(result) if as_json else plain(result), flush=True)
-    return 0
+    return ExitCode.DONE
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -66,13 +67,21 @@ def make_parser() -> argparse.ArgumentParser:
     common.add_argument("--control-port", type=int, metavar="N", help=f"its control port ({DEFAULT_PORT})")
     common.add_argument("--token", metavar="T", help=f"its token (else that in {TOKEN_VARIABLE})")
     common.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser = _Parser(prog=PROGRAM, description="Do something to a box that runs.", parents=[common])
-    commands = parser.add_subparsers(dest="operation", required=True, metavar="OPERATION")
+    parser = _Parser(
+        prog=PROGRAM,
+        description="Do something to a box that runs.",
+        epilog=f"example:\n  {example('push')}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        parents=[common],
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="OPERATION")
     for name, operation in OPERATIONS.items():
         command = commands.add_parser(
             name,
             help=operation.meaning,
             description=operation.meaning,
+            epilog=f"example:\n  {example(name)}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
             parents=[common],
             argument_default=argparse.SUPPRESS,
             allow_abbrev=False,
@@ -82,6 +91,32 @@ def make_parser() -> argparse.ArgumentParser:
         if name == "log":
             command.add_argument("--follow", action="store_true", help="go on with what comes, until Ctrl-C")
     return parser
+
+
+def example(name: str) -> str:
+    """Return a command line of an operation, to copy."""
+    return f"{PROGRAM} {name} {_EXAMPLES.get(name, '')}".rstrip()
+
+
+# The options in the examples of operations that need some.
+_EXAMPLES = {
+    "log": "--follow",
+    "wait_until": "--steady true",
+    "at": """--time 61.5 --operation push --arguments '{"force": [0, 0, 20], "duration": 0.5}'""",
+    "set_digital_input": "--group standard --n 3 --level on",
+    "set_analog_input": "--group standard --n 0 --value 4.2",
+    "push": "--force 0 0 20 --duration 0.5",
+    "attach_payload": "--mass 1.5",
+    "add_obstacle": "--name wall --shape box --size 0.1 1 1 --pose 0.5 0 0.5 0 0 0",
+    "remove_obstacle": "--name wall",
+    "require_safeguard_reset": "--required on",
+    "assign_safety_input": "--pair 0 --function reduced",
+    "run_program": "--script-file my_program.script",
+    "set_speed": "--fraction 0.5",
+    "press_button": "--button teach --pressed on",
+    "answer": "--value 4",
+    "add_to_log": "--text hello",
+}
 
 
 def plain(result: Mapping[str, Any]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import socket
 from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlencode
@@ -60,6 +61,10 @@ class ControlClient:
                 connection.request("POST", f"/v1/{name}", body, headers)
             response = connection.getresponse()
             result = json.loads(response.read())
+        except (socket.gaierror, UnicodeError):
+            raise ControlError(
+                f"{self.host} cannot be looked up: check the name or address of the box"
+            ) from None
         except (OSError, http.client.HTTPException, ValueError) as error:
             raise ControlError(
                 f"no box answers at {self.host}:{self.port} ({_reason(error)}): "

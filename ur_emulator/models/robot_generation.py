@@ -23,6 +23,7 @@ from ur_emulator.errors import ModelError
 from ur_emulator.models.fidelity import Fidelity, read_fidelity
 from ur_emulator.models.software import Software
 from urscript.catalogue import Builtin, catalogue_for
+from urscript.catalogue.versions import Version
 
 # First version, build and date of each row, the oldest first; software between two rows has the build and the
 # date of the earlier one.
@@ -142,6 +143,10 @@ class RobotGeneration:
                 f"version {text} given: this box is a {self.name}, its software is {self.major}.x, "
                 f"for example {self.default_version}"
             )
+        try:
+            Version.of(version).generation  # noqa: B018 - it raises for what no controller has
+        except ValueError as error:
+            raise ModelError(f"version {text} given: {error}") from None
         return version
 
     def fidelity(self, name: str) -> Fidelity:

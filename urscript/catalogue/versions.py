@@ -42,6 +42,8 @@ class Version(NamedTuple):
             ValueError: for a major number that no supported controller carries.
         """
         if self.major == 3:
+            if self > LAST_CB3:
+                raise ValueError(f"no software {self} is known: that of CB3 ends with {LAST_CB3}")
             return Generation.CB3
         if self.major == 5:
             return Generation.E_SERIES
@@ -64,6 +66,10 @@ class Version(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.major}.{self.minor}"
+
+
+LAST_CB3 = Version(3, 15)
+"""The last minor release of the CB3 series. Source: the maker's download pages, manuals up to 3.15.8."""
 
 
 @dataclass(frozen=True, slots=True)

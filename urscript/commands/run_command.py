@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from ur_hil.command_line import ExitCode
 from urscript.advice import with_advice
 from urscript.catalogue import Catalogue
 from urscript.commands.move_watch import MoveWatch
@@ -23,11 +24,11 @@ from urscript.source import Source
 
 NO_ROBOT: Final = "none"
 EXIT_CODES: Final = {
-    RunStatus.FINISHED: 0,
-    RunStatus.RUNNING: 0,
-    RunStatus.FAILED: 1,
-    RunStatus.STOPPED: 1,
-    RunStatus.INTERRUPTED: 130,
+    RunStatus.FINISHED: ExitCode.DONE,
+    RunStatus.RUNNING: ExitCode.DONE,
+    RunStatus.FAILED: ExitCode.FAILED,
+    RunStatus.STOPPED: ExitCode.FAILED,
+    RunStatus.INTERRUPTED: ExitCode.INTERRUPTED,
 }
 
 
@@ -70,7 +71,7 @@ def run(
         program = compile_program(source.text, catalogue=catalogue, name=source.name)
     except ScriptCompileError as error:
         output.compile_error(with_advice(error))
-        raise typer.Exit(1) from None
+        raise typer.Exit(ExitCode.FAILED) from None
     n_lines = trace_lines if trace else 0
     if make is None:
         status = _run_without_robot(program, catalogue, limit, output, n_lines)

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from ur_hil.command_line import ExitCode
 from urscript.catalogue import Catalogue, catalogue_for
 from urscript.source import as_utf8, program_text
 
@@ -43,7 +44,7 @@ def read_program(file: Path) -> str:
         typer.echo(f"cannot read {file}: {error.strerror}", err=True)
     except ValueError as error:
         typer.echo(str(error), err=True)
-    raise typer.Exit(2)
+    raise typer.Exit(ExitCode.WRONG_USAGE)
 
 
 def echo_json(**document: Any) -> None:

@@ -220,6 +220,11 @@ def _listening_socket(host: str, number: int) -> socket.socket:
             raise PortPermissionError(
                 f"port {number} on {host} needs privileges; move all ports with --port-base N if you need it"
             ) from None
+        if isinstance(error, socket.gaierror):
+            raise PortError(
+                f"cannot listen on {host}: no such name or address is known; take one of this machine's own, "
+                "127.0.0.1 keeps other machines out"
+            ) from None
         if error.errno == errno.EADDRNOTAVAIL:
             raise PortError(
                 f"cannot listen on {host}:{number}: {host} is not an address of this machine; "

@@ -1,0 +1,147 @@
+"""What the three commands share: exit codes, versions, help and its examples, completion."""
+
+import argparse
+import re
+import shlex
+import subprocess
+import sys
+from importlib.metadata import version
+
+import pytest
+import typer
+from page_blocks import ROOT, parsed
+
+import pc_client.cli
+import ur_emulator.cli
+import urscript.cli
+from ur_emulator.control import command_line
+from ur_emulator.control.operations import OPERATIONS
+from ur_hil.command_line import EXIT_CODES, ExitCode
+
+APPS = {"ur-client": pc_client.cli.app, "ur-emulator": ur_emulator.cli.app, "urscript": urscript.cli.app}
+MODULES = {"ur-client": "pc_client.cli", "ur-emulator": "ur_emulator.cli", "urscript": "urscript.cli"}
+
+
+def run(program, *words):
+    code = f"import sys; sys.argv[0] = {program!r}; from {MODULES[program]} import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+def commands(command, words):
+    """Every command below one, with its words."""
+    for name, inner in getattr(command, "commands", {}).items():
+        if name != "ctl":
+            yield (*words, name), inner
+        yield from commands(inner, (*words, name))
+
+
+ALL = [
+    (words, command)
+    for program, app in APPS.items()
+    for words, command in commands(typer.main.get_command(app), (program,))
+]
+LEAVES = [pair for pair in ALL if not hasattr(pair[1], "commands")]
+
+
+def test_the_page_has_the_table_of_exit_codes():
+    page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d+) \| (.+) \|$", page, re.MULTILINE)
+    assert rows == [(str(int(code)), meaning) for code, meaning in EXIT_CODES.items()]
+    assert set(EXIT_CODES) == set(ExitCode)
+
+
+@pytest.mark.parametrize("program", APPS)
+def test_version_is_that_of_the_tool(program):
+    done = run(program, "--version")
+    assert (done.returncode, done.stdout) == (0, f"{program} {version('ur-hil')}\n")
+
+
+@pytest.mark.parametrize("program", APPS)
+@pytest.mark.parametrize("words", [("nothing",), ("--nothing",)])
+def test_wrong_usage_is_one_line_and_2(program, words):
+    done = run(program, *words)
+    assert done.returncode == ExitCode.WRONG_USAGE
+    assert done.stderr.startswith(f"{program}: ")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("program", APPS)
+def test_without_words_the_commands_are_listed(program):
+    done = run(program)
+    assert done.returncode == 0
+    for words, _ in ALL:
+        assert words[0] != program or len(words) > 2 or words[1] in done.stdout
+
+
+@pytest.mark.parametrize(("words", "command"), ALL, ids=[" ".join(words) for words, _ in ALL])
+def test_every_command_has_a_short_help_option(words, command):
+    context = command.make_context(words[-1], [], resilient_parsing=True, help_option_names=["-h", "--help"])
+    assert {"-h", "--help"} <= set(command.get_help_option(context).opts)
+
+
+@pytest.mark.parametrize(("words", "command"), LEAVES, ids=[" ".join(words) for words, _ in LEAVES])
+def test_every_help_text_has_examples_that_parse(words, command):
+    lines = [line.strip() for line in command.epilog.splitlines()[2:]]
+    assert lines
+    for line in lines:
+        given = shlex.split(line)
+        assert tuple(given[: len(words)]) == words
+        parsed(APPS[words[0]], given[1:])
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_every_operation_of_ctl_has_an_example_that_parses(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_program.script").write_text("sync()\n")
+    given = shlex.split(command_line.example(name))[2:]
+    parser = command_line.make_parser()
+    asked = vars(parser.parse_args(given))
+    assert asked.pop("command") == name
+    command_line._arguments(name, asked)
+    (subparsers,) = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+    assert command_line.example(name) in subparsers.choices[name].format_help()
+
+
+@pytest.mark.parametrize("program", APPS)
+def test_completion_is_offered_for_the_shells(program):
+    names = {
+        option for parameter in typer.main.get_command(APPS[program]).params for option in parameter.opts
+    }
+    assert {"--install-completion", "--show-completion"} <= names
+
+
+def test_the_software_of_the_robot_keeps_its_old_option_in_serve_only():
+    for words, command in LEAVES:
+        taken = {option for parameter in command.params for option in parameter.opts}
+        assert ("--version" in taken) == (words == ("ur-emulator", "serve"))
+    for option in ("--software", "--version"):
+        assert parsed(APPS["ur-emulator"], ["serve", option, "3.4.0"])["software"] == "3.4.0"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("ur-emulator", "serve", "--software", "3.99"), ("urscript", "check", "--software", "3.99", "a.script")],
+)
+def test_software_that_does_not_exist_is_named(words):
+    done = run(*words)
+    assert done.returncode == ExitCode.WRONG_USAGE
+    assert "no software 3.99 is known: that of CB3 ends with 3.15" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("ur-emulator", "serve", "--host", "nowhere.invalid"), "no such name or address is known"),
+        (("ur-emulator", "ctl", "state", "--host", "nowhere.invalid"), "cannot be looked up"),
+        (("ur-client", "doctor", "--robot", "nowhere.invalid"), "cannot be looked up"),
+    ],
+)
+def test_a_host_that_does_not_exist_is_named(words, said):
+    done = run(*words)
+    assert done.returncode == ExitCode.FAILED
+    told = done.stderr or done.stdout
+    assert said in told
+    assert "nowhere.invalid" in told
+    assert told.count("\n") == 1
