@@ -79,6 +79,24 @@ _WHEN = {
     "ProgramThreadsMessage": "from 3.3: a thread has passed a `$` line",
 }
 
+_ORDER = """\
+### Order
+
+Everything of a cycle leaves in this order. A client that sees a mode, an error or the end of a
+program in a state, on any port, has been sent the message of it on 30001 before.
+
+1. The messages, in the order in which the cycle has caused them: what commands and safety inputs
+   do, then what programs do, then what stops the arm. The error code comes before the safety mode
+   that it leads to, the safety mode before the program's pause or end.
+2. The changed variables of a program that ends come before its `PROGRAM_XXX_STOPPED`, the names of
+   the variables of one that starts after its `PROGRAM_XXX_STARTED`.
+3. Frames of 30003 and data of 30004, if the cycle sends them.
+4. `ProgramThreadsMessage` and `ProgramLabelMessage`, then the state, if one is due (ten times a
+   second), then the changed variables.
+
+A client that connects gets the state of the last cycle; there are no messages of what was before.
+"""
+
 _VARIABLES = """\
 ## Global variables
 
@@ -117,6 +135,7 @@ def render() -> str:
             messages,
             *_message_rows(),
             "",
+            _ORDER,
             _VARIABLES,
             *_codes(),
             "",

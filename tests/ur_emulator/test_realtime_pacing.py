@@ -5,7 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 from ur_emulator.commands.programs import SetSpeedSlider
+from ur_emulator.commands.safety import TriggerFault
 from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.events import SafetyModeChanged
 from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.pacing import (
@@ -108,6 +110,23 @@ def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count
     box.advance(10.0 + 2 * PERIOD)
     assert [snapshot.tick - seen[0].tick for snapshot in seen] == [0, 1, 2]
     assert [snapshot.target_speed_fraction for snapshot in seen] == [1.0, 1.0, 0.25]
+
+
+def test_messages_of_a_cycle_that_was_computed_early_are_sent_before_anybody_can_see_its_state():
+    controller = Controller(
+        robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(ProgramSlot, network=None)
+    )
+    box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None, pytest.fail)
+    seen = []
+    box.attach([SimpleNamespace(publish=lambda snapshot: seen.append("state"))], [seen.append])
+    box.advance(10.0)
+    seen.clear()
+    box.submit(TriggerFault())
+    box.advance(10.0 + PERIOD - 0.0003)
+    assert SafetyModeChanged(int(controller.snapshot.safety_mode)) in seen
+    assert "state" not in seen
+    box.advance(10.0 + PERIOD)
+    assert seen[-1] == "state"
 
 
 def test_boxes_that_share_a_loop_take_turns():

@@ -7,6 +7,7 @@ from states_support import BRAKING, COMMANDS, ENTRY, check_wires, moving
 
 from protocol.primary.layout import MasterboardData, RobotModeData
 from protocol.primary.messages import ErrorCodeMessage, SafetyModeMessage
+from protocol.primary.state import RobotState
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator import ControlBox
 from ur_emulator.commands.power import ReleaseBrakes
@@ -130,6 +131,31 @@ def test_a_protective_stop_by_script_and_the_five_seconds_of_the_dashboard(box):
         assert messages.message(SafetyModeMessage).safety_mode == SafetyMode.PROTECTIVE_STOP
         primary.sendall(b"set unlock protective stop\n")  # no five seconds on this port
         assert messages.message(SafetyModeMessage).safety_mode == SafetyMode.NORMAL
+
+
+@pytest.mark.parametrize("port", ["primary", "primary_ro"])
+@pytest.mark.parametrize("mode", [mode for mode in MODES if ENTRY[mode] is not None])
+def test_the_message_of_a_mode_comes_before_any_state_that_shows_it(box, mode, port):
+    with connect(box, port) as primary, connect(box, "rtde") as sock:
+        reader = MessageReader(primary)
+        reader.state()
+        client = RtdeClient(sock)
+        client.subscribe("safety_mode")
+        box.submit(COMMANDS[ENTRY[mode]])
+        client.until(lambda v: v["safety_mode"] == mode)
+        order = []
+        while "state" not in order:
+            package = reader.next()
+            match package:
+                case SafetyModeMessage(safety_mode=told) if told == mode:
+                    order.append("safety mode")
+                case ErrorCodeMessage(code=209):
+                    order.append("error")
+                case RobotState() if package.find(MasterboardData).safety_mode == mode:
+                    order.append("state")
+                case _:
+                    pass
+        assert order == ["error"] * (mode is SafetyMode.PROTECTIVE_STOP) + ["safety mode", "state"]
 
 
 @pytest.mark.parametrize("command", [TriggerViolation(), TriggerFault()])

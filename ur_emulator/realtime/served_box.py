@@ -226,6 +226,11 @@ class ServedBox:
             self._submit_due()
             commands, self._commands = self._commands, {}
             snapshot = self.controller.tick(commands.values())
+            # Events first, also before a cycle that is held: an error must have arrived before any state or
+            # answer that shows its effect.
+            if self.controller.state.events:
+                for event in self.controller.state.events.take():
+                    self.announce(event)
             if now < self._pacer.publish_at:
                 self._is_held = True
                 return self._pacer.publish_at
@@ -255,10 +260,6 @@ class ServedBox:
 
     def _publish(self, snapshot: Snapshot, now: float) -> None:
         self._last_frame = now
-        # Events first: an error must have arrived before the state that shows its effect.
-        if self.controller.state.events:
-            for event in self.controller.state.events.take():
-                self.announce(event)
         for publisher in self._publishers:
             try:
                 publisher.publish(snapshot)
