@@ -8,7 +8,7 @@ from urscript.catalogue import CB3_3_15, catalogue_for
 from urscript.catalogue.types import Support
 
 # Run by the interpreter itself.
-FLOW = {"sync", "sleep", "textmsg"}
+FLOW = {"sync", "sleep", "textmsg", "varmsg"}
 
 
 def offered():

@@ -85,7 +85,8 @@ CB3_UNDOCUMENTED = """
     get_joint_positions tool_contact get_actual_joint_positions_history force_mode_set_gain_scaling
     zero_ftsensor servoc protective_stop request_boolean_from_primary_client
     request_integer_from_primary_client request_float_from_primary_client
-    request_string_from_primary_client set_runstate_standard_digital_outputs set_runstate_outputs tool_pose
+    request_string_from_primary_client set_runstate_standard_digital_outputs
+    set_runstate_configurable_digital_outputs set_runstate_outputs tool_pose varmsg
 """
 # Script manual e-Series 5.11: what it has and CB3 3.15.4 has not.
 ADDED_IN_5_11 = """

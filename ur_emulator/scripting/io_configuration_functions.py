@@ -7,7 +7,15 @@ from typing import Any
 
 from ur_emulator.controller.io.configuration import IoConfiguration, OutputKind
 from ur_emulator.controller.io.euromap import N_EUROMAP, Euromap
-from ur_emulator.controller.io.lines import CURRENT, STANDARD, TOOL, VOLTAGE, AnalogLine, InputOutput
+from ur_emulator.controller.io.lines import (
+    CONFIGURABLE,
+    CURRENT,
+    STANDARD,
+    TOOL,
+    VOLTAGE,
+    AnalogLine,
+    InputOutput,
+)
 from ur_emulator.controller.io.run_states import RunState
 from urscript.errors import ScriptRuntimeError
 
@@ -29,10 +37,14 @@ _RUNSTATE_NAMES = {
 _BOX_RANGES = {0: VOLTAGE, 2: VOLTAGE}
 _TOOL_RANGES = {0: VOLTAGE, 1: VOLTAGE, 2: CURRENT}
 # The outputs that the undocumented list forms speak of, in the order of the old numbering.
-_LISTED_OUTPUTS = (
-    *((OutputKind.STANDARD, i) for i in range(STANDARD.count)),
-    *((OutputKind.TOOL, i) for i in range(TOOL.count)),
-)
+_LISTED_STANDARD = tuple((OutputKind.STANDARD, i) for i in range(STANDARD.count))
+_LISTED_OUTPUTS = {
+    "set_runstate_standard_digital_outputs": _LISTED_STANDARD,
+    "set_runstate_configurable_digital_outputs": tuple(
+        (OutputKind.CONFIGURABLE, i) for i in range(CONFIGURABLE.count)
+    ),
+    "set_runstate_outputs": (*_LISTED_STANDARD, *((OutputKind.TOOL, i) for i in range(TOOL.count))),
+}
 
 
 def io_configuration_functions(io: InputOutput, configuration: IoConfiguration) -> Mapping[str, Function]:
@@ -105,10 +117,7 @@ def _runstates(configuration: IoConfiguration) -> dict[str, Function]:
     for kind, output in _RUNSTATE_NAMES.items():
         name = f"set_runstate_{output}_to_value"
         functions[name] = setter(kind, name)
-    for name, listed in (
-        ("set_runstate_standard_digital_outputs", _LISTED_OUTPUTS[: STANDARD.count]),
-        ("set_runstate_outputs", _LISTED_OUTPUTS),
-    ):
+    for name, listed in _LISTED_OUTPUTS.items():
         functions[name] = set_listed(listed, name)
     return functions
 

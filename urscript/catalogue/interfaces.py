@@ -405,7 +405,8 @@ _MODBUS: tuple[Builtin, ...] = (
     *(
         _row(
             name,
-            (_SIGNAL, *params, secondary),
+            # Exported programs read a signal with one argument. Source: files of 3.13.
+            (_SIGNAL, *params, secondary if params else _SECONDARY_OPTIONAL),
             returns,
             summary,
             since=since,

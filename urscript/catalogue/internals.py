@@ -304,6 +304,17 @@ _FLOW: tuple[Builtin, ...] = (
         nan_ok=True,
     ),
     _row(
+        "varmsg",
+        (Param("name", STRING), Param("value", ANY)),
+        "None",
+        "show a value under a name",
+        since=releases("3.0", "5.0"),
+        support=APPROXIMATE,
+        note="no document says where; it has no effect here",
+        undocumented=BOTH,
+        source=FIELD_USE,
+    ),
+    _row(
         "popup",
         (
             Param("s", ANY),

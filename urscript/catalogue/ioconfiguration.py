@@ -147,6 +147,7 @@ _UNDOCUMENTED: tuple[Builtin, ...] = tuple(
     )
     for name, source in (
         ("set_runstate_standard_digital_outputs", POLYSCOPE_EXPORT),
+        ("set_runstate_configurable_digital_outputs", POLYSCOPE_EXPORT),
         ("set_runstate_outputs", FIELD_USE),
     )
 )

@@ -158,7 +158,7 @@ def _flow_builtins(host: Host) -> dict[str, Callable[..., Any]]:
         for _ in range(ceil(seconds / host.step_time - 1e-9)):
             yield NEXT_CYCLE
 
-    return {"textmsg": textmsg, "sleep": sleep}
+    return {"textmsg": textmsg, "varmsg": lambda thread, name, value: None, "sleep": sleep}
 
 
 def _checked(
