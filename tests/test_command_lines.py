@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from functools import partial
 from importlib.metadata import version
 
 import pytest
@@ -128,6 +129,20 @@ def test_software_that_does_not_exist_is_named(words):
     done = run(*words)
     assert done.returncode == ExitCode.WRONG_USAGE
     assert "no software 3.99 is known: that of CB3 ends with 3.15" in done.stderr
+
+
+def test_where_a_box_cannot_run_that_is_said(monkeypatch, capsys):
+    for platform in ("linux", "darwin"):
+        ur_emulator.check_platform(platform)
+    monkeypatch.setattr(ur_emulator.cli, "check_platform", partial(ur_emulator.check_platform, "win32"))
+    monkeypatch.setattr(sys, "argv", ["ur-emulator", "serve"])
+    with pytest.raises(SystemExit) as left:
+        ur_emulator.cli.main()
+    assert left.value.code == ExitCode.FAILED
+    told = capsys.readouterr().err
+    assert (
+        told == "ur-emulator: the box needs Linux or macOS: on Windows, run it in WSL 2 (docs/commands.md)\n"
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,13 @@
-"""The wheel, installed into a fresh environment: what is in it is enough to connect, to move and to report."""
+"""What is built: the wheel, installed into a fresh environment, moves an arm; the sdist has all the pages."""
 
+import email
 import os
+import re
+import runpy
 import shutil
 import subprocess
 import sys
+import tarfile
 import tomllib
 import venv
 from pathlib import Path
@@ -33,13 +37,29 @@ assert pathlib.Path("out/report.html").stat().st_size > 10_000
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    """Built from a copy: a build leaves folders behind, which would get into the next one."""
-    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
-    for package in PACKAGES:
-        shutil.copytree(ROOT / package, source / package, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, source)
+def source(tmp_path_factory):
+    """A copy to build from: a build leaves folders behind, which would get into the next one."""
+    source = tmp_path_factory.mktemp("source")
+    for folder in (*PACKAGES, "docs", "examples"):
+        shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    for path in ROOT.iterdir():
+        if path.is_file():
+            shutil.copy(path, source)
+    return source
+
+
+@pytest.fixture(scope="module")
+def sdist(source, tmp_path_factory):
+    out = tmp_path_factory.mktemp("sdist")
+    code = f"from setuptools.build_meta import build_sdist; build_sdist({str(out)!r})"
+    run(sys.executable, "-c", code, cwd=source)
+    (made,) = out.glob("*.tar.gz")
+    return made
+
+
+@pytest.fixture(scope="module")
+def wheel(source, tmp_path_factory):
+    out = tmp_path_factory.mktemp("wheel")
     run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", out, source)
     (made,) = out.glob("*.whl")
     return made
@@ -63,6 +83,43 @@ def test_every_file_of_the_packages_is_in_the_wheel(wheel):
     }
     assert files - packed == set()
     assert {name.partition("/")[0] for name in packed if ".dist-info/" not in name} == set(PACKAGES)
+
+
+@pytest.mark.slow
+def test_the_sdist_has_the_packages_the_pages_the_examples_and_the_changelog(sdist):
+    with tarfile.open(sdist) as archive:
+        packed = {name.partition("/")[2] for name in archive.getnames()}
+    files = {
+        path.relative_to(ROOT).as_posix()
+        for folder in (*PACKAGES, "docs", "examples")
+        for path in (ROOT / folder).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert files - packed == set()
+    assert {"CHANGELOG.md", "LICENSE", "README.md", "SECURITY.md", "setup.py"} <= packed
+    assert not any(name.startswith("tests/") for name in packed)
+
+
+@pytest.mark.slow
+def test_the_page_of_the_index_has_no_link_that_leads_nowhere(wheel):
+    with ZipFile(wheel) as archive:
+        (name,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
+        facts = email.message_from_bytes(archive.read(name))
+    page = facts.get_payload()
+    assert facts["Description-Content-Type"] == "text/markdown"
+    assert page.startswith("# ur-hil")
+    targets = re.findall(r"\]\(([^)]*)\)", page)
+    assert [target for target in targets if not target.startswith("https://")] == []
+    named = re.findall(r"`([\w./-]+\.md)`", page)
+    assert len(named) > 10
+    for path in named:
+        assert (ROOT / path).is_file()
+
+
+def test_links_and_images_of_a_readme_become_text():
+    page_for_index = runpy.run_path(str(ROOT / "setup.py"))["page_for_index"]
+    text = "![arm](docs/arm.svg)\n\nSee [the box](docs/box.md#options), [a.md](a.md), [UR](https://example.com/x)."
+    assert page_for_index(text) == "See the box (`docs/box.md`), `a.md`, [UR](https://example.com/x)."
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ with ControlBox(robot="ur3", pace="lockstep", seed=7) as box:
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 from ur_hil import check_packages
@@ -21,8 +22,19 @@ check_packages()
 __all__ = ["BoxRack", "ControlBox"]
 
 
+def check_platform(platform: str = sys.platform) -> None:
+    """Look whether a box can run on a system, named as in `sys.platform`.
+
+    Raises:
+        ImportError: it cannot: its worker process needs what only POSIX systems have.
+    """
+    if platform == "win32":
+        raise ImportError("the box needs Linux or macOS: on Windows, run it in WSL 2 (docs/commands.md)")
+
+
 def __getattr__(name: str) -> Any:
     """Import the box when it is first asked for: tools that only read tables stay light."""
+    check_platform()
     if name == "ControlBox":
         from ur_emulator.emulator import ControlBox
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from protocol.errors import ProtocolError
+from ur_emulator import check_platform
 from ur_emulator.box_log import printable
 from ur_emulator.control.token import TOKEN_VARIABLE
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
@@ -103,6 +104,11 @@ def serve(
     ] = False,
 ) -> None:
     """Serve a control box, or several, powered on with the brakes released, until Ctrl-C."""
+    try:
+        check_platform()
+    except ImportError as error:
+        _complain(str(error))
+        raise typer.Exit(ExitCode.FAILED) from None
     from ur_emulator.descriptor_limit import raise_descriptor_limit
     from ur_emulator.realtime.worker_process import prestart_process
 

@@ -275,7 +275,7 @@ class TcpNetwork:
 
     def now(self) -> float:
         """Seconds of a monotonic clock."""
-        return time.monotonic()
+        return time.perf_counter()  # on Windows, time.monotonic may have steps of 16 ms
 
 
 def _reason(error: OSError) -> str:
