@@ -99,6 +99,27 @@ def test_what_nobody_knows_can_be_left_out(tmp_path, nodes, left, named):
     assert all(re.search(name, text) for name, text in zip(named, told, strict=True))
 
 
+def test_events_and_first_values_that_nobody_knows_can_be_left_out(tmp_path):
+    riddle = "<expression><Riddle/></expression>"
+    data = urp(
+        "<Halt/>",
+        around=f"<Event>{riddle}<children/></Event>",
+        first=f'<variables><variable name="a">{riddle}</variable></variables>',
+    )
+    with pytest.raises(UnknownNodeError, match="<Riddle> in an expression"):
+        made(tmp_path, data)
+    told = made(tmp_path, data, skip_unknown=True)
+    assert len(told.left_out) == 2
+    assert told.parts[-1].splitlines() == ['  $ 2 "Robot Program"', '  $ 3 "Halt"', "  halt", "end"]
+
+
+def test_a_sequence_that_nobody_knows_is_named(tmp_path):
+    with pytest.raises(UnknownNodeError, match="a sequence of type 'AfterStop' cannot"):
+        made(
+            tmp_path, urp("<Halt/>", around='<SpecialSequence type="AfterStop"><children/></SpecialSequence>')
+        )
+
+
 @pytest.mark.parametrize(
     ("data", "problem"),
     [

@@ -73,7 +73,7 @@ def _direction(maker: UrpMaker, node: Node) -> tuple[str, str]:
         return "", expression_of(maker, node).script
     axis, sign = selected[:1], selected[1:]
     if axis not in _AXES or sign not in _SIGNS:
-        raise maker.unknown(node, f"a direction {selected!r}")
+        raise node.source.unknown(f"a direction {selected!r}")
     mark, length = _SIGNS[sign]
     vector = ["0.0"] * 3
     vector[_AXES[axis]] = length
@@ -141,13 +141,13 @@ def _write_until(maker: UrpMaker, node: Node, n: int, acceleration: str, around:
                 writer.add("break")
         case _:
             how = f"{kind} {node.get('distanceNodeType')}".strip()
-            raise maker.unknown(node, f"an <Until> of type {how!r}")
+            raise node.source.unknown(f"an <Until> of type {how!r}")
 
 
 def write_force(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Force>`: its nodes run while the tool gives way."""
     if node.get("type") != "Frame":
-        raise maker.unknown(node, f"a <Force> of type {node.get('type')!r}")
+        raise node.source.unknown(f"a <Force> of type {node.get('type')!r}")
     values = {}
     for tag in ("selection", "wrench", "limitsForce", "limitsMotion"):
         element = node.find(tag)

@@ -81,7 +81,7 @@ def _part(maker: UrpMaker, node: Node, element: Element) -> Expression:
     if len(pins) == 1:
         line = line_of(maker.installation, tree.resolve(pins[0]).get("referencedName", ""), tree.name)
         return Expression(line.read, line.label)
-    raise maker.unknown(node, f"<{element.tag}> in an expression")
+    raise node.source.unknown(f"<{element.tag}> in an expression")
 
 
 def variable_name(node: Node, element: Element | None) -> str:

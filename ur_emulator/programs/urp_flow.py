@@ -6,6 +6,7 @@ Source: program files and the scripts that PolyScope saved beside them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.programs.urp_expressions import expression_of, variable_name
@@ -49,7 +50,7 @@ def write_loop(maker: UrpMaker, node: Node, around: Around) -> None:
             with writer.block(f"while ({condition.script}):"):
                 maker.write_children(node, around)
         case other:
-            raise maker.unknown(node, f"a loop of type {other!r}")
+            raise node.source.unknown(f"a loop of type {other!r}")
 
 
 def _write_watched_loop(maker: UrpMaker, node: Node, around: Around, condition: str) -> None:
@@ -69,7 +70,7 @@ def write_if(maker: UrpMaker, node: Node, around: Around) -> None:
     if node.get("type") not in ("", "If"):
         if node.get("type") in ("ElseIf", "Else"):
             raise node.source.error(f"an {node.get('type')} node stands behind no If")
-        raise maker.unknown(node, f"an <If> node of type {node.get('type')!r}")
+        raise node.source.unknown(f"an <If> node of type {node.get('type')!r}")
     if len(node.branches) > BUDGETS.node_depth:
         raise node.source.error(f"an <If> node has more than {BUDGETS.node_depth} branches")
     _write_branches(maker, (node, *node.branches), around)
@@ -122,7 +123,7 @@ def write_switch(maker: UrpMaker, node: Node, around: Around) -> None:
     writer = maker.writer
     for case in node.children:
         if case.kind != "Case":
-            raise maker.unknown(case, f"<{case.kind}> in a <Switch>")
+            raise case.source.unknown(f"<{case.kind}> in a <Switch>")
     value = expression_of(maker, node)
     maker.switches += 1
     variable = f"switch_{maker.switches}"
@@ -174,9 +175,18 @@ def write_thread(maker: UrpMaker, node: Node, around: Around) -> None:
 def write_events(maker: UrpMaker, events: Sequence[Node], around: Around) -> None:
     """Write all `<Event>` nodes: one thread looks for them in each cycle."""
     writer = maker.writer
+    known: list[tuple[Node, str]] = []
+    for event in events:
+        maker.try_to(partial(_note_condition, maker, event, known))
+    if not known:
+        return
     with writer.block("thread EventThread():"), writer.block("while (True):"):
-        for index, node in enumerate(events):
-            with writer.branch(f"{'elif' if index else 'if'} ({expression_of(maker, node).script}):"):
+        for index, (node, condition) in enumerate(known):
+            with writer.branch(f"{'elif' if index else 'if'} ({condition}):"):
                 maker.write_children(node, around)
         writer.add("end", "sync()")
     writer.add("eventThread = run EventThread()")
+
+
+def _note_condition(maker: UrpMaker, event: Node, known: list[tuple[Node, str]]) -> None:
+    known.append((event, expression_of(maker, event).script))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
-from ur_emulator.errors import ProgramFileError, UnknownNodeError
+from ur_emulator.errors import UnknownNodeError
 from ur_emulator.programs.installation import Installation
 from ur_emulator.programs.reading import ProgramReader
 from ur_emulator.programs.script_writer import ScriptWriter
@@ -63,26 +64,29 @@ class UrpMaker:
     switches: int = 0
     left_out: list[str] = field(default_factory=list)
 
-    def unknown(self, node: Node, what: str) -> ProgramFileError:
-        """Return the error that names what is not known."""
-        return UnknownNodeError(
-            f"{node.source.tree.name}: {what} cannot be turned into a script; "
-            "put the .script that PolyScope saved with the program beside it, "
-            "or leave it out (--skip-unknown-nodes)"
-        )
-
     def write(self, node: Node, around: Around) -> None:
         """Write one node.
 
         Raises:
             UnknownNodeError: the node, or something in it, is not known.
         """
+        self.try_to(partial(self._write, node, around))
+
+    def _write(self, node: Node, around: Around) -> None:
+        write = self.writers.get(node.kind)
+        if write is None:
+            raise node.source.unknown(f"a <{node.kind}> node")
+        write(self, node, around)
+
+    def try_to(self, action: Callable[[], None]) -> None:
+        """Do something; what it has written is removed if it meets what is not known and may be left out.
+
+        Raises:
+            UnknownNodeError: something is not known, and must not be left out.
+        """
         place = self.writer.place
         try:
-            write = self.writers.get(node.kind)
-            if write is None:
-                raise self.unknown(node, f"a <{node.kind}> node")
-            write(self, node, around)
+            action()
         except UnknownNodeError as error:
             if not self.skip_unknown:
                 raise

@@ -38,7 +38,7 @@ def write_move(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Move>`: its nodes stand at the same level."""
     motion = _motion(maker, node)
     if node.get("optimoveEnabled") == "true":
-        raise maker.unknown(node, "a <Move> with OptiMove")
+        raise node.source.unknown("a <Move> with OptiMove")
     maker.writer.label(node.number, motion, around.mark)
     if node.get("useActiveTCP") == "false" and (tcp := node.find("tcp")) is not None:
         maker.writer.add(set_tcp(maker, node, tcp))
@@ -64,7 +64,7 @@ def write_waypoint(maker: UrpMaker, node: Node, around: Around) -> None:
     move = _move_around(node, around)
     builtin = _TYPES[_motion(maker, move)][0]
     if node.children:
-        raise maker.unknown(node, "what is inside of a waypoint")
+        raise node.source.unknown("what is inside of a waypoint")
     maker.writer.label(node.number, _waypoint_name(node), around.mark or _AFTER)
     target = _target(maker, node, move, builtin)
     maker.writer.add(f"{builtin}({target}, {_motion_parameters(maker, node, node, move)})")
@@ -116,7 +116,7 @@ def _target(maker: UrpMaker, node: Node, move: Node, builtin: str) -> str:
         case "Relative":
             return _relative_target(maker, node)
         case other:
-            raise maker.unknown(node, f"a waypoint of type {other!r}")
+            raise node.source.unknown(f"a waypoint of type {other!r}")
 
 
 def _fixed_target(maker: UrpMaker, node: Node, move: Node, builtin: str) -> str:
@@ -215,7 +215,7 @@ def feature_label(name: str) -> str:
 def _motion(maker: UrpMaker, move: Node) -> str:
     motion = move.get("motionType")
     if motion not in _TYPES:
-        raise maker.unknown(move, f"a move of type {motion!r}")
+        raise move.source.unknown(f"a move of type {motion!r}")
     return motion
 
 
@@ -247,7 +247,7 @@ def _motion_parameters(maker: UrpMaker, motion: Node, waypoint: Node, move: Node
     own = {} if parameters is None else dict(parameters.attrib)
     unknown = set(own) - _PARAMETERS - {"reference"}
     if unknown:
-        raise maker.unknown(waypoint, f"motion parameter {min(unknown)!r} of a waypoint")
+        raise waypoint.source.unknown(f"motion parameter {min(unknown)!r} of a waypoint")
     given = [
         ("a", own.get(acceleration) or move.get("acceleration")),
         ("v", own.get(speed) or move.get("speed")),

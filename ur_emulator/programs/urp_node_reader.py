@@ -64,7 +64,7 @@ class _NodeReader:
         before = [self._node(source, one) for one in top if one.tag == "SpecialSequence"]
         for node in before:
             if node.get("type") != "BeforeStart":
-                raise source.error(f"a sequence of type {node.get('type')!r} cannot be turned into a script")
+                raise source.unknown(f"a sequence of type {node.get('type')!r}")
         main = [self._node(source, one) for one in top if one.tag == "MainProgram"]
         if not main:
             raise source.error("there is no <MainProgram> in it")

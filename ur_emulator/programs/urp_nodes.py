@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ur_emulator.errors import ProgramFileError
+from ur_emulator.errors import ProgramFileError, UnknownNodeError
 from ur_emulator.programs.folder import FoundFile
 from ur_emulator.programs.script_names import Names
 from ur_emulator.programs.xml_tree import XmlTree
@@ -39,6 +39,14 @@ class Source:
     def error(self, problem: str) -> ProgramFileError:
         """Return the error that says what is wrong with this file."""
         return ProgramFileError(f"{self.tree.name}: {problem}")
+
+    def unknown(self, what: str) -> UnknownNodeError:
+        """Return the error that names what is not known."""
+        return UnknownNodeError(
+            f"{self.tree.name}: {what} cannot be turned into a script; "
+            "put the .script that PolyScope saved with the program beside it, "
+            "or leave it out (--skip-unknown-nodes)"
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -142,9 +143,9 @@ def _write_threads(maker: UrpMaker, nodes: Sequence[Node]) -> None:
             urp_flow.write_thread(maker, node, Around())
         elif node.kind != "Event":
             maker.write(node, Around())
+    for event in events:
+        maker.last_motions |= last_motions(event, is_loop=False)
     if events:
-        for event in events:
-            maker.last_motions |= last_motions(event, is_loop=False)
         urp_flow.write_events(maker, events, Around())
 
 
@@ -154,11 +155,11 @@ def _write_first_values(maker: UrpMaker) -> None:
     for element in program.source.tree.root.iter():
         first = element.find("initializeExpression")
         if first is not None and len(first):
-            _declare_first_value(maker, element, first)
+            maker.try_to(partial(_declare_first_value, maker, element, first))
     for variable in () if program.variables is None else program.variables:
         given = variable.find("expression")
         if given is not None and len(given):
-            _declare_first_value(maker, variable, given)
+            maker.try_to(partial(_declare_first_value, maker, variable, given))
 
 
 def _declare_first_value(maker: UrpMaker, variable: Element, value: Element) -> None:

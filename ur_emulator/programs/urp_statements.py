@@ -63,7 +63,7 @@ def write_script(maker: UrpMaker, node: Node, around: Around) -> None:
         maker.writer.add(line.script)
         return
     if kind not in ("File", "Code"):
-        raise maker.unknown(node, f"a <Script> of type {kind!r}")
+        raise node.source.unknown(f"a <Script> of type {kind!r}")
     content = node.element.findtext("cachedContents")
     name = node.text("file")
     if name:
@@ -90,7 +90,7 @@ def write_assignment(maker: UrpMaker, node: Node, around: Around) -> None:
     question = _QUESTIONS.get(node.get("valueType"))
     if source != "Operator" or question is None:
         how = f"{source} {node.get('valueType')}".strip()
-        raise maker.unknown(node, f"an assignment from {how!r}")
+        raise node.source.unknown(f"an assignment from {how!r}")
     maker.writer.label(node.number, f"{name}≔{source}", around.mark)
     maker.writer.add(f'global {name}={question}("{one_line(node.get("message"))}")')
 
@@ -108,7 +108,7 @@ def write_set(maker: UrpMaker, node: Node, around: Around) -> None:
         maker.writer.label(node.number, f"Set {line.label}={'On' if is_high else 'Off'}", around.mark)
         maker.writer.add(statement)
     elif kind != "NoAction":
-        raise maker.unknown(node, f"a <Set> of type {kind!r}")
+        raise node.source.unknown(f"a <Set> of type {kind!r}")
     else:
         maker.writer.label(node.number, "Set", around.mark)
     if tcp is not None:
@@ -144,7 +144,7 @@ def write_wait(maker: UrpMaker, node: Node, around: Around) -> None:
             awaited = expression_of(maker, node)
             label, condition = awaited.label, f"not({awaited.script})"
         case other:
-            raise maker.unknown(node, f"a <Wait> of type {other!r}")
+            raise node.source.unknown(f"a <Wait> of type {other!r}")
     writer.label(number, f"Wait {label}", around.mark)
     with writer.block(f"while ({condition}):"):
         writer.add("sync()")
@@ -154,9 +154,7 @@ def write_popup(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<Popup>` of a text, a variable or an expression; one that halts does not wait to be closed."""
     kind = node.get("type") or "Message"
     if kind not in _POPUPS:
-        raise node.source.error(
-            f"a popup of type {kind!r} cannot be turned into a script: use {', '.join(_POPUPS)}"
-        )
+        raise node.source.unknown(f"a popup of type {kind!r}")
     match node.get("inputType") or "Text":
         case "Text":
             text = node.get("message") or node.text("message")
@@ -166,7 +164,7 @@ def write_popup(maker: UrpMaker, node: Node, around: Around) -> None:
         case "Expression":
             shown, label = f'str_cat("",{expression_of(maker, node).script})', "Popup"
         case other:
-            raise maker.unknown(node, f"a popup of {other!r}")
+            raise node.source.unknown(f"a popup of {other!r}")
     is_halt = node.get("haltProgram") == "true"
     maker.writer.label(node.number, label, around.mark)
     maker.writer.add(f'popup({shown}, "{kind}", {_POPUPS[kind]}, blocking={not is_halt})')
@@ -179,7 +177,7 @@ def write_timer(maker: UrpMaker, node: Node, around: Around) -> None:
     name = variable_name(node, node.element.find("variable"))
     action = node.get("action")
     if action not in _TIMER_ACTIONS:
-        raise maker.unknown(node, f"a timer's action {action!r}")
+        raise node.source.unknown(f"a timer's action {action!r}")
     maker.timers.setdefault(name)
     maker.writer.label(node.number, f"{name}: {action}", around.mark)
     maker.writer.add(_TIMER_ACTIONS[action].format(t=name))
@@ -189,7 +187,7 @@ def write_contributed(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write the node of a URCap: only External Control is known."""
     name = contributor(node.element)
     if name != EXTERNAL_CONTROL:
-        raise maker.unknown(node, f"a node of the URCap {name!r}")
+        raise node.source.unknown(f"a node of the URCap {name!r}")
     writer = maker.writer
     data = {item.get("key", ""): item.get("value", "") for item in node.element.iter("data")}
     pc = pc_from(data, node.source.tree.name)
