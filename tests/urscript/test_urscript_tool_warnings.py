@@ -84,6 +84,10 @@ WARNED = {
         (body("set_standard_digital_out(9, True)"), "2:28 set_standard_digital_out: Parameter 'n' must be in the range 0 to 7, got 9"),
         (body("set_standard_digital_out(0, 1)"), "2:31 set_standard_digital_out: Parameter 'b' must be True or False, got the int 1"),
     ],
+    "W119": [
+        (body("def f(a, b=0):", "return a", "end", "if False:", "x = f()", "end"), "6:7 f takes exactly 1 or 2 arguments (0 given)"),
+        (body("def f():", "end", "f(1)"), "4:3 f takes exactly 0 arguments (1 given)"),
+    ],
     "W117": [
         (body("movej([90, -90, 0, 0, 0, 0])"), "2:9 movej: joint 0 at 90 rad is 5157 degrees"),
         (body("home = [0, -90, 0, 0, 0, 0]", "movej(home)"), "3:9 movej: joint 1 at -90 rad is -5157 degrees"),
@@ -166,6 +170,7 @@ FINE = {
         body("q = [90, 0, 0, 0, 0, 0]", "def f(q):", "movej(q)", "end", "f([0, 0, 0, 0, 0, d2r(q[0])])"),
         body("force_mode(p[0, 0, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 20, 0, 0, 0], 2, [0.1, 0.1, 15, 10, 0.3, 0.3])", "sleep(90)"),
     ],
+    "W119": [body("def f(a, b=0):", "return a + b", "end", "textmsg(f(1), f(b=2, a=1))")],
     "W118": [body("movel(p[0.4, -1.8, 0.2, 0, 3.14, 0], a=15, v=3, r=0.5)", "set_payload(20, [0, 0, 0.3])")],
     "W115": [body('x = rpc_factory("xmlrpc", "http://a")', "x.append(2)")],
     "W113": ["def f(a):\n  textmsg(a)\nend\nf(1)\n", "def f():\n  sync()\nend\n"],

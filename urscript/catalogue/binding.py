@@ -43,6 +43,16 @@ class CallSignature:
             n_positional: number of positional arguments.
             keywords: names of the keyword arguments, in the order of the call.
         """
+        self.check_keywords(n_positional, keywords)
+        given = n_positional + len(keywords)
+        if n_positional > len(self.names) or given < len(self.names) - len(self.optional):
+            raise self._wrong_count(given)
+        for name in self.names[n_positional:]:
+            if name not in keywords and name not in self.optional:
+                raise self._type_error(f"{self.function}() missing required argument '{name}'")
+
+    def check_keywords(self, n_positional: int, keywords: Sequence[str]) -> None:
+        """Raise ScriptTypeError for a name that no parameter has, or one that has its value already."""
         seen = set(self.names[:n_positional])
         for keyword in keywords:
             if keyword not in self.names:
@@ -52,12 +62,6 @@ class CallSignature:
                     f"{self.function}() got multiple values for keyword argument '{keyword}'"
                 )
             seen.add(keyword)
-        given = n_positional + len(keywords)
-        if n_positional > len(self.names) or given < len(self.names) - len(self.optional):
-            raise self._wrong_count(given)
-        for name in self.names[n_positional:]:
-            if name not in seen and name not in self.optional:
-                raise self._type_error(f"{self.function}() missing required argument '{name}'")
 
     def _wrong_count(self, given: int) -> ScriptTypeError:
         most = len(self.names)

@@ -16,6 +16,7 @@ from urscript.catalogue.costs import EXPENSIVE, UNITS
 from urscript.compile.inference import StaticTypes, Type, is_numeric
 from urscript.compile.python_tree import ask_after, call, constant, load, place
 from urscript.dialect import Dialect
+from urscript.names.own_calls import wrong_count
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Span
 from urscript.syntax import nodes
@@ -277,6 +278,8 @@ class ExpressionCompiler:
     def _user_call(self, expression: nodes.Call, callee: FunctionScope, scope: FunctionScope) -> ast.expr:
         assert callee.node is not None
         span = expression.span
+        if refusal := wrong_count(expression, callee):
+            return call("_refuse", [constant(refusal, span)], span)
         made = call(callee.python_name, [], span)
         parameters = callee.node.parameters
         given = set()

@@ -13,6 +13,7 @@ from typing import Any
 
 from urscript import dialect
 from urscript.catalogue import Catalogue
+from urscript.names.own_calls import wrong_count
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression
@@ -215,7 +216,7 @@ class _Constraints:
             if not isinstance(part, nodes.Call):
                 continue
             callee = scope.find_function(part.function)
-            if callee is None or callee.node is None:
+            if callee is None or callee.node is None or wrong_count(part, callee):
                 continue
             for position, argument in enumerate(part.arguments):
                 name = argument.name or callee.node.parameters[position].name

@@ -13,8 +13,9 @@ from urscript.catalogue.argument_checks import compile_check, fits, type_error
 from urscript.catalogue.types import Builtin, Param
 from urscript.errors import ScriptRuntimeError
 from urscript.lint.names import Variable, expressions_read, owner
-from urscript.lint.rules import REFUSED_ARGUMENT, ScriptWarning
+from urscript.lint.rules import REFUSED_ARGUMENT, WRONG_COUNT, ScriptWarning
 from urscript.lint.units import wrong_unit
+from urscript.names.own_calls import wrong_count
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression
@@ -38,7 +39,12 @@ def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterato
     """Everything this module warns about, in no order; pure functions check their arguments themselves."""
     constants = _constants(program)
     for scope, call in expressions_read(program):
-        if not isinstance(call, nodes.Call) or scope.find_function(call.function) is not None:
+        if not isinstance(call, nodes.Call):
+            continue
+        callee = scope.find_function(call.function)
+        if callee is not None:
+            if refusal := wrong_count(call, callee):
+                yield ScriptWarning(WRONG_COUNT, refusal, call.span, program.source)
             continue
         builtin = catalogue.lookup(call.function)
         if builtin is None or builtin.name in PURE:

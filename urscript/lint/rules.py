@@ -88,6 +88,7 @@ MILLIMETRES: Final = Rule(
     "a length is too large for metres",
     "positions are in metres and speeds of the tool in m/s; no arm reaches 3 m",
 )
+WRONG_COUNT: Final = Rule("W119", "a function of the program gets too many or too few arguments", "as W116")
 
 RULES: Final = (
     UNUSED_GLOBAL,
@@ -108,6 +109,7 @@ RULES: Final = (
     REFUSED_ARGUMENT,
     DEGREES,
     MILLIMETRES,
+    WRONG_COUNT,
 )
 
 

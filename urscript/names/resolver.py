@@ -15,7 +15,6 @@ from collections.abc import Callable
 from typing import Final
 
 from urscript.catalogue import Catalogue
-from urscript.catalogue.binding import CallSignature
 from urscript.dialect import MAX_LOOP_DEPTH, Dialect
 from urscript.errors import (
     ScriptCompileError,
@@ -26,6 +25,7 @@ from urscript.errors import (
 )
 from urscript.names.assignment import find_maybe_unassigned
 from urscript.names.call_graph import mark_recursion, spread_blocking
+from urscript.names.own_calls import shape_of, signature_of
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Source, Span
 from urscript.syntax import nodes
@@ -248,7 +248,10 @@ class _Resolver:
         callee = scope.find_function(call.function)
         if callee is not None:
             runs_in.callees.add(callee)
-            self._check_arguments(call, callee)
+            try:
+                signature_of(callee).check_keywords(*shape_of(call.arguments))
+            except ScriptTypeError as error:
+                self._error(error, call.span)
             return
         builtin = self.catalogue.lookup(call.function)
         if builtin is None:
@@ -259,7 +262,7 @@ class _Resolver:
         self.program.builtins.add(call.function)
         runs_in.blocks = runs_in.blocks or builtin.may_wait
         try:
-            self.catalogue.static_bind(call.function, *_shape(call.arguments))
+            self.catalogue.static_bind(call.function, *shape_of(call.arguments))
         except ScriptTypeError as error:
             self._error(error, call.span)
 
@@ -269,16 +272,6 @@ class _Resolver:
             self._unknown(run.thread, run.span, lambda: list(scope.visible_functions()))
         elif callee.node is not None and callee.node.parameters:
             self._error(ScriptTypeError(f"cannot run {run.thread}: a thread takes no parameters"), run.span)
-
-    def _check_arguments(self, call: nodes.Call, callee: FunctionScope) -> None:
-        """Count and names of the arguments of a user function."""
-        assert callee.node is not None
-        names = [parameter.name for parameter in callee.node.parameters]
-        optional = {parameter.name for parameter in callee.node.parameters if parameter.default is not None}
-        try:
-            CallSignature(call.function, names, optional).check(*_shape(call.arguments))
-        except ScriptTypeError as error:
-            self._error(error, call.span)
 
     def _argument_order(self, arguments: tuple[nodes.Argument, ...]) -> bool:
         """Positional arguments come before named ones."""
@@ -310,9 +303,3 @@ def _declared_name(statement: nodes.Assign | nodes.Declaration) -> str | None:
     if isinstance(statement, nodes.Declaration):
         return statement.name
     return statement.target.name if isinstance(statement.target, nodes.Name) else None
-
-
-def _shape(arguments: tuple[nodes.Argument, ...]) -> tuple[int, tuple[str, ...]]:
-    """Number of positional arguments, names of the named ones."""
-    keywords = tuple(argument.name for argument in arguments if argument.name is not None)
-    return len(arguments) - len(keywords), keywords

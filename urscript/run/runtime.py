@@ -49,6 +49,10 @@ def _store_member(value: Any, name: str, target: Any) -> Any:
     raise ScriptRuntimeError(f"{a_type(target)} has no member '{name}' to assign to")
 
 
+def _refuse(text: str) -> Any:
+    raise ScriptRuntimeError(text)
+
+
 _COMMON: Final[dict[str, Any]] = {
     "_MISSING": object(),
     "_NEXT_CYCLE": NEXT_CYCLE,
@@ -64,6 +68,7 @@ _COMMON: Final[dict[str, Any]] = {
     "_member": _member,
     "_store_member": _store_member,
     "_method": _method,
+    "_refuse": _refuse,
     "_truth": ops.truth,
     "_wrap": wrap_int,
     "_add": ops.add,
