@@ -13,7 +13,8 @@ from protocol.primary.messages import VersionMessage
 from protocol.rtde import messages as R
 from protocol.ur_types import SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.controller.safety.speed_scaling import joint_limits
+from ur_emulator.controller.safety.joint_limits import limits_of
+from ur_emulator.controller.safety.speed_scaling import allowed_speeds
 from ur_emulator.errors import ArgumentError, EmulatorError
 from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.ur3 import UR3
@@ -90,5 +91,5 @@ def test_an_arm_is_as_good_as_one_of_its_fidelities():
 
 def test_reduced_and_recovery_mode_have_its_limits():
     robot = replace(UR3, generation=SECOND)
-    assert joint_limits(SafetyMode.REDUCED, robot) == tuple(0.25 * speed for speed in UR3.qd_max)
-    assert joint_limits(SafetyMode.RECOVERY, robot) == (0.1,) * 6
+    assert allowed_speeds(SafetyMode.REDUCED, limits_of(robot)) == tuple(0.25 * speed for speed in UR3.qd_max)
+    assert allowed_speeds(SafetyMode.RECOVERY, limits_of(robot)) == (0.1,) * 6

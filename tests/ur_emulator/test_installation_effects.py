@@ -5,13 +5,15 @@ import gzip
 import pytest
 from box_support import MessageReader, connect
 from dashboard_support import Dashboard, script_line, urp
-from installation_support import TCP, installation, listed, pose_feature
+from installation_support import SAFETY, TCP, installation, listed, pose_feature
 
 from protocol.primary.messages import TextMessage
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.controller.io.run_states import RunState
+from ur_emulator.controller.safety.joint_limits import limits_of
 from ur_emulator.emulator import ControlBox
 from ur_emulator.models.robot_model import ZERO6
+from ur_emulator.models.robots import robot_by_name
 from ur_emulator.programs.installation import (
     DeclaredPayload,
     DeclaredSignal,
@@ -143,6 +145,34 @@ def test_an_installation_that_the_arm_cannot_bear_is_said(box, dashboard, tmp_pa
     dashboard.ask("load installation heavy.installation")
     dashboard.ask("running")
     assert any("a payload of 8.5 kg is out of range" in entry.text for entry in box.log)
+
+
+def test_the_limits_of_an_installation_bind_the_arm(box, dashboard, tmp_path):
+    """The ranges of the joints count from its safety settings, and the speeds of reduced mode."""
+    narrow = SAFETY.replace("[1, 1, 1,", "[0, 1, 1,")
+    (tmp_path / "cell.installation").write_bytes(installation(f"<SafetySettings>{narrow}</SafetySettings>"))
+    nodes = script_line("textmsg(is_within_safety_limits([0, -1, 0, 0, 0, 0]))") + script_line(
+        "movej([1.0, -1.76, -2.1, -0.1, 1.3, 1.86])"
+    )
+    (tmp_path / "p.urp").write_bytes(urp(nodes, installation="cell"))
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        dashboard.ask_all("load p.urp", "play")
+        assert reader.message(TextMessage).text == "True"
+        dashboard.until("programState", "STOPPED p.urp")
+    assert any("joint 0 cannot be at 1 rad; allowed: -6.3355 to 0.0524" in entry.text for entry in box.log)
+    limits = box._box.controller.state.safety.limits
+    assert limits.reduced_speed == (1.5, 1.5, 1.5, 3.0, 3.0, 3.0)
+    dashboard.ask("load installation default.installation")
+    assert box._box.controller.state.safety.limits == limits_of(robot_by_name("ur3"))
+
+
+def test_an_installation_cannot_widen_the_limits_of_the_arm():
+    own = limits_of(robot_by_name("ur5"))
+    wide, fast = (1e9,) * 6, (100.0,) * 6
+    assert own.within(tuple(-x for x in wide), wide, fast, own.reduced_speed) == own
+    slow = own.within(None, None, (1.0,) * 6, fast)
+    assert (slow.speed, slow.reduced_speed) == ((1.0,) * 6, (1.0,) * 6)
 
 
 # --- variables

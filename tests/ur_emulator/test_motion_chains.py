@@ -25,6 +25,7 @@ from motion_support import (
 
 from protocol.ur_types import SafetyMode
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
+from ur_emulator.controller.safety.joint_limits import limits_of
 from ur_emulator.controller.safety.limit_checks import find_invalid_setpoint
 from ur_emulator.motion.leg import move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
@@ -36,6 +37,8 @@ from ur_emulator.motion.tool import UnreachableError
 V, A = 0.25, 1.2
 # Moves close to a singularity at the least speed take longer [s]; they are not tested.
 LONGEST = 60.0
+
+LIMITS = limits_of(ARM.robot)
 
 
 def straight(goal, **limits):
@@ -225,7 +228,7 @@ def test_near_a_singularity_the_tool_slows_down_for_the_joints():
     assert TOOL.pose(targets[-1].q) == pytest.approx(goal, abs=1e-9)
     assert distance_to_polyline(positions(targets), [start[:3], goal[:3]]).max() < 1e-4
     for before, after in itertools.pairwise(targets):
-        assert find_invalid_setpoint(ARM.robot, before, after, DT) is None
+        assert find_invalid_setpoint(LIMITS, before, after, ARM.robot.stop_deceleration, DT) is None
 
 
 # --- random chains
@@ -247,7 +250,7 @@ moves = st.one_of(
 
 def is_accepted(targets):
     pairs = itertools.pairwise(targets)
-    return all(find_invalid_setpoint(ARM.robot, a, b, DT) is None for a, b in pairs)
+    return all(find_invalid_setpoint(LIMITS, a, b, ARM.robot.stop_deceleration, DT) is None for a, b in pairs)
 
 
 def can_be_executed_one_by_one(makers):

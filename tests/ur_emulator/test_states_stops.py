@@ -30,9 +30,10 @@ from ur_emulator.commands.safety import (
 )
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
+from ur_emulator.controller.safety.joint_limits import limits_of
 from ur_emulator.controller.safety.speed_scaling import (
     TOLERANCE,
-    joint_limits,
+    allowed_speeds,
 )
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.cb3 import CB3
@@ -351,9 +352,9 @@ def test_who_is_too_fast_for_too_long_is_stopped():
 
 def test_limits_of_the_modes():
     robot = robot_by_name("ur3")
-    assert joint_limits(SafetyMode.NORMAL, robot) is None
-    assert joint_limits(SafetyMode.REDUCED, robot) == tuple(0.5 * v for v in robot.qd_max)
-    assert joint_limits(SafetyMode.RECOVERY, robot) == (CB3.limits.recovery_speed,) * 6
+    assert allowed_speeds(SafetyMode.NORMAL, limits_of(robot)) is None
+    assert allowed_speeds(SafetyMode.REDUCED, limits_of(robot)) == tuple(0.5 * v for v in robot.qd_max)
+    assert allowed_speeds(SafetyMode.RECOVERY, limits_of(robot)) == (CB3.limits.recovery_speed,) * 6
 
 
 def test_an_arm_that_wakes_up_out_of_range_is_in_recovery_until_it_is_back():

@@ -10,6 +10,7 @@ from ur_emulator.commands.operation import CommandOperation
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box, inform
 from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.controller.safety.joint_limits import JointLimits
 from ur_emulator.controller.safety.modes import ROW
 from ur_emulator.errors import RefusedError
 
@@ -49,11 +50,14 @@ class SetUp:
 
     Attributes:
         program: a `sec`.
+        limits: of the joints.
     """
 
     program: CompiledProgram
+    limits: JointLimits
 
     def apply(self, box: Box) -> None:
+        box.safety.set_limits(self.limits)
         box.programs.start(self.program)
 
 

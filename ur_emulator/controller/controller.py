@@ -79,7 +79,7 @@ class Controller:
         self.plant = make_plant(robot, fidelity, seed)
         q = six(robot.home_q)
         self.plant.reset(q)
-        self._setpoints = SetpointCheck(robot, self.period_s)
+        self._setpoints = SetpointCheck(robot.stop_deceleration, self.period_s)
         self._mode = mode
         self._saturated_s = 0.0
         self._settle = 0
@@ -248,7 +248,7 @@ class Controller:
             target = state.motion.step(self.period_s, scale)
             if target is before or state.safety.is_stopped:
                 return target
-            violation = self._setpoints.find_invalid(before, target)
+            violation = self._setpoints.find_invalid(state.safety.limits, before, target)
         except UnreachableError:
             violation = UNREACHABLE_PATH
         if violation is None:

@@ -10,6 +10,7 @@ from ur_emulator.controller.events import SafetyModeChanged
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.controller.safety.inputs import SafetyInput, SafetyInputs
+from ur_emulator.controller.safety.joint_limits import JointLimits
 from ur_emulator.controller.safety.limit_checks import Violation
 from ur_emulator.controller.safety.modes import (
     EVENTS,
@@ -18,7 +19,7 @@ from ur_emulator.controller.safety.modes import (
     ProgramEffect,
     SafetyEvent,
 )
-from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, joint_limits
+from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, allowed_speeds
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.path_motion import SCALING_RATE
 from ur_emulator.plant.plant_state import PlantState
@@ -52,6 +53,12 @@ class SafetySystem:
     def assign_input(self, pair: int, function: SafetyInput | None) -> None:
         """Set up a pair of configurable inputs as a safety input; None frees them."""
         self.inputs.assign(pair, function)
+        self._update()
+
+    def set_limits(self, limits: JointLimits) -> None:
+        """Set the limits of the joints, also those of the mode that is in force."""
+        self._state.safety.set_limits(limits)
+        self._set_limits(self._state.safety.mode)
         self._update()
 
     def handle(self, event: SafetyEvent) -> None:
@@ -147,16 +154,15 @@ class SafetySystem:
 
     def _set_limits(self, mode: SafetyMode) -> None:
         state = self._state
-        limits = joint_limits(mode, state.robot)
+        limits = allowed_speeds(mode, state.safety.limits)
         state.motion.scaling_rate = SCALING_RATE
         hard = not state.error_settings.transition_hardness
         state.speed.set_limiter(None if limits is None else SpeedLimiter(limits, state.motion.scale, hard))
 
     def _is_in_range(self) -> bool:
-        robot = self._state.robot
+        limits, actual_q = self._state.safety.limits, self._state.past.snapshot.actual_q
         return all(
-            low <= q <= high
-            for low, q, high in zip(robot.q_min, self._state.past.snapshot.actual_q, robot.q_max, strict=True)
+            low <= q <= high for low, q, high in zip(limits.q_min, actual_q, limits.q_max, strict=True)
         )
 
     def _update(self) -> None:

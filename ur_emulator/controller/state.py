@@ -25,6 +25,7 @@ from ur_emulator.controller.operator import Operator
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.controller.program_requests import ProgramRequests
 from ur_emulator.controller.robot_mode import RobotModeMachine
+from ur_emulator.controller.safety.joint_limits import limits_of
 from ur_emulator.controller.safety.safety_state import SafetyState
 from ur_emulator.controller.safety.speed_scaling import SpeedScaling
 from ur_emulator.controller.tool_settings import ToolSettings
@@ -103,7 +104,7 @@ def make_state(
     version: tuple[int, int],
 ) -> ControllerState:
     """Return the parts of a controller, made in the order in which they need each other."""
-    io, registers, safety, speed = InputOutput(), Registers(), SafetyState(), SpeedScaling()
+    io, registers, safety, speed = InputOutput(), Registers(), SafetyState(limits_of(robot)), SpeedScaling()
     past = PastCycles(clock.generation)
     modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
     io_configuration = IoConfiguration(io, registers, modbus)

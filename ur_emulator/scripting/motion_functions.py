@@ -96,7 +96,7 @@ def motion_functions(
 
         def make(start: Vector6, _: ToolPose) -> Leg:
             goal = joints_of(q, start)
-            require_range("movej", goal, arm.robot)
+            require_range("movej", goal, arm.safety.limits)
             return move_j(start, goal, arm.tool, a=a, v=v, t=t, r=r)
 
         return travel(thread, make)
@@ -160,7 +160,7 @@ def motion_functions(
         angles = floats(q)
         if motion.is_moving or motion.owner is not None:
             raise ScriptRuntimeError("set_pos: the arm moves, stop it first")
-        require_range("set_pos", angles, arm.robot)
+        require_range("set_pos", angles, arm.safety.limits)
         if not place_arm(angles):
             raise ScriptRuntimeError(
                 "set_pos: the arm would touch itself or the table there, choose another place"

@@ -41,7 +41,7 @@ class RobotHost:
         """
         random = pure_builtins(state.seed)["random"]
         self.step_time = state.clock.period_s
-        arm = ScriptArm(state.robot, state.arm, state.motion, state.tool)
+        arm = ScriptArm(state.robot, state.arm, state.motion, state.tool, state.safety)
         self._state = state
         self._sockets = ProgramSockets(state.clock, state.events, network)
         self._remotes = ProgramRemotes(network, state.clock)

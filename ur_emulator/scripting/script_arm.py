@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from protocol.pose import Pose
+from ur_emulator.controller.safety.joint_limits import JointLimits
+from ur_emulator.controller.safety.safety_state import SafetyState
 from ur_emulator.controller.tool_settings import ToolSettings
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
@@ -32,12 +34,14 @@ class ScriptArm:
         model: kinematics of the arm.
         motion: targets of the joints, and the thread that moves them.
         settings: TCP and payload.
+        safety: has the ranges of the joints.
     """
 
     robot: RobotModel
     model: ArmModel
     motion: ArmMotion
     settings: ToolSettings
+    safety: SafetyState
 
     @property
     def tool(self) -> Tool:
@@ -65,9 +69,9 @@ def require_positive(function: str, **limits: float) -> None:
             raise ScriptRuntimeError(f"{function}: {name} must be at least {MIN_LIMIT:g}, got {value:g}")
 
 
-def require_range(function: str, q: Vector6, robot: RobotModel) -> None:
+def require_range(function: str, q: Vector6, limits: JointLimits) -> None:
     """Raise a runtime error for a joint angle [rad] beyond the range of its joint."""
-    for i, (x, low, high) in enumerate(zip(q, robot.q_min, robot.q_max, strict=True)):
+    for i, (x, low, high) in enumerate(zip(q, limits.q_min, limits.q_max, strict=True)):
         if not low <= x <= high:
             raise ScriptRuntimeError(
                 f"{function}: joint {i} cannot be at {x:g} rad; allowed: {low:.4f} to {high:.4f}"

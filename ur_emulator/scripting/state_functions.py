@@ -66,8 +66,9 @@ def state_functions(arm: ScriptArm, past: PastCycles, step_time: float) -> Mappi
 
     def is_within_safety_limits(thread: object, pose: Any, qnear: Any) -> bool:
         q = inverse(pose, qnear, None) if isinstance(pose, Pose) else tuple(pose)
+        limits = arm.safety.limits
         return q is not None and all(
-            low <= x <= high for x, low, high in zip(q, arm.robot.q_min, arm.robot.q_max, strict=True)
+            low <= x <= high for x, low, high in zip(q, limits.q_min, limits.q_max, strict=True)
         )
 
     def get_actual_joint_positions_history(thread: object, steps: float) -> list[float]:

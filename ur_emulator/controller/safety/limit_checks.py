@@ -15,6 +15,7 @@ from operator import sub
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES
 from ur_emulator.controller.events import ErrorReported
+from ur_emulator.controller.safety.joint_limits import JointLimits
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
@@ -51,48 +52,58 @@ class SetpointCheck:
     them. A joint outside its range, because something pushed it, may move back.
 
     Args:
-        robot: limits of the arm.
+        stop_deceleration: of a protective stop [rad/s^2].
         period_s: control cycle [s].
     """
 
-    def __init__(self, robot: RobotModel, period_s: float) -> None:
-        self._robot = robot
+    def __init__(self, stop_deceleration: float, period_s: float) -> None:
+        self._stop_deceleration = stop_deceleration
         self._period_s = period_s
-        self._braking = 0.5 / robot.stop_deceleration
-        # Below these no joint can exceed its own limit: most set-points need no check joint by joint.
-        self._safe_speed = min(robot.qd_safety)
-        self._safe_reach = min(*robot.q_max, *(-low for low in robot.q_min))
+        self._braking = 0.5 / stop_deceleration
+        self._limits: JointLimits | None = None
+        self._safe_speed = self._safe_reach = 0.0
 
-    def find_invalid(self, before: JointTarget, target: JointTarget) -> Violation | None:
+    def find_invalid(self, limits: JointLimits, before: JointTarget, target: JointTarget) -> Violation | None:
         """Return what is wrong with the next set-point, or None.
 
         Args:
+            limits: of the joints.
             before: set-point at the end of the last cycle.
             target: set-point at the end of this one.
         """
+        if limits is not self._limits:
+            # Below these no joint can exceed its own limit: most set-points need no check joint by joint.
+            self._limits = limits
+            self._safe_speed = min(limits.speed)
+            self._safe_reach = min(*limits.q_max, *(-low for low in limits.q_min))
         # Norms are at least as large as each joint's value, and not a number where one is not.
         fastest = hypot(*target.qd)
         steepest = hypot(*map(sub, target.q, before.q)) / self._period_s
         reach = max(map(abs, target.q)) + fastest * fastest * self._braking
         if fastest <= self._safe_speed >= steepest and reach <= self._safe_reach:
             return None
-        return find_invalid_setpoint(self._robot, before, target, self._period_s)
+        return find_invalid_setpoint(limits, before, target, self._stop_deceleration, self._period_s)
 
 
 def find_invalid_setpoint(
-    robot: RobotModel, before: JointTarget, target: JointTarget, period_s: float
+    limits: JointLimits,
+    before: JointTarget,
+    target: JointTarget,
+    stop_deceleration: float,
+    period_s: float,
 ) -> Violation | None:
     """Return what is wrong with a set-point, joint by joint, or None; see `SetpointCheck`.
 
     Args:
-        robot: limits of the arm.
+        limits: of the joints.
         before: set-point at the end of the last cycle.
         target: set-point at the end of this one.
+        stop_deceleration: of a protective stop [rad/s^2].
         period_s: control cycle [s].
     """
-    braking_time = max(map(abs, target.qd)) / (2.0 * robot.stop_deceleration)
+    braking_time = max(map(abs, target.qd)) / (2.0 * stop_deceleration)
     for i, (q_before, q, qd, limit, low, high) in enumerate(
-        zip(before.q, target.q, target.qd, robot.qd_safety, robot.q_min, robot.q_max, strict=True)
+        zip(before.q, target.q, target.qd, limits.speed, limits.q_min, limits.q_max, strict=True)
     ):
         speed = max(abs(qd), abs(q - q_before) / period_s)
         if not speed <= limit * SPEED_TOLERANCE:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from protocol.ur_types import SafetyMode
+from ur_emulator.controller.safety.joint_limits import JointLimits
 from ur_emulator.controller.safety.modes import MOVING_MODES, WATCHED_MODES, SafetyEvent, after, mode_of
 
 # The dashboard refuses to unlock a protective stop sooner than this [s]. Source: UR dashboard documents.
@@ -16,9 +17,11 @@ class SafetyState:
         mode: the safety mode.
         is_stopped: the safety system does not let programs move the arm.
         is_watched: a protective stop would be something new.
+        limits: of the joints, as the installation sets them.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, limits: JointLimits) -> None:
+        self.limits = limits
         self._causes: frozenset[SafetyMode] = frozenset()
         self._stopped_since = 0.0
         self._enter(SafetyMode.NORMAL)
@@ -30,6 +33,10 @@ class SafetyState:
         if not had_stop and SafetyMode.PROTECTIVE_STOP in self._causes:
             self._stopped_since = now
         self._enter(mode_of(self._causes))
+
+    def set_limits(self, limits: JointLimits) -> None:
+        """Set the limits of the joints."""
+        self.limits = limits
 
     def has(self, cause: SafetyMode) -> bool:
         """True while the cause of a mode stands, also under a mode of higher rank."""

@@ -13,8 +13,9 @@ from math import radians
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
 from ur_emulator.controller.events import ErrorReported
+from ur_emulator.controller.safety.joint_limits import JointLimits
 from ur_emulator.controller.safety.limit_checks import Violation
-from ur_emulator.models.robot_model import RobotModel, Vector6, six
+from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.path_motion import SCALING_RATE
 
@@ -25,12 +26,11 @@ PATIENCE = 0.5
 AIM = 0.95
 
 
-def joint_limits(mode: SafetyMode, robot: RobotModel) -> Vector6 | None:
+def allowed_speeds(mode: SafetyMode, limits: JointLimits) -> Vector6 | None:
     """Return the joint speeds allowed in a mode [rad/s]; None for the rated ones."""
     if mode is SafetyMode.REDUCED:
-        share = robot.generation.limits.reduced_share
-        return six([share * limit for limit in robot.qd_max])
-    return (robot.generation.limits.recovery_speed,) * 6 if mode is SafetyMode.RECOVERY else None
+        return limits.reduced_speed
+    return limits.recovery_speed if mode is SafetyMode.RECOVERY else None
 
 
 class SpeedLimiter:
