@@ -21,6 +21,7 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import ArgumentError
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.motion.move import Move
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.program_slot import ProgramSlot
 from ur_emulator.servers.scripts.loop_network import LoopNetwork
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 # Time after the program for the arm to come to rest [s]: the longest ramp and the lag of the drives.
 REST_TIME = 2.0
+# Protective stops that the path of a move may cause, by deviation, collision or set-point (limit_checks.py).
+MOTION_CODES = frozenset({153, 157, 204})
 # A wait for the outside is reported when it has lasted this long [s].
 PATIENCE = 1.0
 _KINDS = {
@@ -129,6 +132,8 @@ class _Run:
         self._due = -math.inf
         self._waits_since = math.inf
         self._is_over = False
+        # The last move that was under way at the beginning of a cycle.
+        self._move: Move | None = None
         self._rest = controller.generation.cycles(REST_TIME)
 
     def submit(self, command: Command) -> None:
@@ -155,6 +160,8 @@ class _Run:
         else:
             self._waits_since = math.inf
         commands, self._commands = self._commands, []
+        motion = self._controller.state.motion
+        self._move = motion.move_of(motion.owner) or self._move
         self._controller.tick(commands)
         self._due = now + self._controller.period_s
         for event in self._controller.state.events.take():
@@ -213,7 +220,8 @@ class _Run:
                 self.status = RunStatus.FAILED
                 self._report(ReportKind.FAILURE, text, line, column)
             case ev.ErrorReported(code, argument, _, text):
-                self._report(ReportKind.CODE, f"C{code}A{argument}: {text}" if code else text, *self._place())
+                coded = f"C{code}A{argument}: {text}" if code else text
+                self._report(ReportKind.CODE, self._why_stopped(code) + coded, *self._place())
             case ev.PopupShown(title, text, blocking=blocking):
                 closed = " (closed)" if blocking else ""
                 self._report(ReportKind.POPUP, f"{title}: {text}{closed}")
@@ -221,6 +229,16 @@ class _Run:
                     self._commands.append(ClosePopup())
             case ev.ValueRequested(request_id, kind, text):
                 self._answer(request_id, kind, text)
+
+    def _why_stopped(self, code: int) -> str:
+        """Return why the arm cannot do the present move, if that is the reason for an error code; else ""."""
+        if code not in MOTION_CODES or self._move is None or self._move.leg.goal is not None:
+            return ""
+        leg, state = self._move.leg, self._controller.state
+        target = f"p[{', '.join(f'{x:.4g}' for x in leg.goal_pose)}]"
+        if state.arm.inverse(leg.goal_pose, state.past.snapshot.target_q, leg.tool.tcp) is None:
+            return f"the target {target} is out of reach; "
+        return f"the target {target} can be reached, but not on this path; "
 
     def _answer(self, request_id: int, kind: RequestedType, question: str) -> None:
         """Answer for the operator; a program whose question is not answered has failed."""

@@ -153,6 +153,23 @@ def test_a_protective_stop_shows_its_code_and_the_move_that_led_to_it(run):
     assert "\n1\n" not in result.stdout
 
 
+@pytest.mark.parametrize(
+    ("move", "said"),
+    [
+        ("movel(p[1.4, -0.1, 0.2, 0, 3.14, 0])", "Robot: the target p[1.4, -0.1, 0.2, 0, 3.14, 0] is out of reach; C204"),
+        ("movel(p[-0.4, -0.1, -0.6, 0, 3.14, 0])", "Robot: the target p[-0.4, -0.1, -0.6, 0, 3.14, 0] is out of reach; C"),
+        ("movep(p[400, 0, 0.2, 0, 3.14, 0])", "Robot: the target p[400, 0, 0.2, 0, 3.14, 0] is out of reach; C204"),
+        ("movej([0, -90, 0, 0, 0, 0])", "joint 1 cannot be at -90 rad"),
+        ("movej(p[1.4, -0.1, 0.2, 0, 3.14, 0])", "The robot cannot reach the requested pose"),
+    ],
+)  # fmt: skip
+def test_a_target_that_the_arm_cannot_reach_is_named(run, move, said):
+    result = run(body(move))
+    assert result.exit_code == 1
+    assert result.stderr.startswith("a.script:2:3: ")
+    assert said in result.stderr
+
+
 def test_an_endless_program_ends_at_the_limit_and_says_so(run):
     result = run("while True:\n  sync()\nend\n", "--limit", "0.8")
     assert result.exit_code == 0

@@ -78,7 +78,7 @@ def run(
     else:
         status = _run_on(make(), program, limit, output, n_lines)
     if EXIT_CODES[status]:
-        raise typer.Exit(EXIT_CODES[status])
+        raise SystemExit(EXIT_CODES[status])  # all that is to be said stands in the output
 
 
 def _find_robot(
