@@ -1,5 +1,6 @@
 """Installations: what is read from their files, in the shapes of real ones."""
 
+import gzip
 from math import inf, pi
 
 import pytest
@@ -189,6 +190,7 @@ SECTION = "[SafetyLimits Normal Joints]\nmaxJointSpeed = [1, 2]\n"
         ([listed("analogInputRange", 0, 1)], None, r"<analogInputRange> is \['0', '1'\], 4 of 0 and 1 are needed"),
         ([f"<Features>{plane_feature('P', [(0, 0, 0)] * 3)}</Features>"], None, "points of a plane lie on a line"),
         ([f"<SafetySettings>{SECTION}</SafetySettings>"], None, "maxJointSpeed of the safety settings has not six"),
+        ([f"<SafetySettings>{SECTION.replace('1, 2', '1, 1, 1, 1, 1, nan')}</SafetySettings>"], None, "has not six numbers"),
         ([], b"7a=1\n", "'7a' is not the name of a variable"),
         ([], b"a=\n", "the value of a is not one line of text"),
         ([], b"a=1\\n2\n", "the value of a is not one line of text"),
@@ -201,3 +203,33 @@ def test_what_makes_no_sense_is_one_line(tmp_path, parts, variables, problem):
     with pytest.raises(ProgramFileError, match=problem) as error:
         read(tmp_path, *parts, variables=variables)
     assert "\n" not in str(error.value)
+
+
+BOMB = gzip.compress(bytes(100_000_000))
+ENTITIES = b'<!DOCTYPE a [<!ENTITY b "cccccccccc">]><InstallationVariables><variable name="a" value="&b;"/></InstallationVariables>'
+
+
+@pytest.mark.parametrize("kind", ["installation", "variables"])
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        (BOMB, "has more than 16[0-9]* bytes unpacked"),
+        (ENTITIES, "a document type is declared"),
+        (b"<a>" * 201 + b"</a>" * 201, "elements are nested more than 200 deep"),
+    ],
+    ids=["gzip", "entities", "depth"],
+)
+def test_hostile_files_are_one_line(tmp_path, kind, data, problem):
+    (tmp_path / "cell.installation").write_bytes(installation())
+    (tmp_path / f"cell.{kind}").write_bytes(data)
+    with pytest.raises(ProgramFileError, match=problem) as error:
+        load_installation(ProgramFolder(tmp_path), "cell.installation")
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_of_100_megabytes_is_not_read(tmp_path):
+    (tmp_path / "cell.installation").write_bytes(installation())
+    with open(tmp_path / "cell.variables", "wb") as file:
+        file.truncate(100_000_000)
+    with pytest.raises(ProgramFileError, match=r"cell\.variables has more than 16[0-9]* bytes"):
+        load_installation(ProgramFolder(tmp_path), "cell.installation")

@@ -31,9 +31,12 @@ def safety_settings(file_name: str, texts: Iterable[str]) -> SafetySettings:
         if text is None:
             return None
         try:
-            return six([float(part) for part in text.strip("[]").split(",")])
+            given = [float(part) for part in text.strip("[]").split(",")]
         except ValueError:
-            raise ProgramFileError(f"{file_name}: {key} of the safety settings has not six numbers") from None
+            given = []
+        if len(given) != 6 or not all(map(math.isfinite, given)):
+            raise ProgramFileError(f"{file_name}: {key} of the safety settings has not six numbers")
+        return six(given)
 
     flags = values.get((_SETUP, "withPositionLimits"), "").strip("[]").split(",")
     is_limited = [flag.strip() != "false" for flag in flags] if len(flags) == 6 else [True] * 6

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from ur_emulator.controller.io.configuration import FREEDRIVE_ACTION
 from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.programs.installation import Installation, OutputRule
+from ur_emulator.programs.script_names import is_identifier
 
 
 def header_lines(installation: Installation) -> Iterator[str]:
@@ -23,7 +24,7 @@ def header_lines(installation: Installation) -> Iterator[str]:
         yield f"global {name}={value}"
     for name in sorted(installation.features):
         feature = installation.features[name]
-        if feature.is_variable:
+        if feature.is_variable and is_identifier(name):
             yield f"global {name}=p{_numbers(feature.pose)}"
 
 
