@@ -34,6 +34,7 @@ OPTIONS = (
     "host",
     "port_base",
     "programs",
+    "skip_unknown_nodes",
     "control_port",
     "control_token",
     "standard_ports",
