@@ -268,7 +268,7 @@ def test_serve_ends_when_its_box_is_switched_off(tmp_path, folder):
 def test_a_programs_folder_that_does_not_exist_is_one_line(tmp_path):
     command = [sys.executable, "-m", "ur_emulator", "serve", "--programs", tmp_path / "nowhere"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
+    assert done.returncode == 2  # a wrong option
     assert (
         done.stderr
         == f"ur-emulator: programs folder {tmp_path}/nowhere given: there is no such folder, make it first\n"
