@@ -1,4 +1,4 @@
-"""The distribution ur-hil: the check that its packages are its own.
+"""The distribution ur-hil: its version, and the check that its packages are its own.
 
 Two of them, `protocol` and `urscript`, have names that a user's own folder or another distribution may have,
 too. Python takes the first that it finds; what fails then is an import deep inside. So the packages call
@@ -10,6 +10,16 @@ from pathlib import Path
 
 PACKAGES = ("protocol", "urscript", "ur_emulator", "pc_client")
 _HOME = Path(__file__).resolve().parents[1]
+
+
+def tool_version() -> str:
+    """The version of the installed distribution; "unknown" in a source tree that is not installed."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("ur-hil")
+    except PackageNotFoundError:
+        return "unknown"
 
 
 def check_packages() -> None:

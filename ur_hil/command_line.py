@@ -8,12 +8,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Final
 
 import typer
 
-DISTRIBUTION: Final = "ur-hil"
+from ur_hil import tool_version
 
 
 class ExitCode(IntEnum):
@@ -32,14 +31,6 @@ EXIT_CODES: Final = {
     ExitCode.INTERRUPTED: "interrupted by Ctrl-C or SIGTERM before it was done",
 }
 """Their meanings, for people."""
-
-
-def tool_version() -> str:
-    """The version of the installed distribution; "unknown" in a source tree that is not installed."""
-    try:
-        return version(DISTRIBUTION)
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def _show_version(context: typer.Context, wanted: bool) -> None:

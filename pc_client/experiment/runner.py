@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from pc_client.control.controller import Controller
@@ -29,6 +28,7 @@ from pc_client.planning.plan import JointPlan
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recorder import Recorder
 from protocol.realtime.layout import RealtimeFrame
+from ur_hil import tool_version
 
 LEAD = 0.2
 """Time at rest before a movement, position loop closed [s]: takes up what the approach left."""
@@ -196,7 +196,7 @@ class ExperimentRunner:
             simulated=info.simulated,
             seed=info.seed,
             pace=pace,
-            client_version=_client_version(),
+            client_version=tool_version(),
             cycle_time_s=info.period,
             identified_delay_s=found.delay,
             loop=dict(found.facts()),
@@ -220,10 +220,3 @@ def _row_sink(recorder: Recorder, log: RunLog | None) -> Callable[[RealtimeFrame
             log.append(frame, step)
 
     return record
-
-
-def _client_version() -> str:
-    try:
-        return version("ur-hil")
-    except PackageNotFoundError:  # run from a source tree
-        return "unknown"

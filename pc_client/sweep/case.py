@@ -6,11 +6,11 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from pc_client.control.controller import Controller
 from pc_client.kinematics.cell import NO_CELL, Cell
+from ur_hil import tool_version
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class Case:
         for address in ("host", "port_base", "reverse_port"):
             arm.pop(address, None)
         return {
-            "client_version": _client_version(),
+            "client_version": tool_version(),
             "movement": asdict(self.movement),
             "arm": arm,
             "controller": asdict(self.controller),
@@ -127,10 +127,3 @@ def all_cases(
         for controller in controllers
     ]
     return list({case.identity: case for case in cases}.values())
-
-
-def _client_version() -> str:
-    try:
-        return version("ur-hil")
-    except PackageNotFoundError:  # run from a source tree
-        return "unknown"

@@ -8,7 +8,6 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable
 from contextlib import suppress
-from importlib.metadata import version as package_version
 
 from protocol.dashboard.commands import USER_ROLES, DashboardCommand
 from protocol.dashboard.connection import CommandReceived
@@ -29,6 +28,7 @@ from ur_emulator.servers.dashboard.reports import (
 )
 from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer
 from ur_emulator.servers.steps import Steps
+from ur_hil import tool_version
 
 # Name that a simulator gives when nothing is loaded. Source: replies of URSim 3.14 as the public client
 # library expects them.
@@ -60,7 +60,7 @@ class DashboardAnswers:
         self._versions = {
             "software": str(access.identity.software.version),
             "robot": access.identity.model,
-            "emulator": package_version("ur-hil"),
+            "emulator": tool_version(),
             "python": platform.python_version(),
         }
         self._methods: dict[str, Callable[[DashboardCommand, str, str], Answer]] = {
