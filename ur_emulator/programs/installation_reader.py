@@ -8,32 +8,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from protocol.pose import T_to_pose
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.models.robot_model import Vector3, Vector6, six
+from ur_emulator.models.robot_model import Vector3, Vector6
 from ur_emulator.programs.installation import (
     STANDARD_GRAVITY,
     DeclaredPayload,
     DeclaredSignal,
     ExternalControlPc,
-    Feature,
     Installation,
     OutputRule,
     StartUp,
 )
+from ur_emulator.programs.installation_features import features
+from ur_emulator.programs.installation_values import InstallationValues
 from ur_emulator.programs.safety_text import safety_settings
-from ur_emulator.programs.urp_values import number
 from ur_emulator.programs.xml_tree import XmlTree
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
 
 # Contributor of a part of an installation. Source: the source text of the URCap.
 _EXTERNAL_CONTROL = "com.fzi.externalcontrol"
@@ -111,7 +104,7 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
         reader.output_rules(),
         0 if reader.attribute("SmoothTransitionSettings", "transitionHardness") == "HARD" else 1,
         reader.line_names(),
-        dict(reader.features()),
+        dict(features(reader)),
         {},
         tuple(reader.signals()),
         reader.safe_home(),
@@ -145,43 +138,29 @@ def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
     return ExternalControlPc(host, int(port or 0))
 
 
-class _Reader:
-    """Looks up the parts of one file.
-
-    Attributes:
-        first: the first element of each kind.
-    """
-
-    def __init__(self, tree: XmlTree) -> None:
-        self._tree = tree
-        self.first: dict[str, Element] = {}
-        for element in tree.root.iter():
-            self.first.setdefault(element.tag.rpartition(".")[2], element)
-
-    def attribute(self, kind: str, name: str) -> str:
-        """Return an attribute of the first element of a kind; "" without one."""
-        return self.first[kind].get(name, "") if kind in self.first else ""
+class _Reader(InstallationValues):
+    """Looks up the parts of one file but its features."""
 
     def external_control(self) -> tuple[ExternalControlPc, str]:
         data: dict[str, str] = {}
-        for part in self._tree.root.iter("Contributed"):
+        for part in self.tree.root.iter("Contributed"):
             if part.get("ownerId") == _EXTERNAL_CONTROL:
                 data |= {item.get("key", ""): item.get("value", "") for item in part.iter("data")}
-        return pc_from(data, self._tree.name), data.get("name", "")
+        return pc_from(data, self.tree.name), data.get("name", "")
 
     def tcps(self) -> tuple[dict[str, Vector6], str]:
         settings = self.first.get("TCPSettings", self.first.get("TCPSettingsImpl"))
         if settings is None:
             return {}, ""
         tcps = {
-            tcp.get("name", ""): self._six(tcp.get("offset"), "offset of a TCP")
+            tcp.get("name", ""): self.vector6(tcp.get("offset"), "offset of a TCP")
             for tcp in settings.iter("tcp")
             if tcp.get("name")
         }
         return tcps, settings.get("activePose", "")
 
     def payload(self) -> DeclaredPayload:
-        for payload in self._tree.root.iter("Payload"):
+        for payload in self.tree.root.iter("Payload"):
             if payload.get("defaultPayload") == "true":
                 mass, cog = payload.get("mass"), payload.get("centerOfGravity")
                 break
@@ -191,31 +170,31 @@ class _Reader:
                 return DeclaredPayload()
             mass, cog = settings.get("toolPayload"), settings.get("centerOfGravity")
         return DeclaredPayload(
-            self._number(mass, "mass of the payload") if mass else 0.0,
-            self._three(cog, "centre of gravity") if cog else None,
+            self.number(mass, "mass of the payload") if mass else 0.0,
+            self.vector3(cog, "centre of gravity") if cog else None,
         )
 
     def gravity(self) -> Vector3:
         mounting = self.first.get("WorldtoMarshal")
         if mounting is None:
             return (0.0, 0.0, STANDARD_GRAVITY)
-        base = self._number(mounting.get("baseAngle", "0"), "angle of the base")
-        tilt = self._number(mounting.get("tiltAngle", "0"), "tilt of the base")
+        base = self.number(mounting.get("baseAngle", "0"), "angle of the base")
+        tilt = self.number(mounting.get("tiltAngle", "0"), "tilt of the base")
         # The sign of y is seen; which of sine and cosine belongs to x is open: both were equal.
         level = STANDARD_GRAVITY * math.sin(tilt)
         return (level * math.cos(base), -level * math.sin(base), STANDARD_GRAVITY * math.cos(tilt))
 
     def tool_voltage(self) -> int:
         given = self.attribute("ToolCommSettings", "toolOutputVoltage")
-        return _VOLTAGES.get(given or self._tree.root.get("toolOutputVoltage", ""), 0)
+        return _VOLTAGES.get(given or self.tree.root.get("toolOutputVoltage", ""), 0)
 
     def domains(self, kind: str, usual: tuple[int, ...]) -> tuple[int, ...]:
-        given = self._list(kind)
+        given = self.items(kind)
         if not given:
             return usual
         if len(given) != len(usual) or not set(given) <= {"0", "1"}:
             raise ProgramFileError(
-                f"{self._tree.name}: <{kind}> is {given[:8]}, {len(usual)} of 0 and 1 are needed"
+                f"{self.tree.name}: <{kind}> is {given[:8]}, {len(usual)} of 0 and 1 are needed"
             )
         return tuple(map(int, given))
 
@@ -223,7 +202,7 @@ class _Reader:
         return tuple(
             (group, index, action)
             for kind, (group, count) in _INPUT_ACTIONS.items()
-            for index, action in enumerate(self._list(kind)[:count])
+            for index, action in enumerate(self.items(kind)[:count])
             if action not in ("", "NONE")
         )
 
@@ -231,33 +210,33 @@ class _Reader:
         return tuple(
             OutputRule(group, index, _RUN_STATES[action])
             for kind, (group, count) in _OUTPUT_ACTIONS.items()
-            for index, action in enumerate(self._list(kind)[:count])
+            for index, action in enumerate(self.items(kind)[:count])
             if action in _RUN_STATES
         )
 
     def line_names(self) -> dict[str, str]:
         names: dict[str, str] = {}
         for kind, (own, start) in _LINE_NAMES.items():
-            for index, name in enumerate(self._list(kind), start):
+            for index, name in enumerate(self.items(kind), start):
                 if name:
                     names.setdefault(name, f"{own}[{index}]")
         return names
 
     def signals(self) -> Iterator[DeclaredSignal]:
-        for unit in self._tree.root.iter("Unit"):
+        for unit in self.tree.root.iter("Unit"):
             for signal in unit.iter("ModbusSignal"):
                 kind = _SIGNAL_TYPES.get(signal.get("type", ""))
                 if kind is None:
                     continue
-                frequency = self._number(signal.get("updateFrequency", "-1"), "frequency of a signal")
+                frequency = self.number(signal.get("updateFrequency", "-1"), "frequency of a signal")
                 rule = _RUN_STATES.get(signal.get("outputAction", ""), RunState.KEEP)
                 if signal.get("setLowAtProgramStop") == "true":
                     rule = RunState.LOW_WHEN_STOPPED
                 yield DeclaredSignal(
                     signal.get("name", ""),
                     unit.get("ipAddress", ""),
-                    int(self._number(signal.get("slaveAddress", "255"), "slave of a signal")),
-                    int(self._number(signal.get("signalAddress", "0"), "address of a signal")),
+                    int(self.number(signal.get("slaveAddress", "255"), "slave of a signal")),
+                    int(self.number(signal.get("signalAddress", "0"), "address of a signal")),
                     kind,
                     frequency if frequency >= 0.0 else None,
                     rule,
@@ -266,8 +245,8 @@ class _Reader:
 
     def safe_home(self) -> Vector6 | None:
         settings = self.first.get("SafeHomeSettings")
-        position = "" if settings is None else self._value(settings, "position")
-        return self._six(position, "safe home") if position else None
+        position = "" if settings is None else self.value(settings, "position")
+        return self.vector6(position, "safe home") if position else None
 
     def start_up(self) -> StartUp:
         settings = self.first.get("DefaultProgramSettings")
@@ -278,85 +257,3 @@ class _Reader:
             settings.get("nameOfSensorToAutoStartProgram", ""),
             settings.get("triggerValueToStartProgram", "true") == "true",
         )
-
-    # --- features
-
-    def features(self) -> Iterator[tuple[str, Feature]]:
-        container = self.first.get("Features", self.first.get("GeomFeatures"))
-        if container is not None:
-            yield from self._features_in(container, "", is_variable=False)
-
-    def _features_in(self, node: Element, name: str, *, is_variable: bool) -> Iterator[tuple[str, Feature]]:
-        """Yield the features in a node; a feature may stand in another node that has its name."""
-        for given in node:
-            child = self._tree.resolve(given)
-            inner_name = child.get("name") or name
-            variable = child.get("isVariable") == "true" or (is_variable and not child.get("isVariable"))
-            pose = self._pose_of(child)
-            if pose is not None and inner_name:
-                yield inner_name, Feature(pose, variable)
-            elif pose is None and given is child:
-                yield from self._features_in(child, inner_name, is_variable=variable)
-
-    def _pose_of(self, node: Element) -> Vector6 | None:
-        """Return the pose of a feature; None for a node that is none."""
-        if node.tag.endswith("GeomPlaneNode") and node.find("firstPoint") is not None:
-            return self._plane(node)
-        if not node.tag.endswith("GeomPoseNode"):
-            return None
-        position = self._value(node, "toolPosition")
-        if not position:
-            return None
-        return (
-            *self._three(position, "position of a feature"),
-            *self._three(self._value(node, "toolAxisAngle"), "rotation of a feature"),
-        )
-
-    def _plane(self, node: Element) -> Vector6:
-        p1, p2, p3 = (self._point(node, name) for name in ("firstPoint", "secondPoint", "thirdPoint"))
-        y, normal = p2 - p1, np.cross(p2 - p1, p3 - p1)
-        length, area = float(np.linalg.norm(y)), float(np.linalg.norm(normal))
-        if not (length > 0.0 and area > 0.0):
-            raise ProgramFileError(f"{self._tree.name}: the points of a plane lie on a line")
-        y, z = y / length, normal / (-area if node.get("userHasPoints") == "true" else area)
-        T_base_plane = np.eye(4)
-        T_base_plane[:3, :4] = np.column_stack((np.cross(y, z), y, z, p1))
-        return six(T_to_pose(T_base_plane))
-
-    def _point(self, node: Element, name: str) -> np.ndarray:
-        point = node.find(name)
-        inner = None if point is None else self._tree.resolve(point)
-        for element in () if inner is None else inner.iter():
-            position = self._value(element, "toolPosition")
-            if position:
-                return np.array(self._three(position, "point of a plane"))
-        raise ProgramFileError(f"{self._tree.name}: a plane has no <{name}>")
-
-    # --- values
-
-    def _value(self, element: Element, name: str) -> str:
-        """Return a list of an element: of its attribute, or of the child of that name."""
-        child = element.find(name)
-        if child is None:
-            return element.get(name, "")
-        return self._tree.resolve(child).get("value", "")
-
-    def _list(self, kind: str) -> list[str]:
-        given = self.attribute(kind, "value")
-        return [item.strip() for item in given.split(",")] if given else []
-
-    def _number(self, text: str | None, what: str) -> float:
-        return number(self._tree, text, what)
-
-    def _numbers(self, text: str | None, count: int, what: str) -> list[float]:
-        parts = (text or "").split(",")
-        if len(parts) != count:
-            raise ProgramFileError(f"{self._tree.name}: {what} has {len(parts)} values, it needs {count}")
-        return [self._number(part, what) for part in parts]
-
-    def _three(self, text: str | None, what: str) -> Vector3:
-        x, y, z = self._numbers(text, 3, what)
-        return (x, y, z)
-
-    def _six(self, text: str | None, what: str) -> Vector6:
-        return six(self._numbers(text, 6, what))
