@@ -86,7 +86,7 @@ class Box(BoxOperations):
         """Assemble the box; nothing listens before it is started.
 
         Args:
-            robot: type of the arm: "ur3", "ur5" or "ur10".
+            robot: type of the arm, such as "ur3" or "ur5e".
             version: software that the box pretends to run; decides layouts and builtins. None: the usual one.
             host: address to listen on; other machines can reach the box only through an address of theirs.
             pace: "realtime" or "lockstep".
@@ -113,7 +113,7 @@ class Box(BoxOperations):
         if generation is not None:
             model = dataclasses.replace(model, generation=generation)
         self.generation = generation = model.generation
-        asked = generation.parse_version(generation.default_version if version is None else version)
+        asked = generation.parse_version(model.default_software if version is None else version)
         software = generation.software(asked)
         imperfections = generation.fidelity(fidelity)
         named_pace = parse_pace(pace)

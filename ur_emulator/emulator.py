@@ -23,7 +23,7 @@ class ControlBox(Box, LoopRunner):
     What can be done to it while it runs is on docs/control.md: `push`, `wait_until`, `state`, `log` ...
 
     Args:
-        robot: type of the arm: "ur3", "ur5" or "ur10".
+        robot: type of the arm, such as "ur3" or "ur5e".
         version: software, such as "3.4.0"; None is the usual one of the arm's generation.
         host: address to listen on.
         pace: "realtime", or "lockstep": as fast as the processor allows, and repeatable.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from ur_emulator.models.cb3 import CB3
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class BoxMaker:
     """Makes boxes (see urscript.robot.RobotMaker); the physics is loaded when the first one is made."""
 
-    names: Sequence[str] = tuple(ROBOTS)
+    robots: Mapping[str, str] = {name: robot.default_software for name, robot in ROBOTS.items()}
     fidelities: Sequence[str] = ("typical", *(it.name for it in CB3.fidelities if it.name != "typical"))
 
     def make(

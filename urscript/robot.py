@@ -6,7 +6,7 @@ The language knows no robot. A package that has one declares a `RobotMaker` as a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
@@ -101,8 +101,8 @@ class ScriptRobot(Protocol):
 class RobotMaker(Protocol):
     """Makes robots; an entry point names an object of this type."""
 
-    names: Sequence[str]
-    """Names of the robots, the default first."""
+    robots: Mapping[str, str]
+    """Names of the robots, the default first, each with the software that it runs if none is named."""
 
     fidelities: Sequence[str]
     """Names of the levels of fidelity, the default first."""
@@ -113,10 +113,10 @@ class RobotMaker(Protocol):
         """A robot at rest, ready to move.
 
         Args:
-            name: One of `names`.
+            name: One of `robots`.
             fidelity: One of `fidelities`.
             seed: Of all random numbers.
-            software: Software version, e.g. (3, 15).
+            software: Software version of the generation of that robot, e.g. (3, 15).
             answers: Answers of the operator to the questions of the program, in order.
         """
         ...

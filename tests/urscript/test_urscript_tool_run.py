@@ -277,7 +277,7 @@ def test_nobody_answers_is_no_error(run):
 
 def test_the_package_offers_its_arms():
     assert [maker for maker in find_makers() if maker is MAKER] == [MAKER]
-    assert MAKER.names == tuple(ROBOTS)
+    assert tuple(MAKER.robots) == tuple(ROBOTS)
 
 
 @pytest.mark.parametrize("name", list(ROBOTS))
@@ -286,10 +286,16 @@ def test_every_arm_can_be_chosen(run, name):
     assert document["robot"].startswith(ROBOTS[name].title)
 
 
+def test_software_chooses_an_arm_that_runs_it(run):
+    document = json.loads(run("textmsg(get_steptime())", "--software", "5.12", "--json").stdout)
+    assert document["robot"].startswith("UR5e")
+
+
 @pytest.mark.parametrize(
     ("words", "allowed"),
     [
         (("--robot", "kuka"), "there are ur3, "),
+        (("--robot", "ur3", "--software", "5.12"), "give software such as 3.15.8, or another robot"),
         (("--fidelity", "perfect"), "there are typical, "),
         (("--seed", "-1"), "greater than or equal to 0"),
         (("--trace", "--json"), "choose one"),

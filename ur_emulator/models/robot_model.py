@@ -104,6 +104,7 @@ class RobotModel:
         robot_type: code in the primary interface's configuration data.
         box_type: code of the control box, as above.
         home_q: a pose clear of the table, away from singularities [rad].
+        first_version: oldest software that the maker has released for it; None: the generation's first.
     """
 
     name: str
@@ -131,8 +132,16 @@ class RobotModel:
     robot_type: int
     box_type: int
     home_q: Vector6
+    first_version: str | None = None
 
     @property
     def qd_safety(self) -> Vector6:
         """Joint speed at which the safety system stops the arm [rad/s]."""
         return six([speed + self.generation.limits.speed_margin for speed in self.qd_max])
+
+    @property
+    def default_software(self) -> str:
+        """Version that a box with this arm runs if the user names none."""
+        usual = self.generation.default_version
+        first = self.first_version or usual
+        return max(usual, first, key=self.generation.parse_version)

@@ -6,9 +6,10 @@ from ur_emulator.errors import ModelError
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.models.ur3 import UR3
 from ur_emulator.models.ur5 import UR5
+from ur_emulator.models.ur5e import UR5E
 from ur_emulator.models.ur10 import UR10
 
-ROBOTS: dict[str, RobotModel] = {robot.name: robot for robot in (UR3, UR5, UR10)}
+ROBOTS: dict[str, RobotModel] = {robot.name: robot for robot in (UR3, UR5, UR10, UR5E)}
 
 
 def robot_by_name(name: str) -> RobotModel:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -12,9 +12,10 @@ import typer
 from ur_hil.command_line import ExitCode
 from urscript.advice import with_advice
 from urscript.catalogue import Catalogue
+from urscript.catalogue.versions import Generation, Version
 from urscript.commands.move_watch import MoveWatch
 from urscript.commands.run_output import JsonOutput, RunOutput, TextOutput
-from urscript.commands.support import AsJson, Software, catalogue_of, read_program, show, shown_name
+from urscript.commands.support import AsJson, catalogue_of, read_program, show, shown_name
 from urscript.commands.tracing import LineTracer, TracedLine
 from urscript.errors import ScriptCompileError
 from urscript.program import CompiledProgram, ProgramStatus, compile_program
@@ -23,6 +24,7 @@ from urscript.robot import Report, ReportKind, RobotMaker, RunStatus, ScriptRobo
 from urscript.source import Source
 
 NO_ROBOT: Final = "none"
+DEFAULT_SOFTWARE: Final = "3.15"
 EXIT_CODES: Final = {
     RunStatus.FINISHED: ExitCode.DONE,
     RunStatus.RUNNING: ExitCode.DONE,
@@ -34,12 +36,19 @@ EXIT_CODES: Final = {
 
 def run(
     file: Annotated[Path, typer.Argument(help="Program to run; - reads it.", show_default=False)],
-    software: Software = "3.15",
+    software: Annotated[
+        str | None,
+        typer.Option(
+            "--software",
+            help="Software version of the robot, e.g. 3.15 or 5.11.",
+            show_default="that of the arm",
+        ),
+    ] = None,
     robot: Annotated[
         str | None,
         typer.Option(
             help="Arm to run it on, e.g. ur3; none only records the calls.",
-            show_default="the first that is installed",
+            show_default="the first that runs the software",
         ),
     ] = None,
     fidelity: Annotated[
@@ -63,55 +72,72 @@ def run(
     """Run a program on an emulated robot, as fast as it goes; exit 1 if it is wrong or fails."""
     if trace and as_json:
         raise typer.BadParameter("--trace shows lines, --json one document: choose one")
-    catalogue = catalogue_of(software)
+    maker, name = _find_robot(robot, software)
+    catalogue = catalogue_of(software or (maker.robots[name] if maker else DEFAULT_SOFTWARE))
+    if maker:
+        _check_options(maker, name, fidelity, catalogue)
     source = Source(read_program(file), shown_name(file))
     output: RunOutput = JsonOutput(source, str(file)) if as_json else TextOutput(source, quiet=quiet)
-    make = _find_robot(robot, fidelity, seed, catalogue, answer or ())
     try:
         program = compile_program(source.text, catalogue=catalogue, name=source.name)
     except ScriptCompileError as error:
         output.compile_error(with_advice(error))
         raise typer.Exit(ExitCode.FAILED) from None
     n_lines = trace_lines if trace else 0
-    if make is None:
+    if maker is None:
         status = _run_without_robot(program, catalogue, limit, output, n_lines)
     else:
-        status = _run_on(make(), program, limit, output, n_lines)
+        made = maker.make(
+            name,
+            fidelity=fidelity or maker.fidelities[0],
+            seed=seed,
+            software=catalogue.version,
+            answers=answer or (),
+        )
+        status = _run_on(made, program, limit, output, n_lines)
     if EXIT_CODES[status]:
         raise SystemExit(EXIT_CODES[status])  # all that is to be said stands in the output
 
 
-def _find_robot(
-    name: str | None, fidelity: str | None, seed: int, catalogue: Catalogue, answers: Sequence[str]
-) -> Callable[[], ScriptRobot] | None:
-    """A function that makes the robot of that name, or the first one installed; None for no robot."""
-    if name == NO_ROBOT:
-        return None
+def _find_robot(name: str | None, software: str | None) -> tuple[RobotMaker | None, str]:
+    """The maker of the robot of that name, and the name; None for no robot.
+
+    Without a name it is the first robot whose generation runs the software.
+    """
     makers = find_makers()
-    if name is None and not makers:
-        return None
-    maker = next((maker for maker in makers if name is None or name.lower() in maker.names), None)
-    if maker is None:
-        known = ", ".join([*(known for maker in makers for known in maker.names), NO_ROBOT])
-        raise typer.BadParameter(f"no robot {name!r} is installed; there are {known}", param_hint="--robot")
-    _require_known(fidelity, maker)
-
-    def make() -> ScriptRobot:
-        return maker.make(
-            (name or maker.names[0]).lower(),
-            fidelity=fidelity or maker.fidelities[0],
-            seed=seed,
-            software=catalogue.version,
-            answers=answers,
-        )
-
-    return make
+    if name == NO_ROBOT or (name is None and not makers):
+        return None, NO_ROBOT
+    robots = {robot: maker for maker in reversed(makers) for robot in maker.robots}
+    if name is not None:
+        maker = robots.get(name.lower())
+        if maker is None:
+            known = ", ".join([*(robot for maker in makers for robot in maker.robots), NO_ROBOT])
+            raise typer.BadParameter(
+                f"no robot {name!r} is installed; there are {known}", param_hint="--robot"
+            )
+        return maker, name.lower()
+    for maker in makers:
+        for robot, usual in maker.robots.items():
+            if software is None or _generation(usual) is catalogue_of(software).version.generation:
+                return maker, robot
+    return makers[0], next(iter(makers[0].robots))
 
 
-def _require_known(fidelity: str | None, maker: RobotMaker) -> None:
+def _generation(software: str) -> Generation:
+    return Version.of(software).generation
+
+
+def _check_options(maker: RobotMaker, name: str, fidelity: str | None, catalogue: Catalogue) -> None:
     if fidelity is not None and fidelity not in maker.fidelities:
         known = ", ".join(maker.fidelities)
         raise typer.BadParameter(f"no fidelity {fidelity!r}; there are {known}", param_hint="--fidelity")
+    usual, given = maker.robots[name], catalogue.version
+    if _generation(usual) is not given.generation:
+        raise typer.BadParameter(
+            f"software {given} is of {given.generation.value}, {name} is of {_generation(usual).value}; "
+            f"give software such as {usual}, or another robot",
+            param_hint="--software",
+        )
 
 
 def _run_on(
