@@ -26,6 +26,15 @@ from bench.tick import measure_tick
 
 RESULTS = Path(__file__).with_name("results.json")
 Measurement = Callable[[float], dict[str, float]]
+# A cycle of 2 ms.
+E_SERIES_ARM = "ur5e"
+
+
+def _on_e_series(figures: dict[str, float]) -> dict[str, float]:
+    """The same figures under names of their own."""
+    return {f"e_series_{name}": value for name, value in figures.items()}
+
+
 # Name -> what runs, given the length of the parts in real time in minutes.
 MEASUREMENTS: dict[str, Measurement] = {
     "script": lambda minutes: measure_script(),
@@ -36,6 +45,10 @@ MEASUREMENTS: dict[str, Measurement] = {
     "realtime": measure_realtime,
     "clients": lambda minutes: measure_clients(60.0 * min(minutes, 1.0)),
     "boxes": lambda minutes: measure_boxes(60.0 * min(minutes, 1.0)),
+    "e_series_tick": lambda minutes: _on_e_series(measure_tick(E_SERIES_ARM)),
+    "e_series_lockstep": lambda minutes: _on_e_series(measure_lockstep(E_SERIES_ARM)),
+    "e_series_realtime": lambda minutes: _on_e_series(measure_realtime(minutes, E_SERIES_ARM)),
+    "e_series_boxes": lambda minutes: _on_e_series(measure_boxes(60.0 * min(minutes, 1.0), 5, E_SERIES_ARM)),
     "connect_storm": lambda minutes: measure_connect_storm(60.0 * min(minutes, 1.0)),
 }
 # What the project asks of itself: measurement -> figure -> (sign, bound).
@@ -47,7 +60,7 @@ ASKED: dict[str, dict[str, tuple[str, float]]] = {
         "statements_in_a_cycle": (">=", 100_000.0),
     },
     "compiling": {"frames_lost_while_compiling": ("<=", 0.0)},
-    "tick": {"tick_x_four_steps": ("<=", 2.5)},
+    "tick": {"tick_x_steps": ("<=", 2.5)},
     "lockstep": {"lockstep_x_realtime": (">=", 40.0), "lockstep_cycle_x_limit": ("<=", 3.0)},
     "realtime": {
         "stream_late_p50_us": ("<=", 250.0),
@@ -63,6 +76,15 @@ ASKED: dict[str, dict[str, tuple[str, float]]] = {
         "clients_late_p999_over_timer_us": ("<=", 1000.0),
     },
     "boxes": {"boxes_realtime": (">=", 20.0)},
+    "e_series_lockstep": {"e_series_lockstep_x_realtime": (">=", 20.0)},
+    "e_series_realtime": {
+        "e_series_stream_late_p50_us": ("<=", 250.0),
+        "e_series_stream_late_p999_over_timer_us": ("<=", 300.0),
+        "e_series_stream_lost_cycles": ("<=", 0.0),
+        "e_series_cpu_percent": ("<=", 40.0),
+        "e_series_rss_mb": ("<=", 150.0),
+    },
+    "e_series_boxes": {"e_series_boxes_realtime": (">=", 5.0)},
     "connect_storm": {
         "connect_storm_per_s": (">=", 199.0),
         "connect_storm_leak_kb": ("<=", 1024.0),
@@ -82,7 +104,7 @@ def main(names: list[str]) -> None:
         found = MEASUREMENTS[name](minutes)
         results |= found
         for figure, value in found.items():
-            sign, bound = ASKED[name].get(figure, ("", None))
+            sign, bound = ASKED.get(name, {}).get(figure, ("", None))
             table.add_row(figure, f"{value:.4g}", f"{sign} {bound:g}" if bound is not None else "")
     known = json.loads(RESULTS.read_text()) if names and RESULTS.exists() else {}
     known |= {name: round(value, 3) for name, value in results.items()}

@@ -1,4 +1,4 @@
-"""How punctual this machine is without us: a process that does nothing but wake up every 8 ms.
+"""How punctual this machine is without us: a process that does nothing but wake up every cycle.
 
 Runs beside the realtime measurement, so that a late frame is separated from a late machine.
 Prints the 99.9th percentile and the maximum of its lateness in microseconds when its time is over.
@@ -11,16 +11,14 @@ import socket
 import sys
 import time
 
-PERIOD = 0.008  # s
 
-
-def main(seconds: float) -> None:
-    """Wake up at absolute deadlines for so many seconds."""
+def main(seconds: float, period: float) -> None:
+    """Wake up at absolute deadlines, a period [s] apart, for so many seconds."""
     idle, _other_end = socket.socketpair()
     began = time.monotonic()
     lateness = []
-    for k in range(1, round(seconds / PERIOD)):
-        deadline = began + k * PERIOD
+    for k in range(1, round(seconds / period)):
+        deadline = began + k * period
         while (now := time.monotonic()) < deadline:
             select.select([idle], [], [], deadline - now)
         lateness.append(now - deadline)
@@ -29,4 +27,4 @@ def main(seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]))
+    main(float(sys.argv[1]), float(sys.argv[2]))

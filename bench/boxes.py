@@ -1,4 +1,4 @@
-"""Twenty boxes in one process in real time, each on its own address with one reader and one RTDE client."""
+"""Many boxes in one process in real time, each on its own address with one reader and one RTDE client."""
 
 from __future__ import annotations
 
@@ -7,22 +7,23 @@ import time
 
 from bench.box_process import box_process
 from bench.side_process import SideProcesses
+from ur_emulator.models.robots import robot_by_name
 
-N_BOXES = 20
 # On Linux and Windows all of 127.0.0.0/8 is this machine.
 _FIRST_HOST = "127.0.0.2"
 _SETTLE = 1.0  # s
 
 
-def measure_boxes(seconds: float) -> dict[str, float]:
-    """Run them for so many seconds."""
+def measure_boxes(seconds: float, n_boxes: int = 20, robot: str = "ur3") -> dict[str, float]:
+    """Run so many boxes for so many seconds."""
     if sys.platform == "darwin":
         return {}
-    with box_process("--seed", "7", "--boxes", str(N_BOXES), "--host", _FIRST_HOST) as rack:
+    options = ("--robot", robot, "--seed", "7", "--boxes", str(n_boxes))
+    with box_process(*options, "--host", _FIRST_HOST) as rack:
         time.sleep(_SETTLE)
         kinds = (("realtime", rack.ports.realtime), ("rtde", rack.ports.rtde))
         clients = [(host, port, kind) for host in rack.hosts for kind, port in kinds]
-        beside = SideProcesses(seconds, clients)
+        beside = SideProcesses(seconds, robot_by_name(robot).generation.period_s, clients)
         rack.process.cpu_percent()
         time.sleep(seconds)
         cpu = rack.process.cpu_percent()

@@ -6,10 +6,10 @@ import time
 
 from bench.box_process import box_process
 from bench.side_process import SideProcesses
+from ur_emulator.models.cb3 import CB3
 
 N_RTDE, N_REALTIME = 50, 50
 _SETTLE = 1.0  # s; until the box has settled
-_CYCLES = 125.0  # per second
 
 
 def measure_clients(seconds: float) -> dict[str, float]:
@@ -21,7 +21,7 @@ def measure_clients(seconds: float) -> dict[str, float]:
         idle = box.process.cpu_percent()
         clients = [(box.host, box.ports.rtde, "rtde")] * N_RTDE
         clients += [(box.host, box.ports.realtime, "realtime")] * N_REALTIME
-        beside = SideProcesses(seconds, clients)
+        beside = SideProcesses(seconds, CB3.period_s, clients)
         box.process.cpu_percent()
         time.sleep(seconds)
         busy = box.process.cpu_percent()
@@ -37,5 +37,5 @@ def measure_clients(seconds: float) -> dict[str, float]:
         "clients_late_p999_over_timer_us": seen.late_us[2] - seen.timer_us[0],
         "clients_bare_timer_late_p999_us": seen.timer_us[0],
         "clients_cpu_percent": busy,
-        "clients_cpu_us_per_frame": 1e4 * (busy - idle) / (_CYCLES * (N_RTDE + N_REALTIME)),
+        "clients_cpu_us_per_frame": 1e4 * (busy - idle) / (CB3.cycle_rate * (N_RTDE + N_REALTIME)),
     }

@@ -1,4 +1,4 @@
-"""What no closed loop can be faster than: four steps of the arm's physics and one round trip of its bytes.
+"""What no closed loop can be faster than: the steps of the arm's physics and one round trip of its bytes.
 
 Measured beside the loop itself, so that both have the same machine at the same time.
 """
@@ -14,13 +14,10 @@ from typing import NamedTuple
 
 import mujoco
 
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant import Plant
 
-STEPS = 4  # of 2 ms in a cycle of 8 ms
 FRAME, COMMAND = 1140, 28  # bytes of a realtime frame, and of a velocity command with its mode
 BATCHES, BATCH = 200, 20
 # The other end of the round trip: plain blocking sockets, nothing but the interpreter between the calls.
@@ -49,21 +46,20 @@ class Limit(NamedTuple):
         return self.steps_us + self.round_trip_us
 
 
-def measure_limit(fidelity: str = "typical") -> Limit:
+def measure_limit(robot: str) -> Limit:
     """Measure both parts, in a second."""
-    return Limit(measure_steps(CB3.fidelity(fidelity)), _measure_round_trip())
+    return Limit(measure_steps(robot), _measure_round_trip())
 
 
-def measure_steps(fidelity: Fidelity) -> float:
-    """Four steps of the arm's own model, at rest under its servos [us]; 0 where there is no physics."""
-    if not fidelity.has_physics:
-        return 0.0
-    robot = robot_by_name("ur3")
-    plant = Plant(robot, fidelity, 7)
+def measure_steps(robot: str) -> float:
+    """The steps of a cycle of the arm's own model, at rest under its servos [us]."""
+    arm = robot_by_name(robot)
+    generation = arm.generation
+    plant = Plant(arm, generation.fidelity("typical"), 7)
     for _ in range(100):
-        plant.step(JointTarget(robot.home_q))
+        plant.step(JointTarget(arm.home_q))
     model, data = plant._physics.model, plant._physics.data
-    return best_of(lambda: mujoco.mj_step(model, data, STEPS))
+    return best_of(lambda: mujoco.mj_step(model, data, generation.n_substeps))
 
 
 def _measure_round_trip() -> float:

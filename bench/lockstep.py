@@ -14,15 +14,15 @@ from pc_client.experiment.runner import ExperimentRunner
 from pc_client.movements import library_names
 
 
-def measure_lockstep() -> dict[str, float]:
+def measure_lockstep(robot: str = "ur3") -> dict[str, float]:
     """Run the ten movements once; time the streaming alone, both processes, real sockets, recording on.
 
     The limit is measured before and after; the smaller one counts.
     """
-    before = measure_limit()
-    cycle_us, period = _measure("typical")
-    exact_us, _ = _measure("exact")
-    after = measure_limit()
+    before = measure_limit(robot)
+    cycle_us, period = _measure(robot, "typical")
+    exact_us, _ = _measure(robot, "exact")
+    after = measure_limit(robot)
     limit_us = min(before.cycle_us, after.cycle_us)
     return {
         "lockstep_x_realtime": 1e6 * period / cycle_us,
@@ -36,9 +36,9 @@ def measure_lockstep() -> dict[str, float]:
     }
 
 
-def _measure(fidelity: str) -> tuple[float, float]:
+def _measure(robot: str, fidelity: str) -> tuple[float, float]:
     """Wall time of a cycle [us] with an arm of this fidelity, and the cycle of the robot [s]."""
-    options = ("--pace", "lockstep", "--seed", "7", "--fidelity", fidelity)
+    options = ("--robot", robot, "--pace", "lockstep", "--seed", "7", "--fidelity", fidelity)
     with box_process(*options) as box, tempfile.TemporaryDirectory() as folder:
         experiment = prepare_experiment(load_movements(library_names()), repeat=1, out=Path(folder))
         with UrDriver("127.0.0.1", box.ports) as driver:

@@ -15,26 +15,30 @@ from bench import bare_timer
 from bench.box_process import box_process
 from protocol.frame_buffer import FrameBuffer
 from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
+from ur_emulator.models.robots import robot_by_name
 
-PERIOD = 0.008  # s
 # What starts and takes memory is a box with everything switched on.
 _PROGRAMS = Path(__file__).parent.parent / "examples" / "scripts"
 _CONTROL_PORT = 31_090
 
 
-def measure_realtime(minutes: float) -> dict[str, float]:
+def measure_realtime(minutes: float, robot: str = "ur3") -> dict[str, float]:
     """Attach one client for so many minutes; compare arrivals with the grid on which the earliest lie."""
+    generation = robot_by_name(robot).generation
+    period = generation.period_s
     everything = ("--programs", str(_PROGRAMS), "--control-port", str(_CONTROL_PORT))
-    with box_process("--seed", "7", *everything) as box:
+    with box_process("--seed", "7", "--robot", robot, *everything) as box:
         timer = subprocess.Popen(
-            [sys.executable, bare_timer.__file__, str(minutes * 60.0)], stdout=subprocess.PIPE, text=True
+            [sys.executable, bare_timer.__file__, str(minutes * 60.0), str(period)],
+            stdout=subprocess.PIPE,
+            text=True,
         )
         stamps, arrivals = [], []
-        n_frames = round(minutes * 60.0 / PERIOD)
+        n_frames = round(minutes * 60.0 / period)
         with socket.create_connection(("127.0.0.1", box.ports.realtime), timeout=5.0) as sock:
             buffer = FrameBuffer(MAX_FRAME_SIZE)
             box.process.cpu_percent()
-            for _ in track(range(n_frames), description=f"125 Hz for {minutes:g} min"):
+            for _ in track(range(n_frames), description=f"{generation.cycle_rate} Hz for {minutes:g} min"):
                 while (frame := buffer.next_frame()) is None:
                     buffer.feed(sock.recv(65536))
                     now = time.monotonic()
@@ -44,8 +48,8 @@ def measure_realtime(minutes: float) -> dict[str, float]:
             rss = box.process.memory_info().rss
         startup = box.startup_s
         timer_p999, timer_max = map(float, timer.communicate()[0].split())
-    ticks = np.round(np.array(stamps) / PERIOD).astype(int)
-    phase = np.array(arrivals) - ticks * PERIOD
+    ticks = np.round(np.array(stamps) / period).astype(int)
+    phase = np.array(arrivals) - ticks * period
     lateness_us = 1e6 * (phase - phase.min())
     return {
         "stream_minutes": minutes,

@@ -30,18 +30,19 @@ class Watched:
 class SideProcesses:
     """Clients and timer, from now on for so many seconds."""
 
-    def __init__(self, seconds: float, clients: list[tuple[str, int, str]]) -> None:
+    def __init__(self, seconds: float, period: float, clients: list[tuple[str, int, str]]) -> None:
         """Start both; return when all clients are connected.
 
         Args:
             seconds: how long they read.
+            period: control cycle of the boxes [s].
             clients: host, port and kind ("realtime" or "rtde") of each.
         """
-        self._streams = _start(streams.__file__, str(seconds), json.dumps(clients))
+        self._streams = _start(streams.__file__, str(seconds), str(period), json.dumps(clients))
         assert self._streams.stdout is not None
         if self._streams.stdout.readline() != "ready\n":
             sys.exit("bench: the clients could not connect")
-        self._timer = _start(bare_timer.__file__, str(seconds))
+        self._timer = _start(bare_timer.__file__, str(seconds), str(period))
 
     def wait(self) -> Watched:
         """Wait for their end."""

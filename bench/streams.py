@@ -1,6 +1,6 @@
 """Many cheap clients in one process: they count frames by their time stamps and note when each one came.
 
-    python bench/streams.py SECONDS '[["127.0.0.1", 30003, "realtime"], ["127.0.0.1", 30004, "rtde"]]'
+    python bench/streams.py SECONDS PERIOD '[["127.0.0.1", 30003, "realtime"], ["127.0.0.1", 30004, "rtde"]]'
 
 says "ready" when all are connected, reads, then prints one JSON object, see `main`. A process of its own:
 nothing else shall want its interpreter.
@@ -21,7 +21,6 @@ import numpy as np
 from protocol.rtde.client_connection import RtdeClientConnection
 from protocol.rtde.messages import Request, RequestProtocolVersion, SetupOutputs, Start
 
-PERIOD = 0.008  # s
 # What a monitor asks for: the time stamp first, then some 500 bytes.
 RECIPE = (
     "timestamp",
@@ -40,18 +39,20 @@ class Stream:
     """One client.
 
     Attributes:
+        period: control cycle of the box [s].
         stamps: time stamps of what has come [s].
         arrivals: monotonic time at which each came [s].
     """
 
-    def __init__(self, host: str, port: int, kind: str) -> None:
-        """Connect; an RTDE client sets itself up."""
+    def __init__(self, host: str, port: int, kind: str, period: float) -> None:
+        """Connect to a box with this control cycle [s]; an RTDE client sets itself up."""
         self.sock = socket.create_connection((host, port), timeout=10.0)
         if kind == "rtde":
             connection = RtdeClientConnection()
-            for request in (RequestProtocolVersion(2), SetupOutputs(RECIPE, 125.0), Start()):
+            for request in (RequestProtocolVersion(2), SetupOutputs(RECIPE, round(1.0 / period)), Start()):
                 self._ask(connection, request)
         self.sock.setblocking(False)
+        self.period = period
         self.stamps, self.arrivals = array("d"), array("d")
         self._size = _SIZE[kind]
         self._buffer = bytearray(_BUFFER)
@@ -82,11 +83,11 @@ class Stream:
 
 def lost_cycles(stream: Stream) -> int:
     """How many cycles never came: holes in the stream, and cycles by which the box fell behind the clock."""
-    cycles = np.round(np.array(stream.stamps) / PERIOD).astype(int)
+    cycles = np.round(np.array(stream.stamps) / stream.period).astype(int)
     holes = cycles[-1] - cycles[0] + 1 - len(np.unique(cycles))
     late, fifth = _phases(stream), max(1, len(cycles) // 5)
     behind = np.median(late[-fifth:]) - np.median(late[:fifth])
-    return int(holes) + max(0, round(float(behind) / PERIOD))
+    return int(holes) + max(0, round(float(behind) / stream.period))
 
 
 def lateness(streams: list[Stream]) -> np.ndarray:
@@ -96,17 +97,18 @@ def lateness(streams: list[Stream]) -> np.ndarray:
 
 
 def _phases(stream: Stream) -> np.ndarray:
-    return np.array(stream.arrivals) - PERIOD * np.round(np.array(stream.stamps) / PERIOD)
+    period = stream.period
+    return np.array(stream.arrivals) - period * np.round(np.array(stream.stamps) / period)
 
 
-def main(seconds: float, clients: list[tuple[str, int, str]]) -> dict[str, object]:
-    """Read for so many seconds.
+def main(seconds: float, period: float, clients: list[tuple[str, int, str]]) -> dict[str, object]:
+    """Read for so many seconds from boxes with this control cycle [s].
 
     Returns:
         lost: cycles that each client lost, in their order; late_us: its 50th, 99th and 99.9th percentile and
         maximum over all clients; cpu_percent: of this process.
     """
-    streams = [Stream(*client) for client in clients]
+    streams = [Stream(*client, period) for client in clients]
     selector = selectors.DefaultSelector()
     for stream in streams:
         selector.register(stream.sock, selectors.EVENT_READ, stream.read)
@@ -135,4 +137,4 @@ def _read_until(end: float, selector: selectors.BaseSelector) -> None:
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(float(sys.argv[1]), json.loads(sys.argv[2]))))
+    print(json.dumps(main(float(sys.argv[1]), float(sys.argv[2]), json.loads(sys.argv[3]))))

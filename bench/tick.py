@@ -6,13 +6,13 @@ from functools import partial
 
 import mujoco
 
-from bench.limit import STEPS, best_of
+from bench.limit import best_of
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
+from urscript.catalogue import catalogue_for
 from urscript.syntax.parser import prepare
 
 ROUNDS = 10
@@ -22,7 +22,7 @@ _SPEEDJ = """
 def p():
   thread stream():
     while True:
-      speedj([0.003, 0.002, 0.002, 0, 0, 0], 1, 0.008)
+      speedj([0.003, 0.002, 0.002, 0, 0, 0], 1, get_steptime())
     end
   end
   run stream()
@@ -33,12 +33,15 @@ end
 """
 
 
-def measure_tick() -> dict[str, float]:
-    """Measure the tick and four steps of the same arm in turn; the best of each counts."""
+def measure_tick(robot: str = "ur3") -> dict[str, float]:
+    """Measure the tick and the steps of a cycle of the same arm in turn; the best of each counts."""
     prepare()
+    arm = robot_by_name(robot)
+    n_steps = arm.generation.n_substeps
+    catalogue = catalogue_for(arm.default_software)
     programs = partial(ProgramSlot, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
-    controller = Controller(robot_by_name("ur3"), CB3.fidelity("typical"), 7, programs)
-    controller.tick([StartProgram(compile_program(_SPEEDJ))])
+    controller = Controller(arm, arm.generation.fidelity("typical"), 7, programs)
+    controller.tick([StartProgram(compile_program(_SPEEDJ, catalogue=catalogue))])
     for _ in range(WARM_UP):
         controller.tick(())
     model, data = controller.plant._physics.model, controller.plant._physics.data
@@ -50,6 +53,6 @@ def measure_tick() -> dict[str, float]:
         controller.tick(())
         controller.state.events.take()
 
-    pairs = [(best_of(tick), best_of(lambda: mujoco.mj_step(model, beside, STEPS))) for _ in range(ROUNDS)]
+    pairs = [(best_of(tick), best_of(lambda: mujoco.mj_step(model, beside, n_steps))) for _ in range(ROUNDS)]
     tick_us, steps_us = (min(times) for times in zip(*pairs, strict=True))
-    return {"tick_us": tick_us, "tick_four_steps_us": steps_us, "tick_x_four_steps": tick_us / steps_us}
+    return {"tick_us": tick_us, "tick_steps_us": steps_us, "tick_x_steps": tick_us / steps_us}
