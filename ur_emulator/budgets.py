@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
+CYCLE: Final = 0.008
+"""Control cycle that the work of programs is limited for [s]: a shorter cycle gets its part of the budget."""
 KIB: Final = 1 << 10
 MIB: Final = 1 << 20
 
@@ -98,19 +100,19 @@ class Budgets:
     # Units of `urscript.run.metering`, 50 ns: 2 ms of a cycle of 8 ms, 4 ms on a machine half as fast.
     # What is saved is for the thousands of assignments with which programs begin.
     program_units: int = _budget(
-        30_000, "units", "the program of a box, a cycle", "the program goes on in the next cycle"
+        30_000, "units", "the program of a box, 8 ms", "the program goes on in the next cycle"
     )
     program_units_saved: int = _budget(
-        120_000, "units", "a cycle after a rest", "the program goes on in the next cycle"
+        120_000, "units", "8 ms after a rest", "the program goes on in the next cycle"
     )
     secondary_programs: int = _budget(
         32, "secondary programs", "a box, not ended yet", "the newest is not started"
     )
     secondary_units: int = _budget(
-        10_000, "units", "all secondary programs of a box, a cycle", "they go on in the next cycle"
+        10_000, "units", "all secondary programs of a box, 8 ms", "they go on in the next cycle"
     )
     secondary_units_saved: int = _budget(
-        30_000, "units", "a cycle after a rest", "they go on in the next cycle"
+        30_000, "units", "8 ms after a rest", "they go on in the next cycle"
     )
 
     # --- variables and labels of running programs, as port 30001 reports them ---

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from protocol.ur_types import ProgramState
-from ur_emulator.budgets import BUDGETS
+from ur_emulator.budgets import BUDGETS, CYCLE
 from ur_emulator.controller.events import (
     ProgramPaused,
     ProgramResumed,
@@ -43,8 +43,11 @@ class ProgramSlot:
         self._network = network
         self._primary: RunningProgram | None = None
         self._secondaries: deque[RunningProgram] = deque()
-        self._work = WorkBudget(BUDGETS.program_units, BUDGETS.program_units_saved)
-        self._secondary_work = WorkBudget(BUDGETS.secondary_units, BUDGETS.secondary_units_saved)
+        share = state.clock.period_s / CYCLE
+        self._work = WorkBudget(share * BUDGETS.program_units, share * BUDGETS.program_units_saved)
+        self._secondary_work = WorkBudget(
+            share * BUDGETS.secondary_units, share * BUDGETS.secondary_units_saved
+        )
         self._ran = False
         self._phase = ProgramState.PLAYING
         self._phase_since = 0
