@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from typing import Final
 
 from urscript.catalogue.catalogue import ALL_ROWS, CB3_3_15, catalogue_for
 from urscript.catalogue.types import Builtin, Support
+from urscript.catalogue.versions import Generation
 
 _HEAD = """\
 # URScript coverage
@@ -23,12 +25,23 @@ from the tables in `urscript/catalogue/` by `make docs`.
 accept them.
 """
 
+_SHOWN: Final = ("3.15", "5.9", "5.12", "5.15", "5.22", "5.25", "10.11")
+
 _LATER_HEAD = """\
-Functions, or forms of functions, that CB3 3.15 does not have. A program compiled for a version that
-has them passes the compiler; the calls are declared only. 5.0 and 10.0 stand for the oldest
-documents: the first release is not known. The methods of lists and matrices that came with 5.15 are
-declared only
-as well."""
+Functions, or forms of functions, that CB3 3.15 does not have; the others are those of the tables above.
+Before its first release a name is not defined: a program that has it is refused, with that release in
+the message. 5.0 and 10.0 stand for the oldest documents: the first release is not known. Others are the
+oldest manual that has the name, or what a client of the maker asks for, so a controller may know it
+earlier."""
+
+
+def _versions() -> list[str]:
+    lines = ["| software | exact | approximate | declared only | all |", "|---|---|---|---|---|"]
+    for text in _SHOWN:
+        catalogue = catalogue_for(text)
+        title = f"{catalogue.version.generation.value} {text}"
+        lines.append(_count_line(title, Counter(row.support for row in catalogue)))
+    return lines
 
 
 def _summary(rows: Iterable[Builtin]) -> list[str]:
@@ -78,16 +91,25 @@ def _table(rows: Iterable[Builtin]) -> list[str]:
 
 
 def _later_table(rows: Iterable[Builtin]) -> list[str]:
-    lines = ["| function | since | until | what it does |", "|---|---|---|---|"]
+    lines = ["| function | since | until | model | what it does | remarks |", "|---|---|---|---|---|---|"]
     for row in rows:
-        cells = (f"`{row.signature}`", str(row.since), str(row.until), row.summary)
+        is_documented = any(row.since.get(g) and g not in row.undocumented for g in Generation)
+        cells = (
+            f"`{row.signature}`",
+            str(row.since),
+            str(row.until),
+            row.support.value,
+            row.summary,
+            _remarks(row, is_documented),
+        )
         lines.append(f"| {' | '.join(_cell(cell) for cell in cells)} |")
     return lines
 
 
 def render() -> str:
     """The whole page as Markdown."""
-    lines = [_HEAD, f"## CB3 {CB3_3_15.version}", "", *_summary(CB3_3_15), ""]
+    lines = [_HEAD, "## Versions", "", *_versions(), "", f"## CB3 {CB3_3_15.version}", ""]
+    lines += [*_summary(CB3_3_15), ""]
     lines += [
         "Besides the functions, programs can read the variables "
         + ", ".join(f"`{item.name}` ({item.value:g} {item.unit})" for item in CB3_3_15.variables.values())
@@ -101,13 +123,7 @@ def render() -> str:
     for module in dict.fromkeys(row.module for row in CB3_3_15):
         lines += [f"### {module}", "", *_table(row for row in CB3_3_15 if row.module == module), ""]
     lines += [
-        "## e-Series 5.11",
-        "",
-        "The same functions unless the next table says otherwise; none is checked against an e-Series arm.",
-        "",
-        *_summary(catalogue_for("5.11")),
-        "",
-        "## What other versions know",
+        "## Later software",
         "",
         _LATER_HEAD,
         "",

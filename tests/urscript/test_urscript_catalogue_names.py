@@ -192,6 +192,44 @@ def test_later_names_are_known_later_only() -> None:
     assert not set(ROS.split()) & catalogue_for("5.25").names
 
 
+# e-Series release -> what it brought. Source: the maker's manuals by release, gates of the maker's clients.
+BROUGHT = {
+    "5.3": "get_target_waypoint",
+    "5.4": "tool_contact",
+    "5.9": "get_inverse_kin_has_solution ft_rtde_input_enable",
+    "5.10": "set_target_payload get_freedrive_status get_target_payload_inertia",
+    "5.14": "struct",
+    "5.15": """
+        make_list estimate_payload high_holding_torque_disable high_holding_torque_enable
+        modbus_add_rw_signal modbus_get_error modbus_get_time_since_signal_invalid
+        modbus_request_update_signal_value modbus_reset_connection modbus_set_signal_watchdog
+        set_base_acceleration set_baselight_off set_baselight_iec set_baselight_solid
+    """,
+    "5.17": "get_gravity get_base_acceleration get_tool_temp time",
+    "5.19": "tool_wrench_limit_set tool_wrench_limit_disable",
+    "5.21": "optimovej optimovel eip_writer_factory eip_reader_factory",
+    "5.22": "motion_version_set motion_version_get",
+    "5.23": """
+        direct_torque get_mass_matrix get_jacobian get_jacobian_time_derivative
+        get_coriolis_and_centrifugal_torques
+    """,
+    "5.24": """
+        get_actual_joint_accelerations get_target_joint_accelerations get_rtde_value jerk_gain_scaling_set
+        jerk_gain_scaling_get force_mode_get_damping force_mode_get_gain_scaling
+        freedrive_mode_no_incorrect_payload_check add_frame attach_frame delete_frame delete_all_frames
+        move_frame get_pose convert_pose reset_world_model is_frame get_frame_parent get_children
+        frame_tracking_enable frame_tracking_disable set_mass_properties set_payload_from_attached_frames
+    """,
+}
+
+
+@pytest.mark.parametrize("minor", range(1, 26))
+def test_each_release_of_the_e_series_brought_its_names_and_dropped_none(minor: int) -> None:
+    before, after = ({row.name for row in ALL_ROWS if row.is_in(Version(5, n))} for n in (minor - 1, minor))
+    assert after - before == set(BROUGHT.get(f"5.{minor}", "").split())
+    assert before <= after
+
+
 def test_no_row_is_left_out_of_the_lists_above() -> None:
     listed = " ".join([*CB3_MANUAL.values(), CB3_UNDOCUMENTED, ADDED_IN_5_11, LATER, ROS]).split()
     polyscope = {"set_tool_output_mode", "set_tool_digital_output_mode"}
@@ -220,6 +258,10 @@ def test_no_row_is_left_out_of_the_lists_above() -> None:
         ("3.15", "set_tool_communication", False),
         ("10.7", "optimovej", False),
         ("10.8", "optimovej", True),
+        ("5.24", "ros_publisher_factory", False),
+        ("10.11", "ros_publisher_factory", True),
+        ("10.10", "direct_torque", False),
+        ("10.11", "direct_torque", True),
     ],
 )
 def test_first_releases(version: str, name: str, known: bool) -> None:
@@ -266,8 +308,17 @@ def test_first_releases(version: str, name: str, known: bool) -> None:
         (
             "5.25",
             "direct_torque",
-            "direct_torque(torques, friction_comp=True, viscous_scale=1 for each joint, "
-            "coulomb_scale=1 for each joint)",
+            "direct_torque(torque, friction_comp=True, viscous_scale=[0.9, 0.9, 0.8, 0.9, 0.9, 0.9], "
+            "coulomb_scale=[0.8, 0.8, 0.7, 0.8, 0.8, 0.8])",
+        ),
+        ("5.24", "direct_torque", "direct_torque(torque, friction_comp=True)"),
+        ("10.11", "direct_torque", "direct_torque(torque, friction_comp=True)"),
+        ("5.17", "time", "time()"),
+        ("5.18", "time", "time(mode=0)"),
+        (
+            "5.10",
+            "set_target_payload",
+            "set_target_payload(m, cog, inertia=[0, 0, 0, 0, 0, 0], transition_time=0)",
         ),
     ],
 )

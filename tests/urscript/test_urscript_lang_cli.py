@@ -90,6 +90,21 @@ def test_the_software_version_decides_which_names_exist(call):
     assert call("check", "--software", "9.9", late=late).exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("software", "name", "hint"),
+    [
+        ("5.9", "set_target_payload", "known since e-Series 5.10, PolyScope X 10.0; this is e-Series 5.9"),
+        ("3.15", "struct", "known since e-Series 5.14, PolyScope X 10.0; this is CB3 3.15"),
+        ("5.17", "optimovej", "known since e-Series 5.21, PolyScope X 10.8; this is e-Series 5.17"),
+        ("5.11", "set_euromap_output", "known since CB3 3.0; this is e-Series 5.11"),
+        ("3.7", "str_cat", "known since CB3 3.8, e-Series 5.0, PolyScope X 10.0; this is CB3 3.7"),
+    ],
+)
+def test_a_name_of_other_software_comes_with_its_first_releases(call, software, name, hint):
+    result = call("check", "--software", software, other=f"def p():\n  {name}()\nend\n")
+    assert f"other.script:2:3: Compile error: name '{name}' is not defined ({hint})" in result.output
+
+
 def test_suggestions_fit_what_is_unknown(call):
     output = call(
         "check", hints="def p():\n  speed = 1\n  x = sped + force\n  movej_([0])\n  run moveit()\nend\n"

@@ -23,7 +23,7 @@ from .motion import VARIABLES
 from .processpath import ROWS as PROCESSPATH
 from .types import Builtin, BuiltinArray, ModuleVariable
 from .urmath import ROWS as URMATH
-from .versions import Version
+from .versions import Generation, PerGeneration, Version
 from .world_model import ROWS as WORLD_MODEL
 
 ALL_ROWS: tuple[Builtin, ...] = (
@@ -106,6 +106,12 @@ class Catalogue:
         by_lower_case = {known.lower(): known for known in names}
         matches = get_close_matches(name.lower(), by_lower_case, n=1, cutoff=0.75)
         return by_lower_case[matches[0]] if matches else None
+
+    def first_releases(self, name: str) -> PerGeneration:
+        """The first release of each generation that knows a name; none where no software does."""
+        since = [row.since for row in self._rows if row.name == name]
+        firsts = ([each.get(generation) for each in since] for generation in Generation)
+        return PerGeneration(*(min(filter(None, known), default=None) for known in firsts))
 
     def static_bind(self, name: str, n_positional: int, keyword_names: Sequence[str] = ()) -> list[Slot]:
         """Where the value of each parameter comes from in a call of this form; the list must not be changed.

@@ -233,7 +233,7 @@ _REGISTERS: tuple[Builtin, ...] = (
         (Param("key", STRING),),
         "value",
         "an RTDE output by name",
-        since=LATE_E_SERIES,
+        since=releases(None, "5.24", "10.11"),
         source=MANUAL_LATE,
     ),
 )
@@ -368,6 +368,7 @@ _SECONDARY = Param("is_secondary_program", BOOL)
 _SECONDARY_OPTIONAL = Param("is_secondary_program", BOOL, False)
 _UNTIL_LATE = releases(None, "5.21")
 _FIRST = releases("3.0", "5.0")
+_SIGNALS_5_15 = releases(None, "5.15", "10.0")
 
 
 def _add_signal(types: int, *later: Param) -> tuple[Param, ...]:
@@ -471,7 +472,7 @@ _MODBUS: tuple[Builtin, ...] = (
         note="lost when the server cannot be reached",
     ),
     *(
-        _row(name, params, returns, summary, time=time, since=LATE_E_SERIES, source=MANUAL_LATE)
+        _row(name, params, returns, summary, time=time, since=_SIGNALS_5_15, source=MANUAL_LATE)
         for name, params, returns, summary, time in (
             (
                 "modbus_add_rw_signal",
@@ -568,7 +569,7 @@ _FACTORIES: tuple[Builtin, ...] = (
             (*_TOPIC, *_QUALITY_OF_SERVICE),
             "handle",
             f"a ROS 2 {words}",
-            since=releases(None, None, "10.0"),
+            since=releases(None, None, "10.11"),
             source=MANUAL_X,
         )
         for kind, words in (

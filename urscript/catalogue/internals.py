@@ -252,16 +252,6 @@ _SETTINGS: tuple[Builtin, ...] = (
     ),
     _row(
         "set_target_payload",
-        (_MASS, Param("cog", VECTOR3, unit="m"), Param("inertia", JOINTS, [0, 0, 0, 0, 0, 0], "kg m^2")),
-        "None",
-        "payload mass, centre of gravity and inertia at once",
-        support=APPROXIMATE,
-        note="the inertia is checked and not used",
-        since=releases(None, "5.10"),
-        until=releases(None, "5.21"),
-    ),
-    _row(
-        "set_target_payload",
         (
             _MASS,
             Param("cog", VECTOR3, unit="m"),
@@ -272,8 +262,9 @@ _SETTINGS: tuple[Builtin, ...] = (
         "payload mass, centre of gravity and inertia at once",
         support=APPROXIMATE,
         note="the inertia is checked and not used; it counts at once",
-        since=LATE_E_SERIES,
-        source=MANUAL_LATE,
+        since=releases(None, "5.10", "10.0"),
+        # The manual of 5.11 has no fourth parameter; the maker's driver gives it from 5.10 on.
+        source=f"{MANUAL_E}, module internals, and the maker's driver script",
     ),
     _row(
         "set_gravity",
@@ -397,36 +388,62 @@ _JOINT_ARGUMENTS = (Param("q", JOINTS, None, "rad", shown="current joint positio
 
 _LATER: tuple[Builtin, ...] = (
     *(
-        _row(name, params, returns, summary, since=LATE_E_SERIES, source=MANUAL_LATE)
-        for name, params, returns, summary in (
-            ("get_actual_joint_accelerations", (), "list of 6, rad/s^2", "measured joint accelerations"),
-            ("get_target_joint_accelerations", (), "list of 6, rad/s^2", "commanded joint accelerations"),
-            ("get_tool_temp", (), "float, degree C", "tool temperature"),
-            ("get_gravity", (), "list of 3, m/s^2", "gravity in force"),
-            ("get_base_acceleration", (), "list of 3, m/s^2", "base acceleration in force"),
+        _row(name, params, returns, summary, since=since, source=MANUAL_LATE)
+        for since, rows in (
             (
-                "set_base_acceleration",
-                (Param("a", VECTOR3, unit="m/s^2"),),
-                "None",
-                "acceleration of the base",
+                releases(None, "5.15", "10.0"),
+                (
+                    (
+                        "set_base_acceleration",
+                        (Param("a", VECTOR3, unit="m/s^2"),),
+                        "None",
+                        "acceleration of the base",
+                    ),
+                    (
+                        "estimate_payload",
+                        (Param("poses", LIST, unit="at least four"), Param("wrenches", LIST)),
+                        "struct(mass, cog)",
+                        "payload from wrenches measured at several poses",
+                    ),
+                    ("high_holding_torque_disable", (), "None", "hold with less torque at rest"),
+                    ("high_holding_torque_enable", (), "None", "hold with full torque at rest"),
+                    ("set_baselight_off", (), "None", "base light off (UR20, UR30)"),
+                    ("set_baselight_iec", (), "None", "base light shows the state (UR20, UR30)"),
+                    (
+                        "set_baselight_solid",
+                        tuple(Param(colour, INT, unit="0 to 255", low=0, high=255) for colour in "rgb"),
+                        "None",
+                        "base light in one colour (UR20, UR30)",
+                    ),
+                ),
             ),
             (
-                "estimate_payload",
-                (Param("poses", LIST, unit="at least four"), Param("wrenches", LIST)),
-                "struct(mass, cog)",
-                "payload from wrenches measured at several poses",
+                releases(None, "5.17", "10.0"),
+                (
+                    ("get_tool_temp", (), "float, degree C", "tool temperature"),
+                    ("get_gravity", (), "list of 3, m/s^2", "gravity in force"),
+                    ("get_base_acceleration", (), "list of 3, m/s^2", "base acceleration in force"),
+                ),
             ),
-            ("high_holding_torque_disable", (), "None", "hold with less torque at rest"),
-            ("high_holding_torque_enable", (), "None", "hold with full torque at rest"),
-            ("set_baselight_off", (), "None", "base light off (UR20, UR30)"),
-            ("set_baselight_iec", (), "None", "base light shows the state (UR20, UR30)"),
             (
-                "set_baselight_solid",
-                tuple(Param(colour, INT, unit="0 to 255", low=0, high=255) for colour in "rgb"),
-                "None",
-                "base light in one colour (UR20, UR30)",
+                releases(None, "5.24", "10.11"),
+                (
+                    (
+                        "get_actual_joint_accelerations",
+                        (),
+                        "list of 6, rad/s^2",
+                        "measured joint accelerations",
+                    ),
+                    (
+                        "get_target_joint_accelerations",
+                        (),
+                        "list of 6, rad/s^2",
+                        "commanded joint accelerations",
+                    ),
+                ),
             ),
         )
+        for name, params, returns, summary in rows
     ),
     *(
         _row(name, params, returns, summary, since=releases(None, "5.23", "10.11"), source=MANUAL_LATE)
@@ -454,10 +471,19 @@ _LATER: tuple[Builtin, ...] = (
     ),
     _row(
         "time",
+        (),
+        "struct(sec, nanosec)",
+        "time since the controller was started",
+        since=releases(None, "5.17"),
+        until=releases(None, "5.18"),
+        source=MANUAL_LATE,
+    ),
+    _row(
+        "time",
         (Param("mode", INT, 0, "0 uptime, 2 system GMT", choices=(0, 2)),),
         "struct(sec, nanosec)",
         "clock of the controller",
-        since=releases(None, "5.17", "10.0"),
+        since=releases(None, "5.18", "10.0"),
         source=MANUAL_LATE,
     ),
 )

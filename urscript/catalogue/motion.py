@@ -21,6 +21,9 @@ EXACT, APPROXIMATE = Support.EXACT, Support.APPROXIMATE
 
 A_JOINT_DEFAULT, V_JOINT_DEFAULT = 1.4, 1.05
 A_TOOL_DEFAULT, V_TOOL_DEFAULT = 1.2, 0.25
+# Shares of the modelled friction that direct_torque compensates. Source: script manual 5.25.1, direct_torque.
+VISCOUS_SCALE = (0.9, 0.9, 0.8, 0.9, 0.9, 0.9)
+COULOMB_SCALE = (0.8, 0.8, 0.7, 0.8, 0.8, 0.8)
 
 _A_TOOL = Param("a", NUMBER, A_TOOL_DEFAULT, "m/s^2")
 _V_TOOL = Param("v", NUMBER, V_TOOL_DEFAULT, "m/s")
@@ -299,7 +302,7 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "None",
         "hand guiding without the check of the payload",
         time=SWITCH,
-        since=releases("3.0", "5.21", "10.0"),
+        since=releases("3.0", "5.24", "10.11"),
         support=APPROXIMATE,
         note=_GUIDED,
         source="URScript API Reference CB3 3.15.4, module motion; later e-Series directories",
@@ -522,6 +525,15 @@ _CONVEYORS: tuple[Builtin, ...] = (
     ),
 )
 
+_WITH_5_22 = releases(None, "5.22", "10.9")  # 10.9 is of the same time
+_WITH_5_24 = releases(None, "5.24", "10.11")
+_WITH_SCALES = releases(None, "5.25", "10.12")  # in truth 5.25.1 and 10.12.1
+
+
+def _list_text(numbers: tuple[float, ...]) -> str:
+    return f"[{', '.join(map(str, numbers))}]"
+
+
 _LATER: tuple[Builtin, ...] = (
     *tuple(
         _row(
@@ -548,41 +560,41 @@ _LATER: tuple[Builtin, ...] = (
         (Param("version", INT, unit="1 or 2", low=1, high=2),),
         "None",
         "choose the planner of movej and movel",
-        since=LATE_E_SERIES,
+        since=_WITH_5_22,
         source=MANUAL_LATE,
     ),
-    _row("motion_version_get", (), "int", "the planner in force", since=LATE_E_SERIES, source=MANUAL_LATE),
+    _row("motion_version_get", (), "int", "the planner in force", since=_WITH_5_22, source=MANUAL_LATE),
     _row(
         "jerk_gain_scaling_set",
         (Param("gain", NUMBER, unit="0.01 to 1", low=0.01, high=1),),
         "None",
         "scale the jerk limits",
-        since=LATE_E_SERIES,
+        since=_WITH_5_24,
         source=MANUAL_LATE,
     ),
-    _row("jerk_gain_scaling_get", (), "float", "the scale in force", since=LATE_E_SERIES, source=MANUAL_LATE),
+    _row("jerk_gain_scaling_get", (), "float", "the scale in force", since=_WITH_5_24, source=MANUAL_LATE),
     _row(
         "direct_torque",
-        (Param("torques", JOINTS, unit="Nm"), Param("friction_comp", BOOL, True)),
+        (Param("torque", JOINTS, unit="Nm"), Param("friction_comp", BOOL, True)),
         "None",
         "one cycle of joint torque beside gravity compensation",
         time=MOTION,
         since=releases(None, "5.23", "10.11"),
-        until=releases(None, "5.25", None),
+        until=_WITH_SCALES,
         source=MANUAL_LATE,
     ),
     _row(
         "direct_torque",
         (
-            Param("torques", JOINTS, unit="Nm"),
-            Param("friction_comp", BOOL, True),
-            Param("viscous_scale", JOINTS, None, "factors", shown="1 for each joint"),
-            Param("coulomb_scale", JOINTS, None, "factors", shown="1 for each joint"),
+            Param("torque", JOINTS, unit="Nm"),
+            Param("friction_comp", BOOL, None, "deprecated; not used beside a scale", shown="True"),
+            Param("viscous_scale", JOINTS, None, "factors", shown=_list_text(VISCOUS_SCALE)),
+            Param("coulomb_scale", JOINTS, None, "factors", shown=_list_text(COULOMB_SCALE)),
         ),
         "None",
         "one cycle of joint torque beside gravity compensation",
         time=MOTION,
-        since=releases(None, "5.25"),
+        since=_WITH_SCALES,
         source=MANUAL_LATE,
     ),
     _row(
@@ -610,7 +622,7 @@ _LATER: tuple[Builtin, ...] = (
         (),
         "float",
         "damping in force",
-        since=LATE_E_SERIES,
+        since=_WITH_5_24,
         support=EXACT,
         source=MANUAL_LATE,
     ),
@@ -619,7 +631,7 @@ _LATER: tuple[Builtin, ...] = (
         (),
         "float",
         "gain scaling in force",
-        since=LATE_E_SERIES,
+        since=_WITH_5_24,
         support=EXACT,
         source=MANUAL_LATE,
     ),

@@ -29,7 +29,10 @@ STEP_TIME: Mapping[Generation, float] = {
 
 
 class Version(NamedTuple):
-    """A release of the controller software; bug-fix numbers never changed the set of builtins documented."""
+    """A release of the controller software.
+
+    Without bug-fix numbers: one release is known whose bug fix changed the builtins, 5.25.1 (direct_torque).
+    """
 
     major: int
     minor: int

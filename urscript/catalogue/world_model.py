@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .chapter import MANUAL_X, Chapter
 from .types import Builtin, Param, ParamType
-from .versions import LATE_E_SERIES
+from .versions import releases
 
 _row = Chapter("world_model").row
 
@@ -15,7 +15,7 @@ _POSE = Param("pose", POSE, unit="m, rad")
 _REFERENCE = Param("ref_name", STRING, "base")
 
 ROWS: tuple[Builtin, ...] = tuple(
-    _row(name, params, returns, summary, since=LATE_E_SERIES, source=MANUAL_X)
+    _row(name, params, returns, summary, since=releases(None, "5.24", "10.11"), source=MANUAL_X)
     for name, params, returns, summary in (
         ("add_frame", (_NAME, _POSE, _REFERENCE), "None", "add a frame"),
         ("attach_frame", (Param("child", STRING), Param("parent", STRING)), "None", "attach one to another"),

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Final
 
 from urscript.catalogue import Catalogue
+from urscript.catalogue.versions import NEVER
 from urscript.dialect import MAX_LOOP_DEPTH, Dialect
 from urscript.errors import (
     ScriptCompileError,
@@ -288,9 +289,14 @@ class _Resolver:
 
     def _unknown(self, name: str, span: Span, known: Callable[[], list[str]]) -> None:
         self._n_unknown += 1
-        # The search for similar names is slow, so there is a limit.
-        alike = self.catalogue.suggest(name, known()) if self._n_unknown <= MAX_SUGGESTIONS else None
-        hint = f"did you mean '{alike}'?" if alike else None
+        hint = None
+        # The searches are slow, so there is a limit.
+        if self._n_unknown <= MAX_SUGGESTIONS:
+            releases, version = self.catalogue.first_releases(name), self.catalogue.version
+            if releases != NEVER:
+                hint = f"known since {releases}; this is {version.generation.value} {version}"
+            elif alike := self.catalogue.suggest(name, known()):
+                hint = f"did you mean '{alike}'?"
         name_only = Span(span.line, span.column, span.line, span.column + len(name))
         self._error(ScriptNameError(name, hint=hint), name_only)
 
