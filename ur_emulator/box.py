@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from protocol.primary.messages import ReportLevel
-from protocol.ur_types import RobotMode, simulated_serial
+from protocol.ur_types import RobotMode, RobotType, simulated_serial
 from ur_emulator.box_log import LogEntry
 from ur_emulator.box_options import check_options, parse_pace, standard_ports
 from ur_emulator.control.operations import BoxOperations, make
@@ -141,7 +141,7 @@ class Box(BoxOperations):
             self._fail,
         )
         self._intake = ProgramIntake(self._loop.tasks, software.catalogue, self._box)
-        identity = BoxIdentity(software, model.title, self.serial_number)
+        identity = BoxIdentity(software, model.title, RobotType(model.robot_type).name, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         folder = ProgramFolder(None if programs is None else Path(programs))
         self._player = player = ProgramPlayer(self._access, folder, skip_unknown=skip_unknown_nodes)

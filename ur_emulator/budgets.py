@@ -111,9 +111,7 @@ class Budgets:
     secondary_units: int = _budget(
         10_000, "units", "all secondary programs of a box, 8 ms", "they go on in the next cycle"
     )
-    secondary_units_saved: int = _budget(
-        30_000, "units", "8 ms after a rest", "they go on in the next cycle"
-    )
+    secondary_units_saved: int = _budget(30_000, "units", "8 ms after a rest", "they go on in the next cycle")
 
     # --- variables and labels of running programs, as port 30001 reports them ---
 

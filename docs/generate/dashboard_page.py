@@ -5,14 +5,12 @@ from __future__ import annotations
 from protocol.dashboard.commands import (
     COMMANDS,
     GREETING,
+    REMOTE_CONTROL_ONLY,
     USER_ROLES,
     DashboardCommand,
     unknown_command_reply,
 )
 from protocol.dashboard.connection import MAX_LINE
-from protocol.ur_types import SoftwareVersion
-
-_FIRST_CB3 = SoftwareVersion(3, 0)
 
 _INTRODUCTION = f"""\
 # Dashboard server: port 29999
@@ -29,7 +27,11 @@ case-sensitive.
 A reply comes after the control cycle in which the command has acted, so that the next line sees its
 effect. If the last column gives a version, the reply comes from that software on only when the
 command is complete (the program is loaded or has started, the arm rests); older software replies at
-once.
+once. *Since* gives the first software of CB3 and e-Series, "-" where a generation does not have the
+command.
+
+An e-Series robot executes the commands marked with R only in remote control. In local control it
+replies `{REMOTE_CONTROL_ONLY}`.
 
 While a line waits for its reply, the lines after it wait too. The box closes the connection of a
 client that sends a line of more than {MAX_LINE} bytes or does not read its replies. A client that
@@ -43,8 +45,8 @@ def render() -> str:
     return "\n".join(
         (
             _INTRODUCTION,
-            "| command | does | reply | else | since | when done |",
-            "|---|---|---|---|---|---|",
+            "| command | does | reply | else | since | R | when done |",
+            "|---|---|---|---|---|---|---|",
             *map(_line, COMMANDS),
             "",
             f"Roles: {', '.join(f'`{role}`' for role in USER_ROLES)}.\n",
@@ -55,7 +57,14 @@ def render() -> str:
 def _line(row: DashboardCommand) -> str:
     name = f"{row.name} <{row.argument}>" if row.argument else row.name
     others = "<br>".join(f"`{reply}`" for key, reply in row.replies.items() if key != "ok")
-    since = "3.0" if row.since <= _FIRST_CB3 else f"{row.since.major}.{row.since.minor}"
     done = f"{row.done_since.major}.{row.done_since.minor}" if row.done_since else ""
-    cells = (f"`{name}`", row.does, f"`{row.replies['ok']}`", others, since, done)
+    cells = (
+        f"`{name}`",
+        row.does,
+        f"`{row.replies['ok']}`",
+        others,
+        str(row.since),
+        "R" * row.needs_remote,
+        done,
+    )
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"

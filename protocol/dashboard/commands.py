@@ -1,11 +1,12 @@
-"""The dashboard server's commands as CB3 has them: names, reply texts, first versions.
+"""The dashboard server's commands: names, reply texts, first versions of each generation.
 
 One row a command. A reply is chosen by its key and filled in: `row.reply("ok", path="/programs/a.urp")`.
 What a command does to the robot and when it fails is the box's business.
 
 Sources: UR "Dashboard Server, port 29999" (support page, CB series) and "Dashboard Server Remote Control
-Interface e-Series" (2022) for the wording; first versions from UR's client library; where the two documents
-differ, what that library's tests expect of a CB3 3.14/3.15 simulator.
+Interface e-Series" (2022) for the wording and for what needs remote control; first versions from UR's client
+library; where documents differ, what that library's tests expect of simulators with 3.14, 3.15 and 5.x; reply
+of `load` on 5.x: log of a real robot.
 """
 
 from __future__ import annotations
@@ -16,10 +17,13 @@ from types import MappingProxyType
 
 from protocol.errors import LocalProtocolError
 from protocol.ur_types import SoftwareVersion
+from protocol.wire_record import ALWAYS, Since, since
 
 __all__ = [
     "COMMANDS",
     "GREETING",
+    "OPERATIONAL_MODES",
+    "REMOTE_CONTROL_ONLY",
     "USER_ROLES",
     "DashboardCommand",
     "commands_of",
@@ -30,6 +34,12 @@ __all__ = [
 GREETING = "Connected: Universal Robots Dashboard Server"
 """The line that the server sends on accept; clients read it before their first command."""
 
+REMOTE_CONTROL_ONLY = (
+    "Command is not allowed due to safety reasons, please switch robot to Remote Control mode "
+    "and reconnect to port 29999"
+)
+"""The reply of an e-Series robot in local control to commands with `needs_remote`. Source: public clients."""
+
 
 @dataclass(frozen=True, slots=True)
 class DashboardCommand:
@@ -38,19 +48,21 @@ class DashboardCommand:
     Attributes:
         name: the fixed words, spelled as on the wire.
         argument: description of the argument; "" if there is none.
-        since: first CB3 software.
+        since: first software of each generation.
         does: description.
         replies: templates by key; "ok" is always there. Braces name what the box fills in.
         done_since: first software whose reply comes when the command is carried out; None for commands whose
-            reply has always come at once. (3, 0): all CB3 software.
+            reply has always come at once. e-Series software is newer than all of them.
+        needs_remote: an e-Series robot refuses it in local control.
     """
 
     name: str
     argument: str
-    since: SoftwareVersion
+    since: Since
     does: str
     replies: Mapping[str, str]
     done_since: SoftwareVersion | None = None
+    needs_remote: bool = False
 
     def replies_when_done(self, version: SoftwareVersion) -> bool:
         """True if software `version` answers when the command is carried out, not when it is taken."""
@@ -74,79 +86,108 @@ class DashboardCommand:
 def _row(
     name: str,
     argument: str,
-    since: tuple[int, int],
+    since: Since,
     does: str,
     ok: str,
     done_since: tuple[int, int] | None = None,
+    *,
+    needs_remote: bool = False,
     **failures: str,
 ) -> DashboardCommand:
     replies = MappingProxyType({"ok": ok, **failures})
     done = SoftwareVersion(*done_since) if done_since else None
-    return DashboardCommand(name, argument, SoftwareVersion(*since), does, replies, done)
+    return DashboardCommand(name, argument, since, does, replies, done, needs_remote)
 
 
 _NOT_FOUND = "File not found: {name}"
+_LOAD = "loads a program and its installation, or changes nothing"
+_NOT_LOADED = "Error while loading program: {name}"
+
+_SINCE_3_1 = since((3, 1))
+_ONLY_CB3 = since((3, 1), None)
+_SINCE_3_12 = since((3, 12), (5, 6))
+_SINCE_3_13 = since((3, 13), (5, 8))
+_ONLY_E_SERIES = since(None)
+_SINCE_5_6 = since(None, (5, 6))
 
 COMMANDS: tuple[DashboardCommand, ...] = (
-    _row("load", "program.urp", (1, 4), "loads a program and its installation, or changes nothing",
-         "Loading program: {path}", (3, 3),
-         not_found=_NOT_FOUND, failed="Error while loading program: {name}"),
-    _row("play", "", (1, 4), "starts the loaded program at the top, or lets a paused one go on",
-         "Starting program", (3, 3), failed="Failed to execute: play"),
-    _row("stop", "", (1, 4), "stops the program; harmless without one",
-         "Stopped", (3, 3), failed="Failed to execute: stop"),
-    _row("pause", "", (1, 4), "pauses the program that plays",
-         "Pausing program", (3, 3), failed="Failed to execute: pause"),
-    _row("quit", "", (1, 4), "closes the connection", "Disconnected"),
-    _row("shutdown", "", (1, 4), "switches the robot and the box off", "Shutting down"),
-    _row("running", "", (1, 6), "whether a program plays: `true` or `false`", "Program running: {running}"),
-    _row("robotmode", "", (1, 6), "robot mode", "Robotmode: {mode}"),
-    _row("get loaded program", "", (1, 6), "which program is loaded",
+    _row("load", "program.urp", since((3, 0), None), _LOAD, "Loading program: {path}", (3, 3),
+         not_found=_NOT_FOUND, failed=_NOT_LOADED),
+    _row("load", "program.urp", _ONLY_E_SERIES, _LOAD, "Loading program: {path}, {installation}", (3, 3),
+         needs_remote=True, not_found=_NOT_FOUND, failed=_NOT_LOADED),
+    _row("play", "", ALWAYS, "starts the loaded program at the top, or lets a paused one go on",
+         "Starting program", (3, 3), needs_remote=True, failed="Failed to execute: play"),
+    _row("stop", "", ALWAYS, "stops the program; harmless without one",
+         "Stopped", (3, 3), needs_remote=True, failed="Failed to execute: stop"),
+    _row("pause", "", ALWAYS, "pauses the program that plays",
+         "Pausing program", (3, 3), needs_remote=True, failed="Failed to execute: pause"),
+    _row("quit", "", ALWAYS, "closes the connection", "Disconnected"),
+    _row("shutdown", "", ALWAYS, "switches the robot and the box off", "Shutting down"),
+    _row("running", "", ALWAYS, "whether a program plays: `true` or `false`", "Program running: {running}"),
+    _row("robotmode", "", ALWAYS, "robot mode", "Robotmode: {mode}"),
+    _row("get loaded program", "", ALWAYS, "which program is loaded",
          "Loaded program: {path}", none="No program loaded"),
-    _row("popup", "text", (1, 6), "shows a popup; it stays until it is closed", "showing popup"),
-    _row("close popup", "", (1, 6), "closes all popups, also those that programs wait for", "closing popup"),
-    _row("addToLog", "text", (1, 8), "writes into the log",
+    _row("popup", "text", ALWAYS, "shows a popup; it stays until it is closed", "showing popup"),
+    _row("close popup", "", ALWAYS, "closes all popups, also those that programs wait for", "closing popup"),
+    _row("addToLog", "text", ALWAYS, "writes into the log",
          "Added log message", empty="No log message to add"),
-    _row("isProgramSaved", "", (1, 8), "whether the loaded program is saved; its name without folder",
+    _row("isProgramSaved", "", ALWAYS, "whether the loaded program is saved; its name without folder",
          "{saved} {program}"),
-    _row("programState", "", (1, 8),
+    _row("programState", "", ALWAYS,
          "`STOPPED`, `PLAYING` or `PAUSED`; the name without folder, `<unnamed>` if nothing is loaded",
          "{state} {program}"),
-    _row("PolyscopeVersion", "", (1, 8), "software: four numbers and a date",
+    _row("PolyscopeVersion", "", ALWAYS, "software: four numbers and a date",
          "URSoftware {version} ({date})"),
-    _row("setUserRole", "role", (3, 1), "sets who uses the pendant, which has no effect on the ports",
+    _row("version", "", since(None, (5, 13)), "software: four numbers", "{version}"),
+    _row("setUserRole", "role", _ONLY_CB3, "sets who uses the pendant, which has no effect on the ports",
          "Setting user role: {role}", failed="Failed setting user role: {role}"),
-    _row("getUserRole", "", (3, 1), "the role that was set", "{role}"),
-    _row("power on", "", (3, 0), "powers the arm", "Powering on"),
-    _row("power off", "", (3, 0), "cuts the power of the arm; a program stops", "Powering off"),
-    _row("brake release", "", (3, 0), "releases the brakes, powering the arm first if need be",
-         "Brake releasing"),
-    _row("safetymode", "", (3, 0), "safety mode", "Safetymode: {mode}"),
-    _row("safetystatus", "", (3, 11), "safety mode with its reason", "Safetystatus: {status}"),
-    _row("unlock protective stop", "", (3, 1), "ends a protective stop",
-         "Protective stop releasing",
+    _row("getUserRole", "", _ONLY_CB3, "the role that was set", "{role}"),
+    _row("set operational mode", "manual|automatic", _ONLY_E_SERIES,
+         "sets the operational mode, which the pendant can no longer change",
+         "Operational mode {mode} is set", failed="Failed setting operational mode: {mode}"),
+    _row("get operational mode", "", _SINCE_5_6,
+         "`MANUAL`, `AUTOMATIC`, or `NONE` if no mode and no password was ever set", "{mode}"),
+    _row("clear operational mode", "", _ONLY_E_SERIES, "gives the operational mode back to the pendant",
+         "No longer controlling the operational mode. Current operational mode: '{mode}'."),
+    _row("power on", "", ALWAYS, "powers the arm", "Powering on", needs_remote=True),
+    _row("power off", "", ALWAYS, "cuts the power of the arm; a program stops", "Powering off",
+         needs_remote=True),
+    _row("brake release", "", ALWAYS, "releases the brakes, powering the arm first if need be",
+         "Brake releasing", needs_remote=True),
+    _row("safetymode", "", ALWAYS, "safety mode", "Safetymode: {mode}"),
+    _row("safetystatus", "", since((3, 11), (5, 4)), "safety mode with its reason", "Safetystatus: {status}"),
+    _row("unlock protective stop", "", _SINCE_3_1, "ends a protective stop",
+         "Protective stop releasing", needs_remote=True,
          too_early="Cannot unlock protective stop until 5s after occurrence. "
                    "Always inspect cause of protective stop before unlocking"),
-    _row("close safety popup", "", (3, 1), "closes a popup about safety", "closing safety popup"),
-    _row("load installation", "file.installation", (3, 2), "loads an installation",
-         "Loading installation: {path}", (3, 2),
+    _row("close safety popup", "", _SINCE_3_1, "closes a popup about safety", "closing safety popup",
+         needs_remote=True),
+    _row("load installation", "file.installation", since((3, 2)), "loads an installation",
+         "Loading installation: {path}", (3, 2), needs_remote=True,
          not_found=_NOT_FOUND, failed="Failed to load installation: {name}"),
-    _row("restart safety", "", (3, 7), "restarts the safety system after a violation or fault: power off",
-         "Restarting safety"),
-    _row("get serial number", "", (3, 12), "serial number, digits", "{serial}"),
-    _row("get robot model", "", (3, 12), "`UR3`, `UR5` or `UR10`", "{model}"),
-    _row("generate flight report", "controller|software|system", (3, 13),
+    _row("restart safety", "", since((3, 7), (5, 1)),
+         "restarts the safety system after a violation or fault: power off",
+         "Restarting safety", needs_remote=True),
+    _row("is in remote control", "", _SINCE_5_6, "whether the robot is in remote control: `true` or `false`",
+         "{remote}"),
+    _row("get serial number", "", _SINCE_3_12, "serial number, digits", "{serial}"),
+    _row("get robot model", "", _SINCE_3_12, "`UR3`, `UR5` or `UR10`; an e-Series arm has the same name",
+         "{model}"),
+    _row("generate flight report", "controller|software|system", _SINCE_3_13,
          "writes a report; `system` if no kind is given",
          "Flight Report generated with id:{id}", (3, 13), failed="{reason}"),
-    _row("generate support file", "directory", (3, 13), "writes a report and packs it with all others",
+    _row("generate support file", "directory", _SINCE_3_13, "writes a report and packs it with all others",
          "Completed successfully:{file}", (3, 13), failed="{reason}"),
-    _row("saveLog", "", (3, 13), "writes the log to a file",
+    _row("saveLog", "", _SINCE_3_13, "writes the log to a file",
          "Log saved to disk", (3, 13), failed="Failed to execute: saveLog"),
 )  # fmt: skip
-"""All commands of CB3 software. What newer software renamed or added for e-Series is not here."""
+"""All commands of both generations."""
 
 USER_ROLES = ("PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED")
 """What `setUserRole` accepts."""
+
+OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
+"""What `set operational mode` accepts, in any letter case."""
 
 # A name has at most so many words.
 _MOST_WORDS = 4
@@ -156,7 +197,7 @@ def commands_of(
     version: SoftwareVersion, table: Iterable[DashboardCommand] = COMMANDS
 ) -> Mapping[str, DashboardCommand]:
     """The commands of a table that software `version` knows, by name."""
-    return MappingProxyType({command.name: command for command in table if command.since <= version})
+    return MappingProxyType({command.name: command for command in table if command.since.covers(version)})
 
 
 def match_command(line: str, known: Mapping[str, DashboardCommand]) -> tuple[DashboardCommand, str] | None:

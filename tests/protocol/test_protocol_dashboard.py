@@ -81,6 +81,35 @@ def test_lines_that_are_not(line):
     assert robot.reply(event.answer) == unknown_command_reply(line).encode("latin-1") + b"\n"
 
 
+@pytest.mark.parametrize(
+    ("name", "cb3", "e_series"),
+    [
+        ("play", "3.0", "5.0"), ("setUserRole", "3.1", None), ("getUserRole", "3.1", None),
+        ("set operational mode", None, "5.0"), ("clear operational mode", None, "5.0"),
+        ("get operational mode", None, "5.6"), ("is in remote control", None, "5.6"), ("version", None, "5.13"),
+        ("restart safety", "3.7", "5.1"), ("safetystatus", "3.11", "5.4"), ("get serial number", "3.12", "5.6"),
+        ("get robot model", "3.12", "5.6"), ("generate flight report", "3.13", "5.8"),
+        ("generate support file", "3.13", "5.8"), ("saveLog", "3.13", "5.8"),
+    ],
+)  # fmt: skip
+def test_first_software_of_a_command(name, cb3, e_series):
+    for first, newest in ((cb3, V3_15), (e_series, SoftwareVersion(5, 25, 1))):
+        assert (name in commands_of(newest)) is (first is not None)
+        if first:
+            since = SoftwareVersion.parse(first)
+            assert name in commands_of(since)
+            if since.minor:
+                assert name not in commands_of(since._replace(minor=since.minor - 1, bugfix=99))
+
+
+def test_what_an_e_series_robot_refuses_in_local_control():
+    """The column R of the maker's e-Series document."""
+    assert {row.name for row in COMMANDS if row.needs_remote} == {
+        "load", "play", "stop", "pause", "power on", "power off", "brake release", "unlock protective stop",
+        "close safety popup", "load installation", "restart safety",
+    }  # fmt: skip
+
+
 def test_older_software_knows_fewer_commands():
     assert match_command("get serial number", commands_of(SoftwareVersion(3, 11))) is None
     assert match_command("get serial number", commands_of(SoftwareVersion(3, 12))) == (
@@ -113,8 +142,14 @@ EXPECTED = {
     "isProgramSaved": r"(true|false) .*\.urp",
     "programState": "(STOPPED|PLAYING|PAUSED) .*",
     "PolyscopeVersion": r"URSoftware \d+\.\d+\.\d+\.\d+ \(.*\)",
+    "version": r"\d+\.\d+\.\d+\.\d+",
     "setUserRole": "Setting user role: NONE",
     "getUserRole": "NONE",
+    "set operational mode": "Operational mode (MANUAL|AUTOMATIC) is set",
+    "get operational mode": "(NONE|MANUAL|AUTOMATIC)",
+    "clear operational mode": r"No longer controlling the operational mode\. "
+    r"Current operational mode: '(MANUAL|AUTOMATIC)'\.",
+    "is in remote control": "(true|false)",
     "power on": "Powering on",
     "power off": "Powering off",
     "brake release": "Brake releasing",
@@ -132,16 +167,17 @@ EXPECTED = {
     "shutdown": "Shutting down",
 }
 VALUES = {
-    "path": "/programs/a.urp", "running": "true", "mode": "POWER_OFF", "status": "NORMAL", "saved": "true",
+    "path": "/programs/a.urp", "installation": "/programs/b.installation", "running": "true", "mode": "POWER_OFF", "status": "NORMAL", "saved": "true",
     "program": "a.urp", "state": "STOPPED", "version": "3.15.8.106339", "date": "Nov 10 2021", "role": "NONE",
-    "serial": "20993000007", "model": "UR3", "id": 3, "file": "ur_20993000007.zip",
+    "serial": "20993000007", "model": "UR3", "remote": "true", "id": 3, "file": "ur_20993000007.zip",
 }  # fmt: skip
 
 
 def test_replies_are_what_clients_compare_with():
     assert {command.name for command in COMMANDS} == set(EXPECTED)
     for command in COMMANDS:
-        assert re.fullmatch(EXPECTED[command.name], command.reply("ok", **VALUES)), command.name
+        values = VALUES | ({"mode": "MANUAL"} if "operational" in command.name else {})
+        assert re.fullmatch(EXPECTED[command.name], command.reply("ok", **values)), command.name
 
 
 def test_a_reply_needs_a_known_key_and_its_values():

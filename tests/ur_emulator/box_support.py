@@ -159,7 +159,7 @@ def bare_access(software, controller, commands):
         announce=lambda event: None,
         report=report,
     )
-    return BoxAccess(BoxIdentity(software, "UR3", "20993000007"), box, None, None)
+    return BoxAccess(BoxIdentity(software, "UR3", "UR3", "20993000007"), box, None, None)
 
 
 def connect(box, port):

@@ -141,10 +141,38 @@ CASES = {
     ("saveLog", "ok"): ([], "saveLog", "Log saved to disk"),
     ("saveLog", "failed"): ([no_place_for_the_log], "saveLog", "Failed to execute: saveLog"),
 }
+# What a UR5e answers to commands that CB3 has not, or in another way: the line, the reply.
+E_SERIES_CASES = {
+    "PolyscopeVersion": r"URSoftware 5\.15\.0\.126572 \(Oct 01 2023\)",
+    "version": r"5\.15\.0\.126572",
+    "get robot model": "UR5",
+    "get serial number": "20991000007",
+    "get operational mode": "NONE",
+    "set operational mode automatic": "Failed setting operational mode: automatic",
+    "clear operational mode": r"No longer controlling the operational mode\. Current operational mode: 'NONE'\.",
+    "is in remote control": "true",
+    "safetystatus": "Safetystatus: NORMAL",
+    "load wait.urp": "Loading program: /programs/wait.urp, /programs/default.installation",
+    "load nothing.urp": "File not found: nothing.urp",
+}
+
+
+@pytest.mark.parametrize(("line", "expected"), E_SERIES_CASES.items())
+def test_reply_of_a_ur5e(folder, line, expected):
+    with (
+        ControlBox(
+            robot="ur5e", version="5.15.0", pace="lockstep", port_base=None, seed=7, programs=folder
+        ) as box,
+        Dashboard(box) as dashboard,
+    ):
+        assert re.fullmatch(expected, dashboard.ask(line))
 
 
 def test_every_reply_has_a_case():
-    assert set(CASES) == {(row.name, key) for row in COMMANDS for key in row.replies}
+    assert set(CASES) == {(row.name, key) for row in COMMANDS if row.since.cb3 for key in row.replies}
+    known = commands_of(SoftwareVersion(5, 15))
+    asked = {match_command(line, known)[0].name for line in E_SERIES_CASES}
+    assert asked >= {row.name for row in COMMANDS if row.since.cb3 is None}
 
 
 @pytest.mark.parametrize(("before", "line", "expected"), CASES.values(), ids=map(" ".join, CASES))
@@ -274,8 +302,14 @@ def test_a_client_reads_what_another_has_done(box, dashboard):
 # --- versions
 
 
-@pytest.mark.parametrize("version", ["3.0", "3.1", "3.2", "3.7", "3.11", "3.12", "3.13", "3.15.8"])
-def test_older_software_knows_fewer_commands(folder, version):
+@pytest.mark.parametrize(
+    ("robot", "version"),
+    [
+        *(("ur3", version) for version in ("3.0", "3.1", "3.2", "3.7", "3.11", "3.12", "3.13", "3.15.8")),
+        *(("ur5e", version) for version in ("5.0", "5.6", "5.9.4", "5.13")),
+    ],
+)
+def test_each_software_knows_its_commands_and_no_others(folder, robot, version):
     software = SoftwareVersion.parse(version)
     lines = [
         f"{row.name} x" if row.argument else row.name
@@ -283,7 +317,7 @@ def test_older_software_knows_fewer_commands(folder, version):
         if row.name not in ("quit", "shutdown")
     ]
     with (
-        ControlBox(version=version, pace="lockstep", port_base=None, programs=folder) as box,
+        ControlBox(robot=robot, version=version, pace="lockstep", port_base=None, programs=folder) as box,
         Dashboard(box) as dashboard,
     ):
         unknown = [
@@ -292,7 +326,7 @@ def test_older_software_knows_fewer_commands(folder, version):
             if "understand" in reply
         ]
     assert unknown == [line for line in lines if match_command(line, commands_of(software)) is None]
-    assert bool(unknown) is (software < (3, 13))
+    assert unknown
 
 
 def test_software_up_to_3_2_answers_load_before_it_is_done(folder):

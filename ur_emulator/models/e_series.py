@@ -18,7 +18,15 @@ from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 _BUILDS: Builds = (
     (SoftwareVersion(5, 0), 101000, datetime(2018, 6, 1)),  # chosen
     (SoftwareVersion(5, 8), 10253, datetime(2020, 2, 11)),  # chosen
-    (SoftwareVersion(5, 24), 0, datetime(2025, 10, 4, 0, 25, 33)),  # date: UR client library's test bytes
+    (SoftwareVersion(5, 9), 1031110, datetime(2020, 10, 1)),  # build: program files of 5.9.1; date chosen
+    (SoftwareVersion(5, 11, 9), 1010452, datetime(2022, 1, 24)),  # a real robot's answer to PolyscopeVersion
+    (SoftwareVersion(5, 11, 11), 1010452, datetime(2022, 4, 11, 7, 48, 21)),  # date: capture
+    (SoftwareVersion(5, 12), 1101319, datetime(2022, 3, 22)),  # PolyscopeVersion
+    (SoftwareVersion(5, 12, 1), 1101497, datetime(2022, 6, 20)),  # log of a real robot
+    (SoftwareVersion(5, 12, 2), 1101497, datetime(2022, 6, 28, 11, 30, 43)),  # date: capture
+    (SoftwareVersion(5, 15), 126572, datetime(2023, 10, 1)),  # build: folder of URSim 5.15.0; date chosen
+    (SoftwareVersion(5, 22, 1), 1214860, datetime(2025, 6, 5)),  # PolyscopeVersion of a real UR12e
+    (SoftwareVersion(5, 24), 1214860, datetime(2025, 10, 4, 0, 25, 33)),  # date: UR client library's bytes
 )
 
 # Ends of the joint ranges [rad]. Source: configuration data of a UR5e capture, 2 pi + 3 degrees.

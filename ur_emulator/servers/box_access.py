@@ -29,12 +29,14 @@ class BoxIdentity:
 
     Attributes:
         software: four numbers and a date.
-        model: as people write it, "UR3".
+        model: as people write it, "UR5e".
+        wire_model: as the dashboard server writes it: "UR5" for a UR5e.
         serial_number: digits; see protocol.ur_types.simulated_serial.
     """
 
     software: Software
     model: str
+    wire_model: str
     serial_number: str
 
 

@@ -81,8 +81,14 @@ class DashboardAnswers:
             "PolyscopeVersion": lambda row, *_: row.reply(
                 version=str(access.identity.software.version), date=access.identity.software.day
             ),
+            "version": lambda row, *_: row.reply(version=str(access.identity.software.version)),
             "setUserRole": self._set_user_role,
             "getUserRole": lambda row, *_: row.reply(role=self._user_role),
+            # This box has neither: it takes every command, and nobody has set a mode.
+            "set operational mode": lambda row, mode, _: row.reply("failed", mode=mode),
+            "get operational mode": lambda row, *_: row.reply(mode="NONE"),
+            "clear operational mode": lambda row, *_: row.reply(mode="NONE"),
+            "is in remote control": lambda row, *_: row.reply(remote="true"),
             "power on": lambda row, *_: self._applied(row, PowerOn()),
             "power off": lambda row, *_: self._applied(row, PowerOff()),
             "brake release": lambda row, *_: self._applied(row, ReleaseBrakes()),
@@ -95,7 +101,7 @@ class DashboardAnswers:
             "load installation": self._load_installation,
             "restart safety": lambda row, *_: self._applied(row, RestartSafety()),
             "get serial number": lambda row, *_: row.reply(serial=access.identity.serial_number),
-            "get robot model": lambda row, *_: row.reply(model=access.identity.model),
+            "get robot model": lambda row, *_: row.reply(model=access.identity.wire_model),
             "generate flight report": self._flight_report,
             "generate support file": self._support_file,
             "saveLog": self._save_log,
@@ -135,16 +141,15 @@ class DashboardAnswers:
         loading = self._player.load_installation(name)
         return self._loaded(row, loading, name, lambda: _path_of(self._player.installation))
 
-    @staticmethod
     def _loaded(
-        row: DashboardCommand, loading: Steps[None], name: str, path: Callable[[], str]
+        self, row: DashboardCommand, loading: Steps[None], name: str, path: Callable[[], str]
     ) -> Steps[str]:
         """Answer when a file is loaded, or is not."""
         try:
             yield from loading
         except RefusedError as refusal:
             return row.reply("not_found" if isinstance(refusal, MissingFileRefusal) else "failed", name=name)
-        return row.reply(path=path())
+        return row.reply(path=path(), installation=_path_of(self._player.installation))
 
     def _done(self, row: DashboardCommand, action: Steps[None]) -> Steps[str]:
         """Answer when an action is done, or, in older software, when it has begun."""
