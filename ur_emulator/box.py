@@ -113,7 +113,7 @@ class Box(BoxOperations):
         if generation is not None:
             model = dataclasses.replace(model, generation=generation)
         self.generation = generation = model.generation
-        asked = generation.parse_version(model.default_software if version is None else version)
+        asked = model.software_version(version)
         software = generation.software(asked)
         imperfections = generation.fidelity(fidelity)
         named_pace = parse_pace(pace)

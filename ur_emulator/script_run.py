@@ -66,16 +66,17 @@ class ScriptBox:
             answers: what the operator answers, in order.
 
         Raises:
-            EmulatorError: there is no such arm or fidelity.
+            EmulatorError: there is no such arm or fidelity, or the arm needs newer software.
         """
         model = robot_by_name(robot)
+        version = model.software_version(f"{software[0]}.{software[1]}")
         self._loop = EventLoop()
         self._controller = Controller(
             model,
             model.generation.fidelity(fidelity),
             seed,
             partial(ProgramSlot, network=LoopNetwork(self._loop, model.generation.period_s, _raise)),
-            version=(software[0], software[1]),
+            version=(version.major, version.minor),
         )
         self._answers = deque(answers)
         self._start_tick = self._controller.snapshot.tick

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from math import pi, radians
+from math import radians
 
 from protocol.dashboard.commands import COMMANDS
 from protocol.primary.layout import SUB_PACKAGES
@@ -22,10 +22,6 @@ _BUILDS: Builds = (
     (SoftwareVersion(3, 15), 106339, datetime(2021, 11, 30)),  # 3.15.8; date of its manual, time chosen
 )
 
-# Ends of the joint ranges [rad]; safety blocks of real installations: +-363 degrees.
-RANGE_END = 2.0 * pi + radians(3.0)
-# Ends where the installation sets no position limit: the least and the greatest number of revolutions.
-FIRST_TURN, LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
 
 CB3 = RobotGeneration(
     name=Generation.CB3.value,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import datetime
-from math import pi, radians
+from math import radians
 
 from protocol.dashboard.commands import COMMANDS
 from protocol.primary.layout import SUB_PACKAGES
@@ -29,8 +29,6 @@ _BUILDS: Builds = (
     (SoftwareVersion(5, 24), 1214860, datetime(2025, 10, 4, 0, 25, 33)),  # date: UR client library's bytes
 )
 
-# Ends of the joint ranges [rad]. Source: configuration data of a UR5e capture, 2 pi + 3 degrees.
-RANGE_END = 2.0 * pi + radians(3.0)
 
 E_SERIES = RobotGeneration(
     name=Generation.E_SERIES.value,

@@ -14,9 +14,10 @@ from collections.abc import Sequence
 from math import cos, sin
 
 import mujoco
+import numpy as np
 
 from ur_emulator.errors import ModelError
-from ur_emulator.models.robot_model import DhRow, RobotModel, Vector3
+from ur_emulator.models.robot_model import DhRow, Link, RobotModel, Vector3
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 LINKS = tuple(f"link_{i}" for i in range(1, 7))
@@ -56,8 +57,11 @@ def arm_spec(robot: RobotModel, dh: Sequence[DhRow], mass_scale: Sequence[float]
         body.explicitinertial = True
         body.mass = link.mass * scale
         body.ipos = to_body(row, link.com)
-        body.iquat = _turn_x_then_z(row.alpha, 0.0)
-        body.inertia = [moment * scale for moment in link.inertia]
+        if any(link.products):
+            body.fullinertia = [scale * entry for entry in _body_tensor(row, link)]
+        else:
+            body.iquat = _turn_x_then_z(row.alpha, 0.0)
+            body.inertia = [moment * scale for moment in link.inertia]
         body.add_joint(name=JOINTS[i], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
         parent, position, twist = body, (row.a, 0.0, row.d), row.alpha
     flange_turn = _turn_x_then_z(twist, 0.0)
@@ -73,6 +77,14 @@ def to_body(row: DhRow, point: Vector3) -> Vector3:
     x, y, z = point
     c, s = cos(row.alpha), sin(row.alpha)
     return (x + row.a, c * y - s * z, s * y + c * z + row.d)
+
+
+def _body_tensor(row: DhRow, link: Link) -> list[float]:
+    """Inertia tensor xx, yy, zz, xy, xz, yz of a link [kg m²], along the axes of its MuJoCo body."""
+    c, s = cos(row.alpha), sin(row.alpha)
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    tensor = turn @ np.array(link.tensor) @ turn.T
+    return [float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
 
 
 def _turn_x_then_z(about_x: float, about_z: float) -> tuple[float, float, float, float]:

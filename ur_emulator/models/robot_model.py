@@ -14,7 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ur_emulator.errors import ModelError
+
 if TYPE_CHECKING:
+    from protocol.ur_types import SoftwareVersion
     from ur_emulator.models.robot_generation import RobotGeneration
 
 Vector3 = tuple[float, float, float]
@@ -63,14 +66,22 @@ class Link:
     Attributes:
         mass: [kg].
         com: centre of mass in the link's DH frame [m].
-        inertia: principal moments about the centre of mass, along the axes of the DH frame [kg m²].
+        inertia: moments xx, yy, zz about the centre of mass, along the axes of the DH frame [kg m²].
         hull: capsules that stand for its shape in collisions.
+        products: of inertia xy, xz, yz, likewise; 0 where `inertia` has the principal moments [kg m²].
     """
 
     mass: float
     com: Vector3
     inertia: Vector3
     hull: tuple[Capsule, ...]
+    products: Vector3 = (0.0, 0.0, 0.0)
+
+    @property
+    def tensor(self) -> tuple[Vector3, Vector3, Vector3]:
+        """The rows of the inertia tensor [kg m²]."""
+        (xx, yy, zz), (xy, xz, yz) = self.inertia, self.products
+        return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,3 +156,15 @@ class RobotModel:
         usual = self.generation.default_version
         first = self.first_version or usual
         return max(usual, first, key=self.generation.parse_version)
+
+    def software_version(self, text: str | None) -> SoftwareVersion:
+        """Return the version of the software from its text; None is the usual one.
+
+        Raises:
+            ModelError: the text is no version of the generation, or an older one than the arm needs.
+        """
+        version = self.generation.parse_version(self.default_software if text is None else text)
+        first = self.first_version
+        if first is not None and version < self.generation.parse_version(first):
+            raise ModelError(f"version {text} given: a {self.title} needs {first} or newer")
+        return version

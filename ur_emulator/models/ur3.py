@@ -17,7 +17,8 @@ from __future__ import annotations
 
 from math import pi
 
-from ur_emulator.models.cb3 import CB3, FIRST_TURN, LAST_TURN, RANGE_END
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.joint_ranges import FIRST_TURN, LAST_TURN, RANGE_END
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
 
 UR3 = RobotModel(

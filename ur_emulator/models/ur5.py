@@ -18,7 +18,8 @@ from __future__ import annotations
 
 from math import pi
 
-from ur_emulator.models.cb3 import CB3, RANGE_END
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.joint_ranges import RANGE_END
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
 
 UR5 = RobotModel(

@@ -2,10 +2,8 @@
 
 Sources, cited by letter below:
  A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR5e table).
- B  UniversalRobots/Universal_Robots_ROS2_Description 3.1.0, config/ur5e: measured inertia tensors and joint
-    limits.
- C  Fits of the drive model to the logs of a real UR3e and a real UR10e, carried over by joint size (3, 3, 3,
-    1, 1, 1).
+ B  UniversalRobots/Universal_Robots_ROS2_Description 3.1.0, config/ur5e: measured inertia tensors.
+ C  Drives by joint size (3, 3, 3, 1, 1, 1), see `joint_sizes.py`.
  G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 """
 
@@ -13,7 +11,9 @@ from __future__ import annotations
 
 from math import pi
 
-from ur_emulator.models.e_series import E_SERIES, RANGE_END
+from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.joint_ranges import RANGE_END
+from ur_emulator.models.joint_sizes import SIZE_1, SIZE_3, drives
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
 
 UR5E = RobotModel(
@@ -35,30 +35,35 @@ UR5E = RobotModel(
             mass=3.761,
             com=(0.0, -0.02561, 0.00193),
             inertia=(0.0070021, 0.0064809, 0.0065729),
+            products=(0.0000007, -0.0000105, 0.0004999),
             hull=(Capsule((0.0, -0.01, 0.0), (0.0, 0.0, 0.05), 0.065),),
         ),
         Link(  # upper arm: from the elbow (origin) back to the shoulder along +x
             mass=8.058,
             com=(0.2125, 0.0, 0.11336),
             inertia=(0.0150589, 0.333881, 0.332472),
+            products=(-0.000054, 0.0000056, -0.0000018),
             hull=(Capsule((0.0, 0.0, 0.136), (0.425, 0.0, 0.136), 0.06),),
         ),
         Link(  # forearm: from wrist 1 (origin) back to the elbow along +x
             mass=2.846,
             com=(0.15, 0.0, 0.0265),
             inertia=(0.0039963, 0.0787925, 0.0784851),
+            products=(-0.0000137, 0.0013727, -0.0000066),
             hull=(Capsule((0.0, 0.0, 0.0165), (0.3922, 0.0, 0.0165), 0.048),),
         ),
         Link(  # wrist 1: from the forearm along +y to the axis of wrist 2
             mass=1.37,
             com=(0.0, -0.0018, 0.01634),
             inertia=(0.0016549, 0.0013596, 0.0012628),
+            products=(-0.0000028, -0.0000044, 0.0001016),
             hull=(Capsule((0.0, -0.04, 0.0), (0.0, 0.005, 0.0), 0.04),),
         ),
         Link(  # wrist 2: from wrist 1 along -y to the axis of wrist 3
             mass=1.3,
             com=(0.0, 0.0018, 0.01634),
             inertia=(0.0013562, 0.0012783, 0.0009661),
+            products=(-0.0000027, 0.0000044, -0.0000505),
             hull=(Capsule((0.0, 0.04, 0.0), (0.0, -0.005, 0.0), 0.04),),
         ),
         Link(  # wrist 3 with the tool flange at the origin, facing +z
@@ -69,25 +74,17 @@ UR5E = RobotModel(
         ),
     ),
     base_hull=(Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.01), 0.075),),
-    tau_max=(150.0, 150.0, 150.0, 28.0, 28.0, 28.0),  # B
     qd_max=(pi,) * 6,  # B: 180 deg/s
     q_min=(-RANGE_END,) * 6,  # capture of a UR5e
     q_max=(RANGE_END,) * 6,
-    armature=(1.93, 1.93, 1.93, 0.212, 0.212, 0.212),  # C
-    viscous=(12.0, 12.0, 12.0, 2.1, 2.1, 2.1),  # C
-    coulomb=(6.4, 6.4, 6.4, 1.5, 1.5, 1.5),  # C
-    coulomb_standstill=0.33,  # as for the UR5
-    coulomb_speed=0.08,
-    torque_constant=(9.839, 9.839, 9.839, 7.571, 7.571, 7.571),  # C
+    **drives(SIZE_3, SIZE_3, SIZE_3, SIZE_1, SIZE_1, SIZE_1),  # C
     stop_deceleration=13.0,  # as for the UR5
-    servo_frequency=12.0,  # assumed, as for the UR3
-    servo_damping=0.9,
     # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(2.9, 3.7, 2.6, 0.23, 0.22, 0.212),
+    servo_inertia=(3, 3.88, 2.73, 0.235, 0.217, 0.212),
     payload_max=5.0,  # UR5e data sheet
     reach=0.85,
     robot_type=1,  # client interface sheet, configuration data
     box_type=4,
     # Elbow up, tool forward and 45 degrees down, flange at about (.55, 0, .35) m.
-    home_q=(0.2238, -1.7062, -1.8784, -0.3550, 1.4132, 1.7304),
+    home_q=(0.2817, -1.7391, -2.0296, -0.1784, 1.3730, 1.7726),
 )
