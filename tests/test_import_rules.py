@@ -198,7 +198,7 @@ def test_effects_stay_at_the_rim(package):
                 "mcap",
                 "asyncio",
                 "pydantic",
-                "ur_emulator.control.http_port",
+                "ur_emulator.servers.http.port",
             },
         ),
         ("pc_client.experiment.runner", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),

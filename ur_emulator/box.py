@@ -188,10 +188,11 @@ class Box(BoxOperations):
         self._operations = OperationRunner(self._loop, context)
         self._wanted_control_port = control_port
         if control_port is not None:
-            from ur_emulator.control.http_port import HttpPort
-            from ur_emulator.control.http_request import Gate
+            from ur_emulator.control.http_answers import ControlAnswers
+            from ur_emulator.servers.http.port import HttpPort
 
-            ports[CONTROL] = HttpPort(self._access, self._operations, Gate(host, control_token))
+            answers = ControlAnswers(self._operations, host, control_token)
+            ports[CONTROL] = HttpPort(self._access, answers)
         self._port_set = PortSet(self._loop, host, self._box, ports)
         self.is_shut_down = False
         self.failure: Exception | None = None

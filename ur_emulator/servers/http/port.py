@@ -1,8 +1,8 @@
-"""The control API over HTTP: `GET /v1/state`, `POST /v1/push` with a JSON object, and so on.
+"""A port that speaks HTTP: reads requests, and sends what `answers` has to say.
 
-h11 knows HTTP/1.1, `http_request` what a request asks for, `runner` does it. The requests of a client are
-answered in order, one after the other. Everything is bounded: header, body, an answer, and the number of
-clients: the one that has been silent longest is closed for a new one.
+h11 knows HTTP/1.1. The requests of a client are answered in order, one after the other. Everything is
+bounded: header, body, an answer, and the number of clients: the one that has been silent longest is closed
+for a new one.
 """
 
 from __future__ import annotations
@@ -10,25 +10,22 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, fields, is_dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import h11
 
 from ur_emulator.box_log import LogEntry
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.control.http_request import (
-    JSON,
-    LIST,
-    MAX_HEADER,
-    Gate,
-    HttpError,
-    check_head,
-    parse_request,
-)
-from ur_emulator.control.operations import describe
-from ur_emulator.control.runner import OperationRunner
-from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError
+from ur_emulator.errors import NotRunningError
 from ur_emulator.servers.box_access import BoxAccess
+from ur_emulator.servers.http.messages import (
+    JSON,
+    MAX_HEADER,
+    HttpAnswer,
+    HttpError,
+    HttpRequest,
+    check_head,
+)
 from ur_emulator.servers.session import Session
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
@@ -37,19 +34,29 @@ from ur_emulator.servers.tcp.connection import Connection
 _PIECE_COST = 4
 
 
+class Answers(Protocol):
+    """What a port has to say."""
+
+    def answer(self, request: HttpRequest, connection: Connection) -> Steps[HttpAnswer]:
+        """Do what a request asks for.
+
+        Raises:
+            HttpError: it is answered with this error.
+        """
+        ...
+
+
 class HttpPort:
     """Answers HTTP requests.
 
     Args:
         access: to the box.
-        runner: does the operations.
-        gate: decides whose requests are answered.
+        answers: to requests.
     """
 
-    def __init__(self, access: BoxAccess, runner: OperationRunner, gate: Gate) -> None:
+    def __init__(self, access: BoxAccess, answers: Answers) -> None:
         self._access = access
-        self._runner = runner
-        self._gate = gate
+        self._answers = answers
         # The one that has been silent longest first.
         self._sessions: dict[Connection, _HttpSession] = {}
 
@@ -59,7 +66,7 @@ class HttpPort:
             idle = [other for other, session in self._sessions.items() if not session.is_busy]
             (idle or list(self._sessions))[0].close()
         self._sessions[connection] = _HttpSession(
-            connection, self._access, self._runner, self._gate, self._is_not_silent
+            connection, self._access, self._answers, self._is_not_silent
         )
         connection.allow_half_close(self.ended)
 
@@ -91,13 +98,11 @@ class _HttpSession(Session):
         self,
         connection: Connection,
         access: BoxAccess,
-        runner: OperationRunner,
-        gate: Gate,
+        answers: Answers,
         on_request: Callable[[Connection], None],
     ) -> None:
         super().__init__(connection, access)
-        self._runner = runner
-        self._gate = gate
+        self._answers = answers
         self._on_request = on_request
         self.http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEADER)
         self._request: h11.Request | None = None
@@ -150,34 +155,18 @@ class _HttpSession(Session):
         """Do what a request asks for, and answer it."""
         assert self._request is not None
         try:
-            name, arguments = parse_request(self._request, body, self._gate)
+            answer = yield from self._answers.answer(HttpRequest.of(self._request, body), self.connection)
         except HttpError as error:
-            self._finish(error.status, {"error": str(error)}, *error.headers)
-            return
-        if name == LIST:
-            self._finish(200, {"operations": describe()})
-            return
-        steps = self._runner.steps(name, arguments)
-        try:
-            while True:
-                next(steps)
-                if self.connection.has_ended and name == "wait_until":
-                    self.connection.close()  # it may have gone, and the wait may take an hour
-                if not self.connection.is_open:
-                    return
-                yield
-        except StopIteration as end:
-            self._finish(200, end.value)
-        except EmulatorError as error:
-            self._finish(_status_of(error), {"error": str(error)})
+            answer = HttpAnswer(error.status, {"error": str(error)}, error.headers)
+        self._finish(answer)
 
     # --- answers
 
-    def _finish(self, status: int, result: Any, *more: tuple[str, str]) -> None:
+    def _finish(self, answer: HttpAnswer) -> None:
         """Send an answer; then the next request may be read."""
         if not self.connection.is_open:
             return
-        self._respond(status, result, *more)
+        self._respond(answer)
         if self.http.our_state is h11.MUST_CLOSE:
             self.connection.close_when_sent()
         elif self.http.our_state is h11.DONE and self.http.their_state is h11.DONE:
@@ -187,19 +176,19 @@ class _HttpSession(Session):
     def _reject(self, status: int, text: str) -> None:
         """Answer with an error after which nothing more can be read, and close."""
         if self.http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            self._respond(status, {"error": " ".join(text.split())}, ("Connection", "close"))
+            self._respond(HttpAnswer(status, {"error": " ".join(text.split())}, (("Connection", "close"),)))
         self.connection.close_when_sent()
 
-    def _respond(self, status: int, result: Any, *more: tuple[str, str]) -> None:
-        body = json.dumps(result, default=_as_json).encode() + b"\n"
+    def _respond(self, answer: HttpAnswer) -> None:
+        body = json.dumps(answer.result, default=_as_json).encode() + b"\n"
         headers = [
             ("Content-Type", JSON),
             ("Content-Length", str(len(body))),
             ("Cache-Control", "no-store"),
             ("X-Content-Type-Options", "nosniff"),
-            *more,
+            *answer.headers,
         ]
-        events: list[h11.Event] = [h11.Response(status_code=status, headers=headers)]
+        events: list[h11.Event] = [h11.Response(status_code=answer.status, headers=headers)]
         if self._request is None or self._request.method != b"HEAD":
             events.append(h11.Data(data=body))
         self._send(*events, h11.EndOfMessage())
@@ -212,14 +201,6 @@ class _HttpSession(Session):
 
 
 _LOG_FIELDS = tuple(field.name for field in fields(LogEntry))
-
-
-def _status_of(error: EmulatorError) -> int:
-    if isinstance(error, ArgumentError):
-        return 400
-    if isinstance(error, RefusedError):
-        return 409
-    return 503 if isinstance(error, NotRunningError) else 500
 
 
 def _as_json(value: Any) -> Any:
