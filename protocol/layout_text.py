@@ -80,7 +80,7 @@ def _describe_fields(record: type[Any], version: SoftwareVersion) -> Iterator[st
 
 
 _TYPE_NAMES = {
-    "?": "bool", "b": "i8", "B": "u8", "i": "i32", "I": "u32", "Q": "u64", "f": "f32", "d": "f64",
+    "?": "bool", "b": "i8", "B": "u8", "H": "u16", "i": "i32", "I": "u32", "Q": "u64", "f": "f32", "d": "f64",
     "p": "u8+text", "t": "i32+text", "s": "text", "*": "records",
 }  # fmt: skip
 

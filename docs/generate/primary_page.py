@@ -10,17 +10,22 @@ from protocol.capture import StreamDecoder
 from protocol.layout_text import type_name
 from protocol.primary.layout import SUB_PACKAGES
 from protocol.primary.messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
-from protocol.primary.packages import SECONDARY_MESSAGES, encode_message_package
+from protocol.primary.packages import SECONDARY_MESSAGES, SafetyTolerances, encode_message_package
 from protocol.primary.state import state_size
 from protocol.primary.values import value_codes
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import ALWAYS, WireField, wire_fields
 
 _V3_15 = SoftwareVersion(3, 15, 8)
+_V5_12 = SoftwareVersion(5, 12)
 # The first software of each size of a state.
 _SIZES = tuple(
-    SoftwareVersion(*pair)
-    for pair in ((3, 0), (3, 1), (3, 2), (3, 3), (3, 5), (3, 10), (5, 0), (5, 1), (5, 4))
+    SoftwareVersion(*numbers)
+    for numbers in (
+        *((3, minor) for minor in (0, 1, 2, 3, 5, 10)),
+        *((5, minor) for minor in (0, 1, 4, 9)),
+        (5, 25, 1),
+    )
 )
 
 _INTRODUCTION = """\
@@ -41,16 +46,16 @@ unknown types.
 
 ## On connection
 
-| | package | bytes in 3.15 | from |
+| | package | bytes in 3.15 | in 5.12 |
 |---|---|---|---|
-| 1 | version message, a segment of its own: some clients read only once | {version} | |
-| 2 | startup message, undocumented | 24 | |
-| 3 | safety tolerances, undocumented: type 24, 22 floats | 181 | 3.10 |
-| 4 | the first state, with kinematics and configuration | {first} | |
-| 5 | 30001 and 30011: names and values of the running program's global variables | from 16 on | |
+| 1 | version message, a segment of its own: some clients read only once | {version} | {version} |
+| 2 | startup message, undocumented | 24 | 24 |
+| 3 | safety tolerances, undocumented: type 24, 22 floats; from 3.10 on, not from {until} on | 181 | - |
+| 4 | the first state, with kinematics and configuration | {first} | {first_e} |
+| 5 | 30001 and 30011: names and values of the running program's global variables | from 16 on | from 16 on |
 
-The following states have no kinematics and configuration ({later} bytes). These two come again in
-the first state after the brakes have opened.
+The following states have no kinematics and configuration ({later} bytes, in 5.12 {later_e}). These
+two come again in the first state after the brakes have opened.
 """
 
 _MESSAGES = """\
@@ -111,7 +116,12 @@ def render() -> str:
     """Return the page."""
     greeting = encode_message_package(version_message(_V3_15), _V3_15)
     introduction = _INTRODUCTION.format(
-        version=len(greeting), first=state_size(_V3_15, first=True), later=state_size(_V3_15, first=False)
+        version=len(greeting),
+        until=f"{SafetyTolerances.UNTIL.major}.{SafetyTolerances.UNTIL.minor}",
+        first=state_size(_V3_15, first=True),
+        later=state_size(_V3_15, first=False),
+        first_e=state_size(_V5_12, first=True),
+        later_e=state_size(_V5_12, first=False),
     )
     decoded = StreamDecoder(_V3_15).feed(greeting)
     messages = _MESSAGES.format(
@@ -145,7 +155,7 @@ def render() -> str:
 
 def _size_row(version: SoftwareVersion) -> tuple[object, ...]:
     first, later = state_size(version, first=True), state_size(version, first=False)
-    return f"{version.major}.{version.minor}", first, later
+    return str(version).removesuffix(".0"), first, later
 
 
 def _sub_packages() -> Iterator[str]:

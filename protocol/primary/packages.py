@@ -4,7 +4,7 @@ A new connection gets the version message (its own segment: some clients read it
 then the startup message, then states at 10 Hz; the first state holds all sub-packages. On the secondary
 port only the messages in `SECONDARY_MESSAGES` are sent. A reader gets unknown packages as they are.
 
-Sources: UR "Primary/Secondary Client Interface" (2021); captures of 3.3, 3.10, 5.4 and 5.8.
+Sources: UR "Primary/Secondary Client Interface" (2021); captures of 3.3, 3.10, 5.4, 5.8 and 5.11.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ __all__ = [
     "decode_package",
     "encode_message_package",
     "encode_safety_tolerances",
+    "sends_safety_tolerances",
 ]
 
 SECONDARY_MESSAGES: tuple[type[RobotMessage], ...] = (VersionMessage, StartupMessage)
@@ -73,9 +74,11 @@ class SafetyTolerances:
 
     Attributes:
         SINCE: the first software seen to send it. Source: captures of 3.3 (absent) and 3.10 (present).
+        UNTIL: the first software that no longer sends it. Source: captures of 5.4 (present), 5.11 (absent).
     """
 
     SINCE: ClassVar[Since] = since((3, 10))
+    UNTIL: ClassVar[SoftwareVersion] = SoftwareVersion(5, 11)
 
     values: tuple[float, ...] = _SAFETY_TOLERANCES
 
@@ -92,6 +95,11 @@ Package: TypeAlias = RobotState | RobotMessage | ProgramStateMessage | SafetyTol
 
 
 # --- sending ---
+
+
+def sends_safety_tolerances(version: SoftwareVersion) -> bool:
+    """Whether software `version` sends `SafetyTolerances` to new clients."""
+    return SafetyTolerances.SINCE.covers(version) and version < SafetyTolerances.UNTIL
 
 
 def encode_message_package(message: RobotMessage, version: SoftwareVersion) -> bytes:

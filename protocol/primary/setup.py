@@ -9,17 +9,19 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from protocol.primary.framing import SubPackage
-from protocol.ur_types import SIMULATED_MASTERBOARD, SIMULATOR_CHECKSUM
+from protocol.ur_types import SIMULATED_MASTERBOARD, SIMULATOR_CHECKSUM, SoftwareVersion
 from protocol.wire_record import Since, ValueOrigin, since, wire
 
 __all__ = [
     "CalibrationData",
     "ConfigurationData",
     "KinematicsInfo",
+    "SingularityInfo",
     "ToolCommunicationInfo",
     "ToolModeInfo",
 ]
 
+_SINCE_5_25_1 = Since(None, SoftwareVersion(5, 25, 1))
 _PROPERTY, _CONSTANT, _ZERO = ValueOrigin.PROPERTY, ValueOrigin.CONSTANT, ValueOrigin.INTERNAL_ZERO
 
 
@@ -77,6 +79,16 @@ class ConfigurationData(SubPackage):
     controller_box_type: int = wire("i", "4 UR5, 5 UR10, 6 UR3", default=6, origin=_PROPERTY)
     robot_type: int = wire("i", "RobotType", default=3, origin=_PROPERTY)
     robot_sub_type: int = wire("i", "1 CB2, 2 CB3, 3 e-Series", default=2, origin=_PROPERTY)
+    box_series: int = wire(
+        "H",
+        "5 CB5, 7 CB7; early software writes 1 and 2 (URCL)",
+        default=5,
+        since=_SINCE_5_25_1,
+        origin=_CONSTANT,
+    )
+    tool_flange_type: int = wire(
+        "H", "1 and 2: versions of the flange", default=1, since=_SINCE_5_25_1, origin=_CONSTANT
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,3 +125,14 @@ class ToolModeInfo(SubPackage):
     output_mode: int = wire("B", "0 digital, 1 dual-pin power", origin=_CONSTANT)
     digital_output_mode0: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, origin=_CONSTANT)
     digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, origin=_CONSTANT)
+
+
+@dataclass(frozen=True, slots=True)
+class SingularityInfo(SubPackage):
+    """Internal, e-Series. That 5.9 is the first software is inferred: a state of 5.8 does not have it."""
+
+    SUB_TYPE: ClassVar[int] = 13
+    SINCE: ClassVar[Since] = since(None, (5, 9))
+
+    severity: int = wire("B", origin=_ZERO)
+    singularity_type: int = wire("B", origin=_ZERO)

@@ -44,6 +44,21 @@ MESSAGES = [
      M.VersionMessage(major=3, minor=10, build_date="03-05-2019, 06:39:00"),
      f"00000037 14 {NO_TIME_HEX} fe 03 09 {b'URControl'.hex()} 03 0a 00000000 00000000 "
      f"{b'03-05-2019, 06:39:00'.hex()}"),
+    ("5.24",
+     M.VersionMessage(timestamp=0, major=5, minor=24, build_date="04-10-2025, 00:25:33"),
+     f"00000037 14 {'00' * 8} fe 03 09 {b'URControl'.hex()} 05 18 00000000 00000000 "
+     f"{b'04-10-2025, 00:25:33'.hex()}"),
+    ("5.24",
+     M.KeyMessage(timestamp=0, source=-2, title="PROGRAM_XXX_STARTED", text="textmsg"),
+     f"00000032 14 {'00' * 8} fe 07 00000000 00000000 13 {b'PROGRAM_XXX_STARTED'.hex()} {b'textmsg'.hex()}"),
+    ("5.24", M.ErrorCodeMessage(source=7, code=210, report_level=2, data_type=2, data=1, text="C210A0"),
+     f"00000029 14 {NO_TIME_HEX} 07 06 000000d2 00000000 00000002 00000002 00000001 {b'C210A0'.hex()}"),
+    ("5.24", M.SafetyModeMessage(source=7, safety_mode=13, data_type=4),
+     f"00000020 14 {NO_TIME_HEX} 07 05 00000000 00000000 0d 00000004 00000000"),
+    ("5.24", M.PopupMessage(request_id=1, is_error=True, title="T", text="text"),
+     f"00000020 14 {NO_TIME_HEX} fd 02 00000001 00000008 00 01 00 01 54 {b'text'.hex()}"),
+    ("5.0.5", M.RuntimeExceptionMessage(timestamp=0, line=3, column=1, text="compile_error_name_not_found:txtmsg:"),
+     f"0000003b 14 {'00' * 8} fd 0a 00000003 00000001 {b'compile_error_name_not_found:txtmsg:'.hex()}"),
     ("3.15.8",
      M.KeyMessage(timestamp=0, source=-2, title="PROGRAM_XXX_STARTED", text="textmsg"),
      f"00000032 14 {'00' * 8} fe 07 00000000 00000000 13 {b'PROGRAM_XXX_STARTED'.hex()} {b'textmsg'.hex()}"),
@@ -155,7 +170,8 @@ def test_values_that_do_not_fit_are_named(message, problem):
 TOTALS = [
     ("3.0", 1247, 577), ("3.1", 1295, 625), ("3.3", 1306, 636), ("3.4.5", 1306, 636), ("3.5", 1350, 680),
     ("3.9.1", 1350, 680), ("3.14.3", 1352, 682), ("3.15.8", 1352, 682), ("5.0.5", 1376, 706),
-    ("5.1", 1384, 714), ("5.3", 1384, 714), ("5.8", 1386, 716),
+    ("5.1", 1384, 714), ("5.3", 1384, 714), ("5.8", 1386, 716), ("5.9.4", 1393, 723), ("5.24", 1393, 723),
+    ("5.25", 1393, 723), ("5.25.1", 1397, 723),
 ]  # fmt: skip
 
 
@@ -216,6 +232,29 @@ def test_order_and_sizes_on_the_wire_in_3_15():
     assert seen == [
         (0, 47), (1, 251), (4, 101), (5, 225), (9, 53), (3, 75), (2, 37), (6, 445), (7, 61), (8, 9), (10, 43),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("version", "more"),
+    [("5.0.5", [(11, 26)]), ("5.8", [(11, 26), (12, 8)]), ("5.12", [(11, 26), (12, 8), (13, 7)])],
+)
+def test_order_and_sizes_on_the_wire_of_an_e_series(version, more):
+    version = SoftwareVersion.parse(version)
+    data = S.encode_state([record() for record in L.SUB_PACKAGES], version)
+    seen = [(sub_type, len(body) + 5) for sub_type, body in S.split_state(data[5:])]
+    board, info = (75, 9) if version >= SoftwareVersion(5, 4) else (74, 8)
+    assert seen == [
+        (0, 47), (1, 251), (4, 101), (5, 225), (9, 53), (3, board), (2, 37), (6, 445), (7, 61), (8, info), (10, 43),
+        *more,
+    ]  # fmt: skip
+
+
+def test_configuration_grows_with_5_25_1():
+    record = U.ConfigurationData(box_series=7, tool_flange_type=2)
+    for version, end in (("5.25", ""), ("5.25.1", "0007 0002")):
+        data = S.encode_sub_package(U.ConfigurationData, record, SoftwareVersion.parse(version))
+        assert data[445:] == bytes.fromhex(end)
+    assert S.decode_sub_package(6, data[5:]) == record
 
 
 def test_robot_mode_data_byte_by_byte():
@@ -311,11 +350,11 @@ def test_records_may_be_mappings_or_any_object():
 
 def test_a_reader_skips_what_newer_software_appends():
     record = distinct(U.ConfigurationData)
-    data = S.encode_sub_package(U.ConfigurationData, record, V3_15)
+    data = S.encode_sub_package(U.ConfigurationData, record, SoftwareVersion(5, 25, 1))
     assert S.decode_sub_package(6, data[5:] + b"\x00\x01\x00\x02") == record
-    body = F.encode_package(13, b"\x01\x02") + S.encode_sub_package(L.ForceModeData, L.ForceModeData(), V3_15)
+    body = F.encode_package(14, b"\x01\x02") + S.encode_sub_package(L.ForceModeData, L.ForceModeData(), V3_15)
     (state,) = read(F.encode_package(16, body))
-    assert state.sub_packages == (S.UnknownSubPackage(13, b"\x01\x02"), L.ForceModeData())
+    assert state.sub_packages == (S.UnknownSubPackage(14, b"\x01\x02"), L.ForceModeData())
     assert state.find(L.ForceModeData) == L.ForceModeData()
     assert state.find(L.JointData) is None
 

@@ -29,6 +29,7 @@ from ur_emulator.controller import events
 from ur_emulator.controller.safety.limit_checks import most_loaded_joint
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.e_series import E_SERIES
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.servers.primary.event_messages import message_for
 from ur_emulator.servers.primary.port import PrimaryPort
@@ -36,7 +37,10 @@ from ur_emulator.servers.primary.robot_state import StateEncoder, dexterity, set
 from ur_emulator.servers.programs.words import SPEED_WORD, WORDS
 
 V3_15 = SoftwareVersion(3, 15, 8)
-VERSIONS = [SoftwareVersion(3, minor) for minor in range(16)]
+E_SERIES_VERSIONS = [
+    SoftwareVersion.parse(text) for text in ("5.0.5", "5.3", "5.8", "5.9.4", "5.12", "5.25.1")
+]
+VERSIONS = [*(SoftwareVersion(3, minor) for minor in range(16)), *E_SERIES_VERSIONS]
 
 
 class Client:
@@ -65,12 +69,14 @@ class PortBench(Bench):
     """A controller with its four primary and secondary ports; `intake` notes what would be run."""
 
     def __init__(self, version=V3_15, **kwargs):
-        super().__init__(**kwargs)
+        robot, generation = ("ur3", CB3) if version.major == 3 else ("ur5e", E_SERIES)
+        super().__init__(robot=robot, generation=generation, **kwargs)
         self.version = version
         self.taken = []
-        states = StateEncoder(CB3.software(version), self.controller.state.arm)
+        software = generation.software(version)
+        states = StateEncoder(software, self.controller.state.arm)
         self.primary, self.secondary, self.primary_ro, self.secondary_ro = self.ports = [
-            PrimaryPort(CB3.software(version), self.controller, intake, states, all_messages=every)
+            PrimaryPort(software, self.controller, intake, states, all_messages=every)
             for intake in (self, None)
             for every in (True, False)
         ]
@@ -106,7 +112,7 @@ def test_the_greeting_of_every_version(version):
         expected = [
             (M.VersionMessage, greeting_size(version)),
             (M.StartupMessage, 24),
-            *([(SafetyTolerances, 181)] if version >= SoftwareVersion(3, 10) else []),
+            *([(SafetyTolerances, 181)] if (3, 10) <= version < (5, 11) else []),
             (RobotState, state_size(version, first=True)),
         ]
         assert [(type(package), size) for package, size in packages[: len(expected)]] == expected
@@ -124,12 +130,14 @@ def test_the_box_marks_itself_in_every_version(version):
         assert state.find(U.ConfigurationData).masterboard_version == SIMULATED_MASTERBOARD
 
 
-@pytest.mark.parametrize("version", [SoftwareVersion(3, 0), SoftwareVersion(3, 4), V3_15], ids=str)
+@pytest.mark.parametrize(
+    "version", [SoftwareVersion(3, 0), SoftwareVersion(3, 4), V3_15, SoftwareVersion(5, 12)], ids=str
+)
 def test_ten_states_a_second_without_the_setup(version):
     bench = PortBench(version)
     client = Client(bench.secondary)
     client.take(version)
-    bench.tick(125)
+    bench.tick(bench.controller.generation.cycle_rate)
     states = client.take(version)
     assert len(states) == 10
     assert {size for _, size in states} == {state_size(version, first=False)}
@@ -268,7 +276,9 @@ def test_the_captured_dexterity_is_that_of_the_captured_pose():
     assert np.linalg.det(dh_jacobian(ur5e, q)) ** 2 == pytest.approx(0.0035351144, rel=1e-6)
 
 
-@pytest.mark.parametrize(("name", "robot_type", "box_type"), [("ur3", 3, 6), ("ur5", 1, 4), ("ur10", 2, 5)])
+@pytest.mark.parametrize(
+    ("name", "robot_type", "box_type"), [("ur3", 3, 6), ("ur5", 1, 4), ("ur10", 2, 5), ("ur5e", 1, 4)]
+)
 def test_configuration_is_that_of_the_model(name, robot_type, box_type):
     robot = robot_by_name(name)
     configuration = next(
@@ -276,7 +286,28 @@ def test_configuration_is_that_of_the_model(name, robot_type, box_type):
     )
     assert configuration.robot_type == robot_type
     assert configuration.controller_box_type == box_type
-    assert configuration.robot_sub_type == 2
+    assert configuration.robot_sub_type == robot.generation.robot_subtype == (3 if name.endswith("e") else 2)
     assert configuration.joint_max_speed == robot.qd_safety
     assert configuration.dh_a == tuple(row.a for row in robot.dh)
     assert configuration.dh_d == tuple(row.d for row in robot.dh)
+
+
+def test_configuration_of_a_ur5e_is_that_of_the_capture():
+    """The first state of the maker's 5.8 simulator, but for the mark of this box."""
+    bench = PortBench(SoftwareVersion(5, 8))
+    (state,) = (p for p, _ in Client(bench.primary).take(bench.version) if isinstance(p, RobotState))
+    assert len(state.sub_packages) == 13
+    assert state_size(bench.version, first=True) == 1386
+    told = state.find(U.ConfigurationData)
+    assert told.joint_max_limit == pytest.approx((6.3355451848,) * 6)
+    assert told.joint_min_limit == pytest.approx((-6.3355451848,) * 6)
+    assert told.joint_max_speed == pytest.approx((3.341592653589793,) * 6, rel=1e-15)
+    assert told.joint_max_acceleration == (40.0,) * 6
+    assert (told.v_joint_default, told.a_joint_default) == (1.0471975511965976, 1.3962634015954636)
+    assert (told.v_tool_default, told.a_tool_default, told.eq_radius) == (0.25, 1.2, 0.25)
+    assert told.dh_a == (0.0, -0.425, -0.3922, 0.0, 0.0, 0.0)
+    assert told.dh_d == (0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996)
+    assert told.dh_alpha == pytest.approx((1.570796327, 0.0, 0.0, 1.570796327, -1.570796327, 0.0))
+    assert told.dh_theta == (0.0,) * 6
+    assert (told.masterboard_version, told.controller_box_type) == (SIMULATED_MASTERBOARD, 4)
+    assert (told.robot_type, told.robot_sub_type) == (1, 3)

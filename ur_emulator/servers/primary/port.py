@@ -10,7 +10,11 @@ its threads stand in PolyScope's tree.
 from __future__ import annotations
 
 from protocol.primary.messages import RobotMessage, StartupMessage, version_message
-from protocol.primary.packages import SafetyTolerances, encode_message_package, encode_safety_tolerances
+from protocol.primary.packages import (
+    encode_message_package,
+    encode_safety_tolerances,
+    sends_safety_tolerances,
+)
 from protocol.ur_types import RobotMode
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, ProgramStarted, ProgramStopped
@@ -60,7 +64,7 @@ class PrimaryPort(ScriptPort):
         self._was_running = controller.snapshot.robot_mode == RobotMode.RUNNING
         self._greeting = encode_message_package(version_message(version, software.built), version)
         self._second_greeting = encode_message_package(StartupMessage(), version)
-        if SafetyTolerances.SINCE.covers(version):
+        if sends_safety_tolerances(version):
             self._second_greeting += encode_safety_tolerances()
 
     def opened(self, connection: Connection) -> None:

@@ -22,6 +22,7 @@ from protocol.primary.setup import (
     CalibrationData,
     ConfigurationData,
     KinematicsInfo,
+    SingularityInfo,
     ToolCommunicationInfo,
     ToolModeInfo,
 )
@@ -144,6 +145,7 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
         SafetyData(safety_checksum=checksum, elbow_sphere=(*snap.elbow_position, ELBOW_RADIUS)),
         ToolCommunicationInfo(),
         ToolModeInfo(),
+        SingularityInfo(),
     )
 
 
