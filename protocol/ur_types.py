@@ -89,9 +89,9 @@ class ControlMode(IntEnum):
 
 
 class SafetyMode(IntEnum):
-    """State of the safety system as CB3 software 3.15 numbers it.
+    """State of the safety system.
 
-    Source: UR primary/secondary client interface, masterboard data. Newer software adds 12 to 22.
+    Source: UR primary/secondary client interface, masterboard data; from 12 on UR client library, e-Series.
     """
 
     NORMAL = 1
@@ -105,6 +105,16 @@ class SafetyMode(IntEnum):
     FAULT = 9
     VALIDATE_JOINT_ID = 10
     UNDEFINED_SAFETY_MODE = 11
+    AUTOMATIC_MODE_SAFEGUARD_STOP = 12
+    SYSTEM_THREE_POSITION_ENABLING_STOP = 13
+    TP_THREE_POSITION_ENABLING_STOP = 14
+    IMMI_EMERGENCY_STOP = 15
+    IMMI_SAFEGUARD_STOP = 16
+    PROFISAFE_WAITING_FOR_PARAMETERS = 17
+    PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP = 18
+    PROFISAFE_SAFEGUARD_STOP = 19
+    PROFISAFE_EMERGENCY_STOP = 20
+    SAFETY_API_SAFEGUARD_STOP = 22
 
 
 class SafetyStatus(IntEnum):

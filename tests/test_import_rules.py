@@ -49,10 +49,10 @@ BOX_ORDER = (
 )
 CONTROLLER_ORDER = (
     {"events"},
-    {"clock", "operator", "program_requests", "programs", "robot_mode", "tool_settings"},
+    {"arm_in_space", "clock", "operator", "program_requests", "programs", "robot_mode", "tool_settings"},
     {"io"},
     {"safety"},
-    {"arm_in_space", "client_inputs", "electrics", "error_settings"},
+    {"client_inputs", "electrics", "error_settings"},
     {"snapshot"},
     {"past_cycles"},
     {"compliance"},

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
+from dataclasses import astuple
+from itertools import pairwise, permutations
+from math import degrees, inf
 from typing import NamedTuple
 
 from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.controller.robot_mode import JOINT_MODES, PASSING_TIME, TRANSITIONS
+from ur_emulator.controller.safety.enabling_device import ACTIVE, STOPPING, EnablingState
+from ur_emulator.controller.safety.enabling_device import TRANSITIONS as ENABLING_TRANSITIONS
+from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.controller.safety.modes import EVENTS, MODES, after, mode_of
+from ur_emulator.controller.safety.operational_mode import OPERATIONAL_MODES, ModeSource, OperationalMode
 from ur_emulator.controller.safety.status_bits import safety_status_bits
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.e_series import E_SERIES
 
 
 class ProgramTransition(NamedTuple):
@@ -60,7 +68,9 @@ Commands are those of `ur_emulator.commands`; `ControlBox.submit` takes them.
 
 Every mode but NORMAL has a cause: a button, an input, or an event that stays until it is reset.
 Several causes can be active at a time; the mode is that of the first one in this table.
-`safety_status` is the same number.
+`safety_status` gives its number, `safety_mode` too but for the modes from 12 on, which are
+SAFEGUARD_STOP there. Those and all that follows from an operational mode exist on e-Series boxes
+only.
 """
 
 _EVENTS = """
@@ -78,21 +88,37 @@ Each column has only the cause of the mode in its head; `.` means no change.
 """
 
 _SPEEDS = """
-### Reduced and recovery mode
+### Reduced, recovery and manual mode
 
-The joint speed limits are half the rated speeds in reduced mode and 30 °/s in recovery mode: the
-time on the path runs slower, and `speed_scaling` shows by how much. With
+The time on the path runs slower where a limit of the mode asks for it, and `speed_scaling` shows by
+how much. With
 `set_safety_mode_transition_hardness(0)`, the default, the arm slows down, and stops for the
-safeguard, with its full deceleration; with `(1)` it does so gently, within 0.25 s. A joint above
-its limit for more than 0.5 s causes a protective stop, C191. Recovery mode begins when the brakes
-open while a joint is out of its range, and ends when all joints are back.
+safeguard, with its full deceleration; with `(1)` it does so gently, within 0.25 s. What stays above
+a limit for more than 0.5 s causes a protective stop. Recovery mode begins when the brakes open while
+a joint is out of its range, and ends when all joints are back.
+"""
 
+_INPUTS = """
 ### Safety inputs
 
 Emergency stop and safeguard stop have dedicated inputs (EI, SI): `PressEmergencyStop`,
 `ReleaseEmergencyStop`, `SafeguardStop`. Pairs of configurable inputs can be set up with
-`AssignSafetyInput(pair, function)` as system emergency stop, reduced mode or safeguard reset; low
-is safe, one low channel is enough.
+`AssignSafetyInput(pair, function)`; low is safe, one low channel is enough. Functions on all boxes:
+{all}. On e-Series boxes also: {e_series}.
+"""
+
+_OPERATIONAL = """
+## Operational mode (e-Series)
+
+The first of these that has chosen a mode decides: {sources}. Without a choice the mode is NONE, as
+on a box without an operational-mode password. `set_operational_mode` is the pendant,
+`set operational mode` the dashboard, the selector a pair of configurable inputs (low automatic, high
+manual).
+"""
+
+_ENABLING = """
+A three-position enabling device is connected with `enabling_device`, or with a pair of configurable
+inputs (high: in its middle position). No safeguard reset ends its stop.
 """
 
 _ROBOT = """
@@ -173,6 +199,41 @@ def render() -> str:
             ),
         ),
         _SPEEDS,
+        *_table(
+            ("generation", "mode", "joints", "TCP and elbow", "force", "power", "momentum", "programs"),
+            _limit_rows(),
+        ),
+        _INPUTS.format(
+            all=", ".join(it.value for it in SafetyInput if not it.needs_operational_modes),
+            e_series=", ".join(it.value for it in SafetyInput if it.needs_operational_modes),
+        ),
+        _OPERATIONAL.format(sources=", ".join(source.name.lower() for source in ModeSource)).strip("\n"),
+        "",
+        *_diagram(_operational_edges()),
+        "",
+        *_table(
+            ("mode", "freedrive by people", "limits of manual mode", "enabling device", "its own safeguard"),
+            (
+                (mode.name, *("yes" if right else "no" for right in astuple(row)))
+                for mode, row in OPERATIONAL_MODES.items()
+            ),
+        ),
+        _ENABLING,
+        *_table(
+            ("state", "is", "stops in manual mode", "bit 11 of `safety_status_bits`"),
+            (
+                (
+                    state.name,
+                    state.value,
+                    "yes" if state in STOPPING else "no",
+                    int(state in ACTIVE),
+                )
+                for state in EnablingState
+            ),
+        ),
+        "",
+        *_diagram(_enabling_edges()),
+        "",
         _ROBOT.strip("\n"),
         "",
         *_diagram(_robot_edges()),
@@ -243,6 +304,34 @@ def _matrix() -> Iterator[str]:
             cells.append("." if then is mode else then.name)
         rows.append((event.value, *cells))
     return _table(("event", *(mode.name for mode in order)), rows)
+
+
+def _limit_rows() -> Iterator[tuple[str, ...]]:
+    """Give the limits of each mode that has some."""
+    for generation in (CB3, E_SERIES):
+        rules = generation.limits
+        rows = [
+            ("REDUCED", f"{rules.reduced_share:.0%} of the rated speeds", rules.reduced),
+            ("RECOVERY", f"{degrees(rules.recovery_speed):.0f} °/s", rules.recovery),
+        ]
+        if generation.has_operational_modes:
+            rows.append(("MANUAL", "", rules.manual))
+        for mode, joints, limits in rows:
+            runs = mode != "RECOVERY" or rules.has_programs_in_recovery
+            values = zip(astuple(limits), ("m/s", "N", "W", "kg m/s"), strict=True)
+            cells = ("" if value == inf else f"{value:g} {unit}" for value, unit in values)
+            yield generation.name, mode, joints, *cells, "yes" if runs else "no"
+
+
+def _operational_edges() -> Iterator[tuple[str, str, str]]:
+    for before, then in permutations(OperationalMode, 2):
+        yield before.name, then.name, "no choice" if then is OperationalMode.NONE else then.value
+
+
+def _enabling_edges() -> Iterator[tuple[str, str, str]]:
+    for (before, act), then in ENABLING_TRANSITIONS.items():
+        if before is not then:
+            yield before.name, then.name, act.value
 
 
 def _robot_edges() -> Iterator[tuple[str, str, str]]:

@@ -99,7 +99,7 @@ class RobotStatusBits(IntFlag):
 
 
 class SafetyStatusBits(IntFlag):
-    """Bits of `safety_status_bits`. Source: UR RTDE guide."""
+    """Bits of `safety_status_bits`. Source: UR RTDE guide; bit 11: UR client library, e-Series."""
 
     NORMAL_MODE = 1 << 0
     REDUCED_MODE = 1 << 1
@@ -112,3 +112,4 @@ class SafetyStatusBits(IntFlag):
     VIOLATION = 1 << 8
     FAULT = 1 << 9
     STOPPED_DUE_TO_SAFETY = 1 << 10
+    THREE_POSITION_ENABLING_INPUT_ACTIVE = 1 << 11

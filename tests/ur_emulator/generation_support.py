@@ -7,7 +7,7 @@ from protocol.dashboard.commands import COMMANDS
 from protocol.primary.layout import ForceModeData
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.robot_generation import RobotGeneration, SafetyLimits
+from ur_emulator.models.robot_generation import ArmLimits, RobotGeneration, SafetyLimits
 
 MISSING_BUILTIN = "popup"
 
@@ -18,7 +18,17 @@ SECOND = RobotGeneration(
     major=5,
     default_version="5.1.0",
     builds=((SoftwareVersion(5, 0), 77, datetime(2031, 2, 3)),),
-    limits=SafetyLimits(reduced_share=0.25, recovery_speed=0.1, speed_margin=0.1, acceleration=55.0),
+    limits=SafetyLimits(
+        reduced_share=0.25,
+        recovery_speed=0.1,
+        speed_margin=0.1,
+        acceleration=55.0,
+        reduced=ArmLimits(tool_speed=0.5),
+        recovery=ArmLimits(tool_speed=0.2, force=90.0, power=70.0, momentum=9.0),
+        manual=ArmLimits(tool_speed=0.3),
+        has_programs_in_recovery=False,
+    ),
+    has_operational_modes=True,
     fidelities=tuple(
         replace(it, dead_time=it.dead_time + 0.004, force_sigma=0.15)
         for it in CB3.fidelities

@@ -1,6 +1,7 @@
 """What the box decides by its generation, it reads from the record: a second record gives a second kind of box."""
 
 from dataclasses import fields, replace
+from functools import partial
 
 import pytest
 from box_support import Bench, FrameReader, MessageReader, connect
@@ -14,9 +15,10 @@ from protocol.rtde import messages as R
 from protocol.ur_types import SafetyMode
 from ur_emulator import ControlBox
 from ur_emulator.controller.safety.joint_limits import limits_of
-from ur_emulator.controller.safety.speed_scaling import allowed_speeds
+from ur_emulator.controller.safety.speed_scaling import ModeLimits, limits_of_mode
 from ur_emulator.errors import ArgumentError, EmulatorError
 from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.robot_generation import ArmLimits
 from ur_emulator.models.ur3 import UR3
 
 
@@ -91,5 +93,10 @@ def test_an_arm_is_as_good_as_one_of_its_fidelities():
 
 def test_reduced_and_recovery_mode_have_its_limits():
     robot = replace(UR3, generation=SECOND)
-    assert allowed_speeds(SafetyMode.REDUCED, limits_of(robot)) == tuple(0.25 * speed for speed in UR3.qd_max)
-    assert allowed_speeds(SafetyMode.RECOVERY, limits_of(robot)) == (0.1,) * 6
+    rules = SECOND.limits
+    of = partial(limits_of_mode, joints=limits_of(robot), rules=rules)
+    reduced = tuple(0.25 * speed for speed in UR3.qd_max)
+    assert of(SafetyMode.REDUCED, is_manual=False) == ModeLimits(reduced, rules.reduced)
+    assert of(SafetyMode.RECOVERY, is_manual=True) == ModeLimits((0.1,) * 6, rules.recovery)
+    assert of(SafetyMode.NORMAL, is_manual=True) == ModeLimits(robot.qd_safety, rules.manual)
+    assert of(SafetyMode.REDUCED, is_manual=True).arm == ArmLimits(tool_speed=0.3)

@@ -6,7 +6,7 @@ import pytest
 from states_support import ENDLESS, moving
 
 from docs.generate import states_page
-from protocol.ur_types import ProgramState, SafetyMode
+from protocol.ur_types import ProgramState, SafetyStatus
 from ur_emulator.commands.power import PowerOff
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
 from ur_emulator.commands.safety import (
@@ -77,6 +77,6 @@ def test_pauses_lead_to_paused(pause):
     assert transitions_of(pause) == [(P.PLAYING, P.PAUSING), (P.PAUSING, P.PAUSED)]
 
 
-def test_every_number_of_the_safety_mode_that_a_cb3_uses_is_on_the_page():
-    unused = {SafetyMode.VALIDATE_JOINT_ID, SafetyMode.UNDEFINED_SAFETY_MODE}
-    assert {row.mode for row in MODES} == set(SafetyMode) - unused
+def test_every_number_of_the_safety_status_is_on_the_page():
+    unused = {SafetyStatus.VALIDATE_JOINT_ID, SafetyStatus.UNDEFINED_SAFETY_MODE}
+    assert {row.mode for row in MODES} == set(SafetyStatus) - unused

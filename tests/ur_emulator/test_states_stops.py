@@ -31,12 +31,10 @@ from ur_emulator.commands.safety import (
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
 from ur_emulator.controller.safety.joint_limits import limits_of
-from ur_emulator.controller.safety.speed_scaling import (
-    TOLERANCE,
-    allowed_speeds,
-)
+from ur_emulator.controller.safety.speed_scaling import TOLERANCE, ModeLimits, limits_of_mode
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.robot_generation import UNLIMITED
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import SpeedJ
@@ -340,21 +338,23 @@ def test_a_fast_arm_is_within_the_limits_half_a_second_after_reduced_mode_began(
 def test_who_is_too_fast_for_too_long_is_stopped():
     bench = Bench(fidelity="ideal")
     bench.tick(1, REDUCE)
-    limiter = bench.controller.state.speed.limiter
-    fast = (0.0, 0.0, 3.0, 0.0, 0.0, 0.0)
-    found = [limiter.find_violation(fast, 0.008) for _ in range(70)]
+    limiter, plant = bench.controller.state.speed.limiter, bench.controller.plant.sense()
+    fast = plant._replace(actual_qd=(0.0, 0.0, 3.0, 0.0, 0.0, 0.0))
+    space = bench.now.space
+    found = [limiter.find_violation(fast, space, 0.008) for _ in range(70)]
     assert found[:60] == [None] * 60
     assert found[-1].error.code == 191
     assert "elbow at 3.000 rad/s" in found[-1].error.text
-    assert limiter.find_violation((0.0,) * 6, 0.008) is None
-    assert limiter.find_violation(fast, 0.008) is None
+    assert limiter.find_violation(plant, space, 0.008) is None
+    assert limiter.find_violation(fast, space, 0.008) is None
 
 
 def test_limits_of_the_modes():
     robot = robot_by_name("ur3")
-    assert allowed_speeds(SafetyMode.NORMAL, limits_of(robot)) is None
-    assert allowed_speeds(SafetyMode.REDUCED, limits_of(robot)) == tuple(0.5 * v for v in robot.qd_max)
-    assert allowed_speeds(SafetyMode.RECOVERY, limits_of(robot)) == (CB3.limits.recovery_speed,) * 6
+    of = partial(limits_of_mode, is_manual=False, joints=limits_of(robot), rules=CB3.limits)
+    assert of(SafetyMode.NORMAL) is None
+    assert of(SafetyMode.REDUCED) == ModeLimits(tuple(0.5 * v for v in robot.qd_max), UNLIMITED)
+    assert of(SafetyMode.RECOVERY) == ModeLimits((CB3.limits.recovery_speed,) * 6, UNLIMITED)
 
 
 def test_an_arm_that_wakes_up_out_of_range_is_in_recovery_until_it_is_back():
@@ -383,10 +383,11 @@ def test_the_scale_of_an_arm_at_rest_is_that_of_the_slider():
     bench = Bench()
     bench.tick(1, REDUCE)
     limiter = bench.controller.state.speed.limiter
-    assert limiter.step(motion, 0.4, 0.008) == 0.4
-    assert limiter.step(motion, 0.0, 0.008) == 0.0
+    space = bench.now.space
+    assert limiter.step(motion, space, 0.4, 0.008) == 0.4
+    assert limiter.step(motion, space, 0.0, 0.008) == 0.0
     motion.command(SimpleNamespace(), SpeedJ((0.0,) * 6, 1.0))
-    assert limiter.step(motion, 1.0, 0.008) == 1.0
+    assert limiter.step(motion, space, 1.0, 0.008) == 1.0
 
 
 # --- the pendant and the start

@@ -18,10 +18,12 @@ from ur_emulator.controller.safety.modes import (
 )
 
 M, E = SafetyMode, SafetyEvent
-N, RD, RC, SG, PS, SE, RE, V, F = (
+N, RD, RC, EN, AS, SG, PS, SE, RE, V, F = (
     M.NORMAL,
     M.REDUCED,
     M.RECOVERY,
+    M.SYSTEM_THREE_POSITION_ENABLING_STOP,
+    M.AUTOMATIC_MODE_SAFEGUARD_STOP,
     M.SAFEGUARD_STOP,
     M.PROTECTIVE_STOP,
     M.SYSTEM_EMERGENCY_STOP,
@@ -30,25 +32,31 @@ N, RD, RC, SG, PS, SE, RE, V, F = (
     M.FAULT,
 )
 # From (columns) by event (rows) to; from a mode whose cause alone stands.
-FROM = (N, RD, RC, SG, PS, SE, RE, V, F)
+FROM = (N, RD, RC, EN, AS, SG, PS, SE, RE, V, F)
 EXPECTED = {
-    E.PROTECTIVE_STOP: (PS, PS, PS, PS, PS, SE, RE, V, F),
-    E.UNLOCK: (N, RD, RC, SG, N, SE, RE, V, F),
-    E.SAFEGUARD_OPENED: (SG, SG, SG, SG, PS, SE, RE, V, F),
-    E.SAFEGUARD_RESTORED: (N, RD, RC, N, PS, SE, RE, V, F),
-    E.ROBOT_EMERGENCY_PRESSED: (RE, RE, RE, RE, RE, RE, RE, V, F),
-    E.SYSTEM_EMERGENCY_PRESSED: (SE, SE, SE, SE, SE, SE, RE, V, F),
-    E.ROBOT_EMERGENCY_RELEASED: (N, RD, RC, SG, PS, SE, N, V, F),
-    E.SYSTEM_EMERGENCY_RELEASED: (N, RD, RC, SG, PS, N, RE, V, F),
-    E.REDUCED_ON: (RD, RD, RC, SG, PS, SE, RE, V, F),
-    E.REDUCED_OFF: (N, N, RC, SG, PS, SE, RE, V, F),
-    E.RANGE_LEFT: (RC, RC, RC, SG, PS, SE, RE, V, F),
-    E.RANGE_KEPT: (N, RD, N, SG, PS, SE, RE, V, F),
-    E.VIOLATION: (V, V, V, V, V, V, V, V, F),
-    E.FAULT: (F, F, F, F, F, F, F, F, F),
-    E.RESTART: (N, RD, N, SG, N, SE, RE, N, N),
-    E.POWERED_OFF: (N, RD, N, SG, PS, SE, RE, V, F),
+    E.PROTECTIVE_STOP: (PS, PS, PS, PS, PS, PS, PS, SE, RE, V, F),
+    E.UNLOCK: (N, RD, RC, EN, AS, SG, N, SE, RE, V, F),
+    E.SAFEGUARD_OPENED: (SG, SG, SG, SG, SG, SG, PS, SE, RE, V, F),
+    E.SAFEGUARD_RESTORED: (N, RD, RC, EN, AS, N, PS, SE, RE, V, F),
+    E.AUTOMATIC_SAFEGUARD_OPENED: (AS, AS, AS, AS, AS, SG, PS, SE, RE, V, F),
+    E.AUTOMATIC_SAFEGUARD_RESTORED: (N, RD, RC, EN, N, SG, PS, SE, RE, V, F),
+    E.NOT_ENABLED: (EN, EN, EN, EN, AS, SG, PS, SE, RE, V, F),
+    E.ENABLED: (N, RD, RC, N, AS, SG, PS, SE, RE, V, F),
+    E.ROBOT_EMERGENCY_PRESSED: (RE, RE, RE, RE, RE, RE, RE, RE, RE, V, F),
+    E.SYSTEM_EMERGENCY_PRESSED: (SE, SE, SE, SE, SE, SE, SE, SE, RE, V, F),
+    E.ROBOT_EMERGENCY_RELEASED: (N, RD, RC, EN, AS, SG, PS, SE, N, V, F),
+    E.SYSTEM_EMERGENCY_RELEASED: (N, RD, RC, EN, AS, SG, PS, N, RE, V, F),
+    E.REDUCED_ON: (RD, RD, RC, EN, AS, SG, PS, SE, RE, V, F),
+    E.REDUCED_OFF: (N, N, RC, EN, AS, SG, PS, SE, RE, V, F),
+    E.RANGE_LEFT: (RC, RC, RC, EN, AS, SG, PS, SE, RE, V, F),
+    E.RANGE_KEPT: (N, RD, N, EN, AS, SG, PS, SE, RE, V, F),
+    E.VIOLATION: (V, V, V, V, V, V, V, V, V, V, F),
+    E.FAULT: (F, F, F, F, F, F, F, F, F, F, F),
+    E.RESTART: (N, RD, N, EN, AS, SG, N, SE, RE, N, N),
+    E.POWERED_OFF: (N, RD, N, EN, AS, SG, PS, SE, RE, V, F),
 }
+# Modes of a CB3 that commands lead into; those of an e-Series box: test_states_operational.py.
+COMMANDED = [mode for mode in FROM if mode not in (RC, EN, AS)]
 CASES = [(event, was, EXPECTED[event][i]) for event in SafetyEvent for i, was in enumerate(FROM)]
 
 
@@ -57,7 +65,7 @@ def test_the_tables_are_whole():
     assert set(EVENTS) == set(EXPECTED) == set(SafetyEvent)
     assert all(row.remedy for row in MODES if row.mode is not N)
     assert {N, RD, RC} == MOVING_MODES
-    assert {N, RD, RC, SG} == WATCHED_MODES
+    assert {N, RD, RC, EN, AS, SG} == WATCHED_MODES
 
 
 @pytest.mark.parametrize(("event", "was", "then"), CASES)
@@ -104,22 +112,22 @@ def enter(mode, *, loaded=False):
     return bench
 
 
-@pytest.mark.parametrize("mode", [mode for mode in FROM if mode is not RC])
+@pytest.mark.parametrize("mode", COMMANDED)
 @pytest.mark.parametrize("event", COMMANDS)
 def test_commands_lead_where_the_table_says(mode, event):
     bench = enter(mode)
-    assert bench.now.safety_mode == mode
+    assert bench.now.safety_status == mode
     bench.tick(BRAKING)
     if event in (E.ROBOT_EMERGENCY_RELEASED, E.SYSTEM_EMERGENCY_RELEASED):
         then = N if mode in (SE, RE) else mode  # the command releases both
     else:
         then = EXPECTED[event][FROM.index(mode)]
     bench.tick(1, COMMANDS[event])
-    assert bench.now.safety_mode == then
+    assert bench.now.safety_status == bench.now.safety_mode == then
 
 
 @pytest.mark.parametrize("loaded", [False, True])
-@pytest.mark.parametrize("mode", [mode for mode in FROM if mode is not RC])
+@pytest.mark.parametrize("mode", COMMANDED)
 def test_what_a_mode_does_to_arm_program_and_power(mode, loaded):
     bench = enter(mode, loaded=loaded)
     bench.tick(BRAKING)
@@ -140,7 +148,7 @@ def test_what_a_mode_does_to_arm_program_and_power(mode, loaded):
     assert any(bench.now.target_qd) is row.may_move
 
 
-@pytest.mark.parametrize("mode", [mode for mode in FROM if not ROW[mode].may_have_power])
+@pytest.mark.parametrize("mode", [mode for mode in COMMANDED if not ROW[mode].may_have_power])
 def test_power_is_refused_with_the_remedy(mode):
     bench = enter(mode)
     bench.tick(BRAKING)

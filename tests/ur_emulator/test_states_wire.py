@@ -44,7 +44,9 @@ def test_ports_agree_in_recovery_and_while_powering_up():
         bench.tick()
     assert bench.now.robot_mode == RobotMode.RUNNING
     bench.controller.safety.handle(SafetyEvent.RANGE_LEFT)
-    bench.controller.state.past.snapshot = bench.now._replace(safety_mode=int(SafetyMode.RECOVERY))
+    bench.controller.state.past.snapshot = bench.now._replace(
+        safety_mode=int(SafetyMode.RECOVERY), safety_status=int(SafetyMode.RECOVERY)
+    )
     assert bench.now.safety_status_bits == 1 << 3
     check_wires(bench)
 

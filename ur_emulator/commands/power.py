@@ -37,7 +37,10 @@ class StartFreedrive:
     """Go into freedrive, as `set robotmode freedrive` asks; `set robotmode run` ends it."""
 
     def apply(self, box: Box) -> None:
-        box.state.compliance.start_freedrive(by_client=True)
+        if box.state.operational.allows.allows_freedrive:
+            box.state.compliance.start_freedrive(by_client=True)
+        else:
+            inform(box.state, "freedrive refused: the operational mode is AUTOMATIC: choose manual mode")
 
 
 def _give_power(box: Box, command: ModeCommand) -> None:

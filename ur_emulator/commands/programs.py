@@ -102,8 +102,8 @@ class SetSpeedSlider(CommandOperation):
 
 def _why_not_running(state: ControllerState) -> str:
     """Return why no program may move the arm now; "" if one may."""
-    if state.safety.is_stopped:
-        safety = state.safety.mode
+    if not state.safety.lets_programs_run:
+        safety = state.safety.status
         return f"the robot is in {safety.name}, it must be RUNNING: {ROW[safety].remedy}"
     mode = state.mode.mode
     return "" if mode is RobotMode.RUNNING else f"the robot is in {mode.name}, it must be RUNNING"

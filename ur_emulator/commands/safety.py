@@ -11,11 +11,12 @@ from protocol.primary.messages import ReportLevel
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import SafetyMode
 from ur_emulator.commands.operation import CommandOperation
+from ur_emulator.commands.operational import needs_operational_modes
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.robot_mode import ModeCommand
-from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, SafetyInput
+from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, Guard, SafetyInput
 from ur_emulator.controller.safety.modes import SafetyEvent
 from ur_emulator.errors import RefusedError
 
@@ -38,13 +39,28 @@ class ReleaseEmergencyStop(CommandOperation):
         box.safety.inputs.release()
 
 
+GuardName = Literal["permanent", "automatic mode"]
+
+
+def _guard_of(box: Box, name: GuardName) -> Guard:
+    """Return a safeguard, if the box has it.
+
+    Raises:
+        RefusedError: it does not.
+    """
+    if Guard(name) is Guard.AUTOMATIC:
+        needs_operational_modes(box.state)
+    return Guard(name)
+
+
 class SafeguardStop(CommandOperation):
-    """Open the safeguard, or close it again."""
+    """Open a safeguard, or close it again."""
 
     active: bool = parameter("begin, or end it", default=True)
+    safeguard: GuardName = parameter("which; that of automatic mode acts in no other", default="permanent")
 
     def apply(self, box: Box) -> None:
-        box.safety.inputs.guard(self.active)
+        box.safety.inputs.guard(_guard_of(box, self.safeguard), self.active)
 
 
 class ReducedMode(CommandOperation):
@@ -106,16 +122,19 @@ class RequireSafeguardReset(CommandOperation):
     """Set up whether a closed safeguard also needs a reset before the program continues."""
 
     required: bool = parameter("a reset is needed")
+    safeguard: GuardName = parameter("which", default="permanent")
 
     def apply(self, box: Box) -> None:
-        box.safety.inputs.require_reset(self.required)
+        box.safety.inputs.require_reset(_guard_of(box, self.safeguard), self.required)
 
 
 class ResetSafeguard(CommandOperation):
-    """Press the reset button of the safeguard; it has an effect once the safeguard is closed."""
+    """Press the reset button of a safeguard; it has an effect once the safeguard is closed."""
+
+    safeguard: GuardName = parameter("which", default="permanent")
 
     def apply(self, box: Box) -> None:
-        box.safety.inputs.reset()
+        box.safety.inputs.reset(_guard_of(box, self.safeguard))
 
 
 class AssignSafetyInput(CommandOperation):
@@ -125,10 +144,13 @@ class AssignSafetyInput(CommandOperation):
     """
 
     pair: int = parameter("inputs 2 * pair and 2 * pair + 1", low=0, high=N_INPUT_PAIRS - 1)
-    function: Literal["emergency stop", "reduced", "safeguard reset", "none"] = parameter("of the pair")
+    function: str = parameter("of the pair", choices=("none", *(it.value for it in SafetyInput)))
 
     def apply(self, box: Box) -> None:
-        box.safety.assign_input(self.pair, None if self.function == "none" else SafetyInput(self.function))
+        function = None if self.function == "none" else SafetyInput(self.function)
+        if function is not None and function.needs_operational_modes:
+            needs_operational_modes(box.state)
+        box.safety.assign_input(self.pair, function)
 
 
 class ChangeSafetySettings(CommandOperation):

@@ -243,7 +243,9 @@ class Controller:
     def _next_target(self) -> JointTarget:
         """Advance the motion; an invalid set-point is replaced by a protective stop."""
         state, before = self.state, self.state.motion.target
-        scale = state.speed.step(state.motion, self.period_s)
+        scale, limiter = state.speed.slider, state.speed.limiter
+        if limiter is not None:
+            scale = limiter.step(state.motion, state.past.snapshot.space, scale, self.period_s)
         try:
             target = state.motion.step(self.period_s, scale)
             if target is before or state.safety.is_stopped:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from protocol.rtde.types import SafetyStatusBits
 from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.compliance.external_sensor import VARIABLE
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import JOINT_VECTORS
+from ur_emulator.controller.safety.enabling_device import ACTIVE
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
+
+_ENABLING_BIT = int(SafetyStatusBits.THREE_POSITION_ENABLING_INPUT_ACTIVE)
 
 
 def make_snapshot(
@@ -48,6 +52,8 @@ def make_snapshot(
         robot_mode=int(mode),
         joint_mode=JOINT_VECTORS[mode, safety_mode],
         safety_mode=int(safety_mode),
+        safety_status=int(state.safety.status),
+        enabling_bit=_ENABLING_BIT if state.enabling_device.state in ACTIVE else 0,
         speed_scaling=speed.share,
         target_speed_fraction=speed.slider,
         runtime_state=int(programs.runtime_state),

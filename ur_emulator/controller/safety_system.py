@@ -6,7 +6,7 @@ The tables are in `safety/modes.py`. `is_busy` is false in cycles in which nothi
 from __future__ import annotations
 
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.controller.events import SafetyModeChanged
+from ur_emulator.controller.events import LogAdded, SafetyModeChanged
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.controller.safety.inputs import SafetyInput, SafetyInputs
@@ -19,7 +19,7 @@ from ur_emulator.controller.safety.modes import (
     ProgramEffect,
     SafetyEvent,
 )
-from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, allowed_speeds
+from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, limits_of_mode
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.path_motion import SCALING_RATE
 from ur_emulator.plant.plant_state import PlantState
@@ -39,7 +39,9 @@ class SafetySystem:
     def __init__(self, state: ControllerState, programs: Programs) -> None:
         self._state = state
         self._programs = programs
-        self.inputs = SafetyInputs(self.handle)
+        self.inputs = SafetyInputs(
+            self.handle, state.enabling_device, state.operational, self._begin_operational_mode
+        )
         self._cut_after: int | None = None
         self._rests_since: int | None = None
         self._is_waiting = False
@@ -113,8 +115,9 @@ class SafetySystem:
 
     def find_violation(self, sensed: PlantState) -> Violation | None:
         """Return a violation of the limits of this safety mode, or None."""
-        limiter, dt = self._state.speed.limiter, self._state.clock.period_s
-        return None if limiter is None else limiter.find_violation(sensed.actual_qd, dt)
+        state = self._state
+        limiter, space = state.speed.limiter, state.past.snapshot.space
+        return None if limiter is None else limiter.find_violation(sensed, space, state.clock.period_s)
 
     # --- effects
 
@@ -142,6 +145,12 @@ class SafetySystem:
             if robot_mode is RobotMode.RUNNING:
                 self._programs.resume()
 
+    def _begin_operational_mode(self) -> None:
+        state = self._state
+        self._set_limits(state.safety.mode)
+        self._update()
+        state.events.append(LogAdded("Safety", f"Operational mode: {state.operational.mode.name}"))
+
     def _wait(self) -> None:
         """Pause program and arm until the mode ends; a program that was paused before stays paused."""
         state, programs = self._state, self._programs
@@ -154,7 +163,8 @@ class SafetySystem:
 
     def _set_limits(self, mode: SafetyMode) -> None:
         state = self._state
-        limits = allowed_speeds(mode, state.safety.limits)
+        is_manual, rules = state.operational.allows.is_slow, state.robot.generation.limits
+        limits = limits_of_mode(mode, is_manual, state.safety.limits, rules)
         state.motion.scaling_rate = SCALING_RATE
         hard = not state.error_settings.transition_hardness
         state.speed.set_limiter(None if limits is None else SpeedLimiter(limits, state.motion.scale, hard))

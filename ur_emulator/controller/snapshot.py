@@ -50,6 +50,8 @@ class _Fields(NamedTuple):
     robot_mode: int
     joint_mode: tuple[int, ...]
     safety_mode: int
+    safety_status: int
+    enabling_bit: int
     speed_scaling: float
     target_speed_fraction: float
     runtime_state: int
@@ -152,19 +154,14 @@ class Snapshot(_Fields):
     # --- words and values that follow from others
 
     @property
-    def safety_status(self) -> int:
-        """The safety mode, under its later name."""
-        return self.safety_mode
-
-    @property
     def robot_status_bits(self) -> int:
         """Power, program and buttons, as RobotStatusBits."""
         return robot_status_bits(self.robot_mode, self.runtime_state) | self.buttons
 
     @property
     def safety_status_bits(self) -> int:
-        """The safety mode, as SafetyStatusBits."""
-        return safety_status_bits(self.safety_mode)
+        """The safety status and the enabling device, as SafetyStatusBits."""
+        return safety_status_bits(self.safety_status) | self.enabling_bit
 
     @property
     def tcp_force_scalar(self) -> float:

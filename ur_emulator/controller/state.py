@@ -25,7 +25,9 @@ from ur_emulator.controller.operator import Operator
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.controller.program_requests import ProgramRequests
 from ur_emulator.controller.robot_mode import RobotModeMachine
+from ur_emulator.controller.safety.enabling_device import EnablingDevice
 from ur_emulator.controller.safety.joint_limits import limits_of
+from ur_emulator.controller.safety.operational_mode import OperationalModeChoice
 from ur_emulator.controller.safety.safety_state import SafetyState
 from ur_emulator.controller.safety.speed_scaling import SpeedScaling
 from ur_emulator.controller.tool_settings import ToolSettings
@@ -47,6 +49,8 @@ class ControllerState:
         place_arm: puts the resting arm at joint angles [rad]; False where it would touch something.
         mode: robot mode, and the modes that lead to another one.
         safety: causes of safety modes, and the mode that they lead to.
+        operational: who has chosen which operational mode, and what it allows.
+        enabling_device: the three-position enabling device.
         speed: speed slider, and the limits of a safety mode that has some.
         tool: TCP, payload and gravity.
         io: digital and analogue lines.
@@ -74,6 +78,8 @@ class ControllerState:
     place_arm: Callable[[Vector6], bool]
     mode: RobotModeMachine
     safety: SafetyState
+    operational: OperationalModeChoice
+    enabling_device: EnablingDevice
     speed: SpeedScaling
     tool: ToolSettings
     io: InputOutput
@@ -104,7 +110,9 @@ def make_state(
     version: tuple[int, int],
 ) -> ControllerState:
     """Return the parts of a controller, made in the order in which they need each other."""
-    io, registers, safety, speed = InputOutput(), Registers(), SafetyState(limits_of(robot)), SpeedScaling()
+    io, registers, speed, operational = InputOutput(), Registers(), SpeedScaling(), OperationalModeChoice()
+    rules = robot.generation.limits
+    safety = SafetyState(limits_of(robot), has_programs_in_recovery=rules.has_programs_in_recovery)
     past = PastCycles(clock.generation)
     modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
     io_configuration = IoConfiguration(io, registers, modbus)
@@ -117,6 +125,8 @@ def make_state(
         place_arm=place_arm,
         mode=mode,
         safety=safety,
+        operational=operational,
+        enabling_device=EnablingDevice(),
         speed=speed,
         tool=ToolSettings(),
         io=io,
@@ -127,7 +137,7 @@ def make_state(
         encoders=Encoders(),
         modbus=modbus,
         modbus_map=MapMemory(version),
-        compliance=Compliance(motion, mode, safety, io_configuration, past),
+        compliance=Compliance(motion, mode, safety, operational, io_configuration, past),
         force_sense=ForceSense(clock.generation),
         operator=Operator(),
         error_settings=ErrorSettings(),

@@ -11,7 +11,7 @@ from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.fidelity import FIDELITIES
-from ur_emulator.models.robot_generation import Builds, RobotGeneration, SafetyLimits
+from ur_emulator.models.robot_generation import UNLIMITED, Builds, RobotGeneration, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 
 _BUILDS: Builds = (
@@ -35,7 +35,12 @@ CB3 = RobotGeneration(
         recovery_speed=radians(30.0),  # UR3 and UR5/CB3 user manuals
         speed_margin=0.2,  # safety blocks of real installations: 191.5 and 371.5 deg/s
         acceleration=40.0,  # not known; that of a UR5e capture
+        reduced=UNLIMITED,  # chosen: only joint speeds are limited
+        recovery=UNLIMITED,  # likewise
+        manual=UNLIMITED,
+        has_programs_in_recovery=True,  # chosen
     ),
+    has_operational_modes=False,
     fidelities=FIDELITIES,
     robot_subtype=2,
     dashboard=COMMANDS,

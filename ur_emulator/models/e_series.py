@@ -12,7 +12,7 @@ from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.fidelity import FIDELITIES
-from ur_emulator.models.robot_generation import Builds, RobotGeneration, SafetyLimits
+from ur_emulator.models.robot_generation import ArmLimits, Builds, RobotGeneration, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 
 _BUILDS: Builds = (
@@ -38,11 +38,17 @@ E_SERIES = RobotGeneration(
     default_version="5.15.0",
     builds=_BUILDS,
     limits=SafetyLimits(
-        reduced_share=0.5,  # chosen: the manual's defaults were not at hand
+        reduced_share=1.0,  # installations: the limits of reduced mode are those of normal mode
         recovery_speed=radians(30.0),  # PolyScope X manual
         speed_margin=0.2,  # configuration data of a UR5e capture: pi + .2 rad/s
         acceleration=40.0,  # the same capture
+        reduced=ArmLimits(tool_speed=0.75),  # default of installations
+        # UR5e hardware manual 2022
+        recovery=ArmLimits(tool_speed=0.25, force=100.0, power=80.0, momentum=10.0),
+        manual=ArmLimits(tool_speed=0.25),  # chosen: reduced speed of ISO 10218-1
+        has_programs_in_recovery=False,  # UR5e hardware manual 2022
     ),
+    has_operational_modes=True,
     fidelities=tuple(
         replace(
             fidelity,

@@ -31,6 +31,35 @@ Builds = tuple[tuple[SoftwareVersion, int, datetime], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ArmLimits:
+    """Limits of a mode beside the speeds of the joints; infinite where the mode has none.
+
+    Attributes:
+        tool_speed: of TCP and elbow [m/s].
+        force: at the TCP [N].
+        power: mechanical, of all joints [W].
+        momentum: of the arm [kg m/s].
+    """
+
+    tool_speed: float = math.inf
+    force: float = math.inf
+    power: float = math.inf
+    momentum: float = math.inf
+
+    def within(self, other: ArmLimits) -> ArmLimits:
+        """Return the stricter of two limits, each."""
+        return ArmLimits(
+            tool_speed=min(self.tool_speed, other.tool_speed),
+            force=min(self.force, other.force),
+            power=min(self.power, other.power),
+            momentum=min(self.momentum, other.momentum),
+        )
+
+
+UNLIMITED = ArmLimits()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyLimits:
     """Limits that the safety systems of all arms have in common.
 
@@ -39,12 +68,20 @@ class SafetyLimits:
         recovery_speed: joint speed of recovery mode [rad/s].
         speed_margin: how far a joint may exceed its rated speed before the safety system stops it [rad/s].
         acceleration: largest joint acceleration that the configuration data announce [rad/s^2].
+        reduced: in reduced mode.
+        recovery: in recovery mode.
+        manual: in the operational mode MANUAL, where the generation has it.
+        has_programs_in_recovery: programs run in recovery mode.
     """
 
     reduced_share: float
     recovery_speed: float
     speed_margin: float
     acceleration: float
+    reduced: ArmLimits
+    recovery: ArmLimits
+    manual: ArmLimits
+    has_programs_in_recovery: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,6 +96,7 @@ class RobotGeneration:
         default_version: what a box runs if the user names none.
         builds: which version has which build.
         limits: of the safety system.
+        has_operational_modes: manual and automatic mode, enabling device, automatic-mode safeguard.
         fidelities: how far its arms are from perfect ones.
         robot_subtype: code in the primary interface's configuration data.
         dashboard: commands of the dashboard server.
@@ -80,6 +118,7 @@ class RobotGeneration:
     default_version: str
     builds: Builds
     limits: SafetyLimits
+    has_operational_modes: bool
     fidelities: tuple[Fidelity, ...]
     robot_subtype: int
     dashboard: tuple[DashboardCommand, ...]

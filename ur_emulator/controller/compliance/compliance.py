@@ -17,6 +17,7 @@ from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.controller.robot_mode import RobotModeMachine
 from ur_emulator.controller.safety.limit_checks import SPEED_TOLERANCE, Violation
+from ur_emulator.controller.safety.operational_mode import OperationalModeChoice
 from ur_emulator.controller.safety.safety_state import SafetyState
 from ur_emulator.models.robot_model import RobotModel, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
@@ -50,6 +51,7 @@ class Compliance:
         motion: ArmMotion,
         mode: RobotModeMachine,
         safety: SafetyState,
+        operational: OperationalModeChoice,
         inputs: IoConfiguration,
         past: PastCycles,
     ) -> None:
@@ -59,12 +61,14 @@ class Compliance:
             motion: of the arm; force mode is an overlay of it, a guided arm its place.
             mode: compliance ends when it is not RUNNING.
             safety: compliance ends when it stops the arm.
+            operational: decides whether people may guide the arm.
             inputs: may request freedrive.
             past: measured positions.
         """
         self._motion = motion
         self._robot_mode = mode
         self._safety = safety
+        self._operational = operational
         self._inputs = inputs
         self._past = past
         self.force_damping, self.force_gain_scaling = 0.0, 1.0
@@ -145,7 +149,9 @@ class Compliance:
             self.by_program = self.by_client = self.by_input = False
             self.end_force()
         else:
-            wanted = self._is_teach_pressed or self._inputs.requests_freedrive()
+            may_guide = self._operational.allows.allows_freedrive
+            self.by_client = self.by_client and may_guide
+            wanted = may_guide and (self._is_teach_pressed or self._inputs.requests_freedrive())
             self.by_input = wanted and (self.by_input or not motion.is_moving)
         was_guided = self.mode is ControlMode.TEACH
         if self.is_in_freedrive:

@@ -1,8 +1,8 @@
 """Buttons and inputs of the safety system: their states, and the events of their changes.
 
 Commands and configurable inputs may activate a function at the same time; it ends when none of them does.
-Source: UR3/CB3 user manual, safety I/O: low is the safe state, both channels of a pair are looked at. That a
-pair whose channels differ is not a fault is chosen.
+Source: UR3/CB3 user manual and UR5e hardware manual 2022, safety I/O: low is the safe state, both channels of
+a pair are looked at. That a pair whose channels differ is not a fault is chosen.
 """
 
 from __future__ import annotations
@@ -11,17 +11,36 @@ from collections.abc import Callable
 from enum import Enum
 
 from ur_emulator.controller.io.lines import CONFIGURABLE
+from ur_emulator.controller.safety.enabling_device import STOPPING, EnablingAct, EnablingDevice
 from ur_emulator.controller.safety.modes import SafetyEvent
+from ur_emulator.controller.safety.operational_mode import ModeSource, OperationalMode, OperationalModeChoice
+from ur_emulator.controller.safety.safeguard import Safeguard
 
 N_INPUT_PAIRS = CONFIGURABLE.count // 2
 
 
 class SafetyInput(Enum):
-    """What a pair of configurable inputs can be set up for. Source: UR3/CB3 manual, configurable I/O."""
+    """What a pair of configurable inputs can be set up for. Source: manuals, configurable I/O."""
 
     EMERGENCY_STOP = "emergency stop"  # low presses the system emergency stop
     REDUCED = "reduced"  # low switches reduced mode on
     SAFEGUARD_RESET = "safeguard reset"  # a rising edge resets
+    OPERATIONAL_MODE = "operational mode"  # low is automatic, high manual
+    ENABLING_DEVICE = "three-position enabling"  # high while it is in its middle position
+    AUTOMATIC_SAFEGUARD = "automatic-mode safeguard"  # low opens it
+    AUTOMATIC_RESET = "automatic-mode safeguard reset"  # a rising edge resets
+
+    @property
+    def needs_operational_modes(self) -> bool:
+        """True where only a box with operational modes has it."""
+        return self not in (self.EMERGENCY_STOP, self.REDUCED, self.SAFEGUARD_RESET)
+
+
+class Guard(Enum):
+    """The safeguards of a box; the values are those of the control API."""
+
+    PERMANENT = "permanent"
+    AUTOMATIC = "automatic mode"
 
 
 _PRESSED = {
@@ -41,13 +60,30 @@ class SafetyInputs:
         assigned: pairs of configurable inputs that are set up.
     """
 
-    def __init__(self, handle: Callable[[SafetyEvent], None]) -> None:
+    def __init__(
+        self,
+        handle: Callable[[SafetyEvent], None],
+        device: EnablingDevice,
+        choice: OperationalModeChoice,
+        chosen: Callable[[], None],
+    ) -> None:
+        """Begin with nothing active.
+
+        Args:
+            handle: called with each event.
+            device: the enabling device.
+            choice: of the operational mode.
+            chosen: called when the operational mode has changed.
+        """
         self._handle = handle
+        self._device = device
+        self._choice = choice
+        self._chosen = chosen
         self.assigned: dict[int, SafetyInput] = {}
+        self._safeguards = {guard: Safeguard() for guard in Guard}
         self._pressed: set[tuple[str, str]] = set()
         self._reducing: set[str] = set()
-        self._is_open = self._needs_reset = False
-        self._reset_was_high: bool | None = None
+        self._levels: dict[SafetyInput, bool] = {}
 
     # --- emergency stops
 
@@ -64,33 +100,64 @@ class SafetyInputs:
             if kind not in held:
                 self._handle(event)
 
-    # --- safeguard
+    # --- safeguards and enabling device
 
-    def guard(self, is_open: bool) -> None:
-        """Open or close the safeguard."""
-        self._is_open = is_open
-        if is_open:
-            self._handle(SafetyEvent.SAFEGUARD_OPENED)
-        elif not self._needs_reset:
-            self._handle(SafetyEvent.SAFEGUARD_RESTORED)
+    def guard(self, guard: Guard, is_open: bool) -> None:
+        """Open or close a safeguard."""
+        self._safeguards[guard].guard(is_open)
+        self._stop_or_go_on()
 
-    def require_reset(self, required: bool) -> None:
-        """Set up whether closing is enough."""
-        self._needs_reset = required
-        if not self._is_open and not required:
-            self._handle(SafetyEvent.SAFEGUARD_RESTORED)
+    def require_reset(self, guard: Guard, required: bool) -> None:
+        """Set up whether closing a safeguard is enough."""
+        self._safeguards[guard].require_reset(required)
+        self._stop_or_go_on()
 
-    def reset(self) -> None:
-        """Press the reset button."""
-        if not self._is_open:
-            self._handle(SafetyEvent.SAFEGUARD_RESTORED)
+    def reset(self, guard: Guard) -> None:
+        """Press the reset button of a safeguard."""
+        self._safeguards[guard].reset()
+        self._stop_or_go_on()
 
-    # --- reduced mode
+    def act_on_device(self, act: EnablingAct) -> None:
+        """Let something happen to the enabling device."""
+        self._device.act(act)
+        self._stop_or_go_on()
+
+    def _stop_or_go_on(self) -> None:
+        """Send what the safeguards and the enabling device say in this operational mode, stops first."""
+        allows, stops = self._choice.allows, {g: row.is_stopping for g, row in self._safeguards.items()}
+        causes = (
+            (stops[Guard.PERMANENT], SafetyEvent.SAFEGUARD_OPENED, SafetyEvent.SAFEGUARD_RESTORED),
+            (
+                stops[Guard.AUTOMATIC] and allows.heeds_safeguard,
+                SafetyEvent.AUTOMATIC_SAFEGUARD_OPENED,
+                SafetyEvent.AUTOMATIC_SAFEGUARD_RESTORED,
+            ),
+            (
+                self._device.state in STOPPING and allows.needs_enabling,
+                SafetyEvent.NOT_ENABLED,
+                SafetyEvent.ENABLED,
+            ),
+        )
+        for stands, event, end in sorted(causes, key=lambda row: not row[0]):
+            self._handle(event if stands else end)
+
+    # --- modes
 
     def reduce(self, active: bool, who: str = "command") -> None:
         """Switch reduced mode on or off."""
         (self._reducing.add if active else self._reducing.discard)(who)
         self._handle(SafetyEvent.REDUCED_ON if self._reducing else SafetyEvent.REDUCED_OFF)
+
+    def choose_mode(self, source: ModeSource, mode: OperationalMode | None) -> None:
+        """Choose the operational mode, or leave the choice to others."""
+        before = self._choice.mode
+        self._choice.choose(source, mode)
+        if self._choice.mode is before:
+            return
+        if self._choice.mode is OperationalMode.MANUAL:
+            self._device.act(EnablingAct.BEGIN_MANUAL_MODE)
+        self._stop_or_go_on()
+        self._chosen()
 
     # --- configurable inputs
 
@@ -100,13 +167,9 @@ class SafetyInputs:
             self.assigned.pop(pair, None)
         else:
             self.assigned[pair] = function
-        functions = self.assigned.values()
-        if SafetyInput.EMERGENCY_STOP not in functions:
-            self.release("input")
-        if SafetyInput.REDUCED not in functions:
-            self.reduce(False, "input")
-        if SafetyInput.SAFEGUARD_RESET not in functions:
-            self._reset_was_high = None
+        for freed in self._levels.keys() - set(self.assigned.values()):
+            del self._levels[freed]
+            self._follow(freed, None)
 
     def step(self, digital_in: int) -> None:
         """Read the inputs that are set up."""
@@ -114,16 +177,43 @@ class SafetyInputs:
         for pair, function in self.assigned.items():
             lines = digital_in >> (CONFIGURABLE.first + 2 * pair) & 3
             high[function] = high[function] and lines == 3
-        pressed = high.get(SafetyInput.EMERGENCY_STOP) is False
-        if pressed != (("system", "input") in self._pressed):
-            if pressed:
-                self.press("system", "input")
-            else:
-                self.release("input")
-        reduced = high.get(SafetyInput.REDUCED) is False
-        if reduced != ("input" in self._reducing):
-            self.reduce(reduced, "input")
-        reset = high.get(SafetyInput.SAFEGUARD_RESET)
-        if reset and self._reset_was_high is False:
-            self.reset()
-        self._reset_was_high = reset
+        if high == self._levels:
+            return
+        before, self._levels = self._levels, high
+        for function, level in high.items():
+            if level is not before.get(function):
+                self._follow(function, level, rises=before.get(function) is False)
+
+    def _follow(self, function: SafetyInput, high: bool | None, *, rises: bool = False) -> None:
+        """Do what a new level of an input means; None: nothing is connected any more."""
+        match function:
+            case SafetyInput.EMERGENCY_STOP:
+                if high is False:
+                    self.press("system", "input")
+                else:
+                    self.release("input")
+            case SafetyInput.REDUCED:
+                self.reduce(high is False, "input")
+            case SafetyInput.SAFEGUARD_RESET:
+                if rises:
+                    self.reset(Guard.PERMANENT)
+            case SafetyInput.OPERATIONAL_MODE:
+                self.choose_mode(ModeSource.SELECTOR, _SELECTED.get(high))
+            case SafetyInput.ENABLING_DEVICE:
+                self.act_on_device(_ENABLING[high])
+            case SafetyInput.AUTOMATIC_SAFEGUARD:
+                self.guard(Guard.AUTOMATIC, high is False)
+            case SafetyInput.AUTOMATIC_RESET:
+                if rises:
+                    self.reset(Guard.AUTOMATIC)
+
+
+_SELECTED: dict[bool | None, OperationalMode] = {
+    False: OperationalMode.AUTOMATIC,
+    True: OperationalMode.MANUAL,
+}
+_ENABLING: dict[bool | None, EnablingAct] = {
+    False: EnablingAct.RELEASE,
+    True: EnablingAct.PRESS,
+    None: EnablingAct.DISCONNECT,
+}

@@ -7,8 +7,8 @@ lies under it. `EVENTS` says which causes an event brings and takes.
 
 Sources: UR3/CB3 user manual 3.13, safety chapters: stop categories (0: power is cut at once, 1: brake and
 then cut the power, 2: brake and keep the power), safeguard stop with automatic resume or a reset button,
-reduced mode and recovery mode; the dashboard server's documents for unlocking and restarting. What is marked
-C in `why` is chosen because nothing is known.
+reduced mode and recovery mode; e-Series: UR5e hardware manual 2022, safety I/O; the dashboard server's
+documents for unlocking and restarting. What is marked C in `why` is chosen because nothing is known.
 """
 
 from __future__ import annotations
@@ -65,10 +65,22 @@ class ModeRow:
         return self.arm in (ArmEffect.NOTHING, ArmEffect.SLOW)
 
     @property
+    def safety_mode(self) -> Mode:
+        """The mode as `safety_mode` gives it; `safety_status` gives the mode itself."""
+        return _GENERAL.get(self.mode, self.mode)
+
+    @property
     def may_have_power(self) -> bool:
         """True when the joints may have power."""
         return self.arm is not ArmEffect.POWER_OFF
 
+
+# What the dashboard's `safetymode` calls safeguard stops, `safetystatus` says why. Source: list of its words;
+# that the number `safety_mode` of the other ports follows it is chosen.
+_GENERAL = {
+    Mode.AUTOMATIC_MODE_SAFEGUARD_STOP: Mode.SAFEGUARD_STOP,
+    Mode.SYSTEM_THREE_POSITION_ENABLING_STOP: Mode.SAFEGUARD_STOP,
+}
 
 _A, _P = ArmEffect, ProgramEffect
 _AGAIN = "then power on and brake release"
@@ -113,6 +125,22 @@ MODES: tuple[ModeRow, ...] = (
         "close the safeguard",
         "stop category 2 and automatic resume D",
     ),
+    ModeRow(
+        Mode.AUTOMATIC_MODE_SAFEGUARD_STOP,
+        _A.PATH_STOP,
+        _P.PAUSE_FOR_A_WHILE,
+        False,
+        "close the safeguard of automatic mode",
+        "e-Series; stop category 2 D; automatic resume I",
+    ),
+    ModeRow(
+        Mode.SYSTEM_THREE_POSITION_ENABLING_STOP,
+        _A.PATH_STOP,
+        _P.PAUSE_FOR_A_WHILE,
+        False,
+        "hold the enabling device in its middle position, after it was released",
+        "e-Series; stop category 2 D; automatic resume C",
+    ),
     ModeRow(Mode.RECOVERY, _A.SLOW, _P.NOTHING, True, "move the joints into their range", "D; programs C"),
     ModeRow(Mode.REDUCED, _A.SLOW, _P.NOTHING, False, "end reduced mode", "D"),
     ModeRow(Mode.NORMAL, _A.NOTHING, _P.NOTHING, False, "", "D"),
@@ -134,6 +162,10 @@ class SafetyEvent(Enum):
     UNLOCK = "unlock protective stop"
     SAFEGUARD_OPENED = "safeguard opened"
     SAFEGUARD_RESTORED = "safeguard restored"
+    AUTOMATIC_SAFEGUARD_OPENED = "automatic-mode safeguard opened"
+    AUTOMATIC_SAFEGUARD_RESTORED = "automatic-mode safeguard restored"
+    NOT_ENABLED = "enabling device released or fully pressed"
+    ENABLED = "enabling device in its middle position"
     ROBOT_EMERGENCY_PRESSED = "robot emergency stop pressed"
     SYSTEM_EMERGENCY_PRESSED = "system emergency stop pressed"
     ROBOT_EMERGENCY_RELEASED = "robot emergency stop released"
@@ -183,6 +215,19 @@ EVENTS: dict[SafetyEvent, EventRow] = {
     _E.SAFEGUARD_RESTORED: _takes(
         "safeguard input SI; where a reset button is set up, that button once SI is closed",
         Mode.SAFEGUARD_STOP,
+    ),
+    _E.AUTOMATIC_SAFEGUARD_OPENED: _brings(
+        Mode.AUTOMATIC_MODE_SAFEGUARD_STOP, "e-Series: configurable input, or automatic mode begins"
+    ),
+    _E.AUTOMATIC_SAFEGUARD_RESTORED: _takes(
+        "e-Series: configurable input, its reset where one is set up, or automatic mode ends",
+        Mode.AUTOMATIC_MODE_SAFEGUARD_STOP,
+    ),
+    _E.NOT_ENABLED: _brings(
+        Mode.SYSTEM_THREE_POSITION_ENABLING_STOP, "e-Series: configurable input, or manual mode begins"
+    ),
+    _E.ENABLED: _takes(
+        "e-Series: configurable input, or manual mode ends", Mode.SYSTEM_THREE_POSITION_ENABLING_STOP
     ),
     _E.ROBOT_EMERGENCY_PRESSED: _brings(Mode.ROBOT_EMERGENCY_STOP, "button on the pendant, input EI"),
     _E.SYSTEM_EMERGENCY_PRESSED: _brings(Mode.SYSTEM_EMERGENCY_STOP, "configurable input"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from protocol.ur_types import SafetyMode
 from ur_emulator.controller.safety.joint_limits import JointLimits
-from ur_emulator.controller.safety.modes import MOVING_MODES, WATCHED_MODES, SafetyEvent, after, mode_of
+from ur_emulator.controller.safety.modes import MOVING_MODES, ROW, WATCHED_MODES, SafetyEvent, after, mode_of
 
 # The dashboard refuses to unlock a protective stop sooner than this [s]. Source: UR dashboard documents.
 UNLOCK_DELAY = 5.0
@@ -14,14 +14,17 @@ class SafetyState:
     """Which causes stand, and the safety mode that follows from them; see `modes`.
 
     Attributes:
-        mode: the safety mode.
+        status: the mode of the first cause in `modes.MODES`.
+        mode: the safety mode: `status`, or what several of them have in common.
         is_stopped: the safety system does not let programs move the arm.
+        lets_programs_run: programs may start and go on.
         is_watched: a protective stop would be something new.
         limits: of the joints, as the installation sets them.
     """
 
-    def __init__(self, limits: JointLimits) -> None:
+    def __init__(self, limits: JointLimits, *, has_programs_in_recovery: bool) -> None:
         self.limits = limits
+        self._stops_programs = frozenset() if has_programs_in_recovery else {SafetyMode.RECOVERY}
         self._causes: frozenset[SafetyMode] = frozenset()
         self._stopped_since = 0.0
         self._enter(SafetyMode.NORMAL)
@@ -47,6 +50,7 @@ class SafetyState:
         return self.mode is SafetyMode.PROTECTIVE_STOP and now - self._stopped_since >= UNLOCK_DELAY
 
     def _enter(self, mode: SafetyMode) -> None:
-        self.mode = mode
+        self.status, self.mode = mode, ROW[mode].safety_mode
         self.is_stopped = mode not in MOVING_MODES
+        self.lets_programs_run = not self.is_stopped and mode not in self._stops_programs
         self.is_watched = mode in WATCHED_MODES

@@ -1,6 +1,6 @@
-"""Speed scaling: the speed slider, and the joint limits of reduced and recovery mode.
+"""Speed scaling: the speed slider, and the limits of reduced, recovery and manual mode.
 
-In these modes the time on the path runs slower, so that no joint exceeds its limit.
+In these modes the time on the path runs slower, so that no joint, nor TCP or elbow, exceeds its limit.
 
 The limits are those of the robot's generation. Source of tolerance and patience: UR3 and UR5/CB3 user
 manuals. That the controller slows down instead of stopping is chosen.
@@ -8,43 +8,76 @@ manuals. That the controller slows down instead of stopping is chosen.
 
 from __future__ import annotations
 
-from math import radians
+from dataclasses import dataclass
+from math import hypot, isfinite, radians
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
+from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety.joint_limits import JointLimits
 from ur_emulator.controller.safety.limit_checks import Violation
+from ur_emulator.kinematics.arm_model import CartesianState
+from ur_emulator.models.robot_generation import UNLIMITED, ArmLimits, SafetyLimits
 from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.path_motion import SCALING_RATE
+from ur_emulator.plant.plant_state import PlantState
 
 TOLERANCE = radians(1.15)
-# A joint above its limit for longer than this is a protective stop [s].
+# Tolerance of the limits of TCP, force, power and momentum, as a share; chosen.
+ARM_TOLERANCE = 0.05
+# Above a limit for longer than this is a protective stop [s].
 PATIENCE = 0.5
 # The controller stays below the limit by this share, so that noise and lag do not cross it.
 AIM = 0.95
 
 
-def allowed_speeds(mode: SafetyMode, limits: JointLimits) -> Vector6 | None:
-    """Return the joint speeds allowed in a mode [rad/s]; None for the rated ones."""
-    if mode is SafetyMode.REDUCED:
-        return limits.reduced_speed
-    return limits.recovery_speed if mode is SafetyMode.RECOVERY else None
+@dataclass(frozen=True, slots=True)
+class ModeLimits:
+    """Limits that hold in a mode.
+
+    Attributes:
+        joints: speeds [rad/s].
+        arm: the others.
+    """
+
+    joints: Vector6
+    arm: ArmLimits
+
+
+def limits_of_mode(
+    mode: SafetyMode, is_manual: bool, joints: JointLimits, rules: SafetyLimits
+) -> ModeLimits | None:
+    """Return what is allowed in a mode; None where the rated joint speeds are all.
+
+    Args:
+        mode: the safety mode.
+        is_manual: the operational mode is MANUAL.
+        joints: limits of the joints.
+        rules: limits of the generation.
+    """
+    manual = rules.manual if is_manual else UNLIMITED
+    match mode:
+        case SafetyMode.REDUCED:
+            return ModeLimits(joints.reduced_speed, manual.within(rules.reduced))
+        case SafetyMode.RECOVERY:
+            return ModeLimits(joints.recovery_speed, manual.within(rules.recovery))
+    return None if manual == UNLIMITED else ModeLimits(joints.speed, manual)
 
 
 class SpeedLimiter:
-    """Keeps joint speeds below limits.
+    """Keeps speeds below the limits of a mode.
 
     Attributes:
         scale: speed scaling asked for in this cycle, 0..1.
     """
 
-    def __init__(self, limits: Vector6, scale: float, hard: bool) -> None:
+    def __init__(self, limits: ModeLimits, scale: float, hard: bool) -> None:
         """Begin.
 
         Args:
-            limits: of the joints [rad/s].
+            limits: of the mode.
             scale: in force until now.
             hard: slow down with the deceleration of a stop, else with the rate of the speed slider.
         """
@@ -53,19 +86,22 @@ class SpeedLimiter:
         self._hard = hard
         self._exceeded_s = 0.0
 
-    def step(self, motion: ArmMotion, slider: float, dt: float) -> float:
+    def step(self, motion: ArmMotion, space: ArmInSpace, slider: float, dt: float) -> float:
         """Return the scale for the next cycle; the path is slowed down to keep the limits.
 
         Args:
             motion: of the arm; the rate of its scaling is set.
+            space: the arm in the last cycle.
             slider: speed slider, 0..1.
             dt: duration of a cycle [s].
         """
         target = motion.target
         load = max(
             abs(qd + qdd * dt) / limit
-            for qd, qdd, limit in zip(target.qd, target.qdd, self._limits, strict=True)
+            for qd, qdd, limit in zip(target.qd, target.qdd, self._limits.joints, strict=True)
         )
+        if isfinite(self._limits.arm.tool_speed):
+            load = max(load, _tool_speed(space.target) / self._limits.arm.tool_speed)
         scale = slider if load <= 0.0 else min(slider, motion.scale * AIM / load)
         rate = SCALING_RATE
         if self._hard and (speed := max(map(abs, target.qd))) > 0.0:
@@ -78,21 +114,52 @@ class SpeedLimiter:
         """Return the part of the slider's speed that the limits allow, 0..1."""
         return min(1.0, self.scale / slider) if slider > 0.0 else 1.0
 
-    def find_violation(self, actual_qd: Vector6, dt: float) -> Violation | None:
-        """Return the protective stop for a joint that has been too fast for too long, or None."""
-        excess = [abs(qd) - limit for qd, limit in zip(actual_qd, self._limits, strict=True)]
+    def find_violation(self, sensed: PlantState, space: ArmInSpace, dt: float) -> Violation | None:
+        """Return the protective stop for what has exceeded a limit for too long, or None.
+
+        Args:
+            sensed: measured state of the arm.
+            space: the arm in the last cycle.
+            dt: duration of a cycle [s].
+        """
+        error = self._joint_error(sensed.actual_qd) or self._arm_error(sensed, space)
+        self._exceeded_s = 0.0 if error is None else self._exceeded_s + dt
+        return Violation(error) if error is not None and self._exceeded_s > PATIENCE else None
+
+    def _joint_error(self, actual_qd: Vector6) -> ErrorReported | None:
+        limits = self._limits.joints
+        excess = [abs(qd) - limit for qd, limit in zip(actual_qd, limits, strict=True)]
         worst = max(range(6), key=excess.__getitem__)
         if excess[worst] <= TOLERANCE:
-            self._exceeded_s = 0.0
-            return None
-        self._exceeded_s += dt
-        if self._exceeded_s <= PATIENCE:
             return None
         text = (
             f"Protective Stop: Joint speed limit violated: {JOINT_NAMES[worst]} at "
-            f"{abs(actual_qd[worst]):.3f} rad/s, limit {self._limits[worst]:.3f}"
+            f"{abs(actual_qd[worst]):.3f} rad/s, limit {limits[worst]:.3f}"
         )
-        return Violation(ErrorReported(191, 32 + worst, ReportLevel.WARNING, text))
+        return ErrorReported(191, 32 + worst, ReportLevel.WARNING, text)
+
+    def _arm_error(self, sensed: PlantState, space: ArmInSpace) -> ErrorReported | None:
+        limits = self._limits.arm
+        if limits == UNLIMITED:
+            return None
+        power = sum(
+            abs(moment * qd) for moment, qd in zip(sensed.target_moment, sensed.actual_qd, strict=True)
+        )
+        for code, name, unit, value, limit in (
+            (192, "TCP speed", "m/s", _tool_speed(space.actual), limits.tool_speed),
+            (0, "Force", "N", hypot(*space.tcp_force[:3]), limits.force),
+            (195, "Power", "W", power, limits.power),
+            (0, "Momentum", "kg m/s", space.actual.momentum, limits.momentum),
+        ):
+            if value > limit * (1.0 + ARM_TOLERANCE):
+                text = f"Protective Stop: {name} limit violated: {value:.3f} {unit}, limit {limit:g}"
+                return ErrorReported(code, 0, ReportLevel.WARNING, text)
+        return None
+
+
+def _tool_speed(arm: CartesianState) -> float:
+    """Return the speed of TCP or elbow, whichever is faster [m/s]."""
+    return max(hypot(*arm.tcp_speed[:3]), hypot(*arm.elbow_velocity))
 
 
 class SpeedScaling:
@@ -100,7 +167,7 @@ class SpeedScaling:
 
     Attributes:
         slider: speed slider, 0..1.
-        limiter: keeps joint speeds below the limits of the safety mode; None in a mode that has none.
+        limiter: keeps speeds below the limits of the mode; None in a mode that has none.
     """
 
     __slots__ = ("limiter", "slider")
@@ -114,12 +181,8 @@ class SpeedScaling:
         self.slider = fraction
 
     def set_limiter(self, limiter: SpeedLimiter | None) -> None:
-        """Limit the joint speeds from now on, or no longer."""
+        """Limit the speeds from now on, or no longer."""
         self.limiter = limiter
-
-    def step(self, motion: ArmMotion, dt: float) -> float:
-        """Return the scale for the next cycle; arguments as in `SpeedLimiter.step`."""
-        return self.slider if self.limiter is None else self.limiter.step(motion, self.slider, dt)
 
     @property
     def share(self) -> float:

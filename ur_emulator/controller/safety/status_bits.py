@@ -11,6 +11,7 @@ from ur_emulator.controller.robot_mode import POWERED
 RUNNING_STATES = frozenset({ProgramState.PLAYING, ProgramState.PAUSING, ProgramState.RESUMING})
 
 _EMERGENCY = SafetyStatusBits.EMERGENCY_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
+_SAFEGUARD = int(SafetyStatusBits.SAFEGUARD_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY)
 
 # Inferred from the names of the bits: every mode has one of its own, and what keeps the arm from moving also
 # says so. The bits of a mode that is not listed are 0.
@@ -21,9 +22,9 @@ SAFETY_BITS: dict[int, int] = {
     SafetyMode.PROTECTIVE_STOP: int(
         SafetyStatusBits.PROTECTIVE_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
     ),
-    SafetyMode.SAFEGUARD_STOP: int(
-        SafetyStatusBits.SAFEGUARD_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
-    ),
+    SafetyMode.SAFEGUARD_STOP: _SAFEGUARD,
+    SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _SAFEGUARD,
+    SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: _SAFEGUARD,
     SafetyMode.SYSTEM_EMERGENCY_STOP: int(SafetyStatusBits.SYSTEM_EMERGENCY_STOPPED | _EMERGENCY),
     SafetyMode.ROBOT_EMERGENCY_STOP: int(SafetyStatusBits.ROBOT_EMERGENCY_STOPPED | _EMERGENCY),
     SafetyMode.VIOLATION: int(SafetyStatusBits.VIOLATION | SafetyStatusBits.STOPPED_DUE_TO_SAFETY),
@@ -38,6 +39,6 @@ def robot_status_bits(robot_mode: int, runtime_state: int) -> int:
     return int(power | running)
 
 
-def safety_status_bits(safety_mode: int) -> int:
-    """Return `safety_status_bits` for a SafetyMode."""
-    return SAFETY_BITS.get(safety_mode, 0)
+def safety_status_bits(safety_status: int) -> int:
+    """Return `safety_status_bits` for a SafetyStatus, but for the enabling device."""
+    return SAFETY_BITS.get(safety_status, 0)

@@ -13,7 +13,6 @@ from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetUp, StartProgram, StopProgram
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.safety.joint_limits import limits_of
-from ur_emulator.controller.safety.modes import MOVING_MODES
 from ur_emulator.controller.safety.status_bits import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
 from ur_emulator.programs.compiling import (
@@ -227,7 +226,7 @@ class ProgramPlayer:
     def _must_be_able_to_play(self) -> None:
         """Refuse to play while something stands against it."""
         snapshot = self._access.snapshot
-        if snapshot.safety_mode not in MOVING_MODES:
+        if not self._access.controller.state.safety.lets_programs_run:
             self._refuse("play", "the robot is stopped for safety")
         if snapshot.robot_mode != RobotMode.RUNNING:
             mode = RobotMode(snapshot.robot_mode).name

@@ -1,0 +1,69 @@
+"""Operational mode and enabling device of an e-Series box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from ur_emulator.commands.operation import CommandOperation
+from ur_emulator.commands.parameters import parameter
+from ur_emulator.controller.command import Box
+from ur_emulator.controller.safety.enabling_device import EnablingAct
+from ur_emulator.controller.safety.operational_mode import ModeSource, OperationalMode
+from ur_emulator.errors import RefusedError
+
+if TYPE_CHECKING:
+    from ur_emulator.controller.state import ControllerState
+
+
+class SetOperationalMode(CommandOperation):
+    """Choose the operational mode at the pendant; a wired selector and the dashboard override it."""
+
+    mode: Literal["none", "manual", "automatic"] = parameter("the mode; none: no password is set")
+
+    def apply(self, box: Box) -> None:
+        _choose(box, ModeSource.PENDANT, None if self.mode == "none" else OperationalMode(self.mode))
+
+
+@dataclass(frozen=True, slots=True)
+class ChooseModeByDashboard:
+    """Choose the operational mode as `set operational mode` does; None: as `clear operational mode`."""
+
+    mode: OperationalMode | None
+
+    def apply(self, box: Box) -> None:
+        _choose(box, ModeSource.DASHBOARD, self.mode)
+
+
+class MoveEnablingDevice(CommandOperation):
+    """Press or release the three-position enabling device, which acts in manual mode."""
+
+    position: Literal["none", "released", "pressed", "fully pressed"] = parameter(
+        "pressed is its middle position; none: no device is connected"
+    )
+
+    def apply(self, box: Box) -> None:
+        needs_operational_modes(box.state)
+        box.safety.inputs.act_on_device(EnablingAct(self.position))
+
+
+def needs_operational_modes(state: ControllerState) -> None:
+    """Refuse what only a box with operational modes has.
+
+    Raises:
+        RefusedError: it has none.
+    """
+    generation = state.robot.generation
+    if not generation.has_operational_modes:
+        raise RefusedError(f"a box of the {generation.name} has no operational modes")
+
+
+def _choose(box: Box, source: ModeSource, mode: OperationalMode | None) -> None:
+    needs_operational_modes(box.state)
+    decides = box.state.operational.source
+    if mode is not None and decides < source:
+        raise RefusedError(
+            f"the operational mode stays {box.state.operational.mode.name}: "
+            f"the {decides.name.lower()} decides, which comes before the {source.name.lower()}"
+        )
+    box.safety.inputs.choose_mode(source, mode)
