@@ -11,7 +11,7 @@ from box_support import FakeNetwork, connect
 
 from pc_client.kinematics.robot_model import ROBOTS as CLIENT_ROBOTS
 from pc_client.kinematics.robot_model import robot_model
-from protocol.ur_types import parse_serial
+from protocol.ur_types import RobotType, parse_serial
 from ur_emulator import ControlBox
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
@@ -117,7 +117,7 @@ def test_box_names_its_arm_on_the_wire(robot):
             lines.readline()
             lines.write("get robot model\n")
             lines.flush()
-            assert lines.readline() == f"{robot.title}\n"
+            assert lines.readline() == f"{RobotType(robot.robot_type).name}\n"
         assert parse_serial(box.serial_number).simulated
 
 
