@@ -237,7 +237,7 @@ class _Run:
             return ""
         leg, state = self._move.leg, self._controller.state
         target = f"p[{', '.join(f'{x:.4g}' for x in leg.goal_pose)}]"
-        if state.arm.inverse(leg.goal_pose, state.past.snapshot.target_q, leg.tool.tcp) is None:
+        if state.arm.inverse(leg.goal_pose, state.motion.target.q, leg.tool.tcp) is None:
             return f"the target {target} is out of reach; "
         return f"the target {target} can be reached, but not on this path; "
 

@@ -91,6 +91,7 @@ def test_a_trajectory_with_blends_and_one_that_is_cancelled(box):
         for offset in offsets:
             servers.point(np.add(start, [0, 0, 0, 0, 0, offset]), 0.2, 0.02)
         assert servers.result() == DONE
+        rtde.catch_up()
         values = rtde.until(lambda v: not any(v["target_qd"]))
         assert np.allclose(values["target_q"], start, atol=1e-5)
         servers.send(IDLE, timeout_ms=0)

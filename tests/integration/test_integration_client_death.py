@@ -46,7 +46,7 @@ def ramp(frames, deceleration):
         assert change <= deceleration * PERIOD * (1 + 1e-9)
         before = frame
         if frame.runtime_state == ProgramState.STOPPED:
-            return frame
+            return frames.new()  # the target of the cycle in which the program stopped
 
 
 def test_a_closed_reverse_socket_ramps_the_arm_to_rest_and_ends_the_program(lockstep_box):

@@ -76,15 +76,14 @@ def test_a_stream_that_pauses_makes_the_arm_stutter(bench):
 def test_when_a_program_is_stopped_the_arm_ramps_to_rest(bench):
     bench.start(SPIN)
     bench.tick(60)
-    assert bench.now.target_qd[0] == pytest.approx(0.2)
-    before = bench.now.target_qd[0]
+    motion = bench.controller.state.motion
+    before = motion.target.qd[0]
+    assert before == pytest.approx(0.2)
     states = []
     bench.tick(1, StopProgram())
-    while bench.now.target_qd[0] > 0:
-        assert before - bench.now.target_qd[0] <= bench.controller.state.robot.stop_deceleration * 0.008 * (
-            1 + 1e-9
-        )
-        before = bench.now.target_qd[0]
+    while motion.target.qd[0] > 0:
+        assert before - motion.target.qd[0] <= motion.stop_deceleration * 0.008 * (1 + 1e-9)
+        before = motion.target.qd[0]
         states.append(bench.now.runtime_state)
         bench.tick()
     bench.tick()

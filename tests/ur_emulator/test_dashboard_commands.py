@@ -266,11 +266,11 @@ def test_stop_ends_when_the_arm_rests(box, folder, dashboard):
         "while True:\n  speedj([1, 0, 0, 0, 0, 0], 5, 0.5)\n  speedj([-1, 0, 0, 0, 0, 0], 5, 0.5)\nend\n"
     )
     dashboard.ask_all("load go.script", "play")
-    target = box._box.controller
-    while abs(target.snapshot.target_qd[0]) < 0.5:
+    motion = box._box.controller.state.motion
+    while abs(motion.target.qd[0]) < 0.5:
         dashboard.ask("running")
     assert dashboard.ask("stop") == "Stopped"
-    assert not any(target.snapshot.target_qd)
+    assert not any(motion.target.qd)
 
 
 def test_the_log_keeps_what_is_added(box, dashboard):

@@ -106,7 +106,8 @@ def enter(mode, *, loaded=False):
     entry = ENTRY[mode]
     if mode is M.RECOVERY:
         bench.controller.safety.handle(E.RANGE_LEFT)
-        bench.controller.state.past.snapshot = bench.now._replace(actual_q=(7.0, *bench.now.actual_q[1:]))
+        past = bench.controller.state.past
+        past.sensed = past.sensed._replace(actual_q=(7.0, *past.sensed.actual_q[1:]))
     elif entry is not None:
         bench.tick(1, COMMANDS[entry])
     return bench
@@ -132,7 +133,7 @@ def test_what_a_mode_does_to_arm_program_and_power(mode, loaded):
     bench = enter(mode, loaded=loaded)
     bench.tick(BRAKING)
     row, now = ROW[mode], bench.now
-    rests = now.target_qd == (0.0,) * 6
+    rests = not bench.controller.state.motion.is_moving
     assert rests is not row.may_move
     assert now.robot_mode == (RobotMode.RUNNING if row.may_have_power else RobotMode.POWER_OFF)
     assert {

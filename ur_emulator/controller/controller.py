@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from functools import partial
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import ControlMode, RobotMode
@@ -95,10 +94,11 @@ class Controller:
             Clock(generation, generation.cycles(BOOT_TIME)),
             motion,
             RobotModeMachine(mode, self.period_s),
-            partial(_place_arm, self.plant, motion),
+            self._place_arm,
             version or generation.parse_version(generation.default_version)[:2],
         )
         self._payload = self.state.tool.payload
+        self.state.past.place(motion.target, self.plant.sense())
         self.programs = make_programs(self.state)
         self.safety = SafetySystem(self.state, self.programs)
         self.push = FlangePush(self.plant, self.period_s)
@@ -108,7 +108,7 @@ class Controller:
 
     @property
     def snapshot(self) -> Snapshot:
-        """State at the end of the last cycle."""
+        """What ports publish of the last cycle."""
         return self.state.past.snapshot
 
     @property
@@ -140,7 +140,7 @@ class Controller:
             commands: those since the last cycle, in order of arrival.
 
         Returns:
-            The state at the end of the cycle.
+            What ports publish of the cycle.
         """
         state = self.state
         state.clock.advance()
@@ -164,8 +164,8 @@ class Controller:
             self.programs.pause()
         was_active = was_active or (control is _BY_HAND and any(target.qd))
         self._settle = max(self._settle - 1, self._settle_cycles if was_active else 0)
-        snapshot = make_snapshot(state, self.programs, target, sensed)
-        state.past.add(snapshot, is_still=not control and not any(target.qd))
+        snapshot = make_snapshot(state, self.programs, self.plant.report(state.past.sensed))
+        state.past.add(snapshot, target, sensed, is_still=not control and not any(target.qd))
         return snapshot
 
     # --- the parts of a cycle, in their order
@@ -256,7 +256,7 @@ class Controller:
         if violation is None:
             return target
         state.motion.retract(before)
-        self._stop_for(violation, state.past.snapshot.actual_q)
+        self._stop_for(violation, state.past.sensed.actual_q)
         return state.motion.step(self.period_s, scale)
 
     def _stop_for(self, violation: Violation, actual_q: Vector6) -> None:
@@ -268,14 +268,15 @@ class Controller:
             state.motion.place(actual_q)
             self.plant.hold_trim()
 
-
-def _place_arm(plant: Plant | ExactPlant, motion: ArmMotion, q: Vector6) -> bool:
-    """Put a resting arm at joint angles [rad]; False where it would touch itself or something."""
-    if plant.touches(q):
-        return False
-    plant.reset(q)
-    motion.place(q)
-    return True
+    def _place_arm(self, q: Vector6) -> bool:
+        """Put the resting arm at joint angles [rad]; False where it would touch itself or something."""
+        plant, state = self.plant, self.state
+        if plant.touches(q):
+            return False
+        plant.reset(q)
+        state.motion.place(q)
+        state.past.place(state.motion.target, plant.sense())
+        return True
 
 
 _BY_POSITION, _BY_HAND = ControlMode.POSITION, ControlMode.TEACH

@@ -11,23 +11,22 @@ from ur_emulator.controller.safety.enabling_device import ACTIVE
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
 
 _ENABLING_BIT = int(SafetyStatusBits.THREE_POSITION_ENABLING_INPUT_ACTIVE)
 
 
-def make_snapshot(
-    state: ControllerState, programs: Programs, target: JointTarget, sensed: PlantState
-) -> Snapshot:
+def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState) -> Snapshot:
     """Return everything that any port may publish of this cycle.
+
+    The target is the one with which the cycle began: target and measurements are of the same moment.
 
     Args:
         state: after commands, scripts, motion and safety.
         programs: for the program state and line.
-        target: set-point at the end of the cycle.
-        sensed: measured state of the arm.
+        sensed: state of the arm, as `Plant.report` gives it.
     """
+    target = state.past.target
     arm, clock, sensor, wrench = state.arm, state.clock, state.force_sense.sensor, sensed.tcp_force
     if sensor is not None:
         wrench = sensor.wrench_at_flange(state.client_inputs.get(VARIABLE, ZERO6), arm.fk(sensed.actual_q))

@@ -84,7 +84,7 @@ class SafetySystem:
         self._programs.stop()
         state.mode.command(ModeCommand.POWER_OFF)
         state.motion.stop(state.robot.stop_deceleration)
-        state.motion.place(state.past.snapshot.actual_q)
+        state.motion.place(state.past.sensed.actual_q)
         self.handle(SafetyEvent.POWERED_OFF)
 
     def check_range(self) -> None:
@@ -170,7 +170,7 @@ class SafetySystem:
         state.speed.set_limiter(None if limits is None else SpeedLimiter(limits, state.motion.scale, hard))
 
     def _is_in_range(self) -> bool:
-        limits, actual_q = self._state.safety.limits, self._state.past.snapshot.actual_q
+        limits, actual_q = self._state.safety.limits, self._state.past.sensed.actual_q
         return all(
             low <= q <= high for low, q, high in zip(limits.q_min, actual_q, limits.q_max, strict=True)
         )

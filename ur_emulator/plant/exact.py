@@ -1,8 +1,8 @@
 """ExactPlant: an arm without physics, always at its target, as in the maker's simulator.
 
-What is measured equals the target to the last bit, in the cycle of the target. Currents and torques are those
-that the controller's model expects. Nothing acts on the arm: no load but the declared payload, no push, no
-contact, no hand. The accelerometer reads gravity alone, also in motion.
+What is measured equals the target to the last bit, in the cycle of the target; both are published in the
+next. Currents and torques are those that the controller's model expects. Nothing acts on the arm: no load but
+the declared payload, no push, no contact, no hand. The accelerometer reads gravity alone, also in motion.
 """
 
 from __future__ import annotations
@@ -61,6 +61,7 @@ class ExactPlant(Plant):
                 f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
                 cycle=self.cycle,
             )
+        self._thermometers.step(self._drives.target_current)
         self._physics.q[:] = self._q
         self._physics.qd[:] = self._qd
 
@@ -73,7 +74,6 @@ class ExactPlant(Plant):
             mujoco.mj_kinematics(self._physics.model, self._physics.data)
             x, y, z = (GRAVITY * self._physics.flange_rotation[2]).tolist()
             current, moment = self._drives.target_current, self._drives.target_moment
-            self._thermometers.step(current)
             self._state = PlantState(
                 actual_q=self._q,
                 actual_qd=self._qd,
@@ -89,6 +89,10 @@ class ExactPlant(Plant):
                 position_error=ZERO6,
             )
         return self._state
+
+    def report(self, before: PlantState) -> PlantState:
+        """Return the state of the cycle before; see `Plant.report`."""
+        return before
 
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
         """Refuse: no load acts on this arm.

@@ -306,6 +306,16 @@ class Plant:
             )
         return self._state
 
+    def report(self, before: PlantState) -> PlantState:
+        """Return the state of the arm as the box publishes it: that of about the beginning of the cycle.
+
+        Measurements are that old already; target current and moment are those of the cycle before.
+
+        Args:
+            before: what `sense` gave in the cycle before.
+        """
+        return self.sense()._replace(target_current=before.target_current, target_moment=before.target_moment)
+
     def _run(self) -> None:
         """Advance the arm by a cycle and read its sensors; `_keep` completes the cycle."""
         physics, drives, gear = self._physics, self._drives, self._gear

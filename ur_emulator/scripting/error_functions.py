@@ -29,7 +29,7 @@ def error_functions(
     def reset_revolution_counter(thread: object, q_near: Any) -> None:
         # A real box uses it when new safety settings limit a joint that had no limits: not here.
         settings.set_revolution_reference(
-            past.snapshot.actual_q if q_near is None else six([float(x) for x in q_near])
+            past.sensed.actual_q if q_near is None else six([float(x) for x in q_near])
         )
 
     def powerdown(thread: object) -> NoReturn:

@@ -52,6 +52,10 @@ class ScriptArm:
         """Return the pose of the TCP at joint angles [rad]."""
         return self.model.fk(q, self.settings.tcp_offset)
 
+    def tcp_speed(self, q: Vector6, qd: Vector6) -> Vector6:
+        """Return the twist of the TCP at joint angles [rad] and speeds [rad/s]."""
+        return self.model.state(q, qd, self.settings.tcp_offset).tcp_speed
+
     def take(self, thread: object, generator: MotionGenerator) -> None:
         """Let `thread` move the arm with `generator` from the next cycle on."""
         try:

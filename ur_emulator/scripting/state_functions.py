@@ -1,6 +1,7 @@
 """Builtins that read the robot: state getters and kinematics. They take no robot time.
 
-Actual and target values are those of the last cycle, constant while the scripts of a cycle run.
+Actual and target values are those at the end of the last cycle, constant while the scripts of a cycle run. So
+the target that a script reads is the one that the packages of its cycle show.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ def state_functions(arm: ScriptArm, past: PastCycles, step_time: float) -> Mappi
 
     Args:
         arm: with its settings.
-        past: snapshot of the last cycle, and positions before it.
+        past: end of the last cycle, and positions before it.
         step_time: duration of a cycle [s].
     """
     model, motion, settings = arm.model, arm.motion, arm.settings
 
     def joints(value: Any) -> tuple[float, ...]:
-        return past.snapshot.actual_q if value is None else six([float(x) for x in value])
+        return past.sensed.actual_q if value is None else six([float(x) for x in value])
 
     def tool(value: Any) -> tuple[float, ...]:
         return settings.tcp_offset if value is None else tuple(value)
@@ -62,7 +63,7 @@ def state_functions(arm: ScriptArm, past: PastCycles, step_time: float) -> Mappi
         return inverse(pose, qnear, tcp) is not None
 
     def get_actual_tool_flange_pose(thread: object) -> Pose:
-        return Pose.of(model.fk(past.snapshot.actual_q))
+        return Pose.of(model.fk(past.sensed.actual_q))
 
     def is_within_safety_limits(thread: object, pose: Any, qnear: Any) -> bool:
         q = inverse(pose, qnear, None) if isinstance(pose, Pose) else tuple(pose)
@@ -80,38 +81,41 @@ def state_functions(arm: ScriptArm, past: PastCycles, step_time: float) -> Mappi
         return list(past.q_history[int(steps)])
 
     def get_joint_torques(thread: object) -> list[float]:
-        snap = past.snapshot
+        sensed = past.sensed
         return [
             k * (actual - target)
             for k, actual, target in zip(
-                arm.robot.torque_constant, snap.actual_current, snap.target_current, strict=True
+                arm.robot.torque_constant, sensed.actual_current, sensed.target_current, strict=True
             )
         ]
 
     def get_actual_tcp_pose(thread: object) -> Pose:
-        return Pose.of(arm.tcp_pose(past.snapshot.actual_q))
+        return Pose.of(arm.tcp_pose(past.sensed.actual_q))
+
+    def get_actual_tcp_speed(thread: object) -> Pose:
+        return Pose.of(arm.tcp_speed(past.sensed.actual_q, past.sensed.actual_qd))
 
     return {
-        "get_actual_joint_positions": lambda thread: list(past.snapshot.actual_q),
+        "get_actual_joint_positions": lambda thread: list(past.sensed.actual_q),
         "get_target_joint_positions": lambda thread: list(motion.target.q),
         "get_joint_positions": lambda thread: list(motion.path.q),
-        "get_actual_joint_speeds": lambda thread: list(past.snapshot.actual_qd),
+        "get_actual_joint_speeds": lambda thread: list(past.sensed.actual_qd),
         "get_target_joint_speeds": lambda thread: list(motion.target.qd),
         "get_actual_joint_positions_history": get_actual_joint_positions_history,
         "get_target_waypoint": lambda thread: Pose.of(arm.tcp_pose(motion.goal)),
         "get_joint_torques": get_joint_torques,
-        "get_joint_temp": lambda thread, j: past.snapshot.joint_temperatures[int(j)],
+        "get_joint_temp": lambda thread, j: past.sensed.joint_temperatures[int(j)],
         "get_controller_temp": lambda thread: past.snapshot.masterboard_temperature,
         "get_actual_tcp_pose": get_actual_tcp_pose,
         "tool_pose": get_actual_tcp_pose,
         "get_target_tcp_pose": lambda thread: Pose.of(arm.tcp_pose(motion.target.q)),
         "get_actual_tool_flange_pose": get_actual_tool_flange_pose,
-        "get_actual_tcp_speed": lambda thread: Pose.of(past.snapshot.actual_tcp_speed),
-        "get_target_tcp_speed": lambda thread: Pose.of(past.snapshot.target_tcp_speed),
+        "get_actual_tcp_speed": get_actual_tcp_speed,
+        "get_target_tcp_speed": lambda thread: Pose.of(arm.tcp_speed(motion.target.q, motion.target.qd)),
         "get_tcp_force": lambda thread: Pose.of(past.snapshot.actual_tcp_force),
         "force": lambda thread: math.hypot(*past.snapshot.actual_tcp_force[:3]),
         "get_tcp_offset": lambda thread: Pose.of(settings.tcp_offset),
-        "get_tool_accelerometer_reading": lambda thread: list(past.snapshot.actual_tool_accelerometer),
+        "get_tool_accelerometer_reading": lambda thread: list(past.sensed.tool_accelerometer),
         "get_tool_current": lambda thread: past.snapshot.tool_output_current,
         "get_steptime": lambda thread: step_time,
         "get_target_payload": lambda thread: settings.payload.mass,

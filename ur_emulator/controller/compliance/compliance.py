@@ -159,8 +159,8 @@ class Compliance:
             self.mode = ControlMode.TEACH
         else:
             if was_guided:
-                snapshot = self._past.snapshot
-                motion.place(snapshot.actual_q, snapshot.actual_qd)
+                sensed = self._past.sensed
+                motion.place(sensed.actual_q, sensed.actual_qd)
             self.mode = ControlMode.POSITION
             if self.force_mode is not None:
                 self.mode = ControlMode.FORCE
@@ -175,10 +175,10 @@ class Compliance:
 
         Moves have no effect on the arm. They take their time, and end with freedrive.
         """
-        snapshot = self._past.snapshot
+        sensed = self._past.sensed
         if not self._motion.is_moving:
-            self._motion.place(snapshot.actual_q)
-        return JointTarget(snapshot.actual_q, snapshot.actual_qd)
+            self._motion.place(sensed.actual_q)
+        return JointTarget(sensed.actual_q, sensed.actual_qd)
 
     def find_violation(self, robot: RobotModel, sensed: PlantState) -> Violation | None:
         """Return a violation by a compliant arm in this cycle, or None.
