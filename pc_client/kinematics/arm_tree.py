@@ -1,7 +1,7 @@
 """Links and joints of an arm under their ROS names, and a URDF of simple bodies that any viewer can show.
 
-Names, origins and axes are those of the URDF in example-robot-data. Its meshes are addresses that only an
-installation with the same package resolves, and its limits are wrong (see `robot_model`), so the URDF made
+Names, origins and axes are those of the arm's URDF. In example-robot-data its meshes are addresses that only
+an installation with the same package resolves, and its limits are wrong (see `robot_model`), so the URDF made
 here has cylinders and the client's own limits. It has no masses and no torques: it is for viewers.
 
 Frames: `base_link` is the root, `base` is UR's frame (`base_link` turned by pi about z), `tool0` the flange.
@@ -19,7 +19,6 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pc_client.kinematics.robot_data import find_robot_file
 from pc_client.kinematics.robot_model import JointLimits, RobotDescription
 
 Three = tuple[float, float, float]
@@ -108,7 +107,7 @@ def arm_tree(description: RobotDescription) -> ArmTree:
     Raises:
         PlanningError: example-robot-data is not installed.
     """
-    source = ElementTree.parse(find_robot_file(description.urdf)).getroot()
+    source = ElementTree.fromstring(description.urdf)
     joints = [
         _joint(element)
         for element in source.findall("joint")

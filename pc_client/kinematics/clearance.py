@@ -1,7 +1,7 @@
 """How far the arm and its tool stay from themselves, from the surface under them and from what stands around.
 
-Convex hulls of the published collision meshes, moved by the nominal kinematics, against the bodies of a cell;
-distances by Pinocchio's collision library (coal).
+Convex hulls of the published collision meshes, or of the housings of an arm without meshes, moved by the
+nominal kinematics, against the bodies of a cell; distances by Pinocchio's collision library (coal).
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from pc_client.kinematics.cell import Solid, Three
+from pc_client.kinematics.dh_arm import DhArm, link_hulls
 from pc_client.kinematics.robot_data import find_robot_file, find_share_folder
-from pc_client.kinematics.robot_model import RobotModel, load_pinocchio_model
+from pc_client.kinematics.robot_model import RobotDescription, RobotModel, load_pinocchio_model
 
 Array = NDArray[np.float64]
 
@@ -140,7 +141,7 @@ def clearance_model(robot: RobotModel) -> ClearanceModel:
         PlanningError: example-robot-data is not installed.
     """
     cell = robot.cell
-    hulls = _load_hulls(robot.description.urdf)
+    hulls = load_hulls(robot.description)
     links = [_Body(str(hull.name).split("_link")[0].replace("_", " "), hull) for hull in hulls]
     tool = [_Body(f"tool {solid.title}", _geometry(solid, robot)) for solid in cell.tool.solids]
     around = [_Body(f"wall '{wall.name}'", _half_space(wall.normal, wall.offset)) for wall in cell.walls]
@@ -208,11 +209,17 @@ def _geometry(solid: Solid, carrier: RobotModel | None) -> Any:
 
 
 @lru_cache(maxsize=4)
-def _load_hulls(urdf: str) -> tuple[Any, ...]:
-    """Read the meshes of a URDF as convex hulls, one a link (shared, never changed)."""
-    model = load_pinocchio_model(urdf)  # its frames place the meshes, so they are in `base` already
+def load_hulls(description: RobotDescription) -> tuple[Any, ...]:
+    """The convex hulls of the links, base to wrist 3 (shared, never changed)."""
+    model = load_pinocchio_model(description)  # its frames place the links, so they are in `base` already
+    geometry = description.geometry
+    if isinstance(geometry, DhArm):
+        return link_hulls(geometry, model)
     meshes = pin.buildGeomFromUrdf(
-        model, str(find_robot_file(urdf)), pin.GeometryType.COLLISION, package_dirs=[str(find_share_folder())]
+        model,
+        str(find_robot_file(geometry)),
+        pin.GeometryType.COLLISION,
+        package_dirs=[str(find_share_folder())],
     )
     hulls = []
     for mesh in meshes.geometryObjects:

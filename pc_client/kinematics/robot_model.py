@@ -1,8 +1,9 @@
 """The client's nominal arm: published geometry through Pinocchio, and limits of its own.
 
-The geometry is read from example-robot-data, whose UR files equal UR's published DH table; its *limits* are
-wrong (the UR3 file carries UR10 torques and 124-183 deg/s) and its masses are estimates, so neither is used.
-Nothing here may be fed with the kinematics of an emulated box: a client of a real arm does not know them.
+The geometry of the CB3 arms is read from example-robot-data, whose UR files equal UR's published DH table;
+its *limits* are wrong (the UR3 file carries UR10 torques and 124-183 deg/s) and its masses are estimates, so
+neither is used. The other arms, which it lacks, come from the DH table itself (`dh_arm`). Nothing here may be
+fed with the kinematics of an emulated box: a client of a real arm does not know them.
 
 Frames: everything is expressed in UR's `base` frame, the frame of the DH table and of the TCP poses that a
 control box reports. (The URDF's own root, `base_link`, is turned by pi about z against it.) The TCP is the
@@ -21,6 +22,8 @@ import pinocchio as pin
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.cell import NO_CELL, Cell
+from pc_client.kinematics.dh_arm import DhArm, urdf_text
+from pc_client.kinematics.e_series_lengths import UR3E, UR5E, UR10E, UR16E, UR20, UR30
 from pc_client.kinematics.robot_data import find_robot_file
 
 Six = tuple[float, float, float, float, float, float]
@@ -49,21 +52,32 @@ class RobotDescription:
 
     Attributes:
         name: short name, e.g. `ur3`.
-        urdf: file below `example-robot-data/robots/`.
+        geometry: file below `example-robot-data/robots/`, or the lengths of the arm.
         limits: joint limits.
-        q_branch: a posture on the IK branch that is preferred for drawing in front of the arm [rad].
-        tcp_speed_max: TCP speed limit [m/s].
         reach: distance from the base axis to the flange of the stretched arm [m].
         position_tolerance: between the flange that a real arm reports and this model's [m].
+        q_branch: a posture on the IK branch that is preferred for drawing in front of the arm [rad].
+        tcp_speed_max: TCP speed limit [m/s].
     """
 
     name: str
-    urdf: str
+    geometry: str | DhArm
     limits: JointLimits
-    q_branch: Six
-    tcp_speed_max: float
     reach: float
     position_tolerance: float
+    q_branch: Six
+    tcp_speed_max: float
+
+    @property
+    def urdf(self) -> str:
+        """The URDF of its frames.
+
+        Raises:
+            PlanningError: example-robot-data is not installed.
+        """
+        if isinstance(self.geometry, str):
+            return find_robot_file(self.geometry).read_text(encoding="utf-8")
+        return urdf_text(self.geometry, self.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,86 +127,83 @@ def _six_degrees(*angles: float) -> Six:
     return (a, b, c, d, e, f)
 
 
-# Source: UR user manuals CB3 3.13, technical specifications: working range +-360 deg of all joints (wrist 3
-# of the UR3 turns without end, but streaming needs no more than this).
+# Source: UR user manuals CB3 3.13, technical specifications, UR's ROS description of the others: working
+# range +-360 deg of all joints (wrist 3 of UR3 and UR3e turns without end, streaming needs no more).
 _ANY_TURN_MIN: Six = (-2 * pi,) * 6
 _ANY_TURN_MAX: Six = (2 * pi,) * 6
 
 # Elbow up, tool 45 deg down and forward: for the UR3 the branch whose whole box [.275, .425] x [-.2, .2] x
 # [.15, .35] m is reachable at >= .35 m/s in every direction. Source: own closed-form sweep of all branches.
-# The larger arms have the same shape, so the same posture names the same branch.
+# The other arms have the same shape, so the same posture names the same branch.
 _ELBOW_UP = _six_degrees(22.6, -101.1, -120.3, -5.9, 74.2, 106.4)
+
+_TCP_SPEED = 1.0
+"""[m/s]. Source: data sheets up to the UR16e, "typical tool speed 1 m/s"; UR20 and UR30 get no more."""
+
+
+def _arm(
+    name: str,
+    geometry: str | DhArm,
+    speeds: Six,
+    accelerations: tuple[float, float],
+    reach: float,
+    position_tolerance: float,
+) -> RobotDescription:
+    """A row of the table: speeds as rated [deg/s], accelerations of shoulder and elbow [rad/s²]."""
+    shoulder, elbow = accelerations
+    qdd_max = (shoulder, shoulder, elbow, _WRISTS, _WRISTS, _WRISTS)
+    limits = JointLimits(_ANY_TURN_MIN, _ANY_TURN_MAX, _speeds(*speeds), qdd_max)
+    return RobotDescription(name, geometry, limits, reach, position_tolerance, _ELBOW_UP, _TCP_SPEED)
+
+
+# Speeds: UR3, UR5, UR10 manuals CB3 3.13; UR's ROS description (config/*/joint_limits.yaml) says the same and
+# has the other arms.
+_UR3_SPEEDS: Six = (180.0, 180.0, 180.0, 360.0, 360.0, 360.0)
+_UR5_SPEEDS: Six = (180.0,) * 6
+_UR10_SPEEDS: Six = (120.0, 120.0, 180.0, 180.0, 180.0, 180.0)
+_UR20_SPEEDS: Six = (120.0, 120.0, 150.0, 210.0, 210.0, 210.0)
 
 # Accelerations: UR publishes none. UR's own driver streams speedj with a = 40 rad/s²
 # (Universal_Robots_Client_Library, external_control.urscript); no joint gets more. For the large joints it
 # is less, from torque: what UR's "max joint torques" leave after gravity of the bare arm in its worst
 # posture and friction at 1 rad/s, over the inertia of the arm before its base with the rotor. Masses: UR's
 # DH article; rotor inertia and friction: identified sets of real arms (.45 kg m² for joints of size 2 on a
-# UR3, 1.93 for size 3, 5.9 for size 4). The base gets what the shoulder gets.
-#
-# TCP speeds: the data sheets of all three arms, "typical tool speed 1 m/s". Reach: the same. Position
-# tolerances: twice what three real UR3e calibrations come to, 2.7 mm, in proportion to the reach; a choice,
-# docs/fidelity.md.
-ROBOTS = MappingProxyType(
-    {
-        # Speeds: UR3 manual CB3 3.13: base, shoulder, elbow 180 deg/s, wrists 360 deg/s
-        # (= ur_description config/ur3/joint_limits.yaml).
-        "ur3": RobotDescription(
-            name="ur3",
-            urdf="ur_description/urdf/ur3_robot.urdf",
-            limits=JointLimits(
-                _ANY_TURN_MIN,
-                _ANY_TURN_MAX,
-                qd_max=_speeds(180, 180, 180, 360, 360, 360),
-                # (56 - 19 gravity - 10 friction) Nm over .95 kg m²; elbow (28 - 7 - 4) over .4.
-                qdd_max=(28.0, 28.0, 40.0, 40.0, 40.0, 40.0),
-            ),
-            q_branch=_ELBOW_UP,
-            tcp_speed_max=1.0,
-            reach=0.5,
-            position_tolerance=0.005,
-        ),
-        # UR5 manual CB3 3.13: all joints 180 deg/s (= config/ur5/joint_limits.yaml).
-        "ur5": RobotDescription(
-            name="ur5",
-            urdf="ur_description/urdf/ur5_robot.urdf",
-            limits=JointLimits(
-                _ANY_TURN_MIN,
-                _ANY_TURN_MAX,
-                qd_max=_speeds(180, 180, 180, 180, 180, 180),
-                # (150 - 55 - 14) Nm over 3.7 kg m²; elbow (150 - 17 - 17) over 2.6.
-                qdd_max=(22.0, 22.0, 40.0, 40.0, 40.0, 40.0),
-            ),
-            q_branch=_ELBOW_UP,
-            tcp_speed_max=1.0,
-            reach=0.85,
-            position_tolerance=0.009,
-        ),
-        # UR10 manual CB3 3.13: base, shoulder 120 deg/s, others 180 deg/s (config/ur10/joint_limits.yaml).
-        "ur10": RobotDescription(
-            name="ur10",
-            urdf="ur_description/urdf/ur10_robot.urdf",
-            limits=JointLimits(
-                _ANY_TURN_MIN,
-                _ANY_TURN_MAX,
-                qd_max=_speeds(120, 120, 180, 180, 180, 180),
-                # (330 - 122 - 29) Nm over 11.8 kg m²; elbow (150 - 41 - 17) over 4.3.
-                qdd_max=(15.0, 15.0, 21.0, 40.0, 40.0, 40.0),
-            ),
-            q_branch=_ELBOW_UP,
-            tcp_speed_max=1.0,
-            reach=1.3,
-            position_tolerance=0.014,
-        ),
-    }
+# UR3, .61 on a UR3e, 1.93 for size 3, 5.9 for size 4; the larger ones assumed, in proportion to the torque).
+# The base gets what the shoulder gets.
+_WRISTS = 40.0
+
+# Reach: the data sheets. Position tolerances: twice what three real UR3e calibrations come to, 2.7 mm, in
+# proportion to the reach; a choice, docs/fidelity.md.
+_ROWS = (
+    # (56 - 19 gravity - 10 friction) Nm over .95 kg m²; elbow (28 - 7 - 4) over .4.
+    _arm("ur3", "ur_description/urdf/ur3_robot.urdf", _UR3_SPEEDS, (28.0, 40.0), 0.5, 0.005),
+    # (150 - 55 - 14) Nm over 3.7 kg m²; elbow (150 - 17 - 17) over 2.6.
+    _arm("ur5", "ur_description/urdf/ur5_robot.urdf", _UR5_SPEEDS, (22.0, 40.0), 0.85, 0.009),
+    # (330 - 122 - 29) Nm over 11.8 kg m²; elbow (150 - 41 - 17) over 4.3.
+    _arm("ur10", "ur_description/urdf/ur10_robot.urdf", _UR10_SPEEDS, (15.0, 21.0), 1.3, 0.014),
+    # (54 - 19 - 6) Nm over 1.1 kg m²; elbow (28 - 7 - 3) over .4.
+    _arm("ur3e", UR3E, _UR3_SPEEDS, (26.0, 40.0), 0.5, 0.005),
+    # (150 - 62 - 16) Nm over 3.6 kg m²; elbow (150 - 20 - 16) over 2.7.
+    _arm("ur5e", UR5E, _UR5_SPEEDS, (20.0, 40.0), 0.85, 0.009),
+    _arm("ur7e", UR5E, _UR5_SPEEDS, (20.0, 40.0), 0.85, 0.009),
+    # (330 - 125 - 34) Nm over 11.8 kg m²; elbow (150 - 43 - 16) over 4.3.
+    _arm("ur10e", UR10E, _UR10_SPEEDS, (14.0, 21.0), 1.3, 0.014),
+    _arm("ur12e", UR10E, _UR10_SPEEDS, (14.0, 21.0), 1.3, 0.014),
+    # (330 - 91 - 34) Nm over 8.4 kg m²; elbow (150 - 29 - 16) over 2.8.
+    _arm("ur16e", UR16E, _UR10_SPEEDS, (24.0, 37.0), 0.9, 0.01),
+    # (738 - 314 - 76) Nm over 32 kg m²; elbow (433 - 90 - 45) over 13.7.
+    _arm("ur20", UR20, _UR20_SPEEDS, (10.0, 21.0), 1.75, 0.019),
+    # (738 - 221 - 76) Nm over 22 kg m²; elbow (433 - 62 - 45) over 10.6.
+    _arm("ur30", UR30, _UR20_SPEEDS, (20.0, 30.0), 1.3, 0.014),
 )
+ROBOTS = MappingProxyType({arm.name: arm for arm in _ROWS})
 
 
 def robot_model(name: str = "ur3", cell: Cell = NO_CELL) -> RobotModel:
     """Return a fresh nominal model of the arm called `name`.
 
     Args:
-        name: one of `ur3`, `ur5`, `ur10`.
+        name: a key of `ROBOTS`.
         cell: what stands around it and what it carries.
 
     Raises:
@@ -200,24 +211,21 @@ def robot_model(name: str = "ur3", cell: Cell = NO_CELL) -> RobotModel:
     """
     description = ROBOTS.get(name)
     if description is None:
-        raise PlanningError(f"no nominal model is called {name!r}; choose one of {', '.join(sorted(ROBOTS))}")
-    model = load_pinocchio_model(description.urdf)
+        raise PlanningError(f"no nominal model is called {name!r}; choose one of {', '.join(ROBOTS)}")
+    model = load_pinocchio_model(description)
     return RobotModel(description, cell, model, model.createData(), int(model.getFrameId("tool0")))
 
 
 @lru_cache(maxsize=len(ROBOTS))
-def load_pinocchio_model(urdf: str) -> Any:
-    """Read a URDF of example-robot-data and move its world into UR's `base` frame.
+def load_pinocchio_model(description: RobotDescription) -> Any:
+    """Read the frames of an arm and move their world into UR's `base` frame.
 
     The result is shared between all callers and must not be changed.
-
-    Args:
-        urdf: file below `example-robot-data/robots/`.
 
     Returns:
         The Pinocchio model.
     """
-    model = pin.buildModelFromUrdf(str(find_robot_file(urdf)))
+    model = pin.buildModelFromXML(description.urdf)
     T_base_root = model.frames[model.getFrameId("base")].placement.inverse()
     # Everything that hangs directly on the root moves with it; the rest of the chain follows by itself.
     model.jointPlacements[1] = T_base_root * model.jointPlacements[1]

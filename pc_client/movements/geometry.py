@@ -67,12 +67,21 @@ class Box:
 
 #: Where an arm with its tool at RPY(0, 3/4 pi, 0) runs .35 m/s in every direction below its joint speed
 #: limits, in one branch of its inverse kinematics, clear of itself and of the table. Source: a search for the
-#: largest box on a grid (UR3 25 mm, others 50 mm) with the nominal kinematics.
+#: largest box on a grid (UR3 25 mm, others 50 mm) with the nominal kinematics. A UR3e has the UR3's, for the
+#: movements that lie in it.
 WORKING_BOXES: Mapping[str, Box] = MappingProxyType(
     {
         "ur3": Box((0.275, -0.2, 0.15), (0.425, 0.2, 0.35)),
         "ur5": Box((0.3, -0.4, 0.15), (0.65, 0.4, 0.55)),
         "ur10": Box((0.4, -0.7, 0.15), (0.85, 0.7, 0.8)),
+        "ur3e": Box((0.275, -0.2, 0.15), (0.425, 0.2, 0.35)),
+        "ur5e": Box((0.35, -0.45, 0.1), (0.65, 0.45, 0.6)),
+        "ur7e": Box((0.35, -0.45, 0.1), (0.65, 0.45, 0.6)),
+        "ur10e": Box((0.4, -0.65, 0.15), (0.95, 0.65, 0.8)),
+        "ur12e": Box((0.4, -0.65, 0.15), (0.95, 0.65, 0.8)),
+        "ur16e": Box((0.45, -0.5, 0.15), (0.7, 0.5, 0.6)),
+        "ur20": Box((0.55, -0.85, 0.2), (1.3, 0.85, 1.05)),
+        "ur30": Box((0.6, -0.6, 0.15), (1.05, 0.6, 0.75)),
     }
 )
 UR3_BOX = WORKING_BOXES["ur3"]

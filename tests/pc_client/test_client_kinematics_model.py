@@ -6,10 +6,12 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 import pytest
+from closed_form_ik import DH
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics import robot_data
-from pc_client.kinematics.clearance import clearance_model
+from pc_client.kinematics.clearance import clearance_model, load_hulls
+from pc_client.kinematics.dh_arm import DhArm, link_hulls, urdf_text
 from pc_client.kinematics.forward import tcp_jacobian, tcp_pose
 from pc_client.kinematics.inverse import solve_ik
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
@@ -62,7 +64,7 @@ def test_the_large_joints_of_large_arms_accelerate_less():
 
 
 def test_an_unknown_arm_is_refused_with_the_known_ones():
-    with pytest.raises(PlanningError, match=r"'ur4'.*ur10, ur3, ur5"):
+    with pytest.raises(PlanningError, match=r"'ur4'.*ur3, ur5, ur10, ur3e"):
         robot_model("ur4")
 
 
@@ -151,7 +153,7 @@ def test_a_folded_arm_hits_itself_and_an_upright_one_does_not():
 def test_floor_distances_are_those_of_the_lowest_mesh_vertex(q_deg):
     # Against the meshes themselves, every vertex moved by the DH table's own chain of link frames.
     q = np.radians(q_deg)
-    urdf = str(robot_data.find_robot_file(UR3.description.urdf))
+    urdf = str(robot_data.find_robot_file(UR3.description.geometry))
     shares = [str(robot_data.find_share_folder())]
     root = pin.buildModelFromUrdf(urdf)
     meshes = pin.buildGeomFromUrdf(root, urdf, pin.GeometryType.COLLISION, package_dirs=shares)
@@ -168,6 +170,35 @@ def test_floor_distances_are_those_of_the_lowest_mesh_vertex(q_deg):
     clearance = HULLS.along(q)
     assert clearance.floor.least[0] == pytest.approx(min(heights.values()), abs=1e-6)
     assert clearance.floor.nearest[0].joint == min(heights, key=heights.get)
+
+
+# Offsets and radii of CB3 arms, by their URDF and meshes: what `e_series_lengths` has of the others. (The frame
+# of a UR10's upper arm is not in its middle plane.)
+CB3_SIZES = {
+    "ur3": (0.1198, 0.0273, 0.064, (0.046, 0.038, 0.032)),
+    "ur5": (0.13585, 0.01615, 0.075, (0.06, 0.06, 0.038)),
+}
+
+
+@pytest.mark.parametrize("name", CB3_SIZES)
+def test_hulls_by_dh_table_and_joint_sizes_enclose_the_published_meshes(name):
+    out, elbow, foot, radii = CB3_SIZES[name]
+    arm = DhArm(**DH[name]._asdict(), shoulder_offset=out, elbow_offset=elbow, foot=foot, radii=radii)
+    made = link_hulls(arm, pin.buildModelFromXML(urdf_text(arm, name)))
+    published = load_hulls(ROBOTS[name])
+    directions = np.random.default_rng(4).normal(size=(500, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    for ours, theirs in zip(made[2:], published[2:], strict=True):
+        assert theirs.name.startswith(ours.name)
+        beyond = farthest(ours, directions) - farthest(theirs, directions)
+        assert beyond.min() > -0.012
+
+
+def farthest(body, directions):
+    """How far a body reaches in each direction, in the frame of the joint that carries it [m]."""
+    points = np.array([body.geometry.point(i) for i in range(body.geometry.num_points)])
+    moved = points @ body.placement.rotation.T + body.placement.translation
+    return (moved @ directions.T).max(axis=0)
 
 
 def test_the_base_of_the_arm_stands_in_the_base_frame():

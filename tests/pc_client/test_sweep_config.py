@@ -88,7 +88,7 @@ SEARCH = "[search]\ntrials = 3\n[controller]"
         ("MOVES\ngain_p = 3", "put it under [controller]"),
         ('MOVES\nfidelities = ["flawless"]', "give one of exact, ideal, typical, poor"),
         ('MOVES\nfidelities = ["poor", "tipical"]', "fidelities[1]: 'tipical'"),
-        ('MOVES\nrobots = ["ur4"]', "give one of ur3, ur5, ur10"),
+        ('MOVES\nrobots = ["ur4"]', "give one of ur3, ur5, ur10, ur3e"),
         ('MOVES\ncontrollers = ["pid"]', "give one of paper, preview, best"),
         ("MOVES\nseeds = [1.5]", "a whole number from 0"),
         ("MOVES\nseeds = [-1]", "a whole number from 0"),

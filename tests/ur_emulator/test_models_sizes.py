@@ -9,7 +9,6 @@ import pinocchio as pin
 import pytest
 from box_support import FakeNetwork, connect
 
-from pc_client.kinematics.robot_model import ROBOTS as CLIENT_ROBOTS
 from pc_client.kinematics.robot_model import robot_model
 from protocol.ur_types import RobotType, parse_serial
 from ur_emulator import ControlBox
@@ -27,10 +26,9 @@ ARMS = [pytest.param(robot, id=name) for name, robot in ROBOTS.items()]
 E_SERIES_ARMS = [
     pytest.param(robot, id=name) for name, robot in ROBOTS.items() if robot.generation is E_SERIES
 ]
-KNOWN_TO_THE_CLIENT = [pytest.param(ROBOTS[name], id=name) for name in CLIENT_ROBOTS]
 
 
-@pytest.mark.parametrize("robot", KNOWN_TO_THE_CLIENT)
+@pytest.mark.parametrize("robot", ARMS)
 def test_geometry_is_that_of_the_published_urdf(robot):
     arm, other = ArmModel(robot), robot_model(robot.name)
     rng = np.random.default_rng(5)
@@ -43,7 +41,7 @@ def test_geometry_is_that_of_the_published_urdf(robot):
         assert pin.exp3(np.array(rotation)) == pytest.approx(T_base_tcp.rotation, abs=1e-9)
 
 
-@pytest.mark.parametrize("robot", KNOWN_TO_THE_CLIENT)
+@pytest.mark.parametrize("robot", ARMS)
 def test_client_stays_within_the_limits_and_below_speeds_that_take_too_long_to_stop(robot):
     limits = robot_model(robot.name).limits
     assert limits.qd_max == pytest.approx([min(qd, radians(180)) for qd in robot.qd_max])
