@@ -78,7 +78,7 @@ LANGUAGE_ORDER = (
     {"cli"},
 )
 PROTOCOL_ORDER = (
-    {"errors", "frame_buffer", "patience", "pose", "ur_types", "wire_codec", "wire_record"},
+    {"calibration_hash", "errors", "frame_buffer", "patience", "pose", "ur_types", "wire_codec", "wire_record"},
     {"controller_words", "modbus", "script_channel", "velocity_stream", "xmlrpc"},
     {"realtime"},
     {"dashboard"},

@@ -39,6 +39,8 @@ def doctor(
         _show_rhythm(found.rhythm)
     obstacle, unreported = found.obstacle, []
     if found.report is not None:
+        if found.report.calibration is not None:
+            say(f"calibration {found.report.calibration}")
         conditions = preflight(found.report, model_of(found.report, surroundings))
         say(conditions_text(conditions))
         obstacle = refusal(conditions) or obstacle

@@ -11,7 +11,7 @@ from pc_client.driver.rtde_query import ask_rtde
 from pc_client.driver.transport import Network
 from pc_client.errors import DriverError
 from protocol.primary.layout import CartesianInfo, RobotModeData
-from protocol.primary.setup import ConfigurationData
+from protocol.primary.setup import ConfigurationData, KinematicsInfo
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports, RobotType
 
@@ -29,6 +29,7 @@ class RobotReport:
         slider: speed slider, 0 to 1, from port 30001.
         tcp_offset: (6,) pose of the TCP in the flange frame [m, rad], from port 30001.
         payload: mass [kg], by RTDE, since software 3.11.
+        calibration: name of the arm's calibration in the maker's drivers, from port 30001.
     """
 
     info: RobotInfo
@@ -37,6 +38,7 @@ class RobotReport:
     slider: float | None
     tcp_offset: tuple[float, ...] | None
     payload: float | None
+    calibration: str | None
 
 
 def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
@@ -74,6 +76,7 @@ def make_report(
     """
     configuration = primary.newest(ConfigurationData)
     cartesian = primary.newest(CartesianInfo)
+    kinematics = primary.newest(KinematicsInfo)
     return RobotReport(
         info=info,
         configured=None if configuration is None else _name(configuration.robot_type),
@@ -81,6 +84,7 @@ def make_report(
         slider=reported_slider(primary),
         tcp_offset=None if cartesian is None else cartesian.tcp_offset,
         payload=payload,
+        calibration=None if kinematics is None else kinematics.calibration,
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from protocol.calibration_hash import calibration_hash
 from protocol.primary.framing import SubPackage
 from protocol.ur_types import SIMULATED_MASTERBOARD, SIMULATOR_CHECKSUM, SoftwareVersion
 from protocol.wire_record import Since, ValueOrigin, since, wire
@@ -40,6 +41,11 @@ class KinematicsInfo(SubPackage):
     dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
     dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
     calibration_status: int = wire("I", origin=_CONSTANT)
+
+    @property
+    def calibration(self) -> str:
+        """The name of the calibration in the maker's drivers."""
+        return calibration_hash(zip(self.dh_theta, self.dh_d, self.dh_a, self.dh_alpha, strict=True))
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,8 @@ import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
 from pc_client.recording.loader import load_recording
+from protocol.primary.setup import ConfigurationData, KinematicsInfo
+from protocol.primary.state import encode_state
 from protocol.ur_types import SoftwareVersion
 
 COMMANDS = (["experiment"], ["run"], ["movements"], ["movements", "list"], ["report"], ["doctor"], ["export"])
@@ -301,6 +303,17 @@ def test_doctor_shows_every_condition_and_only_reads(robot, capsys):
         "streaming   NOT NOW: the robot's speed slider is 50 %, must be 100 %; set it"
     )
     assert robot.programs == []
+
+
+def test_doctor_names_the_calibration_of_the_arm_as_the_makers_driver_does(robot, capsys):
+    nominal_ur5e = KinematicsInfo(
+        dh_a=(0.0, -0.425, -0.3922, 0.0, 0.0, 0.0),
+        dh_d=(0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996),
+        dh_alpha=(1.570796327, 0.0, 0.0, 1.570796327, -1.570796327, 0.0),
+    )
+    robot.state = encode_state([ConfigurationData(), nominal_ur5e], robot.version)
+    cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"])
+    assert "calibration calib_12788084448423163542\n" in capsys.readouterr().out
 
 
 def test_doctor_says_what_was_not_reported_beside_ready(robot, capsys):

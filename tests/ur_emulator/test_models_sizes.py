@@ -10,6 +10,7 @@ import pytest
 from box_support import FakeNetwork, connect
 
 from pc_client.kinematics.robot_model import robot_model
+from protocol.calibration_hash import calibration_hash
 from protocol.ur_types import RobotType, parse_serial
 from ur_emulator import ControlBox
 from ur_emulator.commands.programs import StartProgram
@@ -157,3 +158,16 @@ def test_stronger_arms_say_that_they_are_their_older_sisters(name, sold_as):
     arm, sister = ROBOTS[name], ROBOTS[sold_as]
     assert (arm.robot_type, arm.box_type, arm.links) == (sister.robot_type, sister.box_type, sister.links)
     assert arm.payload_max > sister.payload_max
+
+
+@pytest.mark.parametrize(
+    ("name", "published"),
+    [
+        ("ur3e", 16756443741236045476), ("ur5e", 12788084448423163542), ("ur10e", 5119701370761913513),
+        ("ur16e", 1935737212149401527), ("ur20", 4890363623803256388), ("ur30", 12001109639981648826),
+    ],
+)  # fmt: skip
+def test_hash_of_the_nominal_calibration_is_the_published_one(name, published):
+    """The hashes stand in the vendor's ROS description beside its nominal tables."""
+    rows = ROBOTS[name].dh
+    assert calibration_hash((row.theta, row.d, row.a, row.alpha) for row in rows) == f"calib_{published}"
