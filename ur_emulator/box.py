@@ -77,6 +77,7 @@ class Box(BoxOperations):
         control_port: int | None = None,
         control_token: str | None = None,
         skip_unknown_nodes: bool = False,
+        remote_control: bool = True,
         *,
         loop: EventLoop | None = None,
         phase: float = 0.0,
@@ -101,6 +102,7 @@ class Box(BoxOperations):
             control_token: what requests on that port must show; None: nothing, on a loopback address only.
             skip_unknown_nodes: run programs of PolyScope without the nodes that are not known, those of
                 URCaps above all; the log names each.
+            remote_control: clients may command the box; False: it starts in local control (e-Series).
             loop: shared with other boxes; None gives the box its own.
             phase: which part of a period its cycles lie after those of the first box of the loop.
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).
@@ -118,6 +120,11 @@ class Box(BoxOperations):
         imperfections = generation.fidelity(fidelity)
         named_pace = parse_pace(pace)
         check_options(host, speed, seed, programs, control_port, control_token)
+        if not (remote_control or generation.has_remote_control):
+            raise EmulatorError(
+                f"local control given: a box of the {generation.name} has none, "
+                "its clients may always command it"
+            )
         prestart_process()  # it loads the compiler while the box is assembled
         self.host = host
         self.port_base = port_base or 0
@@ -134,6 +141,7 @@ class Box(BoxOperations):
             mode=RobotMode.RUNNING,
             version=(asked.major, asked.minor),
         )
+        controller.state.operator.set_remote_control(remote_control)
         self._box = ServedBox(
             controller,
             make_pacer(named_pace, controller.period_s, speed, phase, lead),

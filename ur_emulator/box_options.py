@@ -32,6 +32,7 @@ class BoxOptions(TypedDict, total=False):
     control_port: int | None
     control_token: str | None
     skip_unknown_nodes: bool
+    remote_control: bool
 
 
 def check_options(

@@ -80,6 +80,13 @@ def serve(
             help="Run .urp programs without the nodes that are not known, as of URCaps.",
         ),
     ] = False,
+    remote_control: Annotated[
+        bool,
+        typer.Option(
+            "--remote-control/--local-control",
+            help="Whether clients may command an e-Series box: the dashboard, and scripts on 30001 to 30003.",
+        ),
+    ] = True,
     control_port: Annotated[
         int | None,
         typer.Option(
@@ -135,6 +142,7 @@ def serve(
             control_port=control_port,
             control_token=token,
             skip_unknown_nodes=skip_unknown_nodes,
+            remote_control=remote_control,
         )
     except EmulatorError as error:
         sys.stderr.write(f"ur-emulator: {error}\n")

@@ -35,6 +35,7 @@ OPTIONS = (
     "port_base",
     "programs",
     "skip_unknown_nodes",
+    "remote_control",
     "control_port",
     "control_token",
     "standard_ports",

@@ -15,8 +15,9 @@ by `make docs`.
 
 A client of one of these three ports can make the robot run [URScript](../urscript-coverage.md):
 drivers send their control programs, urx and small tools send a line for every move. The script is
-plain text without framing, the same on all three ports. CB3 has no switch between local and remote
-control: every script is run. The read-only ports 30011 to 30013 run nothing.
+plain text without framing, the same on all three ports. A CB3 runs every script; an e-Series box
+in local control runs none and reports C210, until the client connects anew in remote control. The
+read-only ports 30011 to 30013 run nothing.
 
 ```python
 import socket

@@ -29,6 +29,7 @@ SECOND = RobotGeneration(
         has_programs_in_recovery=False,
     ),
     has_operational_modes=True,
+    has_remote_control=True,
     fidelities=tuple(
         replace(it, dead_time=it.dead_time + 0.004, force_sigma=0.15)
         for it in CB3.fidelities

@@ -383,11 +383,11 @@ def test_the_scale_of_an_arm_at_rest_is_that_of_the_slider():
     bench = Bench()
     bench.tick(1, REDUCE)
     limiter = bench.controller.state.speed.limiter
-    space = bench.now.space
-    assert limiter.step(motion, space, 0.4, 0.008) == 0.4
-    assert limiter.step(motion, space, 0.0, 0.008) == 0.0
+    arm, tcp = bench.controller.state.arm, (0.0,) * 6
+    assert limiter.step(motion, arm, tcp, 0.4, 0.008) == 0.4
+    assert limiter.step(motion, arm, tcp, 0.0, 0.008) == 0.0
     motion.command(SimpleNamespace(), SpeedJ((0.0,) * 6, 1.0))
-    assert limiter.step(motion, space, 1.0, 0.008) == 1.0
+    assert limiter.step(motion, arm, tcp, 1.0, 0.008) == 1.0
 
 
 # --- the pendant and the start

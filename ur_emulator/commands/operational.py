@@ -1,4 +1,4 @@
-"""Operational mode and enabling device of an e-Series box."""
+"""Operational mode, enabling device and remote control of an e-Series box."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from ur_emulator.commands.operation import CommandOperation
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box
+from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.safety.enabling_device import EnablingAct
 from ur_emulator.controller.safety.operational_mode import ModeSource, OperationalMode
 from ur_emulator.errors import RefusedError
@@ -45,6 +46,22 @@ class MoveEnablingDevice(CommandOperation):
     def apply(self, box: Box) -> None:
         needs_operational_modes(box.state)
         box.safety.inputs.act_on_device(EnablingAct(self.position))
+
+
+class SwitchRemoteControl(CommandOperation):
+    """Switch to remote control, or to local control, in which clients may not command the box.
+
+    Clients of the dashboard and of the script ports must connect again after the switch to remote control.
+    """
+
+    on: bool = parameter("remote control, or local", default=True)
+
+    def apply(self, box: Box) -> None:
+        generation = box.state.robot.generation
+        if not generation.has_remote_control:
+            raise RefusedError(f"a box of the {generation.name} has no remote control")
+        box.state.operator.set_remote_control(self.on)
+        box.state.events.append(LogAdded("Controller", f"{'Remote' if self.on else 'Local'} control"))
 
 
 def needs_operational_modes(state: ControllerState) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from protocol.primary.messages import RequestedType
-from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
+from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode, SafetyStatus
 from ur_emulator.models.robot_model import Vector3, Vector6
 
 if TYPE_CHECKING:
@@ -43,6 +43,9 @@ class BoxState:
         time: seconds since controller start.
         robot_mode: a name that `wait_until` lists, such as RUNNING.
         safety_mode: a name that `wait_until` lists, such as NORMAL.
+        safety_status: the same, or which of the safeguards of an e-Series box stops it.
+        operational_mode: NONE, MANUAL or AUTOMATIC; of a CB3 NONE.
+        remote_control: clients may command the box; those of a CB3 always may.
         program_state: a name that `wait_until` lists, such as PLAYING.
         program: name of the program that runs, "" without one.
         joint_modes: of the six joints, such as RUNNING, IDLE or POWER_OFF.
@@ -71,6 +74,9 @@ class BoxState:
     time: float
     robot_mode: str
     safety_mode: str
+    safety_status: str
+    operational_mode: str
+    remote_control: bool
     program_state: str
     program: str
     joint_modes: tuple[str, ...]
@@ -110,6 +116,9 @@ def take_state(controller: Controller) -> BoxState:
         time=now.timestamp,
         robot_mode=RobotMode(now.robot_mode).name,
         safety_mode=SafetyMode(now.safety_mode).name,
+        safety_status=SafetyStatus(now.safety_status).name,
+        operational_mode=controller.state.operational.mode.name,
+        remote_control=bool(operator.remote_spell),
         program_state=ProgramState(now.runtime_state).name,
         program=now.program_name,
         joint_modes=tuple(JointMode(mode).name for mode in now.joint_mode),

@@ -111,6 +111,8 @@ _EXAMPLES = {
     "remove_obstacle": "--name wall",
     "require_safeguard_reset": "--required on",
     "assign_safety_input": "--pair 0 --function reduced",
+    "set_operational_mode": "--mode manual",
+    "enabling_device": "--position pressed",
     "run_program": "--script-file my_program.script",
     "set_speed": "--fraction 0.5",
     "press_button": "--button teach --pressed on",

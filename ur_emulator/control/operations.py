@@ -17,7 +17,7 @@ from ur_emulator.box_log import LogEntry
 from ur_emulator.commands.inputs import SetAnalogInput, SetDigitalInput
 from ur_emulator.commands.obstacles import AddObstacle, RemoveObstacle
 from ur_emulator.commands.operation import Operation
-from ur_emulator.commands.operational import MoveEnablingDevice, SetOperationalMode
+from ur_emulator.commands.operational import MoveEnablingDevice, SetOperationalMode, SwitchRemoteControl
 from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetSpeedSlider, StopProgram
@@ -145,9 +145,10 @@ class BoxOperations:
     assign_safety_input = method(AssignSafetyInput)
     change_safety_settings = method(ChangeSafetySettings)
     confirm_safety = method(ConfirmSafety)
-    # --- operational mode
+    # --- operational mode, remote control
     set_operational_mode = method(SetOperationalMode)
     enabling_device = method(MoveEnablingDevice)
+    remote_control = method(SwitchRemoteControl)
     # --- power
     power_on = method(PowerOn)
     power_off = method(PowerOff)

@@ -245,7 +245,7 @@ class Controller:
         state, before = self.state, self.state.motion.target
         scale, limiter = state.speed.slider, state.speed.limiter
         if limiter is not None:
-            scale = limiter.step(state.motion, state.past.snapshot.space, scale, self.period_s)
+            scale = limiter.step(state.motion, state.arm, state.tool.tcp_offset, scale, self.period_s)
         try:
             target = state.motion.step(self.period_s, scale)
             if target is before or state.safety.is_stopped:

@@ -1,4 +1,4 @@
-"""What programs ask of the operator: values, and popups to be closed; and the buttons of the pendant.
+"""What programs ask of the operator: values, popups to be closed; and what the operator does at the pendant.
 
 There is no person at the box: a client answers.
 
@@ -59,10 +59,13 @@ class Operator:
 
     Attributes:
         buttons: those of the pendant that are pressed, as in RobotStatusBits.
+        remote_spell: number of the present spell of remote control, from 1; 0 in local control. A client may
+            command the box while it is that of its connect. A CB3 has no other than the first.
     """
 
     def __init__(self) -> None:
         self.buttons = 0
+        self.remote_spell = self._n_spells = 1
         self._count = 0
         self._open: dict[int, OperatorRequest] = {}
         self._shown: deque[str] = deque(maxlen=MAX_SHOWN)
@@ -80,6 +83,12 @@ class Operator:
     def press(self, button: int, pressed: bool) -> None:
         """Press a button of the pendant, a bit of RobotStatusBits, or release it."""
         self.buttons = self.buttons | button if pressed else self.buttons & ~button
+
+    def set_remote_control(self, is_remote: bool) -> None:
+        """Switch to remote control, or to local control."""
+        if is_remote and not self.remote_spell:
+            self._n_spells += 1
+        self.remote_spell = self._n_spells if is_remote else 0
 
     def show(self, text: str) -> None:
         """Show a popup that does not block a program; it stays, also without power, until it is closed."""

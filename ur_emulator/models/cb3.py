@@ -41,6 +41,7 @@ CB3 = RobotGeneration(
         has_programs_in_recovery=True,  # chosen
     ),
     has_operational_modes=False,
+    has_remote_control=False,
     fidelities=FIDELITIES,
     robot_subtype=2,
     dashboard=COMMANDS,

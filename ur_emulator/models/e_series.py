@@ -49,6 +49,7 @@ E_SERIES = RobotGeneration(
         has_programs_in_recovery=False,  # UR5e hardware manual 2022
     ),
     has_operational_modes=True,
+    has_remote_control=True,
     fidelities=tuple(
         replace(
             fidelity,

@@ -97,6 +97,7 @@ class RobotGeneration:
         builds: which version has which build.
         limits: of the safety system.
         has_operational_modes: manual and automatic mode, enabling device, automatic-mode safeguard.
+        has_remote_control: local control, in which clients may not command the box, and remote control.
         fidelities: how far its arms are from perfect ones.
         robot_subtype: code in the primary interface's configuration data.
         dashboard: commands of the dashboard server.
@@ -119,6 +120,7 @@ class RobotGeneration:
     builds: Builds
     limits: SafetyLimits
     has_operational_modes: bool
+    has_remote_control: bool
     fidelities: tuple[Fidelity, ...]
     robot_subtype: int
     dashboard: tuple[DashboardCommand, ...]

@@ -102,6 +102,11 @@ class ServedBox:
         """Whether the next cycle takes further commands; for clients that can wait."""
         return len(self._commands) < BUDGETS.commands
 
+    @property
+    def remote_spell(self) -> int:
+        """Number of the present spell of remote control, 0 in local control."""
+        return self.controller.state.operator.remote_spell
+
     def submit(self, command: Command, done: Done | None = None, *, in_place_of: str = "") -> None:
         """Take a command for the next cycle.
 

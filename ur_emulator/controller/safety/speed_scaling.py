@@ -17,9 +17,9 @@ from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety.joint_limits import JointLimits
 from ur_emulator.controller.safety.limit_checks import Violation
-from ur_emulator.kinematics.arm_model import CartesianState
+from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
 from ur_emulator.models.robot_generation import UNLIMITED, ArmLimits, SafetyLimits
-from ur_emulator.models.robot_model import Vector6
+from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.path_motion import SCALING_RATE
 from ur_emulator.plant.plant_state import PlantState
@@ -86,22 +86,21 @@ class SpeedLimiter:
         self._hard = hard
         self._exceeded_s = 0.0
 
-    def step(self, motion: ArmMotion, space: ArmInSpace, slider: float, dt: float) -> float:
+    def step(self, motion: ArmMotion, arm: ArmModel, tcp: Vector6, slider: float, dt: float) -> float:
         """Return the scale for the next cycle; the path is slowed down to keep the limits.
 
         Args:
             motion: of the arm; the rate of its scaling is set.
-            space: the arm in the last cycle.
+            arm: kinematics of the arm.
+            tcp: tool centre point in the flange frame.
             slider: speed slider, 0..1.
             dt: duration of a cycle [s].
         """
         target = motion.target
-        load = max(
-            abs(qd + qdd * dt) / limit
-            for qd, qdd, limit in zip(target.qd, target.qdd, self._limits.joints, strict=True)
-        )
+        ahead = six([qd + qdd * dt for qd, qdd in zip(target.qd, target.qdd, strict=True)])
+        load = max(abs(qd) / limit for qd, limit in zip(ahead, self._limits.joints, strict=True))
         if isfinite(self._limits.arm.tool_speed):
-            load = max(load, _tool_speed(space.target) / self._limits.arm.tool_speed)
+            load = max(load, _tool_speed(arm.state(target.q, ahead, tcp)) / self._limits.arm.tool_speed)
         scale = slider if load <= 0.0 else min(slider, motion.scale * AIM / load)
         rate = SCALING_RATE
         if self._hard and (speed := max(map(abs, target.qd))) > 0.0:

@@ -9,14 +9,16 @@ import platform
 from collections.abc import Callable
 from contextlib import suppress
 
-from protocol.dashboard.commands import USER_ROLES, DashboardCommand
+from protocol.dashboard.commands import OPERATIONAL_MODES, USER_ROLES, DashboardCommand
 from protocol.dashboard.connection import CommandReceived
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
+from ur_emulator.commands.operational import ChooseModeByDashboard
 from ur_emulator.commands.operator import ClosePopup, ShowPopup
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
+from ur_emulator.controller.safety.operational_mode import OperationalMode
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.dashboard.reports import (
@@ -84,11 +86,12 @@ class DashboardAnswers:
             "version": lambda row, *_: row.reply(version=str(access.identity.software.version)),
             "setUserRole": self._set_user_role,
             "getUserRole": lambda row, *_: row.reply(role=self._user_role),
-            # This box has neither: it takes every command, and nobody has set a mode.
-            "set operational mode": lambda row, mode, _: row.reply("failed", mode=mode),
-            "get operational mode": lambda row, *_: row.reply(mode="NONE"),
-            "clear operational mode": lambda row, *_: row.reply(mode="NONE"),
-            "is in remote control": lambda row, *_: row.reply(remote="true"),
+            "set operational mode": self._set_operational_mode,
+            "get operational mode": lambda row, *_: row.reply(mode=self._operational_mode()),
+            "clear operational mode": self._clear_operational_mode,
+            "is in remote control": lambda row, *_: row.reply(
+                remote=str(bool(access.controller.state.operator.remote_spell)).lower()
+            ),
             "power on": lambda row, *_: self._applied(row, PowerOn()),
             "power off": lambda row, *_: self._applied(row, PowerOff()),
             "brake release": lambda row, *_: self._applied(row, ReleaseBrakes()),
@@ -179,6 +182,22 @@ class DashboardAnswers:
         ):
             return row.reply("too_early")
         return self._applied(row, UnlockProtectiveStop())
+
+    def _operational_mode(self) -> str:
+        return self._access.controller.state.operational.mode.name
+
+    def _set_operational_mode(self, row: DashboardCommand, mode: str, _: str) -> Steps[str]:
+        try:
+            if mode.upper() not in OPERATIONAL_MODES:
+                raise RefusedError(f"operational mode {mode}: choose from {', '.join(OPERATIONAL_MODES)}")
+            yield from self._access.apply(ChooseModeByDashboard(OperationalMode[mode.upper()]))
+        except RefusedError:
+            return row.reply("failed", mode=mode)
+        return row.reply(mode=self._operational_mode())
+
+    def _clear_operational_mode(self, row: DashboardCommand, *_: str) -> Steps[str]:
+        yield from self._access.apply(ChooseModeByDashboard(None))
+        return row.reply(mode=self._operational_mode())
 
     def _shutdown(self, row: DashboardCommand, _: str, client: str) -> Steps[str]:
         self._access.note(f"Shut down by {client}")

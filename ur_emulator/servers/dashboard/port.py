@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from protocol.dashboard.commands import REMOTE_CONTROL_ONLY
 from protocol.dashboard.connection import MAX_LINE, CommandReceived, DashboardConnection
 from protocol.errors import ProtocolError
 from ur_emulator.servers.box_access import BoxAccess
@@ -59,6 +60,10 @@ class _DashboardSession(Session):
         super().__init__(connection, access)
         self.lines = DashboardConnection(access.identity.software.dashboard)
         self._answers = answers
+        self._remote_spell = self._spell_now()
+
+    def _spell_now(self) -> int:
+        return self._access.controller.state.operator.remote_spell
 
     def _take(self, data: bytes) -> None:
         try:
@@ -72,6 +77,8 @@ class _DashboardSession(Session):
             return 0
         if not isinstance(event, CommandReceived):
             text = event.answer
+        elif event.command.needs_remote and not 0 < self._remote_spell == self._spell_now():
+            text = REMOTE_CONTROL_ONLY
         else:
             answer = self._answers.answer(event, self.connection.host)
             text = answer if isinstance(answer, str) else (yield from answer)

@@ -29,6 +29,8 @@ from ur_emulator.servers.programs.sender import Program, Sender
 from ur_emulator.servers.programs.words import word_command
 from urscript.catalogue import Catalogue
 
+# Error code for script text in local control. Source: the maker's client library; the text: a user's log.
+READ_ONLY = 210
 # So much of a client's script is taken whatever others send [bytes].
 _ALWAYS_TAKEN = 64 * KIB
 # A program comes a turn later for so many that its sender has sent at once before it, and for so much text of
@@ -45,6 +47,11 @@ class Box(Protocol):
     """
 
     stops: int
+
+    @property
+    def remote_spell(self) -> int:
+        """Number of the present spell of remote control, 0 in local control."""
+        ...
 
     def submit(self, command: Command, *, in_place_of: str = "") -> None:
         """Take a command for the next cycle, in place of one of the same name that waits for it."""
@@ -80,8 +87,15 @@ class ProgramIntake:
 
     # --- clients
 
+    def new_sender(self) -> Sender:
+        """Return a client that has just connected."""
+        return Sender(self._box.remote_spell)
+
     def received(self, sender: Sender, data: bytes) -> None:
-        """Take script text of a client."""
+        """Take script text of a client; in local control it has no effect, until the client connects anew."""
+        if not sender.remote_spell or sender.remote_spell != self._box.remote_spell:
+            self._warn("Socket is read-only when the robot is in local control", READ_ONLY)
+            return
         before = sender.channel.pending
         items = sender.channel.feed(data)
         self._hold(sender, sender.channel.pending - before)
@@ -164,10 +178,10 @@ class ProgramIntake:
             sender.is_told = True
             self._warn("programs come faster than they compile, some were dropped")
 
-    def _warn(self, text: str) -> None:
+    def _warn(self, text: str, code: int = 0) -> None:
         self._n_warnings += 1
         if self._n_warnings <= BUDGETS.script_warnings_per_cycle:
-            self._box.announce(ErrorReported(0, 0, ReportLevel.WARNING, text))
+            self._box.announce(ErrorReported(code, 0, ReportLevel.WARNING, text))
 
     # --- programs
 

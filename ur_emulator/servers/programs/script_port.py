@@ -17,7 +17,7 @@ class ScriptPort:
 
     def opened(self, connection: Connection) -> None:
         """The client gets the next package."""
-        self._clients[connection] = Sender()
+        self._clients[connection] = Sender() if self._intake is None else self._intake.new_sender()
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Take script text."""
