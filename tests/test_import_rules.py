@@ -53,7 +53,7 @@ CONTROLLER_ORDER = (
     {"io"},
     {"safety"},
     {"client_inputs", "electrics", "error_settings"},
-    {"snapshot"},
+    {"energy", "snapshot"},
     {"past_cycles"},
     {"compliance"},
     {"state"},
@@ -78,7 +78,16 @@ LANGUAGE_ORDER = (
     {"cli"},
 )
 PROTOCOL_ORDER = (
-    {"calibration_hash", "errors", "frame_buffer", "patience", "pose", "ur_types", "wire_codec", "wire_record"},
+    {
+        "calibration_hash",
+        "errors",
+        "frame_buffer",
+        "patience",
+        "pose",
+        "ur_types",
+        "wire_codec",
+        "wire_record",
+    },
     {"controller_words", "modbus", "script_channel", "velocity_stream", "xmlrpc"},
     {"realtime"},
     {"dashboard"},

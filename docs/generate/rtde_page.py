@@ -14,7 +14,7 @@ from protocol.rtde.codec import MAX_NAMES_SIZE
 from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField, input_fields, output_fields
 from protocol.rtde.messages import Request, RequestProtocolVersion, RtdePackageType, SetupOutputs, Start
 from protocol.rtde.server_connection import MAX_REQUEST_SIZE, RtdeServerConnection
-from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
+from protocol.rtde.types import RobotStatusBits, SafetyStatusBits, TimeScaleSource
 from protocol.ur_types import SoftwareVersion
 
 _INTRODUCTION = f"""\
@@ -42,8 +42,8 @@ connection begins in protocol version 1; `V` requests version 2, as all current 
 
 * Every request gets exactly one reply, in order; the box sends nothing else before the reply to
   `S`.
-* Rates are 125 a second divided by a whole number: a request for 60 gives 62.5. Rates of 1 to 125
-  are possible.
+* Rates are the control cycles of a second, 125 on a CB3 and 500 on an e-Series, divided by a whole
+  number: a request for 60 gives 62.5. Rates from 1 to all cycles are possible.
 * A connection has one output recipe, the last one, and up to 255 input recipes, numbered from 1.
 * The reply to a name that the software does not have is `NOT_FOUND`, to an input that another
   connection uses `IN_USE`; either makes the whole recipe void (number 0). Inputs are free again
@@ -62,7 +62,7 @@ _OUTPUTS = """\
 ## Outputs
 
 *From* gives the first software of CB3 and e-Series; before it, and where it is "-", the answer is
-`NOT_FOUND`. Variables of late e-Series software that are not listed are `NOT_FOUND` in every version.
+`NOT_FOUND`, as for `{missing}`, which this box never answers.
 """
 
 _INPUTS = """\
@@ -81,12 +81,15 @@ def render() -> str:
             "## Try it\n",
             _example(),
             "\nThis decodes a running box; `decode rtde FILE --names ...` decodes captured bytes.\n",
-            _OUTPUTS,
+            _OUTPUTS.format(missing="` and `".join(field.name for field in OUTPUTS if not field.origin)),
             MARKS,
             *table(("name", "type", "unit", "origin", "meaning", "from"), _output_rows()),
             "",
             *_bits("robot_status_bits", RobotStatusBits),
             *_bits("safety_status_bits", SafetyStatusBits),
+            "* `time_scale_source`: "
+            + ", ".join(f"{int(one)} {_words(one.name)}" for one in TimeScaleSource)
+            + ".",
             "",
             _INPUTS,
             *table(("name", "type", "unit", "meaning", "from"), _input_rows()),
@@ -120,10 +123,12 @@ def _grouped(fields: tuple[RtdeField, ...]) -> Iterator[tuple[str, RtdeField]]:
 
 
 def _bits(name: str, bits: type[RobotStatusBits] | type[SafetyStatusBits]) -> Iterator[str]:
-    names = ", ".join(
-        f"{bit.bit_length() - 1} {bit.name.lower().replace('_', ' ')}" for bit in bits if bit.name
-    )
+    names = ", ".join(f"{bit.bit_length() - 1} {_words(bit.name)}" for bit in bits if bit.name)
     yield f"* `{name}`: {names}."
+
+
+def _words(name: str) -> str:
+    return name.lower().replace("_", " ")
 
 
 def _example() -> str:

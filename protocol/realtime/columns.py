@@ -81,7 +81,7 @@ COLUMNS: tuple[RealtimeColumn, ...] = (
        "0-7 standard, 8-15 configurable, 16-17 tool; sent as the double 5.0 for bits 0 and 2", _DIGITAL_BITS),
     _C("joint_temperatures", 6, "degC", 1044, _MEASURED, "motor temperatures"),
     _C("actual_execution_time", 1, "-", 1044, _CONSTANT,
-       "controller timer, run time of the real-time thread: 0, so that equal runs are equal"),
+       "controller timer, run time of the real-time thread in ms: 0, so that equal runs are equal"),
     _C("test_value", 1, "-", 1044, _ZERO, "used by UR's own software only"),
     _C("robot_mode", 1, "enum", 1044, _MODELLED, "RobotMode"),
     _C("joint_mode", 6, "enum", 1044, _MODELLED, "JointMode"),

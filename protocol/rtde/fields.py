@@ -5,8 +5,9 @@ index where it is one element of it. The box implements the inputs.
 
 Source of names, types and meanings, unless a row says otherwise: UR "Real-Time Data Exchange (RTDE) Guide";
 types compared with the type table of the public client library (`rtde/data_package.cpp`), with which they
-agree. "Base" versions are as old as RTDE itself. Rows of the e-Series whose first version the guide does not
-give are `UNPUBLISHED`: no software that this package knows answers them.
+agree. "Base" versions are as old as RTDE itself. The guide gives no first version for most rows of the
+e-Series alone: those of 5.23 and 5.26 are from the client library and its tests; the others lie between the
+dates of lists of variables in public clients.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ class RtdeField:
         type: its data type.
         unit: SI unit, "enum", "bits" or "-".
         since: first software of each generation that has it.
-        origin: how the emulated box fills an output; None for an input, and for an output of late e-Series
-            software that it does not answer.
+        origin: how the emulated box fills an output; None for an input, and for an output that it does not
+            answer.
         meaning: of the value, with its frame of reference.
         comes_from: attribute of the snapshot, such as "actual_q" or "registers.output_integers[3]"; empty if
             `constant` is what the box sends.
@@ -52,7 +53,7 @@ class RtdeField:
     source: str = "UR RTDE guide"
 
 
-_MEASURED, _MODELLED, _CONSTANT = ValueOrigin.MEASURED, ValueOrigin.MODELLED, ValueOrigin.CONSTANT
+_MEASURED, _MODELLED, _PROPERTY, _CONSTANT, _ = ValueOrigin
 _BOOL, _U8, _U32, _I32, _U64, _F64, _VEC3, _VEC6, _VEC6I, _VEC6U = RtdeType
 
 _BASE = since((3, 2))
@@ -65,7 +66,10 @@ _TCP_OFFSET_SINCE = Since(SoftwareVersion(3, 12, 3), SoftwareVersion(5, 5, 1))
 _SCRIPT_LINE_SINCE = since((3, 14), (5, 9))
 _INERTIA_SINCE = since((3, 15), (5, 11))
 _E_TOOL_SINCE = since(None, (5, 2))
-_UNPUBLISHED = Since(None, None)
+_MONITORS_SINCE = since(None, (5, 11))  # chosen, between 5.9 and 5.14: a box of 5.12 can serve UR's recorder
+_SCALING_SINCE = since(None, (5, 19))  # the end of the range 5.15 to 5.19
+_SINCE_5_23 = since(None, (5, 23))
+_SINCE_5_26 = since(None, (5, 26))
 
 _LIBRARY = "public client library and ur_rtde; not in the guide"
 _AMPERE = "UR primary/secondary client interface gives A; newer guides say mA, older ones A"
@@ -105,8 +109,8 @@ def _fixed(
     return RtdeField(name, kind, unit, since, _CONSTANT, meaning, "", constant, source)
 
 
-def _e_series(name: str, kind: RtdeType, unit: str, meaning: str, since: Since = _UNPUBLISHED) -> RtdeField:
-    """An output that no CB3 has and this box never answers."""
+def _not_answered(name: str, kind: RtdeType, unit: str, meaning: str, since: Since) -> RtdeField:
+    """An output that this box has no value for."""
     return RtdeField(name, kind, unit, since, None, meaning)
 
 
@@ -155,8 +159,9 @@ OUTPUTS: tuple[RtdeField, ...] = (
     _out("actual_q", _VEC6, "rad", _MEASURED, "joint position"),
     _out("actual_qd", _VEC6, "rad/s", _MEASURED, "joint velocity"),
     _out("actual_current", _VEC6, "A", _MEASURED, "joint motor current"),
-    _e_series("actual_current_window", _VEC6, "A", "allowed deviation of the joint current"),
-    _e_series("actual_current_as_torque", _VEC6, "Nm", "joint current as torque", since(None, (5, 23))),
+    _out("actual_current_window", _VEC6, "A", _PROPERTY,
+         "allowed deviation of the joint current: that of the greatest torque", since=_MONITORS_SINCE),
+    _out("actual_current_as_torque", _VEC6, "Nm", _MEASURED, "actual_current as torque", since=_SINCE_5_23),
     _out("joint_control_output", _VEC6, "A", _MEASURED, "joint control current, output of the servo"),
     _out("actual_TCP_pose", _VEC6, "m, rad", _MODELLED, "pose of the TCP in base, from actual_q"),
     _out("actual_TCP_speed", _VEC6, "m/s, rad/s", _MODELLED, "twist of the TCP in base axes, from actual_qd"),
@@ -165,15 +170,21 @@ OUTPUTS: tuple[RtdeField, ...] = (
     _out("target_TCP_speed", _VEC6, "m/s, rad/s", _MODELLED, "twist of the TCP in base axes, from target_qd"),
     _out("tcp_offset", _VEC6, "m, rad", _MODELLED, "active TCP in the flange frame", since=_TCP_OFFSET_SINCE,
          source="public client library, compatibility table"),
-    _e_series("actual_TCP_acceleration", _VEC6, "m/s2, rad/s2", "measured acceleration of the TCP"),
-    _e_series("target_TCP_acceleration", _VEC6, "m/s2, rad/s2", "acceleration set-point of the TCP"),
+    _out("actual_TCP_acceleration", _VEC6, "m/s2, rad/s2", _MODELLED,
+         "of the TCP in base axes, from actual_q, actual_qd and target_qdd", since=_SINCE_5_23,
+         comes_from="space.actual_acceleration"),
+    _out("target_TCP_acceleration", _VEC6, "m/s2, rad/s2", _MODELLED,
+         "of the TCP in base axes, from the target", since=_SINCE_5_23,
+         comes_from="space.target_acceleration"),
     _out("actual_digital_input_bits", _U64, "bits", _MODELLED,
          "0-7 standard, 8-15 configurable, 16-17 tool"),
-    _e_series("actual_configurable_digital_input_bits", _U64, "bits", "configurable inputs"),
+    _out("actual_configurable_digital_input_bits", _U64, "bits", _MODELLED, "0-7 configurable",
+         since=_MONITORS_SINCE, comes_from="configurable_inputs"),
     _out("joint_temperatures", _VEC6, "degC", _MEASURED, "motor temperatures"),
     _out("actual_execution_time", _F64, "-", _CONSTANT,
-         "run time of the controller's real-time thread: 0, so that equal runs are equal"),
-    _e_series("target_execution_time", _F64, "-", "run time that the real-time thread is to have"),
+         "run time of the controller's real-time thread in ms: 0, so that equal runs are equal"),
+    _fixed("target_execution_time", _F64, "ms", 2.0, "run time that the real-time thread may have: the cycle",
+           since=_SINCE_5_23),
     _out("robot_mode", _I32, "enum", _MODELLED, "RobotMode"),
     _out("joint_mode", _VEC6I, "enum", _MODELLED, "JointMode"),
     _out("safety_mode", _I32, "enum", _MODELLED, "SafetyMode"),
@@ -187,7 +198,8 @@ OUTPUTS: tuple[RtdeField, ...] = (
     _out("actual_robot_current", _F64, "A", _MODELLED, "current into the arm"),
     _out("actual_joint_voltage", _VEC6, "V", _MEASURED, "bus voltage at each joint"),
     _out("actual_digital_output_bits", _U64, "bits", _MODELLED, "numbered as the inputs"),
-    _e_series("actual_configurable_digital_output_bits", _U64, "bits", "configurable outputs"),
+    _out("actual_configurable_digital_output_bits", _U64, "bits", _MODELLED, "0-7 configurable",
+         since=_MONITORS_SINCE, comes_from="configurable_outputs"),
     _out("runtime_state", _U32, "enum", _MODELLED, "ProgramState"),
     _out("elbow_position", _VEC3, "m", _MODELLED, "x y z in base", since=_ELBOW_SINCE),
     _out("elbow_velocity", _VEC3, "m/s", _MODELLED, "x y z in base axes", since=_ELBOW_SINCE),
@@ -234,18 +246,30 @@ OUTPUTS: tuple[RtdeField, ...] = (
          since=_SCRIPT_LINE_SINCE),
     _out("ft_raw_wrench", _VEC6, "N, Nm", _MODELLED, "force sensor, here as actual_TCP_force",
          since=since(None, (5, 9)), comes_from="actual_tcp_force"),
-    _e_series("actual_robot_energy_consumed", _F64, "J", "energy consumed"),
-    _e_series("actual_robot_braking_energy_dissipated", _F64, "J", "energy dissipated in braking"),
-    _e_series("encoder0_raw", _I32, "-", "tick count of conveyor encoder 0"),
-    _e_series("encoder1_raw", _I32, "-", "tick count of conveyor encoder 1"),
-    _e_series("joint_position_deviation_ratio", _F64, "-", "1 and above is followed by C153 or C159"),
-    _e_series("collision_detection_ratio", _F64, "-", "1 and above is followed by C157 or C158"),
-    _e_series("wrench_calc_from_currents", _VEC6, "N, Nm", "external wrench from currents"),
-    _e_series("time_scale_source", _I32, "enum", "which limiter scales time"),
-    _e_series("target_gravity", _VEC3, "m/s2", "gravity that the controller assumes"),
-    _e_series("target_base_acceleration", _VEC6, "m/s2, rad/s2", "acceleration of the base"),
-    _e_series("control_step", _U64, "-", "count of control cycles"),
-    _e_series("target_base_wrench", _VEC6, "N, Nm", "wrench at the base"),
+    _out("actual_robot_energy_consumed", _F64, "J", _MODELLED, "robot voltage times robot current, summed up",
+         since=_SINCE_5_23, comes_from="energy_consumed"),
+    _fixed("actual_robot_braking_energy_dissipated", _F64, "J", 0.0, "the bus takes what brakes give",
+           since=_SINCE_5_23),
+    _out("encoder0_raw", _I32, "-", _MODELLED, "tick count of conveyor encoder 0", since=_MONITORS_SINCE,
+         comes_from="encoder_counts[0]"),
+    _out("encoder1_raw", _I32, "-", _MODELLED, "tick count of conveyor encoder 1", since=_MONITORS_SINCE,
+         comes_from="encoder_counts[1]"),
+    _out("joint_position_deviation_ratio", _F64, "-", _MODELLED,
+         "greatest deviation of a joint from its set-point; from 1 on a protective stop, C153",
+         since=_MONITORS_SINCE),
+    _out("collision_detection_ratio", _F64, "-", _MODELLED,
+         "greatest share of a drive's torque that is needed; 1 for .1 s: a protective stop",
+         since=_SCALING_SINCE),
+    _out("wrench_calc_from_currents", _VEC6, "N, Nm", _MODELLED,
+         "estimate of the external wrench at the flange, base axes", since=_SINCE_5_23,
+         comes_from="estimated_force"),
+    _out("time_scale_source", _I32, "enum", _MODELLED, "TimeScaleSource", since=_SCALING_SINCE),
+    _out("target_gravity", _VEC3, "m/s2", _MODELLED, "as a program or an installation has set it",
+         since=_SINCE_5_26, comes_from="gravity"),
+    _not_answered("target_base_acceleration", _VEC6, "m/s2, rad/s2", "of the base", _SINCE_5_26),
+    _out("control_step", _U64, "-", _MODELLED, "count of control cycles", since=_SINCE_5_26,
+         comes_from="tick"),
+    _not_answered("target_base_wrench", _VEC6, "N, Nm", "at the base", _SINCE_5_26),
 )  # fmt: skip
 """Variables that a client can subscribe to, in the order of the guide."""
 

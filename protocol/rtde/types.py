@@ -17,6 +17,7 @@ __all__ = [
     "RtdeValue",
     "SafetyStatusBits",
     "TextLevel",
+    "TimeScaleSource",
 ]
 
 RtdeValue = bool | int | float | tuple[int, ...] | tuple[float, ...]
@@ -113,3 +114,25 @@ class SafetyStatusBits(IntFlag):
     FAULT = 1 << 9
     STOPPED_DUE_TO_SAFETY = 1 << 10
     THREE_POSITION_ENABLING_INPUT_ACTIVE = 1 << 11
+
+
+class TimeScaleSource(IntEnum):
+    """What scales the time of the running program: `time_scale_source`. Source: UR RTDE guide."""
+
+    OTHER = -1
+    PROGRAM_NOT_RUNNING = 0
+    NOT_SCALED = 1
+    JOINT_TORQUE = 2
+    JOINT_ACCELERATION = 3
+    POWER_SUPPLY = 4
+    MOMENTUM = 5
+    STOPPING_TIME = 6
+    STOPPING_DISTANCE = 7
+    TOOL_SPEED = 8
+    ELBOW_SPEED = 9
+    JOINT_SPEED = 10
+    SAFETY_STATE_CHANGE = 11
+    SAFETY_API_STOPPING_DISTANCE = 12
+    TOOL_WRENCH = 13
+    EXTERNAL_AXIS_SPEED = 14
+    EXTERNAL_AXIS_STOPPING = 15

@@ -52,7 +52,7 @@ def test_registers_are_complete_in_both_directions():
 
 
 def test_every_output_of_a_cb3_is_filled_and_what_is_not_is_not_answered():
-    e_series = output_fields(SoftwareVersion(5, 25))
+    e_series = output_fields(SoftwareVersion(5, 26))
     for field in OUTPUTS:
         assert field.origin is not None or field.since.cb3 is None, field.name
         assert field.origin is not None or field.name not in e_series, field.name
@@ -74,6 +74,22 @@ def test_every_output_of_a_cb3_is_filled_and_what_is_not_is_not_answered():
         ("script_control_line", (3, 14), (3, 13)),
         ("payload_inertia", (3, 15), (3, 14)),
         ("ft_raw_wrench", (5, 9), (3, 15)),
+        ("elbow_position", (5, 0), None),
+        ("output_int_register_24", (5, 3), (5, 2)),
+        ("safety_status", (5, 4), (5, 3)),
+        ("payload", (5, 5, 1), (5, 5, 0)),
+        ("tcp_offset", (5, 5, 1), (5, 5, 0)),
+        ("script_control_line", (5, 9), (5, 8)),
+        ("ft_raw_wrench", (5, 9), (5, 8)),
+        ("payload_inertia", (5, 11), (5, 10)),
+        ("joint_position_deviation_ratio", (5, 11), (5, 10)),
+        ("encoder1_raw", (5, 14), (3, 15)),
+        ("time_scale_source", (5, 19), (5, 15)),
+        ("collision_detection_ratio", (5, 19), (5, 15)),
+        ("actual_robot_energy_consumed", (5, 23), (5, 22, 2)),
+        ("actual_current_as_torque", (5, 23), (5, 22, 9)),
+        ("target_gravity", (5, 26), (5, 25, 1)),
+        ("control_step", (5, 26), (5, 25, 1)),
     ],
 )
 def test_first_version_of_a_variable(name, first, before):

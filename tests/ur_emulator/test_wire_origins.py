@@ -1,7 +1,7 @@
 """What the tables say of where values come from is true: what is measured or modelled changes, constants do not."""
 
 import pytest
-from wire_story import Story
+from wire_story import ESeriesStory, Story
 
 from protocol.primary.layout import SUB_PACKAGES
 from protocol.primary.packages import decode_package
@@ -27,6 +27,11 @@ def story():
     return Story()
 
 
+@pytest.fixture(scope="module")
+def e_series_story():
+    return ESeriesStory()
+
+
 def check(name, origin, values):
     """Check one mark against all values that were sent."""
     columns = list(zip(*(value if isinstance(value, tuple) else (value,) for value in values), strict=True))
@@ -39,14 +44,22 @@ def check(name, origin, values):
             assert not any(map(any, columns)), name
 
 
-@pytest.mark.parametrize("version", [V3_15, SoftwareVersion(5, 12)])
-def test_every_output_of_rtde_is_what_the_table_says(story, version):
+def check_outputs(story, version):
     fields = tuple(output_fields(version).values())
     recipe = Recipe((f.name for f in fields), (f.type for f in fields))
     encode = snapshot_encoder(fields, b"")
     packages = [recipe.decode(encode(snapshot)) for snapshot, _ in story.moments]
     for field, *values in zip(fields, *packages, strict=True):
         check(field.name, field.origin, values)
+
+
+def test_every_output_of_rtde_is_what_the_table_says(story):
+    check_outputs(story, V3_15)
+
+
+@pytest.mark.parametrize("version", [SoftwareVersion(5, 12), SoftwareVersion(5, 26)])
+def test_every_output_of_an_e_series_is_what_the_table_says(e_series_story, version):
+    check_outputs(e_series_story, version)
 
 
 def test_every_column_of_a_frame_is_what_the_table_says(story):

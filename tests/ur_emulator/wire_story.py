@@ -80,6 +80,15 @@ end
 INERTIA = (
     "def inertia():\n  set_target_payload(1.5, [0, 0, 0.1], [0.01, 0.02, 0.03, 0.001, 0.002, 0.003])\nend\n"
 )
+E_SERIES = """def e_series():
+  set_gravity([0.1, 0.2, 9.8])
+  encoder_enable_set_tick_count(0, 0)
+  encoder_enable_set_tick_count(1, 0)
+  encoder_set_tick_count(0, 7)
+  encoder_set_tick_count(1, -9)
+  sync()
+end
+"""
 ENDLESS = MOVES.replace("  movej", "  while True:\n    movej", 1).replace("\nend\n", "\n  end\nend\n")
 INPUT_ACTION = 'def action():\n  set_standard_digital_input_action(0, "freedrive")\n  sleep(0.1)\nend\n'
 
@@ -184,3 +193,11 @@ class Story(Bench):
         self.until(lambda now: now.robot_mode == RobotMode.RUNNING)
         self.tick(20, TriggerViolation())
         self.tick(5, RestartSafety())
+
+
+class ESeriesStory(Story):
+    """The same with what only ports of late e-Series software show."""
+
+    def work(self):
+        super().work()
+        self.run(E_SERIES)

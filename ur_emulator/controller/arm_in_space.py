@@ -9,7 +9,10 @@ from collections.abc import Sequence
 
 from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
 from ur_emulator.kinematics.wrench import moved_wrench
-from ur_emulator.models.robot_model import Vector6
+from ur_emulator.models.robot_model import RobotModel, Vector6, six
+
+# Time from a state to those that accelerations are the differences of [s].
+_STEP = 1e-3
 
 
 class ArmInSpace:
@@ -18,23 +21,26 @@ class ArmInSpace:
     Args:
         arm: the controller's kinematics.
         target: angles and speeds of the joints' set-point, (6,) each.
-        actual: measured ones.
+        qdd: accelerations of the set-point [rad/s^2], (6,).
+        actual: measured angles and speeds.
         wrench: at the flange, base axes [N, Nm].
         tcp: tool centre point in the flange frame; None for the flange itself.
     """
 
-    __slots__ = ("_actual", "_actual_joints", "_arm", "_target", "_target_joints", "_tcp", "_wrench")
+    __slots__ = ("_actual", "_actual_joints", "_arm", "_qdd", "_target", "_target_joints", "_tcp", "_wrench")
 
     def __init__(
         self,
         arm: ArmModel,
         target: tuple[Vector6, Vector6],
+        qdd: Vector6,
         actual: tuple[Vector6, Vector6],
         wrench: Vector6,
         tcp: Sequence[float] | None,
     ) -> None:
         self._arm = arm
         self._target_joints = target
+        self._qdd = qdd
         self._actual_joints = actual
         self._wrench = wrench
         self._tcp = tcp
@@ -54,6 +60,32 @@ class ArmInSpace:
         if self._actual is None:
             self._actual = self._arm.state(*self._actual_joints, self._tcp)
         return self._actual
+
+    @property
+    def robot(self) -> RobotModel:
+        """Numbers of the arm."""
+        return self._arm.robot
+
+    @property
+    def target_acceleration(self) -> Vector6:
+        """Acceleration of the TCP at the target, base axes [m/s^2, rad/s^2]."""
+        return self._acceleration(*self._target_joints)
+
+    @property
+    def actual_acceleration(self) -> Vector6:
+        """Acceleration of the TCP at the measured joints, which accelerate as the target does."""
+        return self._acceleration(*self._actual_joints)
+
+    def _acceleration(self, q: Vector6, qd: Vector6) -> Vector6:
+        before, after = (
+            self._arm.state(
+                [a + h * (v + 0.5 * h * acc) for a, v, acc in zip(q, qd, self._qdd, strict=True)],
+                [v + h * acc for v, acc in zip(qd, self._qdd, strict=True)],
+                self._tcp,
+            ).tcp_speed
+            for h in (-_STEP, _STEP)
+        )
+        return six([(b - a) / (2.0 * _STEP) for a, b in zip(before, after, strict=True)])
 
     @property
     def tcp_force(self) -> Vector6:

@@ -158,6 +158,7 @@ class Controller:
         control, target = self._step_motion(running)
         self.plant.step(target if running else None, control)
         sensed = self.plant.sense()
+        state.energy.step(state.mode.mode, sensed.actual_current)
         self._watch(sensed, control, running)
         settings = state.error_settings
         if settings.pause_codes and settings.must_pause(state.events[n_events:]):

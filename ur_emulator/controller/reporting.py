@@ -35,6 +35,7 @@ def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState
     space = ArmInSpace(
         arm,
         (target.q, target.qd),
+        target.qdd,
         (sensed.actual_q, sensed.actual_qd),
         wrench,
         tcp if any(tcp) else None,
@@ -73,5 +74,8 @@ def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState
         euromap_inputs=euromap.inputs,
         euromap_outputs=euromap.outputs,
         registers=state.registers.values(),
+        encoder_counts=state.encoders.counts,
+        gravity=tool.gravity,
+        energy_consumed=state.energy.consumed,
         space=space,
     )

@@ -12,16 +12,15 @@ import math
 from typing import Any, NamedTuple
 
 from protocol.realtime.layout import SNAPSHOT_FIELDS
+from protocol.rtde.types import TimeScaleSource
 from ur_emulator.controller import electrics
 from ur_emulator.controller.arm_in_space import ArmInSpace
+from ur_emulator.controller.io.lines import CONFIGURABLE
 from ur_emulator.controller.io.registers import RegisterValues
 from ur_emulator.controller.robot_mode import POWERED
-from ur_emulator.controller.safety.status_bits import robot_status_bits, safety_status_bits
-from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6
-
-# Bus voltage and idle current of the box; modelled, chosen from captures of resting arms (48 V bus).
-BUS_VOLTAGE = 48.0
-IDLE_CURRENT = 0.25
+from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION, torque_shares
+from ur_emulator.controller.safety.status_bits import RUNNING_STATES, robot_status_bits, safety_status_bits
+from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6, six
 
 
 class _Fields(NamedTuple):
@@ -72,6 +71,9 @@ class _Fields(NamedTuple):
     euromap_inputs: int
     euromap_outputs: int
     registers: RegisterValues
+    encoder_counts: tuple[int, int]
+    gravity: Vector3
+    energy_consumed: float
     # --- computed when it is read
     space: ArmInSpace
 
@@ -82,7 +84,7 @@ class Snapshot(_Fields):
     __slots__ = ()
 
     actual_execution_time = 0.0
-    actual_main_voltage = BUS_VOLTAGE
+    actual_main_voltage = electrics.BUS_VOLTAGE
 
     def as_dict(self) -> dict[str, Any]:
         """Return all fields and all columns of the realtime interface by name."""
@@ -137,14 +139,12 @@ class Snapshot(_Fields):
     @property
     def actual_robot_voltage(self) -> float:
         """Voltage of the arm's bus [V]."""
-        return BUS_VOLTAGE if self.robot_mode in POWERED else 0.0
+        return electrics.BUS_VOLTAGE if self.robot_mode in POWERED else 0.0
 
     @property
     def actual_robot_current(self) -> float:
-        """Current on the arm's bus [A]: plausible; the drives chop, a tenth of the joints' currents shows."""
-        if self.robot_mode not in POWERED:
-            return 0.0
-        return IDLE_CURRENT + 0.1 * sum(map(abs, self.actual_current))
+        """Current on the arm's bus [A]."""
+        return electrics.arm_current(self.actual_current) if self.robot_mode in POWERED else 0.0
 
     @property
     def actual_joint_voltage(self) -> Vector6:
@@ -202,3 +202,44 @@ class Snapshot(_Fields):
     def tool_analog_input_types(self) -> int:
         """Bits 0, 1: domains of the tool inputs."""
         return sum(domain << i for i, domain in enumerate(self.analog_domains[4:]))
+
+    @property
+    def configurable_inputs(self) -> int:
+        """The configurable inputs, bit 0 the first."""
+        return CONFIGURABLE.word_of(self.actual_digital_input_bits)
+
+    @property
+    def configurable_outputs(self) -> int:
+        """The configurable outputs, bit 0 the first."""
+        return CONFIGURABLE.word_of(self.actual_digital_output_bits)
+
+    # --- how far the joints are from protective stops
+
+    @property
+    def actual_current_window(self) -> Vector6:
+        """By how much the currents may differ from their targets [A]: here only torques are limited."""
+        robot = self.space.robot
+        return six([tau / k for tau, k in zip(robot.tau_max, robot.torque_constant, strict=True)])
+
+    @property
+    def actual_current_as_torque(self) -> Vector6:
+        """The joints' currents as torques [Nm]."""
+        constants = self.space.robot.torque_constant
+        return six([k * current for k, current in zip(constants, self.actual_current, strict=True)])
+
+    @property
+    def joint_position_deviation_ratio(self) -> float:
+        """Greatest deviation of a joint, as a share of what the limit checks allow."""
+        return max(map(abs, self.position_error)) / MAX_POSITION_DEVIATION
+
+    @property
+    def collision_detection_ratio(self) -> float:
+        """Greatest torque that a drive is asked for, as a share of what it has."""
+        return max(torque_shares(self.space.robot, self.joint_control_output))
+
+    @property
+    def time_scale_source(self) -> int:
+        """TimeScaleSource: the limits of a safety mode are those of joint speeds before all."""
+        if self.runtime_state not in RUNNING_STATES:
+            return TimeScaleSource.PROGRAM_NOT_RUNNING
+        return TimeScaleSource.NOT_SCALED if self.speed_scaling == 1.0 else TimeScaleSource.JOINT_SPEED

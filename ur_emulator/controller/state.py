@@ -12,6 +12,7 @@ from ur_emulator.controller.client_inputs import ClientInputs
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.compliance.compliance import Compliance
 from ur_emulator.controller.compliance.force_sense import ForceSense
+from ur_emulator.controller.energy import EnergyMeter
 from ur_emulator.controller.error_settings import ErrorSettings
 from ur_emulator.controller.events import EventQueue
 from ur_emulator.controller.io.configuration import IoConfiguration
@@ -53,6 +54,7 @@ class ControllerState:
         enabling_device: the three-position enabling device.
         speed: speed slider, and the limits of a safety mode that has some.
         tool: TCP, payload and gravity.
+        energy: what the arm has taken.
         io: digital and analogue lines.
         registers: general purpose registers.
         io_configuration: which inputs act, which outputs follow the program.
@@ -82,6 +84,7 @@ class ControllerState:
     enabling_device: EnablingDevice
     speed: SpeedScaling
     tool: ToolSettings
+    energy: EnergyMeter
     io: InputOutput
     registers: Registers
     io_configuration: IoConfiguration
@@ -129,6 +132,7 @@ def make_state(
         enabling_device=EnablingDevice(),
         speed=speed,
         tool=ToolSettings(),
+        energy=EnergyMeter(clock.period_s),
         io=io,
         registers=registers,
         io_configuration=io_configuration,

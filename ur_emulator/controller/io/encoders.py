@@ -135,5 +135,11 @@ class Encoders:
         for encoder in self.decoding:
             encoder.step(digital_in)
 
+    @property
+    def counts(self) -> tuple[int, int]:
+        """The present counts [ticks]."""
+        first, second = self.encoders
+        return int(first.count), int(second.count)
+
     def _find_decoding(self) -> None:
         self.decoding = tuple(e for e in self.encoders if e.decoder is not Decoder.OFF)

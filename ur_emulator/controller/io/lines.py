@@ -35,6 +35,10 @@ class DigitalGroup:
         """The bits as a mask of the digital word."""
         return (1 << self.count) - 1 << self.first
 
+    def word_of(self, digital: int) -> int:
+        """Return the lines of a digital word, bit 0 the first."""
+        return (digital & self.mask) >> self.first
+
     def levels(self, word: int) -> int:
         """Return the levels of the lines in a digital word, the first line in the lowest bit."""
         return (word & self.mask) >> self.first

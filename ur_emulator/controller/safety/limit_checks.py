@@ -137,11 +137,16 @@ def most_loaded_joint(robot: RobotModel, currents: tuple[float, ...]) -> int:
         robot: torque constants and limits of the arm.
         currents: of the drives [A], (6,).
     """
-    efforts = [
+    shares = torque_shares(robot, currents)
+    return shares.index(max(shares))
+
+
+def torque_shares(robot: RobotModel, currents: tuple[float, ...]) -> list[float]:
+    """Return the part of its torque that each drive needs; arguments as in `most_loaded_joint`."""
+    return [
         abs(current) * constant / limit
         for current, constant, limit in zip(currents, robot.torque_constant, robot.tau_max, strict=True)
     ]
-    return efforts.index(max(efforts))
 
 
 def find_violation(robot: RobotModel, sensed: PlantState, saturated_s: float) -> Violation | None:
