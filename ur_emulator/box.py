@@ -154,7 +154,7 @@ class Box(BoxOperations):
         folder = ProgramFolder(None if programs is None else Path(programs))
         self._player = player = ProgramPlayer(self._access, folder, skip_unknown=skip_unknown_nodes)
         self._reports = ReportFolder(player.folder)
-        states = StateEncoder(software, controller.state.arm)
+        states = StateEncoder(software, controller.state.arm, controller.state.safety)
         realtime, realtime_ro = (RealtimePort(software.realtime, intake) for intake in (self._intake, None))
         rtde = RtdePort(self._access)
         modbus = ModbusPort(self._access)

@@ -50,7 +50,7 @@ class Bytes:
         self._controller = controller
         self._realtime = layout_for_version(VERSION).encoder()
         self._data = snapshot_encoder(tuple(output_fields(VERSION).values()), b"")
-        self._states = StateEncoder(CB3.software(VERSION), controller.state.arm)
+        self._states = StateEncoder(CB3.software(VERSION), controller.state.arm, controller.state.safety)
         self._hash.update(self._states.encode_first(controller.snapshot))
 
     def take(self, snapshot, events):

@@ -14,7 +14,7 @@ from protocol.primary.messages import VersionMessage
 from protocol.rtde import messages as R
 from protocol.ur_types import SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.controller.safety.joint_limits import limits_of
+from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.controller.safety.speed_scaling import ModeLimits, limits_of_mode
 from ur_emulator.errors import ArgumentError, EmulatorError
 from ur_emulator.models.cb3 import CB3
@@ -94,7 +94,7 @@ def test_an_arm_is_as_good_as_one_of_its_fidelities():
 def test_reduced_and_recovery_mode_have_its_limits():
     robot = replace(UR3, generation=SECOND)
     rules = SECOND.limits
-    of = partial(limits_of_mode, joints=limits_of(robot), rules=rules)
+    of = partial(limits_of_mode, limits=limits_of(robot), rules=rules)
     reduced = tuple(0.25 * speed for speed in UR3.qd_max)
     assert of(SafetyMode.REDUCED, is_manual=False) == ModeLimits(reduced, rules.reduced)
     assert of(SafetyMode.RECOVERY, is_manual=True) == ModeLimits((0.1,) * 6, rules.recovery)

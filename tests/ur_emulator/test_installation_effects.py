@@ -1,19 +1,27 @@
 """Installations: what they do to the box, to scripts that come of nodes, and what programs leave in them."""
 
 import gzip
+import math
 
 import pytest
-from box_support import MessageReader, connect
+from box_support import Bench, MessageReader, connect
 from dashboard_support import Dashboard, script_line, urp
 from installation_support import SAFETY, TCP, installation, listed, pose_feature
 
+from protocol.primary.layout import SafetyData
 from protocol.primary.messages import TextMessage
+from protocol.primary.setup import ConfigurationData
+from protocol.ur_types import SafetyMode
+from ur_emulator.commands.programs import SetUp
+from ur_emulator.commands.push import Push
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.controller.io.run_states import RunState
-from ur_emulator.controller.safety.joint_limits import limits_of
+from ur_emulator.controller.safety.configured_limits import SafetySettings, limits_of
 from ur_emulator.emulator import ControlBox
+from ur_emulator.models.robot_generation import ArmLimits
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.models.ur3 import UR3
 from ur_emulator.programs.installation import (
     DeclaredPayload,
     DeclaredSignal,
@@ -22,6 +30,7 @@ from ur_emulator.programs.installation import (
     OutputRule,
 )
 from ur_emulator.programs.script_header import header_lines, setup_script
+from ur_emulator.servers.primary.robot_state import safety_checksum
 from urscript import compile_program
 
 LAMP = DeclaredSignal("LAMP", "10.0.0.9", 255, 7, SignalType.DIGITAL_OUTPUT, 5.0, RunState.LOW_WHEN_STOPPED)
@@ -170,9 +179,88 @@ def test_the_limits_of_an_installation_bind_the_arm(box, dashboard, tmp_path):
 def test_an_installation_cannot_widen_the_limits_of_the_arm():
     own = limits_of(robot_by_name("ur5"))
     wide, fast = (1e9,) * 6, (100.0,) * 6
-    assert own.within(tuple(-x for x in wide), wide, fast, own.reduced_speed) == own
-    slow = own.within(None, None, (1.0,) * 6, fast)
+    settings = SafetySettings(tuple(-x for x in wide), wide, fast, own.reduced_speed)
+    assert own.within(settings) == own
+    slow = own.within(SafetySettings(joint_speed=(1.0,) * 6, reduced_joint_speed=fast))
     assert (slow.speed, slow.reduced_speed) == ((1.0,) * 6, (1.0,) * 6)
+
+
+def test_reduced_mode_allows_no_more_than_normal_mode():
+    own = limits_of(robot_by_name("ur5e"))
+    normal, reduced = ArmLimits(tool_speed=0.5, force=100.0), ArmLimits(tool_speed=1.0, force=50.0)
+    assert own.within(SafetySettings(arm=normal)).reduced_arm == ArmLimits(tool_speed=0.5, force=100.0)
+    both = own.within(SafetySettings(arm=normal, reduced_arm=reduced))
+    assert (both.arm, both.reduced_arm) == (normal, ArmLimits(tool_speed=0.5, force=50.0))
+
+
+LIMITS = SAFETY.replace("[1, 1, 1,", "[0, 1, 1,") + (
+    "[SafetyLimits Normal Values]\nmaxTcpSpeed = 0.25\nmaxForce = 150.0\nmaxPower = 300.0\nmaxMomentum = 25.0\n"
+    "[SafetyLimits BoundaryPlane0]\nmode = 1\n[SafetyLimits ToolOrientation]\nmaximumTcpOrientationDeviation = 0.5\n"
+)
+
+
+def test_inverse_kinematics_and_what_clients_are_told_keep_the_limits_of_an_installation(
+    box, dashboard, tmp_path
+):
+    (tmp_path / "cell.installation").write_bytes(installation(f"<SafetySettings>{LIMITS}</SafetySettings>"))
+    q = "[1.0, -1.2, -1.7, -0.1, 1.2, 1.8]"
+    nodes = script_line(f"textmsg(get_inverse_kin(get_forward_kin({q}), {q})[0] < 0.06)")
+    (tmp_path / "p.urp").write_bytes(urp(nodes, installation="cell"))
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        dashboard.ask_all("load p.urp", "play")
+        assert reader.message(TextMessage).text == "True"
+    texts = " ".join(entry.text for entry in box.log)
+    assert "/programs/cell.installation: 1 safety plane is not watched" in texts
+    assert "/programs/cell.installation: the limit of the tool's direction is not watched" in texts
+    with connect(box, "primary") as sock:
+        first = MessageReader(sock).state()
+    assert first.find(ConfigurationData).joint_max_limit[0] == pytest.approx(0.0524, abs=1e-4)
+    assert first.find(SafetyData).safety_checksum != safety_checksum(UR3, limits_of(UR3))
+
+
+def set_up(bench, **settings):
+    """Make the limits of an installation effective."""
+    limits = limits_of(bench.controller.state.robot).within(SafetySettings(**settings))
+    bench.tick(1, SetUp(compile_program("sec installation():\n  sync()\nend\n"), limits))
+
+
+@pytest.mark.parametrize("robot", ["ur3", "ur5"])
+def test_an_arm_keeps_the_tool_speed_of_its_installation(robot):
+    bench = Bench(robot=robot, fidelity="ideal")
+    set_up(bench, arm=ArmLimits(tool_speed=0.25))
+    bench.run("movej([-1.0, -1.7, -1.7, -0.1, 1.2, 1.8], a=1.5, v=3)\n")
+    speeds = [math.hypot(*s.target_tcp_speed[:3]) for s in bench.snapshots]
+    assert 0.2 < max(speeds) <= 0.25
+    assert min(s.speed_scaling for s in bench.snapshots) < 0.5
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+    set_up(bench)
+    bench.snapshots.clear()
+    bench.run("movej([0.5, -1.7, -1.7, -0.1, 1.2, 1.8], a=1.5, v=3)\n")
+    assert max(math.hypot(*s.target_tcp_speed[:3]) for s in bench.snapshots) > 0.5
+
+
+def test_an_arm_that_presses_harder_than_its_installation_allows_is_stopped():
+    bench = Bench(fidelity="ideal")
+    set_up(bench, arm=ArmLimits(force=40.0))
+    bench.tick(30, Push((0.0, 0.0, -60.0), duration=2.0))
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+    bench.tick(60)
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert any("Force limit violated" in getattr(event, "text", "") for event in bench.events)
+
+
+def test_a_hand_cannot_lead_a_joint_out_of_the_range_of_its_installation():
+    bench = Bench(fidelity="ideal")
+    end = bench.now.actual_q[0] + 0.05
+    set_up(bench, q_max=(end, *(6.0,) * 5))
+    bench.start("def p():\n  freedrive_mode()\n  sleep(100)\nend\n")
+    bench.tick(5)
+    x, y, *_ = bench.now.actual_tcp_pose
+    arm_length = math.hypot(x, y)
+    bench.tick(150, Push((-60.0 * y / arm_length, 60.0 * x / arm_length, 0.0), duration=5.0))
+    assert any(getattr(event, "code", 0) == 150 for event in bench.events)
+    assert bench.now.actual_q[0] < end + 0.2
 
 
 # --- variables

@@ -20,6 +20,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.errors import ProgramFileError
+from ur_emulator.models.robot_generation import ArmLimits
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import DeclaredPayload, DeclaredSignal, Feature, OutputRule, StartUp
 from ur_emulator.programs.installation_files import NEW_BOX, load_installation
@@ -144,6 +145,23 @@ def test_safety_limits(tmp_path):
     assert safety.q_min == pytest.approx((*(5 * [-WIDE]), -inf), abs=1e-6)
 
 
+def test_other_safety_limits(tmp_path):
+    values = (
+        "[SafetyLimits {} Values]\nmaxTcpSpeed = 1.5\nmaxElbowSpeed = 1.0\nmaxForce = 150.0\nmaxElbowForce = 200.0\n"
+        "maxPower = 300.0\nmaxMomentum = 25.0\nmaxStoppingTime = 0.4\nmaxStoppingDistance = 0.5\n"
+    )
+    plane = "[SafetyLimits BoundaryPlane{}]\nmode = {}\nplaneNormal = [0.0, 0.0, 1.0]\n"
+    planes = "".join(plane.format(n, mode) for n, mode in enumerate((1, '"BOTH"', 0, "DISABLED")))
+    tool = "[SafetyLimits ToolOrientation]\nmaximumTcpOrientationDeviation = {}\n"
+    text = values.format("Normal") + values.format("Reduced").replace("1.0", "0.75") + planes
+    safety = read(tmp_path, f"<SafetySettings>{text}{tool.format(0.5)}</SafetySettings>").safety
+    assert safety.arm == ArmLimits(tool_speed=1.0, force=150.0, power=300.0, momentum=25.0)
+    assert safety.reduced_arm == ArmLimits(tool_speed=0.75, force=150.0, power=300.0, momentum=25.0)
+    assert safety.unwatched == ("2 safety planes are", "the limit of the tool's direction is")
+    usual = read(tmp_path, f"<SafetySettings>{SAFETY}{tool.format(3.159)}</SafetySettings>").safety
+    assert (usual.arm, usual.reduced_arm, usual.unwatched) == (None, None, ())
+
+
 def test_start_up_and_safe_home(tmp_path):
     node = '<DefaultProgramSettings autoLoad="{}" fileName="sub/x.urp" nameOfSensorToAutoStartProgram="digital_in[6]" triggerValueToStartProgram="false"/>'
     home = '<SafeHomeSettings enabled="true"><position value="0.0, -1.5, 0.0, -1.5, 0.0, 0.0"/></SafeHomeSettings>'
@@ -191,6 +209,8 @@ SECTION = "[SafetyLimits Normal Joints]\nmaxJointSpeed = [1, 2]\n"
         ([f"<Features>{plane_feature('P', [(0, 0, 0)] * 3)}</Features>"], None, "points of a plane lie on a line"),
         ([f"<SafetySettings>{SECTION}</SafetySettings>"], None, "maxJointSpeed of the safety settings has not six"),
         ([f"<SafetySettings>{SECTION.replace('1, 2', '1, 1, 1, 1, 1, nan')}</SafetySettings>"], None, "has not six numbers"),
+        ([f"<SafetySettings>{SECTION.replace('1, 2', '1, 1, 1, 1, 1, 0')}</SafetySettings>"], None, "maxJointSpeed of the safety settings is 0, it must be above 0"),
+        (["<SafetySettings>[SafetyLimits Normal Values]\nmaxForce = -1\n</SafetySettings>"], None, "maxForce of the safety settings is '-1', it must be a number above 0"),
         ([], b"7a=1\n", "'7a' is not the name of a variable"),
         ([], b"a=\n", "the value of a is not one line of text"),
         ([], b"a=1\\n2\n", "the value of a is not one line of text"),

@@ -25,7 +25,7 @@ from motion_support import (
 
 from protocol.ur_types import SafetyMode
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
-from ur_emulator.controller.safety.joint_limits import limits_of
+from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.controller.safety.limit_checks import find_invalid_setpoint
 from ur_emulator.motion.leg import move_j, move_tool
 from ur_emulator.motion.move import Follow, Move

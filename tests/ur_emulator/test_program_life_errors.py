@@ -159,7 +159,7 @@ def test_the_secondary_port_reports_nothing():
         CB3.software(VERSION),
         bench.controller,
         None,
-        StateEncoder(CB3.software(VERSION), bench.controller.state.arm),
+        StateEncoder(CB3.software(VERSION), bench.controller.state.arm, bench.controller.state.safety),
         all_messages=False,
     )
     port.opened(client)

@@ -70,7 +70,7 @@ class PortBench(Bench):
             CB3.software(version),
             self.controller,
             None,
-            StateEncoder(CB3.software(version), self.controller.state.arm),
+            StateEncoder(CB3.software(version), self.controller.state.arm, self.controller.state.safety),
             all_messages=all_messages,
         )
 

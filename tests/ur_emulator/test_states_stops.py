@@ -30,7 +30,7 @@ from ur_emulator.commands.safety import (
 )
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
-from ur_emulator.controller.safety.joint_limits import limits_of
+from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.controller.safety.speed_scaling import TOLERANCE, ModeLimits, limits_of_mode
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.cb3 import CB3
@@ -351,7 +351,7 @@ def test_who_is_too_fast_for_too_long_is_stopped():
 
 def test_limits_of_the_modes():
     robot = robot_by_name("ur3")
-    of = partial(limits_of_mode, is_manual=False, joints=limits_of(robot), rules=CB3.limits)
+    of = partial(limits_of_mode, is_manual=False, limits=limits_of(robot), rules=CB3.limits)
     assert of(SafetyMode.NORMAL) is None
     assert of(SafetyMode.REDUCED) == ModeLimits(tuple(0.5 * v for v in robot.qd_max), UNLIMITED)
     assert of(SafetyMode.RECOVERY) == ModeLimits((CB3.limits.recovery_speed,) * 6, UNLIMITED)

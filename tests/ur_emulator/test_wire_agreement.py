@@ -31,7 +31,7 @@ def moments():
     layout = layout_for_version(V3_15)
     frame, rtde = layout.encoder(), snapshot_encoder(FIELDS, b"")
     recipe = Recipe((f.name for f in FIELDS), (f.type for f in FIELDS))
-    states = StateEncoder(CB3.software(V3_15), story.controller.state.arm)
+    states = StateEncoder(CB3.software(V3_15), story.controller.state.arm, story.controller.state.safety)
     names = [f.name for f in FIELDS]
     return [
         (

@@ -73,7 +73,7 @@ def test_every_column_of_a_frame_is_what_the_table_says(story):
 
 @pytest.mark.parametrize("version", [V3_15, SoftwareVersion(3, 2), SoftwareVersion(5, 12)])
 def test_every_field_of_a_state_is_what_the_table_says(story, version):
-    encoder = StateEncoder(CB3.software(version), story.controller.state.arm)
+    encoder = StateEncoder(CB3.software(version), story.controller.state.arm, story.controller.state.safety)
     states = [decode_package(encoder.encode_first(s), version).sub_packages for s, _ in story.moments]
     for record, *sent in zip(state_types(version, first=True), *states, strict=True):
         for field in wire_fields(record):

@@ -26,6 +26,7 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
 )
 from ur_emulator.controller import events
+from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.controller.safety.limit_checks import most_loaded_joint
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.cb3 import CB3
@@ -74,7 +75,7 @@ class PortBench(Bench):
         self.version = version
         self.taken = []
         software = generation.software(version)
-        states = StateEncoder(software, self.controller.state.arm)
+        states = StateEncoder(software, self.controller.state.arm, self.controller.state.safety)
         self.primary, self.secondary, self.primary_ro, self.secondary_ro = self.ports = [
             PrimaryPort(software, self.controller, intake, states, all_messages=every)
             for intake in (self, None)
@@ -282,7 +283,9 @@ def test_the_captured_dexterity_is_that_of_the_captured_pose():
 def test_configuration_is_that_of_the_model(name, robot_type, box_type):
     robot = robot_by_name(name)
     configuration = next(
-        record for record in setup_records(robot, robot.dh, 1) if isinstance(record, U.ConfigurationData)
+        record
+        for record in setup_records(robot, robot.dh, limits_of(robot))
+        if isinstance(record, U.ConfigurationData)
     )
     assert configuration.robot_type == robot_type
     assert configuration.controller_box_type == box_type

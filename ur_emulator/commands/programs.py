@@ -10,7 +10,7 @@ from ur_emulator.commands.operation import CommandOperation
 from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box, inform
 from ur_emulator.controller.events import ScriptFailed
-from ur_emulator.controller.safety.joint_limits import JointLimits
+from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.modes import ROW
 from ur_emulator.errors import RefusedError
 
@@ -50,14 +50,17 @@ class SetUp:
 
     Attributes:
         program: a `sec`.
-        limits: of the joints.
+        limits: of the arm.
     """
 
     program: CompiledProgram
-    limits: JointLimits
+    limits: ConfiguredLimits
 
     def apply(self, box: Box) -> None:
-        box.safety.set_limits(self.limits)
+        limits = self.limits
+        box.safety.set_limits(limits)
+        box.state.arm.set_range(limits.q_min, limits.q_max)
+        box.plant.set_range(limits.q_min, limits.q_max)
         box.programs.start(self.program)
 
 

@@ -220,7 +220,7 @@ class Controller:
             if self.safety.is_busy and violation is None:
                 violation = self.safety.find_violation(sensed)
             if control and violation is None:
-                violation = state.compliance.find_violation(state.robot, sensed)
+                violation = state.compliance.find_violation(sensed)
             if violation is None and stop_requested:
                 violation = _REQUESTED_STOP
             if violation is not None:

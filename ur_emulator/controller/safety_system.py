@@ -9,8 +9,8 @@ from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller.events import LogAdded, SafetyModeChanged
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
+from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.inputs import SafetyInput, SafetyInputs
-from ur_emulator.controller.safety.joint_limits import JointLimits
 from ur_emulator.controller.safety.limit_checks import Violation
 from ur_emulator.controller.safety.modes import (
     EVENTS,
@@ -57,7 +57,7 @@ class SafetySystem:
         self.inputs.assign(pair, function)
         self._update()
 
-    def set_limits(self, limits: JointLimits) -> None:
+    def set_limits(self, limits: ConfiguredLimits) -> None:
         """Set the limits of the joints, also those of the mode that is in force."""
         self._state.safety.set_limits(limits)
         self._set_limits(self._state.safety.mode)

@@ -26,8 +26,8 @@ from ur_emulator.controller.operator import Operator
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.controller.program_requests import ProgramRequests
 from ur_emulator.controller.robot_mode import RobotModeMachine
+from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.controller.safety.enabling_device import EnablingDevice
-from ur_emulator.controller.safety.joint_limits import limits_of
 from ur_emulator.controller.safety.operational_mode import OperationalModeChoice
 from ur_emulator.controller.safety.safety_state import SafetyState
 from ur_emulator.controller.safety.speed_scaling import SpeedScaling

@@ -83,7 +83,12 @@ class ArmModel:
         self._mass = float(self._model.body_subtreemass[root])
         self._tcp: Sequence[float] | None = None
         self._tcp_offset: Vector3 = (0.0, 0.0, 0.0)
+        self.set_range(robot.q_min, robot.q_max)
         self._tcp_rotation: Sequence[float] = rotvec_to_flat(0.0, 0.0, 0.0)
+
+    def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
+        """Set the joint ranges [rad] that `inverse` keeps; at first those of the robot."""
+        self._q_min, self._q_max = q_min, q_max
 
     def fk(self, q: Sequence[float], tcp: Sequence[float] | None = None) -> Pose:
         """Forward kinematics: the pose of the tool centre point at joint angles q (6,) [rad]."""
@@ -233,7 +238,7 @@ class ArmModel:
     def _into_range(self, q: Sequence[float], near: Sequence[float]) -> Vector6 | None:
         """Unwrap each angle to the turn next to `near` that lies in the joint's range."""
         angles: list[float] = []
-        for angle, reference, low, high in zip(q, near, self.robot.q_min, self.robot.q_max, strict=True):
+        for angle, reference, low, high in zip(q, near, self._q_min, self._q_max, strict=True):
             turned = angle + 2.0 * pi * round((reference - angle) / (2.0 * pi))
             while turned > high:
                 turned -= 2.0 * pi

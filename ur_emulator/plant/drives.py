@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.calibration import Calibration
 from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, six
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.freedrive import Freedrive
 from ur_emulator.plant.friction import Friction
@@ -108,6 +108,10 @@ class Drives:
     def set_payload(self, mass: float, cog: Vector3) -> None:
         """Declare the payload to the controller's model: mass [kg], centre in the flange frame [m]."""
         self._dynamics.set_payload(mass, cog)
+
+    def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
+        """Set the joint ranges that freedrive keeps [rad]."""
+        self._guiding.set_range(q_min, q_max)
 
     def hold(self, q: NDArray[np.float64], q_motor: NDArray[np.float64]) -> None:
         """Hold the arm at rest: joints at q, motors at q_motor, (6,) each [rad]."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.models.robot_model import RobotModel, Vector6
 
 # Part of the modelled Coulomb friction that is compensated. With any error of the model (see `Friction`,
 # 70 % at most) it is less than the true friction: a joint never moves by itself.
@@ -38,10 +38,14 @@ class Freedrive:
 
     def __init__(self, robot: RobotModel) -> None:
         self._strength = LIMIT_SHARE * np.array(robot.tau_max)
-        self._low = np.array(robot.q_min) + RANGE_MARGIN
-        self._high = np.array(robot.q_max) - RANGE_MARGIN
+        self.set_range(robot.q_min, robot.q_max)
         self._free_speed = SPEED_MARGIN * np.array(robot.qd_max)
         self._braking_speed = (1.0 - SPEED_MARGIN) * np.array(robot.qd_max)
+
+    def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
+        """Set the joint ranges [rad] at whose ends the drives push back; at first those of the robot."""
+        self._low = np.array(q_min) + RANGE_MARGIN
+        self._high = np.array(q_max) - RANGE_MARGIN
 
     def torque(
         self,

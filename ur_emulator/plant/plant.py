@@ -30,7 +30,7 @@ from ur_emulator.models.calibration import calibrated_dh, draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.random_streams import random_stream
-from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, six
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 from ur_emulator.plant.arm_physics import ArmPhysics
 from ur_emulator.plant.drives import TARGET_MAX, Drives
 from ur_emulator.plant.gear import GearRipple, GearWithPlay
@@ -197,6 +197,10 @@ class Plant:
         self._undo_run_ahead()
         self._physics.loads.declare(mass, cog)
         self._drives.set_payload(mass, cog)
+
+    def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
+        """Set the joint ranges that freedrive keeps [rad]."""
+        self._drives.set_range(q_min, q_max)
 
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
         """Set the true payload at the flange, which the controller does not know.

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.controller.io.run_states import RunState
+from ur_emulator.controller.safety.configured_limits import NO_SETTINGS, SafetySettings
 from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6
 
 STANDARD_GRAVITY = 9.82
@@ -101,23 +102,6 @@ class DeclaredSignal:
 
 
 @dataclass(frozen=True, slots=True)
-class SafetySettings:
-    """Limits of the safety configuration; None where the file gives none.
-
-    Attributes:
-        joint_speed: [rad/s].
-        reduced_joint_speed: in reduced mode [rad/s].
-        q_min: lower ends of the joint ranges [rad]; minus infinity where a joint has no limit.
-        q_max: upper ends [rad].
-    """
-
-    joint_speed: Vector6 | None = None
-    reduced_joint_speed: Vector6 | None = None
-    q_min: Vector6 | None = None
-    q_max: Vector6 | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class StartUp:
     """What the box does when it is switched on.
 
@@ -155,7 +139,7 @@ class Installation:
         variables: name -> value as a literal of URScript, in the order of the file.
         modbus: signals of other units.
         safe_home: joint angles [rad]; None if there are none.
-        safety: limits.
+        safety: limits of the safety configuration.
         start_up: what the box does when it is switched on.
     """
 
@@ -177,7 +161,7 @@ class Installation:
     variables: Mapping[str, str] = field(default_factory=dict)
     modbus: tuple[DeclaredSignal, ...] = ()
     safe_home: Vector6 | None = None
-    safety: SafetySettings = SafetySettings()
+    safety: SafetySettings = NO_SETTINGS
     start_up: StartUp = StartUp()
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from protocol.pose import Pose
-from ur_emulator.controller.safety.joint_limits import JointLimits
+from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.safety_state import SafetyState
 from ur_emulator.controller.tool_settings import ToolSettings
 from ur_emulator.kinematics.arm_model import ArmModel
@@ -73,7 +73,7 @@ def require_positive(function: str, **limits: float) -> None:
             raise ScriptRuntimeError(f"{function}: {name} must be at least {MIN_LIMIT:g}, got {value:g}")
 
 
-def require_range(function: str, q: Vector6, limits: JointLimits) -> None:
+def require_range(function: str, q: Vector6, limits: ConfiguredLimits) -> None:
     """Raise a runtime error for a joint angle [rad] beyond the range of its joint."""
     for i, (x, low, high) in enumerate(zip(q, limits.q_min, limits.q_max, strict=True)):
         if not low <= x <= high:

@@ -16,10 +16,11 @@ from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.controller.robot_mode import RobotModeMachine
+from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.limit_checks import SPEED_TOLERANCE, Violation
 from ur_emulator.controller.safety.operational_mode import OperationalModeChoice
 from ur_emulator.controller.safety.safety_state import SafetyState
-from ur_emulator.models.robot_model import RobotModel, Vector6
+from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.force_mode import ForceMode
 from ur_emulator.motion.target import JointTarget
@@ -180,18 +181,17 @@ class Compliance:
             self._motion.place(sensed.actual_q)
         return JointTarget(sensed.actual_q, sensed.actual_qd)
 
-    def find_violation(self, robot: RobotModel, sensed: PlantState) -> Violation | None:
+    def find_violation(self, sensed: PlantState) -> Violation | None:
         """Return a violation by a compliant arm in this cycle, or None.
 
         Args:
-            robot: limits of the arm.
             sensed: of this cycle.
         """
         if self.mode is ControlMode.TEACH:
             if self._is_refused:
                 self._is_refused = False
                 return WRONG_PAYLOAD
-            return _guided_too_far(robot, sensed)
+            return _guided_too_far(self._safety.limits, sensed)
         if self.force_mode is None:
             return None
         error = sensed.position_error
@@ -220,15 +220,15 @@ WRONG_PAYLOAD = Violation(
 )
 
 
-def _guided_too_far(robot: RobotModel, sensed: PlantState) -> Violation | None:
+def _guided_too_far(limits: ConfiguredLimits, sensed: PlantState) -> Violation | None:
     """Codes C150 and C191 from the maker's list; that they lead to a protective stop is chosen.
 
     A joint outside its range may be moved back.
     """
     for i, (q, qd) in enumerate(zip(sensed.actual_q, sensed.actual_qd, strict=True)):
-        if (q > robot.q_max[i] and qd > 0.0) or (q < robot.q_min[i] and qd < 0.0):
+        if (q > limits.q_max[i] and qd > 0.0) or (q < limits.q_min[i] and qd < 0.0):
             return _stop(150, i, f"Position close to joint limits: {JOINT_NAMES[i]} at {q:.3f} rad")
-        if abs(qd) > robot.qd_safety[i] * SPEED_TOLERANCE:
+        if abs(qd) > limits.speed[i] * SPEED_TOLERANCE:
             return _stop(191, 32 + i, f"Joint speed limit violated: {JOINT_NAMES[i]} at {abs(qd):.3f} rad/s")
     return None
 

@@ -15,7 +15,7 @@ from operator import sub
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES
 from ur_emulator.controller.events import ErrorReported
-from ur_emulator.controller.safety.joint_limits import JointLimits
+from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
@@ -60,10 +60,12 @@ class SetpointCheck:
         self._stop_deceleration = stop_deceleration
         self._period_s = period_s
         self._braking = 0.5 / stop_deceleration
-        self._limits: JointLimits | None = None
+        self._limits: ConfiguredLimits | None = None
         self._safe_speed = self._safe_reach = 0.0
 
-    def find_invalid(self, limits: JointLimits, before: JointTarget, target: JointTarget) -> Violation | None:
+    def find_invalid(
+        self, limits: ConfiguredLimits, before: JointTarget, target: JointTarget
+    ) -> Violation | None:
         """Return what is wrong with the next set-point, or None.
 
         Args:
@@ -86,7 +88,7 @@ class SetpointCheck:
 
 
 def find_invalid_setpoint(
-    limits: JointLimits,
+    limits: ConfiguredLimits,
     before: JointTarget,
     target: JointTarget,
     stop_deceleration: float,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from protocol.ur_types import SafetyMode
-from ur_emulator.controller.safety.joint_limits import JointLimits
+from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.modes import MOVING_MODES, ROW, WATCHED_MODES, SafetyEvent, after, mode_of
 
 # The dashboard refuses to unlock a protective stop sooner than this [s]. Source: UR dashboard documents.
@@ -22,7 +22,7 @@ class SafetyState:
         limits: of the joints, as the installation sets them.
     """
 
-    def __init__(self, limits: JointLimits, *, has_programs_in_recovery: bool) -> None:
+    def __init__(self, limits: ConfiguredLimits, *, has_programs_in_recovery: bool) -> None:
         self.limits = limits
         self._stops_programs = frozenset() if has_programs_in_recovery else {SafetyMode.RECOVERY}
         self._causes: frozenset[SafetyMode] = frozenset()
@@ -37,7 +37,7 @@ class SafetyState:
             self._stopped_since = now
         self._enter(mode_of(self._causes))
 
-    def set_limits(self, limits: JointLimits) -> None:
+    def set_limits(self, limits: ConfiguredLimits) -> None:
         """Set the limits of the joints."""
         self.limits = limits
 

@@ -15,7 +15,7 @@ from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
 from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.events import ErrorReported
-from ur_emulator.controller.safety.joint_limits import JointLimits
+from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.limit_checks import Violation
 from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
 from ur_emulator.models.robot_generation import UNLIMITED, ArmLimits, SafetyLimits
@@ -47,23 +47,24 @@ class ModeLimits:
 
 
 def limits_of_mode(
-    mode: SafetyMode, is_manual: bool, joints: JointLimits, rules: SafetyLimits
+    mode: SafetyMode, is_manual: bool, limits: ConfiguredLimits, rules: SafetyLimits
 ) -> ModeLimits | None:
     """Return what is allowed in a mode; None where the rated joint speeds are all.
 
     Args:
         mode: the safety mode.
         is_manual: the operational mode is MANUAL.
-        joints: limits of the joints.
+        limits: of the arm and its installation.
         rules: limits of the generation.
     """
     manual = rules.manual if is_manual else UNLIMITED
     match mode:
         case SafetyMode.REDUCED:
-            return ModeLimits(joints.reduced_speed, manual.within(rules.reduced))
+            return ModeLimits(limits.reduced_speed, manual.within(limits.reduced_arm))
         case SafetyMode.RECOVERY:
-            return ModeLimits(joints.recovery_speed, manual.within(rules.recovery))
-    return None if manual == UNLIMITED else ModeLimits(joints.speed, manual)
+            return ModeLimits(limits.recovery_speed, manual.within(rules.recovery))
+    arm = manual.within(limits.arm)
+    return None if arm == UNLIMITED else ModeLimits(limits.speed, arm)
 
 
 class SpeedLimiter:

@@ -36,7 +36,9 @@ from protocol.ur_types import (
     SafetyMode,
 )
 from ur_emulator.controller.robot_mode import POWERED
+from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.modes import EMERGENCY_MODES, MOVING_MODES
+from ur_emulator.controller.safety.safety_state import SafetyState
 from ur_emulator.controller.safety.status_bits import RUNNING_STATES
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.kinematics.arm_model import ArmModel
@@ -52,10 +54,10 @@ _UNCONNECTED = frozenset({RobotMode.NO_CONTROLLER, RobotMode.DISCONNECTED})
 _TEACH = int(RobotStatusBits.TEACH_BUTTON_PRESSED)
 
 
-def safety_checksum(robot: RobotModel) -> int:
-    """Return a checksum of the safety settings: there is one set of them for each type of arm."""
-    limits = (robot.q_min, robot.q_max, robot.qd_safety, robot.tau_max, robot.payload_max)
-    return zlib.crc32(repr(limits).encode())
+def safety_checksum(robot: RobotModel, limits: ConfiguredLimits) -> int:
+    """Return a checksum of the safety settings: those of the arm and its installation."""
+    values = (limits.q_min, limits.q_max, limits.speed, robot.tau_max, robot.payload_max)
+    return zlib.crc32(repr(values).encode())
 
 
 def dexterity(arm: ArmModel, snapshot: Snapshot) -> float:
@@ -152,18 +154,20 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
 class StateEncoder:
     """Encodes states for all ports of a box: each snapshot once, however many ports ask for it."""
 
-    def __init__(self, software: Software, arm: ArmModel) -> None:
+    def __init__(self, software: Software, arm: ArmModel, safety: SafetyState) -> None:
         """Prepare what stays.
 
         Args:
             software: decides sizes and contents.
             arm: the controller's kinematics.
+            safety: has the limits of the installation.
         """
         self._software = software
         self._arm = arm
-        self._checksum = safety_checksum(arm.robot)
-        dh = calibrated_dh(arm.robot, arm.calibration)
-        self._setup = setup_records(arm.robot, dh, zlib.crc32(repr(dh).encode()))
+        self._safety = safety
+        self._limits: ConfiguredLimits | None = None
+        self._checksum = 0
+        self._dh = calibrated_dh(arm.robot, arm.calibration)
         self._snapshot: Snapshot | None = None
         self._package = b""
 
@@ -176,25 +180,30 @@ class StateEncoder:
 
     def encode_first(self, snapshot: Snapshot) -> bytes:
         """Return the longer state, which also has kinematics and configuration."""
-        return self._encode((*self._records(snapshot), *self._setup))
+        setup = setup_records(self._arm.robot, self._dh, self._safety.limits)
+        return self._encode((*self._records(snapshot), *setup))
 
     def _encode(self, records: Iterable[SubPackage]) -> bytes:
         return encode_state(records, self._software.version, self._software.sub_packages)
 
     def _records(self, snapshot: Snapshot) -> tuple[SubPackage, ...]:
+        if self._safety.limits is not self._limits:
+            self._limits = self._safety.limits
+            self._checksum = safety_checksum(self._arm.robot, self._limits)
         return state_records(snapshot, self._checksum, dexterity(self._arm, snapshot))
 
 
 def setup_records(
-    robot: RobotModel, calibrated_dh: tuple[DhRow, ...], checksum: int
+    robot: RobotModel, calibrated_dh: tuple[DhRow, ...], limits: ConfiguredLimits
 ) -> tuple[SubPackage, ...]:
     """Return the sub-packages of the first state of a connection.
 
     Args:
-        robot: limits and nominal kinematics.
+        robot: type and nominal kinematics.
         calibrated_dh: kinematics of this very arm.
-        checksum: of the calibration, the same for every joint.
+        limits: of the arm and its installation.
     """
+    checksum = zlib.crc32(repr(calibrated_dh).encode())  # of the calibration, the same for every joint
     return (
         KinematicsInfo(
             checksum=(checksum,) * 6,
@@ -204,9 +213,9 @@ def setup_records(
             dh_alpha=tuple(row.alpha for row in calibrated_dh),
         ),
         ConfigurationData(
-            joint_min_limit=robot.q_min,
-            joint_max_limit=robot.q_max,
-            joint_max_speed=robot.qd_safety,
+            joint_min_limit=limits.q_min,
+            joint_max_limit=limits.q_max,
+            joint_max_speed=limits.speed,
             joint_max_acceleration=(robot.generation.limits.acceleration,) * 6,
             dh_a=tuple(row.a for row in robot.dh),
             dh_d=tuple(row.d for row in robot.dh),

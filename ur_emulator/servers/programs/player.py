@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NoReturn
 from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetUp, StartProgram, StopProgram
 from ur_emulator.controller.events import ScriptFailed
-from ur_emulator.controller.safety.joint_limits import limits_of
+from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.controller.safety.status_bits import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
 from ur_emulator.programs.compiling import (
@@ -182,10 +182,9 @@ class ProgramPlayer:
             text = set_up.log_text or set_up.text
             self._access.note(f"{installation.wire_path} has no effect: {text}")
         elif set_up is not None:
-            safety = installation.safety
-            limits = limits_of(self._access.controller.state.robot).within(
-                safety.q_min, safety.q_max, safety.joint_speed, safety.reduced_joint_speed
-            )
+            limits = limits_of(self._access.controller.state.robot).within(installation.safety)
+            for setting in installation.safety.unwatched:
+                self._access.note(f"{installation.wire_path}: {setting} not watched")
             yield from self._access.apply(SetUp(set_up, limits))
 
     def _declare(self, installation: Installation) -> None:
