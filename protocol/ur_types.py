@@ -6,7 +6,8 @@ The numbers are those of the vendor's client interface documents, the same on ev
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -182,6 +183,14 @@ class SoftwareVersion(NamedTuple):
             )
         return cls(*map(int, parts))
 
+    @property
+    def as_e_series(self) -> SoftwareVersion:
+        """The software 5.x with the same wire formats; only PolyScope X (10.x) has another number.
+
+        Source: releases that the maker documents together, 5.21 and 10.8 to 5.26 and 10.13.
+        """
+        return self if self.major < 10 else SoftwareVersion(5, self.minor + 13, self.bugfix)
+
     def __str__(self) -> str:
         text = f"{self.major}.{self.minor}.{self.bugfix}"
         return f"{text}.{self.build}" if self.build else text
@@ -189,10 +198,13 @@ class SoftwareVersion(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """TCP ports of one control box. Source: UR remote control overview; clients hard-code these numbers.
+    """TCP ports of one control box; 0 for one that is not open.
+
+    Source: UR remote control overview; clients hard-code these numbers.
 
     Attributes:
-        modbus: Modbus TCP; 0 if it is not open.
+        robot_api: Robot API of PolyScope X over HTTP.
+        modbus: Modbus TCP.
         dashboard: commands for programs, power and stops, a line each.
         primary: states and all messages, ten a second; takes scripts.
         secondary: states, ten a second; takes scripts.
@@ -203,6 +215,7 @@ class Ports:
         realtime_ro: as realtime; takes nothing.
     """
 
+    robot_api: int = 80
     modbus: int = 502
     dashboard: int = 29999
     primary: int = 30001
@@ -214,10 +227,16 @@ class Ports:
     realtime_ro: int = 30013
 
     @classmethod
+    def of(cls, numbers: Mapping[str, int]) -> Ports:
+        """The ports of these numbers by name; the others are not open."""
+        return cls(**{field.name: numbers.get(field.name, 0) for field in fields(cls)})
+
+    @classmethod
     def standard(cls, offset: int = 0) -> Ports:
         """The vendor's ports, all moved by `offset` for machines where they are taken.
 
-        The Modbus port, far below the others, is 0 (none) where it would leave the TCP ports.
+        Those of Modbus and of the Robot API, far below the others, are 0 (none) where they would leave the
+        TCP ports.
 
         Raises:
             LocalProtocolError: a moved port would leave 1..65535.
@@ -226,7 +245,8 @@ class Ports:
         if not low <= offset <= high:
             raise LocalProtocolError(f"port offset {offset} leaves the TCP ports: use {low} to {high}")
         return cls(
-            modbus=max(0, 502 + offset),
+            robot_api=max(0, cls().robot_api + offset),
+            modbus=max(0, cls().modbus + offset),
             dashboard=29999 + offset,
             primary=30001 + offset,
             secondary=30002 + offset,

@@ -42,7 +42,10 @@ class ValueOrigin(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Since:
-    """First software version of each generation: CB3 is 3.x, e-Series 5.x; None means never."""
+    """First software version of each generation: CB3 is 3.x, e-Series 5.x; None means never.
+
+    PolyScope X has what the e-Series software of its time has, see `SoftwareVersion.as_e_series`.
+    """
 
     cb3: SoftwareVersion | None
     e_series: SoftwareVersion | None
@@ -50,7 +53,7 @@ class Since:
     def covers(self, version: SoftwareVersion) -> bool:
         """Whether software `version` has it."""
         first = self.cb3 if version.major < 5 else self.e_series
-        return first is not None and version >= first
+        return first is not None and version.as_e_series >= first
 
     def __str__(self) -> str:
         return " / ".join(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from protocol.primary.messages import ReportLevel
-from protocol.ur_types import RobotMode, RobotType, simulated_serial
+from protocol.ur_types import Ports, RobotMode, RobotType, simulated_serial
 from ur_emulator.box_log import LogEntry
 from ur_emulator.box_options import check_options, parse_pace, standard_ports
 from ur_emulator.control.operations import BoxOperations, make
@@ -33,7 +33,7 @@ from ur_emulator.servers.dashboard.answers import DashboardAnswers
 from ur_emulator.servers.dashboard.port import DashboardPort
 from ur_emulator.servers.dashboard.reports import ReportFolder
 from ur_emulator.servers.modbus.server import ModbusPort
-from ur_emulator.servers.port_set import CONTROL, MODBUS, PortSet
+from ur_emulator.servers.port_set import CONTROL, ROBOT_API, PortSet
 from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder
 from ur_emulator.servers.programs.intake import ProgramIntake
@@ -54,7 +54,8 @@ class Box(BoxOperations):
     Attributes:
         generation: that of its arm: control cycle, software and what comes with it.
         host: address that it listens on.
-        ports: numbers of its ports; that for Modbus is 0 if it is not open.
+        ports: numbers of its ports; 0 for one that it does not have.
+        title: arm, generation and software.
         control_port: number of the port for the control API over HTTP, 0 if it is not open.
         port_base: what was added to the standard ones.
         serial_number: as the dashboard gives it; simulated boxes are recognisable by it.
@@ -78,6 +79,7 @@ class Box(BoxOperations):
         control_token: str | None = None,
         skip_unknown_nodes: bool = False,
         remote_control: bool = True,
+        services: Collection[str] = (),
         *,
         loop: EventLoop | None = None,
         phase: float = 0.0,
@@ -103,6 +105,8 @@ class Box(BoxOperations):
             skip_unknown_nodes: run programs of PolyScope without the nodes that are not known, those of
                 URCaps above all; the log names each.
             remote_control: clients may command the box; False: it starts in local control (e-Series).
+            services: of a PolyScope X box, whose ports stay closed until they are enabled: "primary" and
+                "rtde".
             loop: shared with other boxes; None gives the box its own.
             phase: which part of a period its cycles lie after those of the first box of the loop.
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).
@@ -111,13 +115,14 @@ class Box(BoxOperations):
         Raises:
             EmulatorError: an argument is not among the allowed ones.
         """
-        model = robot_by_name(robot)
+        model = robot_by_name(robot, version)
         if generation is not None:
             model = dataclasses.replace(model, generation=generation)
         self.generation = generation = model.generation
         asked = model.software_version(version)
         software = generation.software(asked)
         imperfections = generation.fidelity(fidelity)
+        closed = generation.closed_ports(services)
         named_pace = parse_pace(pace)
         check_options(host, speed, seed, programs, control_port, control_token)
         if not (remote_control or generation.has_remote_control):
@@ -126,6 +131,7 @@ class Box(BoxOperations):
                 "its clients may always command it"
             )
         prestart_process()  # it loads the compiler while the box is assembled
+        self.title = f"{model.title} {generation.name} {asked}"
         self.host = host
         self.port_base = port_base or 0
         self.ports = standard_ports(self.port_base)
@@ -158,9 +164,6 @@ class Box(BoxOperations):
         realtime, realtime_ro = (RealtimePort(software.realtime, intake) for intake in (self._intake, None))
         rtde = RtdePort(self._access)
         modbus = ModbusPort(self._access)
-        dashboard = DashboardPort(
-            self._access, DashboardAnswers(self._access, player, self._reports, self._shut_down)
-        )
         primary, secondary, primary_ro, secondary_ro = messengers = tuple(
             PrimaryPort(software, controller, intake, states, all_messages=all_messages)
             for intake in (self._intake, None)
@@ -176,12 +179,21 @@ class Box(BoxOperations):
             "rtde": rtde,
             "primary": primary,
             "secondary": secondary,
-            "dashboard": dashboard,
-            MODBUS: modbus,
+            "modbus": modbus,
             "realtime_ro": realtime_ro,
             "primary_ro": primary_ro,
             "secondary_ro": secondary_ro,
         }
+        if software.dashboard:
+            replies = DashboardAnswers(self._access, player, self._reports, self._shut_down)
+            ports["dashboard"] = DashboardPort(self._access, replies)
+        if software.robot_api:
+            from ur_emulator.servers.http.port import HttpPort
+            from ur_emulator.servers.robot_api.answers import RobotApiAnswers
+
+            calls = RobotApiAnswers(self._access, player, self._shut_down, host)
+            ports[ROBOT_API] = HttpPort(self._access, calls)
+        self.ports = Ports.of({name: getattr(self.ports, name) for name in ports if name not in closed})
         self.control_port = 0
         self._facts = {
             "software": str(asked),
@@ -202,6 +214,11 @@ class Box(BoxOperations):
             answers = ControlAnswers(self._operations, host, control_token)
             ports[CONTROL] = HttpPort(self._access, answers)
         self._port_set = PortSet(self._loop, host, self._box, ports)
+        if closed:
+            self._port_set.notices.append(
+                f"{len(closed)} ports stay closed, as on a new {generation.name} box: "
+                f"--services {','.join(generation.services)} enables them"
+            )
         self.is_shut_down = False
         self.failure: Exception | None = None
         self.on_end: Callable[[], None] = self._loop.stop if loop is None else self.close
@@ -258,7 +275,7 @@ class Box(BoxOperations):
         self.control_port = numbers.pop(CONTROL, 0)
         if self.control_port:
             close_to_scripts(self, self.control_port)
-        self.ports = dataclasses.replace(self.ports, **{MODBUS: 0, **numbers})
+        self.ports = Ports.of(numbers)
         self._loop.add(self._box)
         self._loop.tasks.start()
         begin = start_up(self._access, self._player)
@@ -266,11 +283,9 @@ class Box(BoxOperations):
 
     def _wanted_numbers(self) -> dict[str, int]:
         """Numbers of the ports to open by name; 0 takes a free one."""
-        numbers = dataclasses.asdict(self.ports)
+        numbers = {name: number for name, number in dataclasses.asdict(self.ports).items() if number}
         if self._free_ports:
             numbers = dict.fromkeys(numbers, 0)
-        elif not numbers[MODBUS]:
-            del numbers[MODBUS]
         if self._wanted_control_port is not None:
             numbers[CONTROL] = self._wanted_control_port
         return numbers

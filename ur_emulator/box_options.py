@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from ipaddress import ip_address
 from os import PathLike
 from pathlib import Path
@@ -33,6 +34,7 @@ class BoxOptions(TypedDict, total=False):
     control_token: str | None
     skip_unknown_nodes: bool
     remote_control: bool
+    services: Collection[str]
 
 
 def check_options(

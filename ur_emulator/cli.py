@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
+# Ports of the line that says that a box is ready.
+_SHOWN_PORTS = ("robot_api", "dashboard", "primary", "secondary", "realtime", "rtde", "modbus")
+
 app = new_app("An emulated Universal Robots control box.")
 
 
@@ -102,6 +105,10 @@ def serve(
             show_envvar=True,
         ),
     ] = None,
+    services: Annotated[
+        str,
+        typer.Option(help="Services of a PolyScope X box to enable: primary,rtde.", show_default="none"),
+    ] = "",
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
@@ -143,6 +150,7 @@ def serve(
             control_token=token,
             skip_unknown_nodes=skip_unknown_nodes,
             remote_control=remote_control,
+            services=services.replace(",", " ").split(),
         )
     except EmulatorError as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
@@ -161,13 +169,8 @@ def serve(
         err.write(f"ur-emulator: {notice}")
     for k, box in enumerate(rack):
         out.write(
-            f"{robot.upper()} {box.generation.name} {software or box.generation.default_version} "
-            f"ready at {box.host}, {pace}, {fidelity}, "
-            f"seed {seed + k}, serial {box.serial_number}: "
-            f"dashboard {box.ports.dashboard}, primary {box.ports.primary}, "
-            f"secondary {box.ports.secondary}, realtime {box.ports.realtime}, rtde {box.ports.rtde}"
-            + (f", modbus {box.ports.modbus}" if box.ports.modbus else "")
-            + (f", control {box.control_port}" if box.control_port else "")
+            f"{box.title} ready at {box.host}, {pace}, {fidelity}, "
+            f"seed {seed + k}, serial {box.serial_number}: {_ports_line(box)}"
         )
         if log:
             box.follow_log(partial(_show_entry, err, f"{box.host} " if boxes > 1 else ""))
@@ -197,6 +200,12 @@ def ctl(context: typer.Context) -> None:
     from ur_emulator.control.command_line import main as control
 
     raise typer.Exit(control(context.args))
+
+
+def _ports_line(box: Box) -> str:
+    """Name the ports that a user may want to connect to."""
+    numbers = {name: getattr(box.ports, name) for name in _SHOWN_PORTS} | {"control": box.control_port}
+    return ", ".join(f"{name.replace('_', ' ')} {number}" for name, number in numbers.items() if number)
 
 
 def _notices(rack: Sequence[Box]) -> Iterator[str]:

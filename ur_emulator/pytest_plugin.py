@@ -36,6 +36,7 @@ OPTIONS = (
     "programs",
     "skip_unknown_nodes",
     "remote_control",
+    "services",
     "control_port",
     "control_token",
     "standard_ports",

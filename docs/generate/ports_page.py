@@ -33,6 +33,7 @@ ROWS: tuple[MapRow, ...] = (
     MapRow("primary_ro", "as 30001", "10 a second", "nothing", "primary.md"),
     MapRow("secondary_ro", "as 30002", "10 a second", "nothing", "primary.md"),
     MapRow("realtime_ro", "as 30003", "125 a second", "nothing", "realtime.md"),
+    MapRow("robot_api", "answers", "on request", "HTTP requests, PolyScope X only", "robot_api.md"),
     MapRow("modbus", "answers", "on request", "Modbus functions 1-6, 15, 16", "modbus.md"),
 )
 """One row a port of `Ports`."""

@@ -144,8 +144,13 @@ def test_the_ready_file_says_what_answers(tmp_path):
     with serving(tmp_path, "--seed", 7) as box:
         assert box.facts["host"] == "127.0.0.1"
         assert box.facts["serial_number"] == "20993000007"
-        assert box.facts["ports"] == dataclasses.asdict(Ports.standard(box.base))
-        for name in box.facts["ports"]:
+        numbers = {name: number for name, number in box.facts["ports"].items() if number}
+        assert numbers == {
+            name: number
+            for name, number in dataclasses.asdict(Ports.standard(box.base)).items()
+            if name != "robot_api"
+        }
+        for name in numbers:
             connect(box, name).close()
         assert [p.name for p in tmp_path.iterdir()] == [p.name for p in tmp_path.glob("ready-*.json")]
 

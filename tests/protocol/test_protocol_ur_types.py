@@ -20,6 +20,7 @@ from protocol.ur_types import (
     parse_serial,
     simulated_serial,
 )
+from protocol.wire_record import since
 
 
 @pytest.mark.parametrize(
@@ -53,6 +54,7 @@ def test_ports_move_together():
     assert Ports.standard(35522).realtime_ro == 65535
     assert Ports.standard(-29998).dashboard == 1
     assert (Ports.standard(-501).modbus, Ports.standard(-502).modbus) == (1, 0)
+    assert (Ports.standard(-79).robot_api, Ports.standard(-80).robot_api) == (1, 0)
 
 
 def test_simulated_serials_say_so_and_carry_the_seed():
@@ -76,11 +78,20 @@ def test_numbers_of_the_documents():
 
 
 def test_safety_status_begins_as_safety_mode():
-    assert [(mode.name, mode.value) for mode in SafetyMode] == [
-        (status.name, status.value) for status in SafetyStatus
-    ][: len(SafetyMode)]
+    assert [(status.name, status.value) for status in SafetyStatus] == [
+        (mode.name, mode.value) for mode in SafetyMode
+    ][: len(SafetyStatus)]
 
 
 def test_errors_have_one_root():
     assert issubclass(LocalProtocolError, ProtocolError)
     assert issubclass(RemoteProtocolError, ProtocolError)
+
+
+@pytest.mark.parametrize(
+    ("version", "same"), [((10, 8), (5, 21)), ((10, 13, 2), (5, 26, 2)), ((5, 9), (5, 9))]
+)
+def test_polyscope_x_has_the_wire_formats_of_its_time(version, same):
+    assert SoftwareVersion(*version).as_e_series == SoftwareVersion(*same)
+    assert since((3, 1), (5, 22)).covers(SoftwareVersion(10, 9))
+    assert not since((3, 1), (5, 22)).covers(SoftwareVersion(10, 8))

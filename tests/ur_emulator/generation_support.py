@@ -5,6 +5,7 @@ from datetime import datetime
 
 from protocol.dashboard.commands import COMMANDS
 from protocol.primary.layout import ForceModeData
+from protocol.robot_api import CALLS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robot_generation import ArmLimits, RobotGeneration, SafetyLimits
@@ -41,6 +42,8 @@ SECOND = RobotGeneration(
         for row in COMMANDS
         if row.name in ("PolyscopeVersion", "robotmode", "running", "power off", "quit")
     ),
+    robot_api=CALLS,
+    services={"radio": ()},
     realtime=tuple(column for column in CB3.realtime if column.since_size <= 1060),
     frame_sizes=((SoftwareVersion(5, 0), 1044), (SoftwareVersion(5, 1), 1060)),
     sub_packages=tuple(record for record in CB3.sub_packages if record is not ForceModeData),

@@ -7,7 +7,8 @@ and ports and compiler get the tables of a software version from here. This modu
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cache
 from pathlib import Path
@@ -17,6 +18,7 @@ from protocol.errors import LocalProtocolError
 from protocol.primary.framing import SubPackage
 from protocol.realtime.columns import RealtimeColumn
 from protocol.realtime.layout import RealtimeLayout, frame_size
+from protocol.robot_api import ApiCall, calls_of
 from protocol.rtde.fields import RtdeField, input_fields, output_fields
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
@@ -100,7 +102,9 @@ class RobotGeneration:
         has_remote_control: local control, in which clients may not command the box, and remote control.
         fidelities: how far its arms are from perfect ones.
         robot_subtype: code in the primary interface's configuration data.
-        dashboard: commands of the dashboard server.
+        dashboard: commands of the dashboard server; none: there is no such server.
+        robot_api: calls of the Robot API; none: there is no such server.
+        services: ports by the service that must be enabled before they open; the others are always open.
         realtime: columns of the frames on port 30003.
         frame_sizes: first version of each size of these frames.
         sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
@@ -124,6 +128,8 @@ class RobotGeneration:
     fidelities: tuple[Fidelity, ...]
     robot_subtype: int
     dashboard: tuple[DashboardCommand, ...]
+    robot_api: tuple[ApiCall, ...] = ()
+    services: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     realtime: tuple[RealtimeColumn, ...]
     frame_sizes: tuple[tuple[SoftwareVersion, int], ...]
     sub_packages: tuple[type[SubPackage], ...]
@@ -190,6 +196,21 @@ class RobotGeneration:
             raise ModelError(f"version {text} given: {error}") from None
         return version
 
+    def closed_ports(self, services: Iterable[str]) -> frozenset[str]:
+        """Return the names of the ports that stay closed if only these services are enabled.
+
+        Raises:
+            ModelError: there is no service of that name.
+        """
+        enabled = frozenset(services)
+        for name in enabled:
+            if name not in self.services:
+                known = f"choose of {', '.join(self.services)}" if self.services else "all ports are open"
+                raise ModelError(f"service {name!r} given: {self.name} has no such service, {known}")
+        return frozenset(
+            port for name, ports in self.services.items() if name not in enabled for port in ports
+        )
+
     def fidelity(self, name: str) -> Fidelity:
         """Look a fidelity up by its name, in any letter case; a name that ends in .toml is a file.
 
@@ -217,6 +238,7 @@ def _software(generation: RobotGeneration, version: SoftwareVersion) -> Software
         version=version._replace(build=version.build or build),
         built=built,
         dashboard=commands_of(version, generation.dashboard),
+        robot_api=calls_of(version, generation.robot_api),
         realtime=RealtimeLayout(tuple(it for it in generation.realtime if it.since_size <= size)),
         sub_packages=generation.sub_packages,
         rtde_outputs=output_fields(version, generation.rtde_outputs),

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ur_emulator.errors import ModelError
+from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.polyscope_x import POLYSCOPE_X
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.models.ur3 import UR3
 from ur_emulator.models.ur3e import UR3E
@@ -23,8 +27,16 @@ _E_SERIES = (UR5E, UR3E, UR7E, UR10E, UR12E, UR16E, UR20, UR30)
 ROBOTS: dict[str, RobotModel] = {robot.name: robot for robot in (*_CB3, *_E_SERIES)}
 
 
-def robot_by_name(name: str) -> RobotModel:
+# Software of another generation that the same arms run.
+_ALSO = {E_SERIES: POLYSCOPE_X}
+
+
+def robot_by_name(name: str, version: str | None = None) -> RobotModel:
     """Look an arm up by its name, in any letter case.
+
+    Args:
+        name: of the arm.
+        version: software that it shall run; an arm of the e-Series may run PolyScope X.
 
     Raises:
         ModelError: when no arm has that name.
@@ -32,4 +44,7 @@ def robot_by_name(name: str) -> RobotModel:
     robot = ROBOTS.get(name.lower())
     if robot is None:
         raise ModelError(f"unknown robot {name!r}: choose one of {', '.join(ROBOTS)}")
+    also = _ALSO.get(robot.generation)
+    if also is not None and version is not None and version.strip().startswith(f"{also.major}."):
+        return replace(robot, generation=also, first_version=None)
     return robot

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from protocol.dashboard.commands import DashboardCommand
     from protocol.primary.framing import SubPackage
     from protocol.realtime.layout import RealtimeLayout
+    from protocol.robot_api import ApiCall
     from protocol.rtde.fields import RtdeField
     from urscript.catalogue import Catalogue
 
@@ -25,6 +26,7 @@ class Software:
         version: four numbers; the last is the build.
         built: when; in the time of the box.
         dashboard: commands of the dashboard server, by name.
+        robot_api: calls of the Robot API.
         realtime: layout of the frames on port 30003.
         sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
         rtde_outputs: variables that a client can subscribe to, by name.
@@ -35,6 +37,7 @@ class Software:
     version: SoftwareVersion
     built: datetime
     dashboard: Mapping[str, DashboardCommand]
+    robot_api: tuple[ApiCall, ...]
     realtime: RealtimeLayout
     sub_packages: tuple[type[SubPackage], ...]
     rtde_outputs: Mapping[str, RtdeField]

@@ -12,7 +12,11 @@ from ur_emulator.servers.tcp.listener import Listener, Port
 from ur_emulator.servers.tcp.places import Places
 from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
 
-CONTROL, MODBUS = "control", "modbus"
+CONTROL, MODBUS, ROBOT_API = "control", "modbus", "robot_api"
+# Ports whose numbers need privileges, and what the box lacks without them.
+_PRIVILEGED = {MODBUS: "Modbus server", ROBOT_API: "Robot API"}
+# Ports of web servers.
+_WEB = frozenset({CONTROL, ROBOT_API})
 
 
 class PortSet:
@@ -51,7 +55,7 @@ class PortSet:
             wanted: numbers by name; 0 takes a free one, a port that is not named stays closed.
 
         Returns:
-            The numbers. That of Modbus may be missing: it is one that needs privileges.
+            The numbers. Those that need privileges may be missing.
 
         Raises:
             PortError: one of them cannot be opened; `close` closes the others.
@@ -63,9 +67,9 @@ class PortSet:
             try:
                 self._listeners[name] = self._listener(name, port, wanted[name])
             except PortPermissionError as error:
-                if name != MODBUS:
+                if name not in _PRIVILEGED:
                     raise
-                self.notices.append(f"no Modbus server: {error}")
+                self.notices.append(f"no {_PRIVILEGED[name]}: {error}")
         return {name: listener.number for name, listener in self._listeners.items()}
 
     def close(self) -> None:
@@ -93,7 +97,7 @@ class PortSet:
             name,
             places,
             self._spare,
-            speaks_http=name == CONTROL,
+            speaks_http=name in _WEB,
         )
 
 

@@ -84,7 +84,7 @@ class HttpAnswer:
 
     Attributes:
         status: code.
-        result: sent as JSON.
+        result: sent as JSON; bytes are sent as they are.
         headers: beside the usual ones.
     """
 

@@ -180,9 +180,13 @@ class _HttpSession(Session):
         self.connection.close_when_sent()
 
     def _respond(self, answer: HttpAnswer) -> None:
-        body = json.dumps(answer.result, default=_as_json).encode() + b"\n"
+        content_type, body = JSON, answer.result
+        if isinstance(body, bytes):
+            content_type = "application/octet-stream"
+        else:
+            body = json.dumps(body, default=_as_json).encode() + b"\n"
         headers = [
-            ("Content-Type", JSON),
+            ("Content-Type", content_type),
             ("Content-Length", str(len(body))),
             ("Cache-Control", "no-store"),
             ("X-Content-Type-Options", "nosniff"),

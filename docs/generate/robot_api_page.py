@@ -1,0 +1,58 @@
+"""The page docs/protocol/robot_api.md, made from the table of calls."""
+
+from __future__ import annotations
+
+from docs.generate.page_parts import table
+from protocol.robot_api import API_VERSIONS, BASE, CALLS
+from protocol.ur_types import Ports
+
+_INTRODUCTION = f"""\
+# Robot API of PolyScope X: port {Ports().robot_api}
+
+Made from `protocol/robot_api.py` by `make docs`.
+
+`ur-emulator serve --robot ur5e --software 10.11` starts a box with PolyScope X. It has no dashboard
+server. Clients call `http://HOST{BASE}` instead: JSON over HTTP. Port {Ports().robot_api} needs
+privileges on most systems; `--port-base N` moves it with the others.
+
+The other ports stay closed until their service is enabled, as on a new robot: `--services
+primary,rtde`. The service `primary` opens 30001, 30002, 30003 and their read-only twins, `rtde`
+opens 30004.
+
+Answers: 200 with the fields of the table; 400 for a body that is not JSON, 403 for a call marked
+with R in local control, 404 for a path or a program that does not exist, 405 for another method,
+409 for what the robot cannot do now, 422 for a field that is missing or has another value. An error
+is `{{"error": "..."}}`. A call is answered when it is complete: POWER_ON when the robot is IDLE.
+
+Programs are the files `NAME.urp`, `NAME.script` and `NAME.urpx` of the folder `--programs`. The
+format of `.urpx` is not known: such files are stored, listed and sent, but not played.
+"""
+
+
+def render() -> str:
+    """Return the page."""
+    return "\n".join(
+        (
+            _INTRODUCTION,
+            *table(
+                ("call", "does", "since", "R"),
+                (
+                    (
+                        f"`{row.method} {row.path}`",
+                        row.does,
+                        f"{row.since.major}.{row.since.minor}",
+                        "R" * row.changes,
+                    )
+                    for row in CALLS
+                ),
+            ),
+            "",
+            "Version of the API, `info.version` of `/openapi.json`:",
+            "",
+            *table(
+                ("from software", "version"),
+                ((f"{since.major}.{since.minor}", version) for since, version in API_VERSIONS),
+            ),
+            "",
+        )
+    )

@@ -1,0 +1,148 @@
+"""The Robot API of PolyScope X: HTTP calls in place of the dashboard server, one row a call.
+
+A call is a method and a path below `BASE`; a part in braces is an argument. Bodies and answers are JSON
+objects; the fields that clients read are named in `does`. A call that changes something is answered with 403
+in local control.
+
+Sources: UR client library (the dashboard client for PolyScope X and its tests), the README of the PolyScope X
+"Remote Robot Controller". What the calls answer beyond the fields that clients read is chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
+
+__all__ = [
+    "API_VERSIONS",
+    "BASE",
+    "CALLS",
+    "ROBOT_MODE_NAMES",
+    "SAFETY_MODE_NAMES",
+    "ApiCall",
+    "api_version",
+    "calls_of",
+    "match_call",
+]
+
+BASE = "/universal-robots/robot-api"
+
+
+@dataclass(frozen=True, slots=True)
+class ApiCall:
+    """One row.
+
+    Attributes:
+        method: of HTTP.
+        path: below `BASE`; a last part in braces is an argument.
+        since: first PolyScope X software.
+        changes: it changes something, which local control forbids.
+        does: description, with the fields of body and answer.
+    """
+
+    method: str
+    path: str
+    since: SoftwareVersion
+    changes: bool
+    does: str
+
+
+def _row(method: str, path: str, since: tuple[int, int], does: str) -> ApiCall:
+    return ApiCall(method, path, SoftwareVersion(*since), method != "GET", does)
+
+
+# The oldest PolyScope X software that the client library's tests name is 10.7.
+_FIRST, _10_12, _10_14 = (10, 0), (10, 12), (10, 14)
+
+CALLS: tuple[ApiCall, ...] = (
+    _row("GET", "/openapi.json", _FIRST, "all calls; `info.version` is that of the API"),
+    _row("PUT", "/robotstate/v1/state", _FIRST,
+         "`action`: POWER_ON, POWER_OFF, BRAKE_RELEASE, UNLOCK_PROTECTIVE_STOP, RESTART_SAFETY"),
+    _row("GET", "/robotstate/v1/robotmode", _10_12, "`mode`: robot mode"),
+    _row("GET", "/robotstate/v1/safetymode", _10_12, "`mode`: safety mode"),
+    _row("PUT", "/program/v1/state", _FIRST, "`action`: play, pause, resume, stop"),
+    _row("GET", "/program/v1/state", _FIRST, "`state`: PLAYING, PAUSED, STOPPED"),
+    _row("PUT", "/program/v1/load", _FIRST, "loads the program `programName`"),
+    _row("PUT", "/program/v1/loaded", _10_12, "loads the program `name`"),
+    _row("GET", "/program/v1/loaded", _10_12, "`name` of the loaded program"),
+    _row("GET", "/system/v1/controlmode", _10_12, "`mode`: LOCAL or REMOTE"),
+    _row("GET", "/system/v1/operationalmode", _10_12, "`mode`: MANUAL or AUTOMATIC"),
+    _row("GET", "/programs/v1", _10_12, "`programs`: each with `name` and dates"),
+    _row("POST", "/programs/v1", _10_12, "takes a new program, the form field `file`; gives `programName`"),
+    _row("PUT", "/programs/v1", _10_12, "replaces a program, the form field `file`; gives `programName`"),
+    _row("GET", "/programs/v1/{name}", _10_12, "the file of a program"),
+    _row("POST", "/popup/v1", _10_14, "shows a popup with `title` and `message`"),
+    _row("DELETE", "/popup/v1", _10_14, "closes all popups"),
+    _row("DELETE", "/popup/v1/safety", _10_14, "closes a popup about safety"),
+    _row("GET", "/versions/v1", _10_14, "`marketingVersion`: software"),
+    _row("GET", "/system/v1/information", _10_14, "`robotType` and `serialNumber`"),
+    _row("PUT", "/system/v1/shutdown", _10_14, "switches the robot and the box off"),
+    _row("POST", "/system/v1/log", _10_14, "writes `message` into the log"),
+)  # fmt: skip
+"""All calls of PolyScope X software that the box answers."""
+
+API_VERSIONS: tuple[tuple[SoftwareVersion, str], ...] = (
+    (SoftwareVersion(10, 0), "3.0.0"),  # chosen; clients know that it lies below 3.1.4
+    (SoftwareVersion(10, 12), "3.1.4"),
+    (SoftwareVersion(10, 13), "3.1.6"),
+    (SoftwareVersion(10, 14), "5.0.107"),
+)
+"""Version of the API, which clients ask for, by the first software that has it."""
+
+ROBOT_MODE_NAMES: Mapping[RobotMode, str] = MappingProxyType(
+    {mode: mode.name for mode in RobotMode} | {RobotMode.UPDATING_FIRMWARE: "UPDATING"}
+)
+SAFETY_MODE_NAMES: Mapping[SafetyMode, str] = MappingProxyType(
+    {mode: mode.name for mode in SafetyMode}
+    | {
+        SafetyMode.SYSTEM_EMERGENCY_STOP: "EMERGENCY_STOP",
+        SafetyMode.ROBOT_EMERGENCY_STOP: "EMERGENCY_STOP",
+        SafetyMode.VIOLATION: "FAULT",
+    }
+)
+
+
+def calls_of(version: SoftwareVersion, table: Iterable[ApiCall] = CALLS) -> tuple[ApiCall, ...]:
+    """The calls of a table that software `version` knows."""
+    return tuple(call for call in table if call.since <= version)
+
+
+def api_version(version: SoftwareVersion) -> str:
+    """The version of the API that software `version` has."""
+    return [text for since, text in API_VERSIONS if since <= version][-1]
+
+
+def match_call(method: str, path: str, known: Iterable[ApiCall]) -> tuple[ApiCall, str] | tuple[None, str]:
+    """The call that a request is, and its argument.
+
+    Args:
+        method: of the request.
+        path: of the request, without the query; a slash at its end has no meaning.
+        known: the calls of the software.
+
+    Returns:
+        The call and the argument of its path ("" without one). Without a call: None, and the methods that
+        the path knows, separated by commas; "" for a path that nothing is known of.
+    """
+    inner = path.removeprefix(BASE).rstrip("/") if path.startswith(f"{BASE}/") else ""
+    allowed = []
+    for call in known:
+        argument = _argument(call.path, inner)
+        if argument is None:
+            continue
+        if call.method == method:
+            return call, argument
+        allowed.append(call.method)
+    return None, ", ".join(dict.fromkeys(allowed))
+
+
+def _argument(pattern: str, path: str) -> str | None:
+    """The argument in the place of the braces, "" where there are none; None: it is another path."""
+    fixed, brace, _ = pattern.partition("{")
+    if not brace:
+        return "" if path == pattern else None
+    rest = path.removeprefix(fixed)
+    return rest if path.startswith(fixed) and rest and "/" not in rest else None

@@ -1,0 +1,305 @@
+"""What the calls of the Robot API do, each in a method; which there are stands in `protocol.robot_api`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
+
+from protocol.robot_api import (
+    BASE,
+    ROBOT_MODE_NAMES,
+    SAFETY_MODE_NAMES,
+    ApiCall,
+    api_version,
+    match_call,
+)
+from protocol.ur_types import RobotMode, SafetyMode
+from ur_emulator.commands.operator import ClosePopup, ShowPopup
+from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
+from ur_emulator.controller.command import Command
+from ur_emulator.controller.events import LogAdded
+from ur_emulator.controller.safety.modes import ROW
+from ur_emulator.controller.safety.operational_mode import OperationalMode
+from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
+from ur_emulator.servers.box_access import BoxAccess
+from ur_emulator.servers.http.messages import HttpAnswer, HttpError, HttpRequest, check_origin
+from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer
+from ur_emulator.servers.robot_api.program_files import (
+    find_program,
+    form_file,
+    list_programs,
+    read_program,
+    write_program,
+)
+from ur_emulator.servers.steps import Steps
+from ur_emulator.servers.tcp.connection import Connection
+
+# Name of the program of a box that has loaded none. Source: a fresh simulator.
+DEFAULT_PROGRAM = "Default program"
+_DONE = HttpAnswer(200, {"message": "done"})
+_LOCAL = "the robot is in local control: switch to remote control first"
+# Modes from which an action starts, and the effect; in the modes behind it has happened already.
+_POWER: dict[str, tuple[frozenset[RobotMode], frozenset[RobotMode], type[Command]]] = {
+    "POWER_ON": (
+        frozenset({RobotMode.POWER_OFF}),
+        frozenset({RobotMode.IDLE, RobotMode.RUNNING}),
+        PowerOn,
+    ),
+    "BRAKE_RELEASE": (frozenset({RobotMode.IDLE}), frozenset({RobotMode.RUNNING}), ReleaseBrakes),
+}
+
+
+class RobotApiAnswers:
+    """Finds the answer to a request.
+
+    Args:
+        access: to the box.
+        player: holds the loaded program.
+        shut_down: closes the box.
+        own_host: address that the port is bound to.
+    """
+
+    def __init__(
+        self, access: BoxAccess, player: ProgramPlayer, shut_down: Callable[[], None], own_host: str
+    ) -> None:
+        self._access = access
+        self._player = player
+        self._shut_down = shut_down
+        self._own_host = own_host
+        self._calls = access.identity.software.robot_api
+        self._methods: dict[str, Callable[[HttpRequest, str], Steps[HttpAnswer]]] = {
+            "GET /openapi.json": lambda *_: _at_once(self._describe()),
+            "PUT /robotstate/v1/state": self._change_robot_state,
+            "GET /robotstate/v1/robotmode": lambda *_: _at_once(
+                {"mode": ROBOT_MODE_NAMES[RobotMode(access.snapshot.robot_mode)], "message": ""}
+            ),
+            "GET /robotstate/v1/safetymode": lambda *_: _at_once(
+                {"mode": SAFETY_MODE_NAMES[SafetyMode(access.snapshot.safety_mode)], "message": ""}
+            ),
+            "PUT /program/v1/state": self._change_program_state,
+            "GET /program/v1/state": lambda *_: _at_once(
+                {"state": self._program_state(), "message": "", "details": ""}
+            ),
+            "PUT /program/v1/load": lambda request, _: self._load(request, "programName"),
+            "PUT /program/v1/loaded": lambda request, _: self._load(request, "name"),
+            "GET /program/v1/loaded": lambda *_: _at_once({"name": self._loaded_name()}),
+            "GET /system/v1/controlmode": lambda *_: _at_once(
+                {"mode": "REMOTE" if access.controller.state.operator.remote_spell else "LOCAL"}
+            ),
+            "GET /system/v1/operationalmode": lambda *_: _at_once({"mode": self._operational_mode()}),
+            "GET /programs/v1": self._list_programs,
+            "POST /programs/v1": lambda request, _: self._store(request, is_new=True),
+            "PUT /programs/v1": lambda request, _: self._store(request, is_new=False),
+            "GET /programs/v1/{name}": self._send_program,
+            "POST /popup/v1": self._show_popup,
+            "DELETE /popup/v1": lambda *_: self._applied(ClosePopup()),
+            "DELETE /popup/v1/safety": lambda *_: _at_once({"message": "done"}),
+            "GET /versions/v1": lambda *_: _at_once(
+                {"marketingVersion": str(access.identity.software.version), "baselineVersion": ""}
+            ),
+            "GET /system/v1/information": lambda *_: _at_once(
+                {"robotType": access.identity.model, "serialNumber": access.identity.serial_number}
+            ),
+            "PUT /system/v1/shutdown": self._shutdown,
+            "POST /system/v1/log": self._add_to_log,
+        }
+
+    def answer(self, request: HttpRequest, connection: Connection) -> Steps[HttpAnswer]:
+        """Answer a request; one that changes something is refused in local control."""
+        check_origin(request.headers, self._own_host)
+        call, argument = match_call(request.method, request.path, self._calls)
+        if call is None:
+            if argument:
+                raise HttpError(405, f"{request.path} is asked with {argument}", ("Allow", argument))
+            raise HttpError(404, f"there is no {ascii(request.path)[:80]}: see {BASE}/openapi.json")
+        if call.changes and not self._access.controller.state.operator.remote_spell:
+            raise HttpError(403, _LOCAL)
+        try:
+            return (yield from self._methods[f"{call.method} {call.path}"](request, argument))
+        except (MissingFileRefusal, FileMissingError) as error:
+            raise HttpError(404, str(error)) from None
+        except RefusedError as error:
+            raise HttpError(409, str(error)) from None
+        except EmulatorError as error:
+            raise HttpError(422, str(error)) from None
+
+    def _describe(self) -> dict[str, Any]:
+        paths: dict[str, dict[str, Any]] = {}
+        for call in self._calls:
+            paths.setdefault(call.path, {})[call.method.lower()] = _described(call)
+        info = {"title": "Robot API", "version": api_version(self._access.identity.software.version)}
+        return {"openapi": "3.0.3", "info": info, "servers": [{"url": BASE}], "paths": paths}
+
+    # --- robot
+
+    def _change_robot_state(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
+        actions: dict[str, Callable[[], Steps[HttpAnswer]]] = {
+            **{action: partial(self._power, action) for action in _POWER},
+            "POWER_OFF": lambda: self._applied(PowerOff()),
+            "UNLOCK_PROTECTIVE_STOP": self._unlock,
+            "RESTART_SAFETY": lambda: self._applied(RestartSafety()),
+        }
+        action = _word(request, "action", actions)
+        return (yield from actions[action]())
+
+    def _power(self, action: str) -> Steps[HttpAnswer]:
+        """Power the arm or open its brakes; answer when that is done."""
+        start, done, command = _POWER[action]
+        safety, snapshot = self._access.controller.state.safety, self._access.snapshot
+        mode = RobotMode(snapshot.robot_mode)
+        if not ROW[safety.mode].may_have_power:
+            raise RefusedError(f"{action} given: the safety mode is {safety.mode.name}")
+        if mode in done:
+            return _DONE
+        if mode not in start:
+            raise RefusedError(f"{action} given: the robot is in {mode.name}")
+        yield from self._access.apply(command())
+        while self._access.controller.state.mode.is_changing:
+            yield
+        return _DONE
+
+    def _unlock(self) -> Steps[HttpAnswer]:
+        safety = self._access.controller.state.safety
+        if safety.mode is SafetyMode.PROTECTIVE_STOP and not safety.may_unlock(
+            self._access.snapshot.timestamp
+        ):
+            raise RefusedError("a protective stop can be unlocked 5 s after it came")
+        return (yield from self._applied(UnlockProtectiveStop()))
+
+    def _operational_mode(self) -> str:
+        mode = self._access.controller.state.operational.mode
+        return "MANUAL" if mode is OperationalMode.MANUAL else "AUTOMATIC"
+
+    def _shutdown(self, *_: object) -> Steps[HttpAnswer]:
+        yield from self._access.apply(PowerOff())
+        self._shut_down()
+        return _DONE
+
+    # --- the loaded program
+
+    def _program_state(self) -> str:
+        if self._player.is_paused:
+            return "PAUSED"
+        return "PLAYING" if self._player.is_running else "STOPPED"
+
+    def _loaded_name(self) -> str:
+        loaded = self._player.loaded
+        return loaded.file_name.rpartition(".")[0] if loaded else DEFAULT_PROGRAM
+
+    def _change_program_state(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
+        player = self._player
+        actions: dict[str, Callable[[], Steps[None]]] = {
+            "play": lambda: player.play(""),
+            "pause": player.pause,
+            "resume": self._resume,
+            "stop": player.stop,
+        }
+        yield from actions[_word(request, "action", actions)]()
+        return HttpAnswer(200, {"state": self._program_state(), "message": "", "details": ""})
+
+    def _resume(self) -> Steps[None]:
+        if not self._player.is_paused:
+            raise RefusedError(f"resume given: the program is {self._program_state()}")
+        yield from self._player.play("")
+
+    def _load(self, request: HttpRequest, key: str) -> Steps[HttpAnswer]:
+        name = _text(request, key)
+        file = find_program(self._player.folder, name)
+        yield from self._player.load(file.wire_path)
+        return HttpAnswer(200, {"name": name, "message": ""})
+
+    # --- program files
+
+    def _list_programs(self, *_: object) -> Steps[HttpAnswer]:
+        names = yield from self._access.in_worker(list_programs, self._player.folder)
+        loaded, state = self._loaded_name(), self._program_state()
+        return HttpAnswer(
+            200,
+            {
+                "programs": [
+                    {
+                        "name": name,
+                        "description": None,
+                        "createdDate": None,
+                        "lastModifiedDate": None,
+                        "lastSavedDate": None,
+                        "programState": state if name == loaded else None,
+                    }
+                    for name in names
+                ]
+            },
+        )
+
+    def _send_program(self, _: HttpRequest, name: str) -> Steps[HttpAnswer]:
+        data = yield from self._access.in_worker(read_program, self._player.folder, name)
+        return HttpAnswer(200, data)
+
+    def _store(self, request: HttpRequest, *, is_new: bool) -> Steps[HttpAnswer]:
+        form = form_file(request.headers.get("content-type", ""), request.body)
+        if form is None:
+            raise HttpError(422, "the body has no form field 'file': send multipart/form-data")
+        file_name, data = form
+        if file_name.rpartition(".")[0] == self._loaded_name() and self._player.is_running:
+            raise RefusedError(f"{file_name} is loaded and plays: stop it first")
+        name = yield from self._access.in_worker(write_program, self._player.folder, file_name, data, is_new)
+        if name is None and is_new:
+            raise HttpError(400, f"there is a program {file_name!r} already: PUT replaces it")
+        if name is None:
+            raise HttpError(404, f"there is no program {file_name!r} yet: POST makes it")
+        return HttpAnswer(200, {"programName": name})
+
+    # --- popups and log
+
+    def _show_popup(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
+        return (yield from self._applied(ShowPopup(_text(request, "message"))))
+
+    def _add_to_log(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
+        self._access.announce(LogAdded("Robot API", _text(request, "message")))
+        return (yield from _at_once({"message": "done"}))
+
+    def _applied(self, command: Command) -> Steps[HttpAnswer]:
+        yield from self._access.apply(command)
+        return _DONE
+
+
+def _at_once(result: object) -> Steps[HttpAnswer]:
+    """Answer without a wait."""
+    return HttpAnswer(200, result)
+    yield
+
+
+def _described(call: ApiCall) -> dict[str, Any]:
+    name = call.path.partition("{")[2].rstrip("}")
+    parameter = {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
+    return {
+        "summary": call.does,
+        **({"parameters": [parameter]} if name else {}),
+        "responses": {"200": {"description": "done"}},
+    }
+
+
+def _text(request: HttpRequest, key: str) -> str:
+    """Return a text of the body.
+
+    Raises:
+        HttpError: there is none.
+    """
+    text = request.json_object().get(key)
+    if not isinstance(text, str):
+        raise HttpError(422, f'the body needs a text {key!r}: {{"{key}": "..."}}')
+    return text
+
+
+def _word(request: HttpRequest, key: str, allowed: Iterable[str]) -> str:
+    """Return a text of the body that must be one of some words.
+
+    Raises:
+        HttpError: it is another, or there is none.
+    """
+    word = _text(request, key)
+    words = list(allowed)
+    if word not in words:
+        raise HttpError(422, f"{key} {ascii(word)[:60]} given: choose one of {', '.join(words)}")
+    return word
