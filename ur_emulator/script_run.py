@@ -68,8 +68,9 @@ class ScriptBox:
         Raises:
             EmulatorError: there is no such arm or fidelity, or the arm needs newer software.
         """
-        model = robot_by_name(robot)
-        version = model.software_version(f"{software[0]}.{software[1]}")
+        asked = f"{software[0]}.{software[1]}"
+        model = robot_by_name(robot, asked)
+        version = model.software_version(asked)
         self._loop = EventLoop()
         self._controller = Controller(
             model,

@@ -286,8 +286,9 @@ def test_every_arm_can_be_chosen(run, name):
     assert document["robot"].startswith(ROBOTS[name].title)
 
 
-def test_software_chooses_an_arm_that_runs_it(run):
-    document = json.loads(run("textmsg(get_steptime())", "--software", "5.12", "--json").stdout)
+@pytest.mark.parametrize("software", ["5.12", "10.11"])
+def test_software_chooses_an_arm_that_runs_it(run, software):
+    document = json.loads(run("textmsg(get_steptime())", "--software", software, "--json").stdout)
     assert document["robot"].startswith("UR5e")
 
 

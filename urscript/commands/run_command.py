@@ -118,13 +118,16 @@ def _find_robot(name: str | None, software: str | None) -> tuple[RobotMaker | No
         return maker, name.lower()
     for maker in makers:
         for robot, usual in maker.robots.items():
-            if software is None or _generation(usual) is catalogue_of(software).version.generation:
+            if software is None or _runs(usual, catalogue_of(software)):
                 return maker, robot
     return makers[0], next(iter(makers[0].robots))
 
 
-def _generation(software: str) -> Generation:
-    return Version.of(software).generation
+def _runs(usual: str, catalogue: Catalogue) -> bool:
+    """Whether a robot that usually runs the software `usual` can run another; PolyScope X is for e-Series."""
+    of_e_series = {Generation.E_SERIES, Generation.POLYSCOPE_X}
+    generations = {Version.of(usual).generation, catalogue.version.generation}
+    return len(generations) == 1 or generations == of_e_series
 
 
 def _check_options(maker: RobotMaker, name: str, fidelity: str | None, catalogue: Catalogue) -> None:
@@ -132,9 +135,9 @@ def _check_options(maker: RobotMaker, name: str, fidelity: str | None, catalogue
         known = ", ".join(maker.fidelities)
         raise typer.BadParameter(f"no fidelity {fidelity!r}; there are {known}", param_hint="--fidelity")
     usual, given = maker.robots[name], catalogue.version
-    if _generation(usual) is not given.generation:
+    if not _runs(usual, catalogue):
         raise typer.BadParameter(
-            f"software {given} is of {given.generation.value}, {name} is of {_generation(usual).value}; "
+            f"software {given} is of {given.generation.value}, which {name} does not run; "
             f"give software such as {usual}, or another robot",
             param_hint="--software",
         )
