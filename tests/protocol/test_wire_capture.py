@@ -128,6 +128,33 @@ def test_a_look_at_a_box_that_runs(interface, port, expected, capsys):
     assert sum(line.startswith("byte") for line in lines) >= 2
 
 
+@pytest.mark.parametrize(
+    ("interface", "count", "expected"),
+    [
+        ("realtime", 1, ["byte 0: realtime frame, 1220 bytes", "  payload_inertia "]),
+        ("primary", 3, ["byte 0: VersionMessage, 55 bytes", "byte 79: RobotState, 1397 bytes",
+                        "    robot_type                   1", "    tool_flange_type             1", "  SingularityInfo"]),
+        ("rtde", 5, ["byte 4: SetupOutputsReply", "  time_scale_source            0"]),
+    ],
+)  # fmt: skip
+def test_a_look_at_a_ur5e(interface, count, expected, capsys):
+    with ControlBox(robot="ur5e", version="5.25.1", pace="lockstep", port_base=None) as box:
+        where = f"{box.host}:{getattr(box.ports, interface)}"
+        arguments = [
+            "decode",
+            interface,
+            "--live",
+            where,
+            "--count",
+            str(count),
+            "--names",
+            "time_scale_source",
+        ]
+        assert main(arguments) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert all(any(line.startswith(start) for line in lines) for start in expected)
+
+
 def test_a_variable_that_the_box_lacks_is_named(capsys):
     with ControlBox(pace="lockstep", port_base=None) as box:
         where = f"{box.host}:{box.ports.rtde}"
