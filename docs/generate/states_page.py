@@ -104,7 +104,7 @@ _INPUTS = """
 Emergency stop and safeguard stop have dedicated inputs (EI, SI): `PressEmergencyStop`,
 `ReleaseEmergencyStop`, `SafeguardStop`. Pairs of configurable inputs can be set up with
 `AssignSafetyInput(pair, function)`; low is safe, one low channel is enough. Functions on all boxes:
-{all}. On e-Series boxes also: {e_series}.
+{all}. On e-Series boxes also: {e_series}. An installation of an e-Series box sets the latter up.
 """
 
 _OPERATIONAL = """

@@ -17,6 +17,7 @@ from ur_emulator.commands.push import Push
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.controller.safety.configured_limits import SafetySettings, limits_of
+from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.emulator import ControlBox
 from ur_emulator.models.robot_generation import ArmLimits
 from ur_emulator.models.robot_model import ZERO6
@@ -176,6 +177,58 @@ def test_the_limits_of_an_installation_bind_the_arm(box, dashboard, tmp_path):
     assert box._box.controller.state.safety.limits == limits_of(robot_by_name("ur3"))
 
 
+INPUTS = """
+[SafetyIOConfiguration Inputs]
+safeguardStopResetInputA = 0
+safeguardStopResetInputB = 1
+threePositionEnablingInputA = 2
+threePositionEnablingInputB = 3
+operationalModeInputA = 255
+operationalModeInputB = 255
+automaticModeSafeguardStopInputA = 4
+automaticModeSafeguardStopInputB = 5
+automaticModeSafeguardStopResetInputA = 6
+automaticModeSafeguardStopResetInputB = 7
+"""
+
+
+@pytest.mark.parametrize(
+    ("robot", "assigned"),
+    [
+        ("ur3", {}),
+        (
+            "ur5e",
+            {
+                1: SafetyInput.ENABLING_DEVICE,
+                2: SafetyInput.AUTOMATIC_SAFEGUARD,
+                3: SafetyInput.AUTOMATIC_RESET,
+            },
+        ),
+    ],
+)
+def test_an_installation_sets_up_inputs_of_an_e_series_box(tmp_path, robot, assigned):
+    settings = f"<SafetySettings>{SAFETY}{INPUTS}</SafetySettings>"
+    (tmp_path / "cell.installation").write_bytes(installation(settings))
+    (tmp_path / "plain.installation").write_bytes(installation(""))
+    with (
+        ControlBox(robot=robot, pace="lockstep", port_base=None, programs=tmp_path) as box,
+        Dashboard(box) as dashboard,
+    ):
+        dashboard.ask("load installation cell.installation")
+        assert box._box.controller.safety.inputs.assigned == assigned
+        if assigned:
+            box.set_operational_mode("automatic")
+            assert box.state.safety_status == "AUTOMATIC_MODE_SAFEGUARD_STOP"
+            for n in (4, 5):
+                box.set_digital_input("configurable", n, True)
+            assert box.state.safety_status == "AUTOMATIC_MODE_SAFEGUARD_STOP"  # it has a reset
+            for n in (6, 7):
+                box.set_digital_input("configurable", n, True)
+            assert box.state.safety_status == "NORMAL"
+        dashboard.ask("load installation plain.installation")
+        assert box._box.controller.safety.inputs.assigned == {}
+
+
 def test_an_installation_cannot_widen_the_limits_of_the_arm():
     own = limits_of(robot_by_name("ur5"))
     wide, fast = (1e9,) * 6, (100.0,) * 6
@@ -222,7 +275,7 @@ def test_inverse_kinematics_and_what_clients_are_told_keep_the_limits_of_an_inst
 def set_up(bench, **settings):
     """Make the limits of an installation effective."""
     limits = limits_of(bench.controller.state.robot).within(SafetySettings(**settings))
-    bench.tick(1, SetUp(compile_program("sec installation():\n  sync()\nend\n"), limits))
+    bench.tick(1, SetUp(compile_program("sec installation():\n  sync()\nend\n"), limits, {}))
 
 
 @pytest.mark.parametrize("robot", ["ur3", "ur5"])

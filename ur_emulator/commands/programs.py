@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from ur_emulator.commands.parameters import parameter
 from ur_emulator.controller.command import Box, inform
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
+from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.controller.safety.modes import ROW
 from ur_emulator.errors import RefusedError
 
@@ -51,16 +53,20 @@ class SetUp:
     Attributes:
         program: a `sec`.
         limits: of the arm.
+        inputs: pairs of configurable inputs that e-Series boxes have, in place of those of the one before.
     """
 
     program: CompiledProgram
     limits: ConfiguredLimits
+    inputs: Mapping[int, SafetyInput]
 
     def apply(self, box: Box) -> None:
         limits = self.limits
         box.safety.set_limits(limits)
         box.state.arm.set_range(limits.q_min, limits.q_max)
         box.plant.set_range(limits.q_min, limits.q_max)
+        if box.state.robot.generation.has_operational_modes:
+            box.safety.set_up_inputs(self.inputs)
         box.programs.start(self.program)
 
 

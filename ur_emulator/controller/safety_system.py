@@ -5,12 +5,14 @@ The tables are in `safety/modes.py`. `is_busy` is false in cycles in which nothi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller.events import LogAdded, SafetyModeChanged
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
-from ur_emulator.controller.safety.inputs import SafetyInput, SafetyInputs
+from ur_emulator.controller.safety.inputs import Guard, SafetyInput, SafetyInputs
 from ur_emulator.controller.safety.limit_checks import Violation
 from ur_emulator.controller.safety.modes import (
     EVENTS,
@@ -55,6 +57,16 @@ class SafetySystem:
     def assign_input(self, pair: int, function: SafetyInput | None) -> None:
         """Set up a pair of configurable inputs as a safety input; None frees them."""
         self.inputs.assign(pair, function)
+        self._update()
+
+    def set_up_inputs(self, inputs: Mapping[int, SafetyInput]) -> None:
+        """Set up what an installation has of the inputs that need operational modes, and free its others."""
+        for pair, function in tuple(self.inputs.assigned.items()):
+            if function.needs_operational_modes:
+                self.inputs.assign(pair, None)
+        for pair, function in inputs.items():
+            self.inputs.assign(pair, function)
+        self.inputs.require_reset(Guard.AUTOMATIC, SafetyInput.AUTOMATIC_RESET in inputs.values())
         self._update()
 
     def set_limits(self, limits: ConfiguredLimits) -> None:

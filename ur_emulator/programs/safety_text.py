@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from ur_emulator.controller.safety.configured_limits import SafetySettings
+from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, SafetyInput
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.models.robot_generation import ArmLimits
 from ur_emulator.models.robot_model import Vector6, six
@@ -24,6 +25,18 @@ _ARM_LIMITS = {
     "maxElbowForce": "force",
     "maxPower": "power",
     "maxMomentum": "momentum",
+}
+_INPUTS = "SafetyIOConfiguration Inputs"
+# Keys of the functions that need an operational mode, without the A or B of their two lines.
+_FUNCTIONS = {
+    "operationalModeInput": SafetyInput.OPERATIONAL_MODE,
+    "threePositionEnablingInput": SafetyInput.ENABLING_DEVICE,
+    "automaticModeSafeguardStopInput": SafetyInput.AUTOMATIC_SAFEGUARD,
+    "automaticModeSafeguardStopResetInput": SafetyInput.AUTOMATIC_RESET,
+}
+# Indices of the two lines of a pair; others, such as 255, set up nothing.
+_PAIRS: dict[tuple[str | None, ...], int] = {
+    (str(2 * pair), str(2 * pair + 1)): pair for pair in range(N_INPUT_PAIRS)
 }
 _SECTION = re.compile(r"\[(.*)\]")
 
@@ -47,6 +60,7 @@ def safety_settings(file_name: str, texts: Iterable[str]) -> SafetySettings:
         text.arm_limits(_NORMAL),
         text.arm_limits(_REDUCED),
         tuple(text.unwatched()),
+        dict(text.inputs()),
     )
 
 
@@ -86,6 +100,13 @@ class _SafetyText:
             if (text := self._values.get((section, key))) is not None:
                 found[name] = min(found.get(name, math.inf), self._positive(key, text))
         return ArmLimits(**found) if found else None
+
+    def inputs(self) -> Iterator[tuple[int, SafetyInput]]:
+        """Yield the pairs of configurable inputs that have a function, and the function."""
+        for key, function in _FUNCTIONS.items():
+            pair = _PAIRS.get(tuple(self._values.get((_INPUTS, key + channel)) for channel in "AB"))
+            if pair is not None:
+                yield pair, function
 
     def unwatched(self) -> Iterator[str]:
         """Yield what is set up and not watched."""

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
+from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.models.robot_generation import UNLIMITED, ArmLimits
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 
 
 @dataclass(frozen=True, slots=True)
 class SafetySettings:
-    """Limits of the safety configuration in an installation; None where it gives none.
+    """The safety configuration in an installation; limits are None where it gives none.
 
     Attributes:
         q_min: lower ends of the joint ranges [rad]; minus infinity where a joint has no limit.
@@ -21,6 +22,7 @@ class SafetySettings:
         arm: the others.
         reduced_arm: in reduced mode.
         unwatched: settings that the safety system does not watch, for the log.
+        inputs: pairs of configurable inputs with functions that need operational modes.
     """
 
     q_min: Vector6 | None = None
@@ -30,6 +32,7 @@ class SafetySettings:
     arm: ArmLimits | None = None
     reduced_arm: ArmLimits | None = None
     unwatched: tuple[str, ...] = ()
+    inputs: Mapping[int, SafetyInput] = field(default_factory=dict)
 
 
 NO_SETTINGS = SafetySettings()

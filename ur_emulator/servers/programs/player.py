@@ -185,7 +185,7 @@ class ProgramPlayer:
             limits = limits_of(self._access.controller.state.robot).within(installation.safety)
             for setting in installation.safety.unwatched:
                 self._access.note(f"{installation.wire_path}: {setting} not watched")
-            yield from self._access.apply(SetUp(set_up, limits))
+            yield from self._access.apply(SetUp(set_up, limits, installation.safety.inputs))
 
     def _declare(self, installation: Installation) -> None:
         """Take an installation; the loaded program begins with what it declares from the next start on."""
