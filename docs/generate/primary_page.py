@@ -202,7 +202,7 @@ def _fields(record: type[Any]) -> str:
 def _codes() -> Iterator[str]:
     columns = [value_codes(SoftwareVersion(3, minor)) for minor in (2, 3, 14)]
     yield from table(
-        ("type", "up to 3.2", "from 3.3", "from 3.14"),
+        ("type", "up to 3.2", "from 3.3 / 5.0", "from 3.14 / 5.9"),
         ((kind.value, *(codes.get(kind, "-") for codes in columns)) for kind in columns[-1]),
     )
 

@@ -14,7 +14,8 @@ _INTRODUCTION = """\
 Made from `protocol/realtime/columns.py` by `make docs`.
 
 This is the oldest interface that reports the robot at full rate, and the simplest: a client
-connects and receives a frame in every control cycle (125 a second), without greeting or request.
+connects and receives a frame in every control cycle (125 a second, 500 on an e-Series), without greeting or
+request.
 Drivers of the first generation, data loggers and MATLAB read it. They write script lines into the
 same socket ([scripts.md](scripts.md)), which sends no answer to them. Port 30013 sends the same
 frames and ignores all input.

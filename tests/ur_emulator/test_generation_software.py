@@ -20,6 +20,9 @@ TOLD = [
     ("3.12.1", (3, 12, 1, 76000), "May 03 2019", (1, 0, "03-05-2019, 06:39:00")),
     ("3.15.8", (3, 15, 8, 106339), "Nov 30 2021", (8, 0, "30-11-2021, 00:00:00")),
     ("3.15.8.7", (3, 15, 8, 7), "Nov 30 2021", (8, 0, "30-11-2021, 00:00:00")),
+    ("5.11.11", (5, 11, 11, 1010452), "Apr 11 2022", (11, 0, "11-04-2022, 07:48:21")),
+    ("5.12.2", (5, 12, 2, 1101497), "Jun 28 2022", (2, 0, "28-06-2022, 11:30:43")),
+    ("5.24.0", (5, 24, 0, 1214860), "Oct 04 2025", (0, 0, "04-10-2025, 00:25:33")),
 ]
 REPORTS_SINCE = SoftwareVersion(3, 13)
 
@@ -28,7 +31,8 @@ REPORTS_SINCE = SoftwareVersion(3, 13)
 def test_every_port_reports_the_same_software(tmp_path, given, numbers, day, message):
     version = SoftwareVersion(*numbers)
     folder = write_programs(tmp_path)
-    with ControlBox(version=given, pace="lockstep", port_base=None, programs=folder) as box:
+    robot = "ur3" if version.major == 3 else "ur5e"
+    with ControlBox(robot=robot, version=given, pace="lockstep", port_base=None, programs=folder) as box:
         with connect(box, "rtde") as sock:
             assert RtdeClient(sock).ask(R.GetControllerVersion()).version == version
         with connect(box, "primary") as sock:
