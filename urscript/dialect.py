@@ -11,6 +11,10 @@ Decisions without a constant, and where they are made:
 | hexadecimal literals, a line end in a string | refused | grammar.lark |
 | a label after a statement, `return` without a value | accepted | grammar.lark |
 | list * matrix, matrix / matrix; matrix + matrix | errors; of equal shape by element | ops |
+| the text of a struct | `{a: 1, b: "x"}` | values |
+| `insert` behind the last element, `remove` | appends, returns nothing | methods |
+| capacity of a slice; of a variable whose first value is a list | its length; that of the list | methods |
+| storing by index into a struct | as by the name of the member | elements |
 | a sign before a list or matrix | by element | ops |
 | reading a variable before it has a value | run-time error | variables |
 | two definitions of one name | the later one counts | resolver |
@@ -34,6 +38,13 @@ Exported programs run thousands of assignments at their start without a sync, so
 LONGEST_STRING: Final = 65_536
 """Characters of a string that `+` makes (U; str_cat and to_str end at 1023, D). Without a limit, a string
 that is added to itself thirty times fills the memory."""
+
+LONGEST_LIST: Final = 65_536
+"""Most elements that a list can have room for (U; a controller allocates no memory at run time, D)."""
+
+LARGEST_STRUCT: Final = 10_000
+"""Values in a struct, with those of the structs and lists in it (U). Without a limit, a struct that holds
+another twice, and so on, has more values than any text of it can show."""
 
 RECURSION_LIMIT: Final = 200
 """Depth at which a recursive function fails with a run-time error (U; no field script recurses)."""
@@ -71,14 +82,18 @@ NONE_FITS_EVERY_VARIABLE: Final = True
 """A variable may go from None to any type and back (U; a variable's type is otherwise fixed, D)."""
 
 
+ListResize = Literal["free", "error", "capacity"]
+
+
 @dataclass(frozen=True, slots=True)
 class Dialect:
     """The language options that one program is compiled with.
 
     Attributes:
         short_circuit: `and` / `or` do not evaluate the right side when the left decides (U).
-        list_resize: What storing a list of another length into a list variable does. "error" since 3.14 /
-            5.9.4 (O for 5.9.4-5.14.6, I for 3.14-3.15), "free" before (O).
+        list_resize: What storing a list of another length into a list variable does. "capacity" since 5.15:
+            it keeps its capacity, a list that is longer is an error (D); "error" since 3.14 / 5.9.4 (O for
+            5.9.4-5.14.6, I for 3.14-3.15), "free" before (O).
         array_arithmetic: The arithmetic operators work on lists and matrices: since 3.14 / 5.9 (O).
         has_pause: `pause` is a statement (e-Series 5.x, D); elsewhere it is an ordinary name.
         statement_budget: Statements a thread may run in one cycle.
@@ -86,7 +101,7 @@ class Dialect:
     """
 
     short_circuit: bool = True
-    list_resize: Literal["free", "error"] = "error"
+    list_resize: ListResize = "error"
     array_arithmetic: bool = True
     has_pause: bool = False
     statement_budget: int = STATEMENT_BUDGET
@@ -100,6 +115,5 @@ def dialect_for(version: Sequence[int]) -> Dialect:
         recent = minor >= 14
         return Dialect(list_resize="error" if recent else "free", array_arithmetic=recent)
     modern = major > 5 or minor >= 15
-    # From 5.15 on a list has a capacity; until that is modelled, storing a longer list is allowed there.
-    resize: Literal["free", "error"] = "error" if not modern and minor >= 9 else "free"
+    resize: ListResize = "capacity" if modern else "error" if minor >= 9 else "free"
     return Dialect(list_resize=resize, array_arithmetic=major > 5 or minor >= 9, has_pause=True)

@@ -177,7 +177,7 @@ class RunningProgram:
         self._kill_wanted = False
         self._namespace: dict[str, Any] = {}
         meter = Meter(self._namespace, work or WorkBudget())
-        self._namespace.update(runtime.base_namespace(program.dialect, meter))
+        self._namespace.update(runtime.base_namespace(program.dialect, program.catalogue.methods, meter))
         budget = program.dialect.statement_budget
         self._scheduler = Scheduler(self._namespace, meter, budget, host.thread_ended)
         self._namespace.update(runtime.flow_namespace(self._scheduler, self._namespace, meter))

@@ -6,15 +6,16 @@
 | bool | `bool` | | list | `list`, homogeneous |
 | int | `int`, 32 bit | | matrix | `Matrix` |
 | float | `float` | | pose | `Pose` |
+| list with room | `CapacityList` | | struct | `Struct` |
 
-URScript passes everything by value. Therefore lists, poses and matrices are never changed in place:
+URScript passes everything by value. Therefore lists, poses, matrices and structs are never changed in place:
 assigning to an element makes a new value (`elements.store_item`), and no copies are needed. Host functions
 must not change lists either. Operators are in `run.ops`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from urscript import dialect
@@ -106,6 +107,82 @@ class Matrix:
         return f"Matrix({[list(row) for row in self.rows]})"
 
 
+class CapacityList(list[Any]):
+    """A list with room for more elements than it has.
+
+    One without is a plain `list`: its capacity is its length.
+
+    Attributes:
+        capacity: Most elements that it can have.
+        sample: A value of the type of its elements.
+    """
+
+    __slots__ = ("capacity", "sample")
+
+    def __init__(self, items: Iterable[Any], capacity: int, sample: Any) -> None:
+        super().__init__(items)
+        self.capacity = capacity
+        self.sample = sample
+
+
+def list_with_capacity(items: list[Any], capacity: int, sample: Any) -> list[Any]:
+    """A list of `items`, which are not more than `capacity`; `sample` is a value of their type."""
+    if len(items) < capacity:
+        return CapacityList(items, capacity, sample)
+    return items if type(items) is list else list(items)
+
+
+class Struct:
+    """A value with named members; never changed once made.
+
+    Attributes:
+        members: Name -> value, in their order.
+        size: Number of values in it, with those of the structs and lists in it.
+
+    Raises:
+        ScriptRuntimeError: it has too many values.
+    """
+
+    __slots__ = ("members", "size")
+
+    members: Mapping[str, Any]
+    size: int
+
+    def __init__(self, members: Mapping[str, Any]) -> None:
+        self.members = members
+        self.size = 1 + sum(map(size_of, members.values()))
+        if self.size > dialect.LARGEST_STRUCT:
+            raise ScriptRuntimeError(f"a struct of {self.size} values; allowed: {dialect.LARGEST_STRUCT}")
+
+    def with_member(self, name: str, value: Any) -> Struct:
+        """The same struct with one member set to `value`."""
+        return Struct({**self.members, name: value})
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Struct) and list(self.members.items()) == list(other.members.items())
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.members))
+
+    def __repr__(self) -> str:
+        return f"Struct({dict(self.members)})"
+
+
+def size_of(value: Any) -> int:
+    """Number of values in a value; eight characters of a string count for one."""
+    kind = type(value)
+    if kind is Struct:
+        return int(value.size)
+    if kind is str:
+        return 1 + (len(value) >> 3)
+    if kind is Matrix:
+        rows, columns = value.shape
+        return 1 + int(rows * columns)
+    if not isinstance(value, list):
+        return 1
+    return 1 + (sum(map(size_of, value)) if value and type(value[0]) in (str, Struct) else len(value))
+
+
 TYPE_NAMES: Final[dict[type, str]] = {
     type(None): "none",
     bool: "bool",
@@ -113,8 +190,10 @@ TYPE_NAMES: Final[dict[type, str]] = {
     float: "float",
     str: "string",
     list: "list",
+    CapacityList: "list",
     Matrix: "matrix",
     Pose: "pose",
+    Struct: "struct",
 }
 """Python type -> its name in URScript; other value classes have theirs as `script_type`."""
 
@@ -187,4 +266,9 @@ def _nested_form(value: Any, float_form: Any, comma: str) -> str:
         return f"[{comma.join(_nested_form(item, float_form, comma) for item in value)}]"
     if isinstance(value, Pose):
         return f"p[{comma.join(_nested_form(item, float_form, comma) for item in value)}]"
+    if isinstance(value, Struct):
+        colon = comma.replace(",", ":")
+        members = value.members.items()
+        parts = (f"{name}{colon}{_nested_form(item, float_form, comma)}" for name, item in members)
+        return f"{{{comma.join(parts)}}}"
     return str(value)

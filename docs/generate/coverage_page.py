@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from typing import Final
 
 from urscript.catalogue.catalogue import ALL_ROWS, CB3_3_15, catalogue_for
+from urscript.catalogue.methods import METHODS
+from urscript.catalogue.methods import SINCE as METHODS_SINCE
 from urscript.catalogue.types import Builtin, Support
 from urscript.catalogue.versions import Generation
 
@@ -90,6 +92,11 @@ def _table(rows: Iterable[Builtin]) -> list[str]:
     return lines
 
 
+def _method_table() -> list[str]:
+    lines = ["| method | returns | what it does |", "|---|---|---|"]
+    return [*lines, *(f"| `{row.form}` | {row.returns} | {row.summary} |" for row in METHODS)]
+
+
 def _later_table(rows: Iterable[Builtin]) -> list[str]:
     lines = ["| function | since | until | model | what it does | remarks |", "|---|---|---|---|---|---|"]
     for row in rows:
@@ -128,5 +135,12 @@ def render() -> str:
         _LATER_HEAD,
         "",
         *_later_table(row for row in ALL_ROWS if not row.is_in(CB3_3_15.version)),
+        "",
+        "## Methods",
+        "",
+        f"Lists, structs and matrices have methods since {METHODS_SINCE}. A list has a length and a "
+        "capacity, which it keeps. Error texts are chosen.",
+        "",
+        *_method_table(),
     ]
     return "\n".join(lines) + "\n"

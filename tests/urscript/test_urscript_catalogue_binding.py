@@ -63,7 +63,9 @@ def test_wrong_calls(version: str, name: str, n_positional: int, keywords: list[
     assert caught.value.wire_text == f"Type error: {text}"
 
 
-@pytest.mark.parametrize("row", ALL_ROWS, ids=lambda row: f"{row.name}-{row.since}")
+@pytest.mark.parametrize(
+    "row", [row for row in ALL_ROWS if not row.any_names], ids=lambda row: f"{row.name}-{row.since}"
+)
 def test_every_row_binds_its_shortest_and_longest_call(row: Builtin) -> None:
     required = [param for param in row.params if param.is_required]
     shortest = static_bind(row, len(required))
@@ -71,6 +73,16 @@ def test_every_row_binds_its_shortest_and_longest_call(row: Builtin) -> None:
         len(row.params) - len(required)
     )
     assert static_bind(row, len(row.params)) == [("arg", i) for i in range(len(row.params))]
+
+
+def test_a_struct_takes_named_arguments_of_any_name() -> None:
+    rows = catalogue_for("5.15")
+    assert rows.static_bind("struct", 0, ["x", "y"]) == [("kw", "x"), ("kw", "y")]
+    for form in ((0, []), (1, ["x"])):
+        with pytest.raises(ScriptTypeError, match="takes one or more named arguments"):
+            rows.static_bind("struct", *form)
+    with pytest.raises(ScriptTypeError, match="multiple values for keyword argument 'x'"):
+        rows.static_bind("struct", 0, ["x", "y", "x"])
 
 
 @given(data=st.data(), row=st.sampled_from(sorted(CB3_3_15, key=lambda row: row.name)))

@@ -25,7 +25,7 @@ ERROR_CLASSES = {
 }
 
 OUT_OF_REACH = {
-    "compile/compiler.py _FunctionCompiler._assign": "every builtin array has a setter",
+    "compile/compiler.py _FunctionCompiler._assign_inside": "every builtin array has a setter",
     "compile/compiler.py compile_resolved": "the limits before it are lower than Python's",
     "run/ops.py equal": "dialect.MIXED_TYPES_COMPARE",
     "program.py _resolve": "the resolver is deeper than the compiler in no program short enough for a chunk",

@@ -11,10 +11,16 @@ from random import Random
 from types import MappingProxyType
 from typing import Any
 
-from . import lists, poses, strings, urmath
+from . import aggregates, lists, poses, strings, urmath
 
 PURE: Mapping[str, Callable[..., Any]] = MappingProxyType(
-    {**urmath.FUNCTIONS, **lists.FUNCTIONS, **poses.FUNCTIONS, **strings.FUNCTIONS}
+    {
+        **urmath.FUNCTIONS,
+        **lists.FUNCTIONS,
+        **poses.FUNCTIONS,
+        **strings.FUNCTIONS,
+        **aggregates.FUNCTIONS,
+    }
 )
 """URScript name -> function of the bound arguments, for all whose result depends on nothing else."""
 

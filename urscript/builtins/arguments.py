@@ -50,7 +50,7 @@ def numbers(function: str, parameter: str, value: Any, kind: ParamType = ParamTy
     count = {ParamType.VECTOR3: 3, ParamType.VECTOR6: 6}.get(kind)
     if kind is ParamType.VECTOR6 and type(value) is Pose:
         return list(value)
-    if type(value) is list and (count is None or len(value) == count) and all(map(is_number, value)):
+    if isinstance(value, list) and (count is None or len(value) == count) and all(map(is_number, value)):
         return value
     raise type_error(function, parameter, kind, value)
 

@@ -28,7 +28,7 @@ def norm(a: Any) -> float:
         return wrap_int(abs(a))
     if is_number(a):
         return abs(a)  # type: ignore[no-any-return]
-    if type(a) is Pose or (type(a) is list and all(map(is_number, a))):
+    if type(a) is Pose or (isinstance(a, list) and all(map(is_number, a))):
         return math.hypot(*a)
     raise type_error("norm", "a", ParamType.NORMED, a)
 
@@ -105,7 +105,7 @@ def integer_to_binary_list(x: Any) -> list[bool]:
 
 def binary_list_to_integer(bits: Any) -> int:
     """Signed value of bits, least significant first; missing ones are 0, those after the 32nd are ignored."""
-    if type(bits) is not list or not all(type(bit) is bool for bit in bits):
+    if not isinstance(bits, list) or not all(type(bit) is bool for bit in bits):
         raise type_error("binary_list_to_integer", "l", ParamType.BOOLS, bits)
     value = sum(1 << place for place, bit in enumerate(bits[:_WORD]) if bit)
     return value - (1 << _WORD) if value >> (_WORD - 1) else value

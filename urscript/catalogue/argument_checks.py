@@ -31,7 +31,7 @@ def _is_int(value: Any) -> bool:
 
 
 def _is_numbers(value: Any, count: int | None = None) -> bool:
-    if type(value) is not list or (count is not None and len(value) != count):
+    if not isinstance(value, list) or (count is not None and len(value) != count):
         return False
     for item in value:
         kind = type(item)
@@ -59,8 +59,8 @@ _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.VECTOR3: lambda value: _is_numbers(value, 3),
     ParamType.VECTOR6: lambda value: type(value) is Pose or _is_numbers(value, 6),
     ParamType.NUMBERS: _is_numbers,
-    ParamType.BOOLS: lambda value: type(value) is list and all(type(item) is bool for item in value),
-    ParamType.LIST: lambda value: type(value) is list,
+    ParamType.BOOLS: lambda value: isinstance(value, list) and all(type(item) is bool for item in value),
+    ParamType.LIST: lambda value: isinstance(value, list),
     ParamType.MATRIX: lambda value: isinstance(value, Matrix),
     ParamType.ARRAY: lambda value: isinstance(value, (list, Pose)),
     ParamType.SIZED: lambda value: isinstance(value, (list, str, Pose)),

@@ -88,8 +88,11 @@ def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str
     Raises:
         ScriptTypeError: wrong count, unknown or repeated keyword; without a place, the caller adds it.
     """
-    if builtin.any_names and not n_positional:
-        return []
+    if builtin.any_names:
+        if n_positional or not keyword_names:
+            raise ScriptTypeError(f"{builtin.name} takes one or more named arguments and no others")
+        CallSignature(builtin.name, keyword_names, frozenset()).check_keywords(0, keyword_names)
+        return [("kw", name) for name in keyword_names]
     names = [param.name for param in builtin.params]
     optional = {param.name for param in builtin.params if not param.is_required}
     CallSignature(builtin.name, names, optional, f"use {builtin.signature}").check(

@@ -17,7 +17,7 @@ from .interfaces import ROWS as INTERFACES
 from .internals import ROWS as INTERNALS
 from .interpreter_mode import ROWS as INTERPRETER_MODE
 from .ioconfiguration import ROWS as IOCONFIGURATION
-from .methods import methods_of
+from .methods import ValueMethod, methods_of
 from .motion import ROWS as MOTION
 from .motion import VARIABLES
 from .processpath import ROWS as PROCESSPATH
@@ -70,7 +70,7 @@ class Catalogue:
             self._by_name.setdefault(name, forms[-1])
         self.variables: Mapping[str, ModuleVariable] = {item.name: item for item in VARIABLES}
         self.arrays: Mapping[str, BuiltinArray] = {item.name: item for item in ARRAYS}
-        self.methods: Mapping[str, frozenset[str]] = methods_of(version)
+        self.methods: Mapping[tuple[str, str], ValueMethod] = methods_of(version)
         self._slots: dict[tuple[str, int, tuple[str, ...]], list[Slot]] = {}
         self._checks = {name: compile_check(row) for name, row in self._by_name.items()}
 

@@ -102,11 +102,11 @@ class _FunctionCompiler:
         self._types = types
         self._expressions = expressions
         self._scope = scope
-        self._globals_stored: set[str] = {"_b", "_x"}
 
     def compile(self) -> list[ast.FunctionDef]:
         """The Python function, after those that compute its defaults."""
         scope = self._scope
+        self._expressions.globals_stored = stored = {"_b", "_x"}
         parameters: list[str] = []
         defaults: list[ast.FunctionDef] = []
         prologue: list[ast.stmt] = []
@@ -130,14 +130,18 @@ class _FunctionCompiler:
         body = self._block(scope.body)
         if scope.recursive:
             body = self._with_depth(body, span)
-        declared = ast.Global(sorted(self._globals_stored), **place(span))
+        declared = ast.Global(sorted(stored), **place(span))
         whole = function(scope.python_name, parameters, [declared, *prologue, *body], span)
         return [*defaults, whole]
 
     def _default(self, name: str, value: Expression) -> ast.FunctionDef:
         """A function of its own for each default: it runs in the call, but sees globals only."""
+        own, self._expressions.globals_stored = self._expressions.globals_stored, set()
         result = self._expressions.compile(value, self._scope.default_scope())
-        return function(name, [], [ast.Return(result, **place(value.span))], value.span)
+        stored, self._expressions.globals_stored = self._expressions.globals_stored, own
+        at = place(value.span)
+        body: list[ast.stmt] = [ast.Global(sorted(stored), **at)] if stored else []
+        return function(name, [], [*body, ast.Return(result, **at)], value.span)
 
     def _fill_in(self, parameter: nodes.Parameter, default: ast.FunctionDef) -> ast.stmt:
         """`if v_x is _MISSING: v_x = default()`."""
@@ -229,36 +233,48 @@ class _FunctionCompiler:
     def _assign(self, statement: nodes.Assign) -> ast.stmt:
         target, span, scope = statement.target, statement.span, self._scope
         value = self._expressions.compile(statement.value, scope)
-        # From the element outwards to the variable. The old value is read after the new one is computed,
-        # because the computation may take time in which another thread changes the variable.
-        while not isinstance(target, nodes.Name):
-            if isinstance(target, nodes.Subscript):
-                array = self._expressions.array(target.target, scope)
-                indices = [self._expressions.compile(index, scope) for index in target.indices]
-                if array is not None:
-                    if array.setter is None:
-                        raise ScriptContextError(f"'{array.name}' cannot be assigned to").locate(
-                            self._program.source, span.line, span.column
-                        )
-                    made = call(f"b_{array.setter}", [load("_T", span), *indices, value], span)
-                    return expression_statement(made, span)
-                helper = "_store_item" if len(indices) == 1 else "_store_cell"
-            else:
-                helper, indices = "_store_member", [constant(target.name, span)]
-            old = self._expressions.compile(target.target, scope)
-            value = self._expressions.asking(call(helper, [value, *indices, old], span))
-            inner = target.target
-            assert isinstance(inner, (nodes.Name, nodes.Subscript, nodes.Attribute))
-            target = inner
-        is_local = target.name in scope.locals and statement.scope != "global"
-        name = f"v_{target.name}" if is_local else f"g_{target.name}"
-        if not is_local:
-            self._globals_stored.add(name)
-        if isinstance(statement.target, nodes.Name):
-            holder = scope if is_local else self._program.main
-            if self._types.variable(target.name, holder) not in SCALARS:
-                value = call("_assign", [value, load(name, span), constant(target.name, span)], span)
+        # The old value is read after the new one is computed, because the computation may take time in which
+        # another thread changes the variable.
+        if not isinstance(target, nodes.Name):
+            return self._assign_inside(target, value, span)
+        name = self._expressions.stored_name(target.name, scope, statement.scope == "global")
+        holder = scope if name.startswith("v_") else self._program.main
+        if self._types.variable(target.name, holder) not in SCALARS:
+            value = call("_assign", [value, load(name, span), constant(target.name, span)], span)
         return store(name, value, span)
+
+    def _assign_inside(
+        self, target: nodes.Subscript | nodes.Attribute, value: ast.expr, span: Span
+    ) -> ast.stmt:
+        """`x[i] = value`, `x.member = value`, `x[i].member[j] = value`."""
+        expressions, scope = self._expressions, self._scope
+        inner = target.target
+        if isinstance(target, nodes.Subscript):
+            array = expressions.array(inner, scope)
+            indices = [expressions.compile(index, scope) for index in target.indices]
+            if array is not None:
+                if array.setter is None:
+                    raise ScriptContextError(f"'{array.name}' cannot be assigned to").locate(
+                        self._program.source, span.line, span.column
+                    )
+                made = call(f"b_{array.setter}", [load("_T", span), *indices, value], span)
+                return expression_statement(made, span)
+            helper = "_store_item" if len(indices) == 1 else "_store_cell"
+        else:
+            helper, indices = "_store_member", [constant(target.name, span)]
+        if isinstance(inner, nodes.Name):
+            name = inner.name
+            arguments = [value, *indices, expressions.compile(inner, scope)]
+        else:
+            helper = "_store_inside"
+            variable, steps = expressions.steps(target, scope)
+            if variable is None:  # an element of a builtin array has nothing inside: this ends the program
+                arguments = [value, *indices, expressions.compile(inner, scope)]
+                return expression_statement(call("_store_item", arguments, span), span)
+            name = variable
+            arguments = [value, steps, expressions.compile(nodes.Name(name, span=span), scope)]
+        changed = expressions.asking(call(helper, arguments, span))
+        return store(expressions.stored_name(name, scope), changed, span)
 
 
 def _first_span(block: Block) -> Span:

@@ -50,6 +50,7 @@ class ExpressionCompiler:
         constants: Values that cannot be literals in Python code, by their name.
         asks: Operations of the present statement whose cost depends on values; after it, or after every few
             of them, the code asks whether the program may go on.
+        globals_stored: Python names of the globals that the present function stores.
     """
 
     def __init__(
@@ -59,8 +60,10 @@ class ExpressionCompiler:
         self._types = types
         self._catalogue = catalogue
         self._dialect = dialect
+        self._changing = {row.name for row in catalogue.methods.values() if row.changes}
         self.constants: dict[str, Any] = {}
         self.asks = 0
+        self.globals_stored: set[str] = set()
 
     def begin_statement(self) -> None:
         """The expressions that follow belong to another statement."""
@@ -262,6 +265,8 @@ class ExpressionCompiler:
         positional = [argument for argument in expression.arguments if argument.name is None]
         named = {argument.name: argument for argument in expression.arguments if argument.name is not None}
         arguments: list[ast.expr] = [load("_T", span)]
+        if self._catalogue[expression.function].any_names:
+            arguments.append(constant(tuple(named), span))
         for slot in self._catalogue.static_bind(expression.function, len(positional), tuple(named)):
             if slot[0] == "arg":
                 arguments.append(self.compile(positional[slot[1]].value, scope))
@@ -303,11 +308,60 @@ class ExpressionCompiler:
         names = [constant(a.name, span) for a in expression.arguments if a.name is not None]
         values = [self.compile(a.value, scope) for a in expression.arguments if a.name is not None]
         at = place(span)
-        arguments: list[ast.expr] = [
-            load("_T", span),
-            self.compile(expression.target, scope),
+        form: list[ast.expr] = [
             constant(expression.method, span),
             ast.List(positional, ast.Load(), **at),
             ast.Dict(list(names), values, **at),
         ]
+        if expression.method in self._changing:
+            variable, steps = self.steps(expression.target, scope)
+            if variable is not None:
+                return self._change(variable, [load("_T", span), *form, steps], span, scope)
+        arguments = [load("_T", span), self.compile(expression.target, scope), *form]
         return self.asking(ast.YieldFrom(call("_method", arguments, span), **at))
+
+    def _change(self, variable: str, arguments: list[ast.expr], span: Span, scope: FunctionScope) -> ast.expr:
+        """A call that may change variable x.
+
+        `(_m := (yield from _change(..., x)), x := _kept(_m, x), _m[1])[2]`. A handle may have methods of
+        the same names, which take time; then x stays as it is.
+        """
+        at = place(span)
+        name = self.stored_name(variable, scope)
+        changed: ast.expr = ast.YieldFrom(
+            call("_change", [*arguments, self._variable(variable, span, scope)], span), **at
+        )
+        changed = ast.NamedExpr(ast.Name("_m", ast.Store(), **at), self.asking(changed), **at)
+        new: ast.expr = call("_kept", [load("_m", span), load(name, span)], span)
+        new = ast.NamedExpr(ast.Name(name, ast.Store(), **at), new, **at)
+        result = ast.Subscript(load("_m", span), constant(1, span), ast.Load(), **at)
+        every = ast.Tuple([changed, new, result], ast.Load(), **at)
+        return ast.Subscript(every, constant(2, span), ast.Load(), **at)
+
+    # --- places ------------------------------------------------------------------------------------------
+
+    def steps(self, target: Expression, scope: FunctionScope) -> tuple[str | None, ast.expr]:
+        """The variable that `target` is, or is inside of, and the steps to it (`elements.Step`).
+
+        Without a variable (a call, a builtin array) it is None.
+        """
+        steps: list[ast.expr] = []
+        span = target.span
+        while not isinstance(target, nodes.Name):
+            if isinstance(target, nodes.Subscript):
+                indices = self._all(target.indices, scope)
+                steps.append(ast.Tuple(indices, ast.Load(), **place(target.span)))
+            elif isinstance(target, nodes.Attribute):
+                steps.append(constant(target.name, target.span))
+            else:
+                return None, constant(None, span)
+            target = target.target
+        known = self._program.is_variable(target.name, scope)
+        return target.name if known else None, ast.List(steps[::-1], ast.Load(), **place(span))
+
+    def stored_name(self, variable: str, scope: FunctionScope, is_global: bool = False) -> str:
+        """The Python name under which a variable is stored."""
+        if variable in scope.locals and not is_global:
+            return f"v_{variable}"
+        self.globals_stored.add(f"g_{variable}")
+        return f"g_{variable}"

@@ -78,6 +78,9 @@ def _constants(program: ResolvedProgram) -> dict[Variable, Expression]:
                 variable = (None, target.name) if statement.scope == "global" else owner(target.name, scope)
                 assigned[variable] += 1
                 values[variable] = statement.value
+    for scope, part in expressions_read(program):
+        if isinstance(part, nodes.MethodCall) and isinstance(part.target, nodes.Name):
+            assigned[owner(part.target.name, scope)] += 1  # it may change its list
     return {variable: value for variable, value in values.items() if assigned[variable] == 1}
 
 

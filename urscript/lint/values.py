@@ -12,9 +12,6 @@ from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression
 from urscript.syntax.walk import all_statements
 
-METHODS_SINCE = (5, 15)
-"""First software in which lists and structs have methods. Source: script manual of the e-Series."""
-
 
 def value_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
     """Everything this module warns about, in no order."""
@@ -23,7 +20,7 @@ def value_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[S
             if isinstance(statement, nodes.ExpressionStatement) and not _has_effect(statement.value):
                 message, hint = _unused(statement.value)
                 yield ScriptWarning(UNUSED_VALUE, message, statement.span, program.source, hint)
-    if "rpc_factory" in program.builtins or tuple(catalogue.version) >= METHODS_SINCE:
+    if "rpc_factory" in program.builtins or catalogue.methods:
         return
     for _, part in expressions_read(program):
         if isinstance(part, nodes.MethodCall):

@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from urscript.catalogue.costs import OF_HOST, OF_PURE, TEXT, UNITS
 from urscript.errors import ScriptBudgetError
-from urscript.values import Matrix, Pose
+from urscript.values import CapacityList, Matrix, Pose, Struct, size_of
 
 MOST_AT_ONCE: Final = 110_000
 """Units of the longest operation that is started, 5 ms: one on arrays cannot be interrupted. A longer one is
@@ -36,8 +36,19 @@ _LEAST_OF_PURE: Final = 3
 _ELEMENT: Final = 5
 """Units that an operator takes for each element of an array (0.25 µs)."""
 
-_OF_ELEMENT: Final = {"_list": 2, "_store_item": 1, "_store_cell": 2, "_neg": _ELEMENT, "_pos": _ELEMENT}
+_OF_ELEMENT: Final = {
+    "_list": 2,
+    "_store_item": 1,
+    "_store_cell": 2,
+    "_store_member": 2,
+    "_store_inside": 2,
+    "_neg": _ELEMENT,
+    "_pos": _ELEMENT,
+}
 _OF_TWO: Final = ("_add", "_sub", "_mul", "_div", "_mod", "_equal", "_unequal")
+
+_OF_METHOD: Final = {"to_string": 12, "slice": 1, "get_row": 1, "get_column": 1}
+"""Units for each element of the value of a method; the others take the same time for all values."""
 
 _SCALARS: Final = frozenset({int, float, bool})
 
@@ -122,16 +133,23 @@ class Meter:
     def operations(self, names: Mapping[str, Any]) -> dict[str, Function]:
         """The operations of `names` that may get arrays, charged for each element."""
         pairs = {name: self._pair(names[name], name == "_mul") for name in _OF_TWO}
-        return pairs | {name: self._change(names[name], units) for name, units in _OF_ELEMENT.items()}
+        return {
+            **pairs,
+            **{name: self._change(names[name], units) for name, units in _OF_ELEMENT.items()},
+            "_method": self._method(names["_method"]),
+            "_change": self._method_that_changes(names["_change"]),
+        }
 
     def function(self, function: Function, cost: tuple[int, int], name: str) -> Function:
         """A builtin, charged its statements and units, and for arrays among its arguments."""
         charge, (own, units) = self.charge, cost
-        cubic = name == "inv"
+        cubic, of_length = name == "inv", name == "make_list"
         of_element = 12 if name in TEXT else 3
 
         def call(*arguments: Any) -> Any:
             statements, work = own, units
+            if of_length and type(arguments[1]) is int:
+                work += max(0, arguments[1]) >> 4
             for argument in arguments:
                 kind = type(argument)
                 if kind is list:
@@ -144,6 +162,10 @@ class Meter:
                     cells = _product(argument, argument) if cubic else _cells(argument)
                     statements += cells
                     work += cells
+                elif kind is Struct or kind is CapacityList:
+                    size = size_of(argument)
+                    statements += size >> 3
+                    work += of_element * size
             charge(statements, work)
             return function(*arguments)
 
@@ -177,8 +199,8 @@ class Meter:
             if first is str or second is str:
                 length = len(a) + len(b) >> 3 if first is second else 0
                 charge(length, 2 + length)
-            elif first is list or second is list:
-                length = len(a if first is list else b)
+            elif isinstance(a, list) or isinstance(b, list):
+                length = _elements(a if isinstance(a, list) else b)
                 if first is Matrix:
                     cells = _cells(a)
                     charge(cells, 3 * cells)
@@ -193,6 +215,8 @@ class Meter:
                     charge(cells, 3 * cells)
             elif first is Pose and second is Pose:
                 charge(0, 16)
+            elif first is Struct and second is Struct:
+                charge(a.size >> 3, _ELEMENT * a.size)
             return operation(a, b)
 
         return operate
@@ -207,9 +231,37 @@ class Meter:
                 charge(len(array) >> 3, units * len(array))
             elif type(array) is Matrix:
                 charge(_cells(array), units * _cells(array))
+            elif isinstance(array, (list, Struct)):
+                size = size_of(array)
+                charge(size >> 3, units * size)
             return operation(*arguments)
 
         return operate
+
+    def _method(self, method: Function) -> Function:
+        """Charge a call of a method that looks at all elements of its value."""
+        charge = self.charge
+
+        def call(thread: Any, target: Any, name: str, *arguments: Any) -> Any:
+            if name in _OF_METHOD:
+                size = size_of(target)
+                charge(size >> 3, _OF_METHOD[name] * size)
+            return method(thread, target, name, *arguments)
+
+        return call
+
+    def _method_that_changes(self, method: Function) -> Function:
+        """Charge a call of a method that makes a list anew: the copy, and the look at each new element.
+
+        It counts for no statements: on a controller the list is not copied.
+        """
+        charge = self.charge
+
+        def call(thread: Any, name: str, arguments: list[Any], named: Any, steps: Any, root: Any) -> Any:
+            charge(0, (size_of(root) >> 4) + 10 * sum(map(size_of, arguments)))
+            return method(thread, name, arguments, named, steps, root)
+
+        return call
 
 
 def host_cost(name: str) -> tuple[int, int]:
@@ -222,6 +274,10 @@ def pure_cost(name: str) -> tuple[int, int]:
     """Statements and units of a call of a pure builtin."""
     units = UNITS.get(name, OF_PURE)
     return max(_LEAST_OF_PURE, units // _CALL_SHARE), units
+
+
+def _elements(items: list[Any]) -> int:
+    return size_of(items) if items and type(items[0]) is Struct else len(items)
 
 
 def _cells(matrix: Matrix) -> int:

@@ -15,7 +15,18 @@ from typing import Any
 from urscript import dialect
 from urscript.errors import ScriptRuntimeError
 from urscript.run.variables import same_kind
-from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type, is_number, type_name, wrap_int
+from urscript.values import (
+    INT_MAX,
+    INT_MIN,
+    CapacityList,
+    Matrix,
+    Pose,
+    Struct,
+    a_type,
+    is_number,
+    type_name,
+    wrap_int,
+)
 
 # --- arithmetic ----------------------------------------------------------------------------------------
 
@@ -56,7 +67,7 @@ def mul(a: Any, b: Any) -> Any:
         return result if INT_MIN <= result <= INT_MAX else wrap_int(result)
     if (ta is float or ta is int) and (tb is float or tb is int):
         return a * b
-    if ta is Matrix and (tb is Matrix or tb is list):
+    if ta is Matrix and (tb is Matrix or isinstance(b, list)):
         return _matrix_product(a, b)
     return _elementwise("*", mul, a, b)
 
@@ -96,7 +107,7 @@ def neg(a: Any) -> Any:
         return -a
     if kind is int:
         return wrap_int(-a)
-    if kind is list:
+    if isinstance(a, list):
         return [neg(item) for item in a]
     if kind is Matrix:
         return Matrix([neg(item) for item in row] for row in a.rows)
@@ -115,7 +126,7 @@ def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]
     """An arithmetic operator of software in which it takes numbers and strings only."""
 
     def operate(*operands: Any) -> Any:
-        if any(type(operand) is list or type(operand) is Matrix for operand in operands):
+        if any(isinstance(operand, (list, Matrix)) for operand in operands):
             names = " and ".join(map(type_name, operands))
             raise ScriptRuntimeError(f"'{sign}' is not defined for {names} in this software version")
         return compute(*operands)
@@ -133,13 +144,13 @@ def _elementwise(sign: str, one: Callable[[Any, Any], Any], a: Any, b: Any) -> A
 
     Source: script manual 3.15.4, array and matrix arithmetic.
     """
-    if type(a) is list and type(b) is list:
+    if isinstance(a, list) and isinstance(b, list):
         if len(a) != len(b):
             raise ScriptRuntimeError(f"'{sign}' needs lists of equal length, got {len(a)} and {len(b)}")
         return [one(x, y) for x, y in zip(a, b, strict=True)]
-    if type(a) is list and is_number(b):
+    if isinstance(a, list) and is_number(b):
         return [one(x, b) for x in a]
-    if is_number(a) and type(b) is list:
+    if is_number(a) and isinstance(b, list):
         return [one(a, y) for y in b]
     if type(a) is Matrix and is_number(b):
         return Matrix([one(x, b) for x in row] for row in a.rows)
@@ -185,9 +196,12 @@ def equal(a: Any, b: Any) -> bool:
     """`a == b`: one bool, also for lists and poses; different types are unequal."""
     ta, tb = type(a), type(b)
     if ta is tb:
-        if ta is list or ta is Pose:
+        if ta is list or ta is Pose or ta is CapacityList:
             # Python's own comparison takes True for 1, and a NaN for equal to itself.
             return a == b and all(map(equal, a, b))
+        if ta is Struct:
+            members = list(a.members) == list(b.members)
+            return members and all(map(equal, a.members.values(), b.members.values()))
         return bool(a == b)
     if ta is bool or tb is bool:
         return False
@@ -195,6 +209,8 @@ def equal(a: Any, b: Any) -> bool:
         return bool(a == b)
     if is_number(a) and is_number(b):
         return bool(a == b)
+    if isinstance(a, list) and isinstance(b, list):
+        return len(a) == len(b) and all(map(equal, a, b))
     if dialect.MIXED_TYPES_COMPARE or a is None or b is None or same_kind(ta, b):
         return False
     raise ScriptRuntimeError(f"cannot compare {a_type(a)} with {a_type(b)}")

@@ -22,31 +22,16 @@ from urscript.catalogue.types import FIXED_SIZE
 from urscript.dialect import Dialect
 from urscript.errors import ScriptRuntimeError
 from urscript.run import elements, ops, variables
-from urscript.run.host import Handle, Host
+from urscript.run.host import Host
 from urscript.run.metering import Meter, host_cost, pure_cost
+from urscript.run.methods import MethodCalls, Methods, kept
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread, join
 from urscript.run.waits import NEXT_CYCLE, OUT_OF_UNITS, Wait
-from urscript.values import Pose, a_type, log_form, type_name, wrap_int
+from urscript.values import Pose, log_form, wrap_int
 
 
 def _halt() -> None:
     raise ProgramHalted
-
-
-def _method(
-    thread: ScriptThread, target: Any, method: str, arguments: list[Any], named: dict[str, Any]
-) -> Generator[Wait, None, Any]:
-    if isinstance(target, Handle):
-        return (yield from target.call_method(thread, method, arguments, named))
-    raise ScriptRuntimeError(f"{a_type(target)} has no method '{method}'")
-
-
-def _member(target: Any, name: str) -> Any:
-    raise ScriptRuntimeError(f"{a_type(target)} has no member '{name}'")
-
-
-def _store_member(value: Any, name: str, target: Any) -> Any:
-    raise ScriptRuntimeError(f"{a_type(target)} has no member '{name}' to assign to")
 
 
 def _refuse(text: str) -> Any:
@@ -65,9 +50,10 @@ _COMMON: Final[dict[str, Any]] = {
     "_cell": elements.cell,
     "_store_item": elements.store_item,
     "_store_cell": elements.store_cell,
-    "_member": _member,
-    "_store_member": _store_member,
-    "_method": _method,
+    "_member": elements.member,
+    "_store_member": elements.store_member,
+    "_store_inside": elements.store_inside,
+    "_kept": kept,
     "_refuse": _refuse,
     "_truth": ops.truth,
     "_wrap": wrap_int,
@@ -101,7 +87,14 @@ _ARITHMETIC: Final = {
 }
 
 
-def base_namespace(dialect: Dialect, meter: Meter) -> dict[str, Any]:
+_ASSIGN: Final = {
+    "free": variables.assign_resizing,
+    "error": variables.assign,
+    "capacity": variables.assign_within_capacity,
+}
+
+
+def base_namespace(dialect: Dialect, methods: Methods, meter: Meter) -> dict[str, Any]:
     """The names that do not depend on the host: operators and values."""
 
     def enter(thread: ScriptThread) -> ScriptThread:
@@ -113,8 +106,15 @@ def base_namespace(dialect: Dialect, meter: Meter) -> dict[str, Any]:
     def leave(thread: ScriptThread) -> None:
         thread.depth -= 1
 
-    assign = variables.assign if dialect.list_resize == "error" else variables.assign_resizing
-    names = {**_COMMON, "_assign": assign, "_enter": enter, "_leave": leave}
+    calls = MethodCalls(methods)
+    names = {
+        **_COMMON,
+        "_assign": _ASSIGN[dialect.list_resize],
+        "_enter": enter,
+        "_leave": leave,
+        "_method": calls.call,
+        "_change": calls.change,
+    }
     if not dialect.array_arithmetic:
         names |= {name: ops.without_arrays(sign, _COMMON[name]) for name, sign in _ARITHMETIC.items()}
     return names | meter.operations(names)
@@ -138,8 +138,6 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, me
     offered = host.builtins()
     flow = _flow_builtins(host)
     bound: dict[str, Any] = {}
-    if catalogue.methods:
-        bound["_method"] = _declared_methods(catalogue.methods)
     for name in names:
         function = flow.get(name) or offered.get(name)
         if function is not None:
@@ -191,25 +189,10 @@ def _without_thread(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def _declared_methods(methods: Mapping[str, frozenset[str]]) -> Callable[..., Any]:
-    def call(
-        thread: ScriptThread, target: Any, method: str, arguments: list[Any], named: dict[str, Any]
-    ) -> Generator[Wait, None, Any]:
-        if method in methods.get(type_name(target), ()):
-            raise _not_modelled(f"{method} of {a_type(target)}")
-        return (yield from _method(thread, target, method, arguments, named))
-
-    return call
-
-
-def _not_modelled(what: str) -> ScriptRuntimeError:
-    return ScriptRuntimeError(
-        f"{what} is declared only: this box does not model it yet (docs/urscript-coverage.md)"
-    )
-
-
 def _declared_only(name: str) -> Callable[..., Any]:
     def call(thread: ScriptThread, *arguments: Any) -> Any:
-        raise _not_modelled(name)
+        raise ScriptRuntimeError(
+            f"{name} is declared only: this box does not model it yet (docs/urscript-coverage.md)"
+        )
 
     return call

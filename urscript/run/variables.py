@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from urscript import dialect
 from urscript.errors import ScriptRuntimeError
-from urscript.values import Pose, a_type, is_number, type_name
+from urscript.values import CapacityList, Pose, Struct, a_type, is_number, list_with_capacity, type_name
 
 
 class _Undefined:
@@ -40,6 +40,33 @@ def same_kind(old: type, value: Any) -> bool:
     return hasattr(old, "thread_id") and new is int
 
 
+def same_type(old: Any, value: Any) -> bool:
+    """Whether an element or member that holds `old` may receive `value`: also elements and members agree."""
+    if type(old) is Struct:
+        return type(value) is Struct and _same_members(old, value)
+    if isinstance(old, list):
+        return isinstance(value, list) and same_type(sample_of(old), sample_of(value))
+    return old is UNDEFINED or value is UNDEFINED or same_kind(type(old), value)
+
+
+def _same_members(old: Struct, value: Struct) -> bool:
+    return list(old.members) == list(value.members) and all(
+        map(same_type, old.members.values(), value.members.values())
+    )
+
+
+def sample_of(items: list[Any]) -> Any:
+    """A value of the type of the elements of a list; UNDEFINED if it never had one."""
+    if items:
+        return items[0]
+    return items.sample if isinstance(items, CapacityList) else UNDEFINED
+
+
+def capacity_of(items: list[Any]) -> int:
+    """Most elements that a list can have."""
+    return items.capacity if isinstance(items, CapacityList) else len(items)
+
+
 def assign(value: Any, old: Any, name: str) -> Any:
     """The new value of variable `name`, which holds `old`, in `name = value`.
 
@@ -55,20 +82,72 @@ def assign(value: Any, old: Any, name: str) -> Any:
 
 def assign_resizing(value: Any, old: Any, name: str) -> Any:
     """`assign` for software in which a list may change its length."""
-    if type(value) is list and type(old) is list:
+    if isinstance(value, list) and isinstance(old, list):
         if old and value and not same_kind(type(old[0]), value[0]):
-            raise _other_type(name, f"a list of {type_name(old[0])}", f"a list of {type_name(value[0])}")
+            raise _other_type(f"variable '{name}'", old, value)
         return value
-    if old is UNDEFINED or same_kind(type(old), value):
+    return _assign_other(value, old, "variable", name)
+
+
+def assign_within_capacity(value: Any, old: Any, name: str) -> Any:
+    """`assign` for software in which a list has a capacity, which it keeps (D); so it can get shorter."""
+    return fitted(value, old, "variable", name)
+
+
+def fitted(value: Any, old: Any, kind: str, name: str) -> Any:
+    """What a variable or member that holds `old` holds after `value` is stored in it.
+
+    Args:
+        value: The new value.
+        old: The present one.
+        kind: "variable" or "member", for messages.
+        name: Its name.
+    """
+    if isinstance(old, list):
+        if type(value) is Struct and (members := list(value.members.values())):
+            # A struct whose members are of one type, that of the list, fits into it (D).
+            value = members if all(same_type(sample_of(old), member) for member in members) else value
+        if isinstance(value, list):
+            return _into_list(value, old, kind, name)
+    return _assign_other(value, old, kind, name)
+
+
+def _into_list(value: list[Any], old: list[Any], kind: str, name: str) -> list[Any]:
+    if not same_type(old, value):
+        raise _other_type(f"{kind} '{name}'", old, value)
+    capacity = capacity_of(old)
+    if len(value) > capacity:
+        raise ScriptRuntimeError(
+            f"a list of {len(value)} elements does not fit into {kind} '{name}' with a capacity of {capacity}"
+        )
+    return list_with_capacity(value, capacity, sample_of(old))
+
+
+def _assign_other(value: Any, old: Any, kind: str, name: str) -> Any:
+    """All but a list into a list."""
+    if type(old) is Struct and type(value) is Struct and list(old.members) == list(value.members):
+        pairs = zip(old.members.items(), value.members.values(), strict=True)
+        return Struct({member: fitted(new, present, "member", member) for (member, present), new in pairs})
+    are_structs = type(old) is type(value) is Struct
+    if old is UNDEFINED or (same_kind(type(old), value) and not are_structs):
         return value
     if dialect.SIX_NUMBERS_FIT_A_POSE_VARIABLE and _is_six_numbers(old) and _is_six_numbers(value):
         return value
-    raise _other_type(name, a_type(old), a_type(value))
+    raise _other_type(f"{kind} '{name}'", old, value)
 
 
 def _is_six_numbers(value: Any) -> bool:
-    return type(value) is Pose or (type(value) is list and len(value) == 6 and all(map(is_number, value)))
+    return type(value) is Pose or (isinstance(value, list) and len(value) == 6 and all(map(is_number, value)))
 
 
-def _other_type(name: str, old: str, new: str) -> ScriptRuntimeError:
-    return ScriptRuntimeError(f"variable '{name}' is {old}, cannot assign {new}")
+def _other_type(what: str, old: Any, new: Any) -> ScriptRuntimeError:
+    return ScriptRuntimeError(f"{what} is {_described(old, new)}, cannot assign {_described(new, old)}")
+
+
+def _described(value: Any, other: Any) -> str:
+    """The type of a value as it differs from that of another."""
+    if isinstance(value, list) and isinstance(other, list):
+        return f"a list of {type_name(sample_of(value))}"
+    if type(value) is Struct and type(other) is Struct:
+        return f"a struct of {', '.join(value.members)}"
+    return a_type(value)
