@@ -11,10 +11,10 @@ Made from `ur_emulator/controller/modbus/robot_map.py` by `make docs`.
 
 ## The box as a server: port 502
 
-The same in all versions of CB3 and e-Series software. Functions 1 and 2 read coils, 3 and 4 registers; 5 and 15 write
-coils, 6 and 16 registers. The unit number is ignored. Several clients can connect at once. Scripts
-access the same map with `read_port_register` and similar functions. A register is a word of 16
-bits; signed values are in two's complement.
+The same in all versions of CB3 and e-Series software. Functions 1 and 2 read coils, 3 and 4
+registers; 5 and 15 write coils, 6 and 16 registers. The unit number is ignored. Several clients can
+connect at once. Scripts access the same map with `read_port_register` and similar functions.
+A register is a word of 16 bits; signed values are in two's complement.
 
 | refused | exception |
 |---|---|
