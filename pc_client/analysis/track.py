@@ -1,7 +1,9 @@
 """The TCP path of one recording: reference and actual position at the same controller time stamps.
 
-Both go through the same operator, the first difference over the time between two frames, so that a perfect
-arm gives a perfect figure. Nothing here smooths or shifts.
+Both go through the same operator, the first difference over the time between two samples, so that a perfect
+arm gives a perfect figure. Nothing here smooths or shifts. Samples are 8 ms apart, as the paper's were; of
+an arm with 500 Hz it is every fourth frame. Encoders have the same noise at both rates, so differenced over
+2 ms it is four times as large, and the figure could not stand beside the paper's.
 """
 
 from __future__ import annotations
@@ -17,8 +19,11 @@ from pc_client.errors import RecordingError
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import Recording
 
-# Fewer samples than this are no movement: 80 ms at 125 Hz.
+# Fewer samples than this are no movement: 80 ms.
 MIN_MOVEMENT_ROWS = 10
+
+_SAMPLING_TIME = 0.008
+"""Time between two samples [s]: the control cycle of the paper's arm."""
 
 SHORTEST_CYCLE, LONGEST_CYCLE = 0.5e-3, 0.05
 """Median steps of time stamps outside are of no robot [s]: UR's control cycles are 8 and 2 ms."""
@@ -75,7 +80,8 @@ class TcpTrack:
 def track_of(recording: Recording) -> TcpTrack:
     """Take the TCP path out of a recording.
 
-    Rows that repeat a time stamp (a heartbeat of a standing controller) are left out.
+    Rows that repeat a time stamp (a heartbeat of a standing controller) are left out, and those between two
+    samples; the first row of the movement is one.
 
     Raises:
         RecordingError: signals are missing, or the movement phase is too short to be judged.
@@ -83,11 +89,7 @@ def track_of(recording: Recording) -> TcpTrack:
     t = recording.t
     with np.errstate(invalid="ignore"):  # endless times are refused below
         rows = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)
-    moving = np.flatnonzero(recording.rows_of(Phase.MOVEMENT)[rows])
-    if len(moving) < MIN_MOVEMENT_ROWS:
-        raise RecordingError(
-            f"{recording.path} has {len(moving)} samples of movement; at least {MIN_MOVEMENT_ROWS} are needed"
-        )
+    moving = _movement_of(recording, rows)
     for name, most in _MOST.items():
         if not np.all(np.abs(recording.column(name)) <= most):  # NaN is not
             raise RecordingError(f"{recording.path} has {name} with values beyond {most:g}, or not a number")
@@ -99,6 +101,9 @@ def track_of(recording: Recording) -> TcpTrack:
             f"{recording.path} has time stamps {cycle:g} s apart; {SHORTEST_CYCLE:g} to {LONGEST_CYCLE:g} s "
             "are a robot's"
         )
+    each = max(round(_SAMPLING_TIME / cycle), 1)
+    rows = rows[moving[0] % each :: each]
+    moving = _movement_of(recording, rows)
     return TcpTrack(
         t=t[rows],
         p_ref=recording.column("ref_tcp_position")[rows],
@@ -107,6 +112,20 @@ def track_of(recording: Recording) -> TcpTrack:
         movement=slice(int(moving[0]), int(moving[-1]) + 1),
         t_begin=float((t - recording.column("ref_t"))[rows[moving[0]]]),
     )
+
+
+def _movement_of(recording: Recording, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Which of these rows (n,) are of the movement phase.
+
+    Raises:
+        RecordingError: too few.
+    """
+    moving = np.flatnonzero(recording.rows_of(Phase.MOVEMENT)[rows])
+    if len(moving) < MIN_MOVEMENT_ROWS:
+        raise RecordingError(
+            f"{recording.path} has {len(moving)} samples of movement; at least {MIN_MOVEMENT_ROWS} are needed"
+        )
+    return moving
 
 
 def velocity(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ from protocol.realtime.layout import MAX_FRAME_SIZE, RealtimeFrame, RealtimeLayo
 from protocol.ur_types import ProgramState
 
 FRAME_TIMEOUT = 1.0
-"""Without a frame for this long [s] the robot counts as gone (125 frames of a CB3 box)."""
+"""Without a frame for this long [s] the robot counts as gone."""
 
 _STOPPED_TIMEOUT = 120.0
 """The same for a robot whose time waits for its clients [s]: its arm does not move unattended, so a box that

@@ -18,12 +18,13 @@ STOP_DECELERATION = 20.0
 """Of the program's ramp to rest [rad/s2]: what a UR3 does in UR's stopping figures (manual UR3/CB3 3.10, stop
 category 0 from 183 deg/s, arm stretched, 3 kg: base 20, shoulder 21, elbow 35 rad/s2; a UR5's base 13)."""
 
-MISSED_ALLOWED = 2
-"""Cycles in which the last velocity is repeated when we are late: 16 ms. UR's client library waits 20 ms.
+MISSED_ALLOWED = 0.016
+"""For so long the last velocity is repeated when we are late [s]. UR's client library waits 20 ms.
 
-From the last command to rest, at the fastest speed that is commanded (180 deg/s, `kinematics.robot_model`):
-8 ms until it is read, 24 ms until the ramp begins, 157 ms ramp, and the time in which the joints follow and
-the feedback shows it. On the emulated arms that makes at most 0.28 s, with the loop of `poor` 0.34 s."""
+From the last command to rest, at the fastest speed that is commanded (180 deg/s, `kinematics.robot_model`),
+on a CB3: 8 ms until it is read, 24 ms until the ramp begins, 157 ms ramp, and the time in which the joints
+follow and the feedback shows it. On the emulated arms that makes at most 0.28 s, with the loop of `poor`
+0.34 s."""
 
 READ_TIMEOUT = 0.5
 """Silence of ours after which the program ends [s]: the arm has come to rest by then, and stays there."""
@@ -63,13 +64,14 @@ def fill_template(template: str, values: Mapping[str, str | int | float]) -> str
     return _MARKED_LINE.sub(lambda line: f"{line['begin']}{values[line['name']]}{line['end']}", template)
 
 
-def receiver_script(host: str, port: int, *, acceleration: float) -> str:
+def receiver_script(host: str, port: int, *, acceleration: float, period: float) -> str:
     """The program for the robot.
 
     Args:
         host: our address as the robot sees it.
         port: where we listen.
         acceleration: of `speedj`, leading axis [rad/s2].
+        period: control cycle of the robot [s].
 
     Raises:
         DriverError: the program is not installed or does not fit this client, or that is no address.
@@ -82,6 +84,6 @@ def receiver_script(host: str, port: int, *, acceleration: float) -> str:
         "acceleration": float(acceleration),
         "stop_deceleration": STOP_DECELERATION,
         "read_timeout": READ_TIMEOUT,
-        "missed_allowed": MISSED_ALLOWED,
+        "missed_allowed": round(MISSED_ALLOWED / period),
     }
     return fill_template(receiver_template(), values)

@@ -29,6 +29,10 @@ UNKNOWN = "unknown"
 _CB3_PERIOD = 0.008
 _E_SERIES_PERIOD = 0.002
 
+_E_SERIES = ("UR3", "UR5", "UR10", "UR16")
+"""What e-Series arms report without their "e". Source: UR's client library: type 1 with software 5 is a UR5e;
+a UR7e reports the type of a UR5, a UR12e that of a UR10."""
+
 
 @dataclass(frozen=True, slots=True)
 class RobotInfo:
@@ -36,7 +40,7 @@ class RobotInfo:
 
     Attributes:
         version: controller software.
-        model: e.g. `UR3`, or "unknown" when the robot does not report it.
+        model: e.g. `UR3` or `UR5e`, or "unknown" when the robot does not report it.
         serial: serial number, or "unknown" when the dashboard server does not report it.
         simulated: True when the robot says so; False when its serial number is that of a real arm and it has
             no mark of a simulator; None when it does not report this.
@@ -82,7 +86,7 @@ def read_robot_info(network: Network, host: str, dashboard_port: int, primary: P
     model = answers.get(_MODEL, "")
     return RobotInfo(
         version,
-        model if _MODEL_NAME.fullmatch(model) else _model_in(configuration),
+        arm_name(model if _MODEL_NAME.fullmatch(model) else _model_in(configuration), version),
         UNKNOWN if serial is None else serial.text,
         _is_simulated(serial, configuration, primary.newest(KinematicsInfo)),
         None if serial is None else serial.seed,
@@ -107,3 +111,8 @@ def _model_in(configuration: ConfigurationData | None) -> str:
         return UNKNOWN if configuration is None else RobotType(configuration.robot_type).name
     except ValueError:  # an arm that was built after this was written
         return UNKNOWN
+
+
+def arm_name(reported: str, version: SoftwareVersion) -> str:
+    """The name of an arm that a robot calls `UR5`, for example: `UR5e` with software of the e-Series."""
+    return f"{reported}e" if version.major >= 5 and reported in _E_SERIES else reported

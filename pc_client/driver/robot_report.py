@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.realtime_client import RealtimeClient
-from pc_client.driver.robot_info import UNKNOWN, RobotInfo, read_robot_info
+from pc_client.driver.robot_info import UNKNOWN, RobotInfo, arm_name, read_robot_info
 from pc_client.driver.rtde_query import ask_rtde
 from pc_client.driver.transport import Network
 from pc_client.errors import DriverError
@@ -24,7 +24,7 @@ class RobotReport:
 
     Attributes:
         info: which robot it is.
-        configured: the arm by the configuration data of port 30001, e.g. `UR3`.
+        configured: the arm by the configuration data of port 30001, e.g. `UR3` or `UR5e`.
         frame: its state on port 30003.
         slider: speed slider, 0 to 1, from port 30001.
         tcp_offset: (6,) pose of the TCP in the flange frame [m, rad], from port 30001.
@@ -79,7 +79,7 @@ def make_report(
     kinematics = primary.newest(KinematicsInfo)
     return RobotReport(
         info=info,
-        configured=None if configuration is None else _name(configuration.robot_type),
+        configured=None if configuration is None else _configured(configuration, info),
         frame=frame,
         slider=reported_slider(primary),
         tcp_offset=None if cartesian is None else cartesian.tcp_offset,
@@ -95,7 +95,7 @@ def check_arm(info: RobotInfo, primary: PackageStream) -> None:
         DriverError: they differ.
     """
     configuration = primary.newest(ConfigurationData)
-    if configuration is None or info.model in (UNKNOWN, configured := _name(configuration.robot_type)):
+    if configuration is None or info.model in (UNKNOWN, configured := _configured(configuration, info)):
         return
     raise DriverError(
         f"the robot's arm is {info.model} (dashboard), {configured} (port 30001), must be one of them; "
@@ -118,8 +118,8 @@ def read_payload(network: Network, host: str, ports: Ports) -> float | None:
     return value if isinstance(value, float) else None
 
 
-def _name(robot_type: int) -> str:
+def _configured(configuration: ConfigurationData, info: RobotInfo) -> str:
     try:
-        return RobotType(robot_type).name
+        return arm_name(RobotType(configuration.robot_type).name, info.version)
     except ValueError:  # an arm that was built after this was written
-        return f"type {robot_type}"
+        return f"type {configuration.robot_type}"

@@ -1,4 +1,4 @@
-"""One value from the RTDE port, for what no other port of a CB3 reports. An absent port is no error."""
+"""One value from the RTDE port, for what no other port reports. An absent port is no error."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MOST_PACKAGES = 100
 """Packages that are read before the first one with data."""
 
 _RATE = 125.0
-"""Packages a second: as many as a CB3 sends, the first one is enough."""
+"""Packages a second: as many as every generation sends, the first one is enough."""
 
 
 def ask_rtde(network: Network, host: str, port: int, name: str) -> RtdeValue | None:

@@ -184,11 +184,13 @@ class UrDriver:
         reverse: Transport | None = None
         try:
             with _AlwaysStopped(self) as guard:
-                self._start(receiver_script(server.address, server.port, acceleration=acceleration))
+                period = self.info.period
+                text = receiver_script(server.address, server.port, acceleration=acceleration, period=period)
+                self._start(text)
                 reverse = server.accept_program(self._look_after, self._frames.patience(DIAL_TIMEOUT))
                 guard.reverse = reverse
                 stream = VelocityStream(
-                    self._frames, reverse, self._network, self.info.period, self._raise_robot_errors
+                    self._frames, reverse, self._network, period, self._raise_robot_errors
                 )
                 try:
                     with collector_paused():

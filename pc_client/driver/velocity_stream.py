@@ -73,11 +73,11 @@ time waits for clients: it may wait for another one that is stopped."""
 _FRAMES_BEFORE_START = 3
 """New frames after which a robot counts as one whose time runs by itself."""
 
-_LONGEST_RISE = 125
-"""New frames in which the speed scaling must have reached 1 after the program started: a second of a CB3."""
+_LONGEST_RISE = 1.0
+"""Time in which the speed scaling must have reached 1 after the program started [s]."""
 
-_HOUSEKEEPING = 16
-"""New frames between two looks at the other connections, and at whether angles and pose belong together: an
+_HOUSEKEEPING = 0.128
+"""Time between two looks at the other connections, and at whether angles and pose belong together [s]: an
 eighth of a second, as robot states come."""
 
 _SHORTEST_GAP = 0.1
@@ -149,6 +149,7 @@ class VelocityStream:
             DriverError: silence of either side, closed sockets, a command that is not safe to send.
         """
         report = StreamReport()
+        each = round(_HOUSEKEEPING / self._period)
         frame = self._wait_for_trigger(report)
         began = self._network.now()
         receive, send, limits = self._frames.receive, self._reverse.send, source.qd_max
@@ -159,7 +160,7 @@ class VelocityStream:
             step = source.answer(frame)
             if step.finished:
                 break
-            if report.n_commands % _HOUSEKEEPING == 0:
+            if report.n_commands % each == 0:
                 source.check_report(frame.actual_q.tolist(), frame.actual_tcp_pose.tolist())
             check_command(step.qd_cmd, limits)
             try:
@@ -169,7 +170,7 @@ class VelocityStream:
                 raise
             on_row(frame, step)
             report.n_commands += 1
-            if report.n_commands % _HOUSEKEEPING == 0:
+            if report.n_commands % each == 0:
                 self._housekeeping()
 
             arrival = receive()
@@ -210,14 +211,14 @@ class VelocityStream:
         scaling when a program starts; it gets the word to rest until then.
         """
         self._frames.drain()
-        n_new = 0
+        n_new, longest = 0, round(_LONGEST_RISE / self._period)
         while True:
             arrival = self._frames.receive()
             report.heartbeats += arrival.n_heartbeats
             n_new += len(arrival.new)
             stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
             if stands_still or n_new >= _FRAMES_BEFORE_START:
-                if stands_still or is_at_full_speed(arrival.latest) or n_new >= _LONGEST_RISE:
+                if stands_still or is_at_full_speed(arrival.latest) or n_new >= longest:
                     report.time_waits = stands_still
                     return arrival.latest
                 self._reverse.send(encode_velocity(VelocityMode.HOLD))

@@ -37,15 +37,15 @@ class ProgramEndedError(RobotStoppedError):
 
 
 def software(version: SoftwareVersion) -> Condition:
-    """The controller is of the generation that this client was made for."""
+    """The controller is of a generation that this client was made for."""
     major = version.major
     generation = "CB2" if major < 3 else "CB3" if major < 5 else "e-Series" if major < 10 else "PolyScope X"
     return Condition(
         "software",
         f"{version}, {generation}",
-        f"a CB3's, {_OLDEST.major}.{_OLDEST.minor} or later",
-        "this client was made for CB3 controllers only",
-        version >= _OLDEST and generation == "CB3",
+        f"{_OLDEST.major}.{_OLDEST.minor} or later, CB3 or e-Series",
+        "this client was made for CB3 and e-Series controllers only",
+        version >= _OLDEST and generation in ("CB3", "e-Series"),
     )
 
 

@@ -82,11 +82,11 @@ def _arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
     return Condition(
         "arm",
         f"{name} (dashboard), {configured} (port 30001)" if differ else "" if name == UNKNOWN else name,
-        " or ".join(known.upper() for known in ROBOTS) if model is None else model.name.upper(),
+        " or ".join(known.title for known in ROBOTS.values()) if model is None else model.title,
         "look which arm it is, and set it so in the installation"
         if differ
         else "plan for the arm that answers",
-        None if name == UNKNOWN else not differ and model is not None and name == model.name.upper(),
+        None if name == UNKNOWN else not differ and model is not None and name == model.title,
     )
 
 
@@ -114,7 +114,7 @@ def _forward_kinematics(report: RobotReport, model: RobotModel | None) -> Condit
     most = model.description.position_tolerance
     return Condition(
         "flange pose",
-        f"{distance * 1e3:.1f} mm, {angle * 1e3:.1f} mrad from the {model.name.upper()} model",
+        f"{distance * 1e3:.1f} mm, {angle * 1e3:.1f} mrad from the {model.title} model",
         f"within {most * 1e3:g} mm, {ROTATION_TOLERANCE * 1e3:g} mrad",
         "this is another arm than the model's, or its calibration or TCP is wrong",
         distance <= most and angle <= ROTATION_TOLERANCE,
@@ -162,7 +162,7 @@ CONDITIONS: tuple[Check, ...] = (
     payload,
     _joint_angles,
 )
-"""What a CB3 must fulfil, in the order in which it is shown: what explains the others comes first."""
+"""What a robot must fulfil, in the order in which it is shown: what explains the others comes first."""
 
 
 def _size(pose: Sequence[float]) -> tuple[float, float]:

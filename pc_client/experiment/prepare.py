@@ -10,8 +10,9 @@ import numpy as np
 
 from pc_client.errors import ClientError, RecordingError
 from pc_client.kinematics.cell import NO_CELL, Cell
-from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
 from pc_client.movements.files import load_motion
+from pc_client.movements.geometry import LIBRARY_SHIFTS, Similarity
 from pc_client.movements.joint_trajectory import JointTrajectory
 from pc_client.movements.movement import Movement
 from pc_client.movements.movement_file import movement_text
@@ -67,8 +68,9 @@ class Experiment:
             report = plan.joints.report
             if report.robot != self.model.name or report.cell != self.model.cell:
                 raise ClientError(
-                    f"{plan.movement.name} was planned for a {report.robot.upper()} ({report.cell.summary}), "
-                    f"this arm is a {self.model.name.upper()} ({self.model.cell.summary}): "
+                    f"{plan.movement.name} was planned for a {ROBOTS[report.robot].title} "
+                    f"({report.cell.summary}), "
+                    f"this arm is a {self.model.title} ({self.model.cell.summary}): "
                     "plan it for this arm"
                 )
 
@@ -126,7 +128,7 @@ def prepare_experiment(
 
 
 def make_plan(motion: Motion, model: RobotModel) -> Plan:
-    """Plan what the TCP, or what the joints shall do.
+    """Plan what the TCP, or what the joints shall do; a movement of the library where the arm can do it.
 
     Args:
         motion: a movement of the TCP, or joint angles over time.
@@ -139,6 +141,8 @@ def make_plan(motion: Motion, model: RobotModel) -> Plan:
         joints = plan_joints(motion, model=model)
         trajectory = SampledTrajectory(joints.t, joints.p)
         return Plan(Movement(motion.name, trajectory, np.array([trajectory.duration])), joints, "")
+    if motion.from_library and (shift := LIBRARY_SHIFTS.get(model.name)):
+        motion = motion.transformed(Similarity(1.0, np.eye(3), np.array(shift)))
     return Plan(motion, plan_movement(motion, model=model, rotations=motion.rotations), _text_of(motion))
 
 

@@ -69,6 +69,11 @@ class RobotDescription:
     tcp_speed_max: float
 
     @property
+    def title(self) -> str:
+        """The name for people, as robots report it, e.g. `UR5e`."""
+        return f"UR{self.name.removeprefix('ur')}"
+
+    @property
     def urdf(self) -> str:
         """The URDF of its frames.
 
@@ -104,6 +109,11 @@ class RobotModel:
     def name(self) -> str:
         """Short name, e.g. `ur3`."""
         return self.description.name
+
+    @property
+    def title(self) -> str:
+        """The name for people, e.g. `UR5e`."""
+        return self.description.title
 
     @property
     def limits(self) -> JointLimits:

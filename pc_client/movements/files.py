@@ -7,6 +7,7 @@ of what is wrong.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -90,7 +91,8 @@ def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
     """
     found = library_path(name_or_path) if isinstance(name_or_path, str) else None
     if found:
-        return _read(found)
+        movement = _read(found)
+        return replace(movement, from_library=True) if isinstance(movement, Movement) else movement
     path = Path(name_or_path)
     if not path.suffix and not path.exists():
         known = [name for names in LIBRARY_SETS.values() for name in names]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import MovementError
 
-__all__ = ["UR3_BOX", "WORKING_BOXES", "Box", "Similarity", "read_only"]
+__all__ = ["LIBRARY_SHIFTS", "UR3_BOX", "WORKING_BOXES", "Box", "Similarity", "read_only"]
 
 
 def read_only(values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
@@ -85,6 +85,20 @@ WORKING_BOXES: Mapping[str, Box] = MappingProxyType(
     }
 )
 UR3_BOX = WORKING_BOXES["ur3"]
+
+#: By how much the movements of the library, which lie in the UR3's box, are moved for an arm that cannot do
+#: them there, m: as little as brings the UR3's box into the arm's.
+LIBRARY_SHIFTS: Mapping[str, tuple[float, float, float]] = MappingProxyType(
+    {
+        "ur5e": (0.075, 0.0, 0.0),
+        "ur7e": (0.075, 0.0, 0.0),
+        "ur10e": (0.125, 0.0, 0.0),
+        "ur12e": (0.125, 0.0, 0.0),
+        "ur16e": (0.175, 0.0, 0.0),
+        "ur20": (0.275, 0.0, 0.05),
+        "ur30": (0.325, 0.0, 0.0),
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)

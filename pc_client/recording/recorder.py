@@ -39,8 +39,8 @@ from pc_client.recording.outbox import Opener, Outbox, open_unbuffered
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.ros_messages import CDR_LITTLE_ENDIAN
 
-ROWS_PER_CHUNK = 64  # half a second at 125 Hz
-# Rows that are kept in memory after the disk failed: two minutes at 125 Hz, 30 MB.
+ROWS_PER_CHUNK = 64  # half a second at 125 Hz, an eighth of one at 500 Hz
+# Rows that are kept in memory after the disk failed: two minutes at 125 Hz, half of one at 500 Hz, 30 MB.
 MAX_HELD_ROWS = 240 * ROWS_PER_CHUNK
 
 _LATEST = 2.0**31

@@ -324,9 +324,9 @@ def test_doctor_says_what_was_not_reported_beside_ready(robot, capsys):
 
 def test_doctor_refuses_another_generation_by_name(robot, capsys):
     robot.state = robot.robot_state()
-    robot.version = SoftwareVersion(5, 12, 2)
+    robot.version = SoftwareVersion(10, 12, 2)
     assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"]) == 1
-    assert "NOT NOW: the robot's software is 5.12.2, e-Series" in capsys.readouterr().out
+    assert "NOT NOW: the robot's software is 10.12.2, PolyScope X" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

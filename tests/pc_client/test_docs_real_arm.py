@@ -77,7 +77,7 @@ def conditions():
     report = SimpleNamespace(tcp_offset=(0.0, 0.0, 0.15, 0.0, 0.0, 0.0), payload=0.0)
     model = robot_model("ur3", CELL)
     return [
-        software(SoftwareVersion(5, 11, 0)),
+        software(SoftwareVersion(10, 11, 0)),
         safety_mode(frame),
         safety_mode(protective),
         robot_mode(frame),
@@ -130,7 +130,7 @@ def test_port_margins_and_tolerances_are_those_of_the_code():
     preview, paper = CONTROLLERS["preview"].path_tolerance, CONTROLLERS["paper"].path_tolerance
     allowed = f"by {1e3 * preview:g} mm before a run ends ({1e3 * paper:g} mm with the published controller"
     assert f"{allowed}, {1e3 * APPROACH.path_tolerance:g} mm in an approach)" in page
-    assert f"repeats the last velocity for {MISSED_ALLOWED} cycles, then `stopj`" in PAGE
+    assert f"repeats the last velocity for {1e3 * MISSED_ALLOWED:g} ms, then `stopj`" in PAGE
 
 
 def test_the_cell_of_the_page_is_one():

@@ -95,7 +95,7 @@ def test_an_arm_that_was_built_later_is_unknown():
 def test_software_that_does_not_report_whether_a_program_runs_is_refused():
     robot = FakeRobot()
     robot.version = SoftwareVersion(3, 1)
-    with pytest.raises(DriverError, match=r"3\.1\.0, CB3, must be a CB3's, 3\.2 or later"):
+    with pytest.raises(DriverError, match=r"3\.1\.0, CB3, must be 3\.2 or later, CB3 or e-Series"):
         UrDriver("robot", network=robot)
     assert set(robot.closed) == {"dashboard", "primary", "secondary"}
 
@@ -259,12 +259,18 @@ def test_dashboard_answers_only_what_it_knows():
 
 
 def test_receiver_program_is_filled_in():
-    text = receiver_script("192.168.0.5", 50123, acceleration=40.0)
+    text = receiver_script("192.168.0.5", 50123, acceleration=40.0, period=0.008)
     assert re.search(r'^  pc_address = "192.168.0.5"\s+# <- client$', text, re.MULTILINE)
     assert re.search(r"^  pc_port = 50123\s+# <- client$", text, re.MULTILINE)
     assert re.search(r"^  acceleration = 40.0\s+# <- client$", text, re.MULTILINE)
+    assert re.search(r"^  missed_allowed = 2\s+# <- client$", text, re.MULTILINE)
     assert text.startswith("def velocity_receiver():\n")
     assert text.endswith("\nend\n")
+
+
+def test_the_robot_is_as_patient_with_us_on_an_e_series():
+    text = receiver_script("192.168.0.5", 50123, acceleration=40.0, period=0.002)
+    assert re.search(r"^  missed_allowed = 8\s+# <- client$", text, re.MULTILINE)
 
 
 def test_the_client_does_not_import_the_language():
@@ -275,7 +281,7 @@ def test_the_client_does_not_import_the_language():
 
 def test_no_program_text_gets_in_through_the_address():
     with pytest.raises(DriverError, match="no address"):
-        receiver_script('1.2.3.4"\n  powerdown()\n', 1, acceleration=1.0)
+        receiver_script('1.2.3.4"\n  powerdown()\n', 1, acceleration=1.0, period=0.008)
 
 
 def test_template_and_client_must_fit():

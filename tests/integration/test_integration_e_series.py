@@ -1,0 +1,70 @@
+"""The client on arms of the e-Series: it finds out which arm answers, runs at 500 Hz, and learns from run to run."""
+
+import numpy as np
+import pytest
+from integration_support import at, free_port_base
+
+from pc_client.analysis.run import analyse_run
+from pc_client.movements.files import load_movement
+from pc_client.recording.loader import load_recording
+from ur_emulator import ControlBox
+
+PERIOD = 0.002  # s
+
+
+def e_series_box(robot, **options):
+    return ControlBox(robot=robot, pace="lockstep", port_base=free_port_base(), seed=5, **options)
+
+
+@pytest.mark.parametrize(
+    ("robot", "version", "name"),
+    [
+        ("ur3e", "5.0.0", "UR3e"),
+        ("ur5e", "5.9.4", "UR5e"),
+        ("ur7e", "5.22.0", "UR5e"),
+        ("ur20", "5.25.1", "UR20"),
+    ],
+)
+def test_doctor_names_the_arm_and_finds_it_ready(ur_client, robot, version, name):
+    with e_series_box(robot, version=version) as box:
+        doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
+    assert doctor.code == 0, doctor.out
+    assert f"robot       {name}, software {version}, " in doctor.out
+    assert f"arm            {name} " in doctor.out
+    assert "streaming   ready" in doctor.out
+
+
+@pytest.fixture(scope="module", params=["ur3e", "ur5e"])
+def recordings(request, tmp_path_factory):
+    """Two runs of one movement by the controller that learns."""
+    from pc_client import cli
+
+    out = tmp_path_factory.mktemp(request.param)
+    with e_series_box(request.param) as box:
+        arguments = ["run", "uniform_4_1", *at(box), "--out", str(out)]
+        assert cli.run([*arguments, "--repeat", "2", "--controller", "best"]) == 0
+    return [load_recording(path) for path in sorted(out.glob("*.mcap"))]
+
+
+def test_every_cycle_of_2_ms_has_its_frame_and_its_command(recordings):
+    for recording in recordings:
+        np.testing.assert_allclose(np.diff(recording.t), PERIOD, atol=1e-9)
+        assert recording.provenance.cycle_time_s == PERIOD
+        assert recording.summary["late_frames"] == recording.summary["lost_frames"] == 0
+
+
+def test_the_loop_is_as_quick_as_the_cycle_and_the_arm_follows_within_what_its_encoders_show(recordings):
+    for recording in recordings:
+        assert 0.001 < recording.provenance.identified_delay_s < 0.015
+        assert recording.provenance.loop["gain_margin"] > 10.0
+        run = analyse_run(recording)
+        assert abs(run.snr.speed_lag_s) < 0.002
+        assert run.snr.speed_db > 31.0
+    assert recordings[1].summary["learned_from"] == 1
+
+
+def test_a_movement_of_the_library_is_where_the_arm_can_do_it(recordings):
+    recording = recordings[0]
+    moved = np.array(recording.provenance.target_points) - load_movement("uniform_4_1").target_points
+    there = (0.075, 0.0, 0.0) if recording.provenance.robot_model == "UR5e" else (0.0, 0.0, 0.0)
+    np.testing.assert_allclose(moved, np.tile(there, (len(moved), 1)), atol=1e-12)
