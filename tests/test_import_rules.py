@@ -52,7 +52,7 @@ CONTROLLER_ORDER = (
     {"arm_in_space", "clock", "operator", "program_requests", "programs", "robot_mode", "tool_settings"},
     {"io"},
     {"safety"},
-    {"client_inputs", "electrics", "error_settings"},
+    {"arm_dynamics", "client_inputs", "electrics", "error_settings"},
     {"energy", "snapshot"},
     {"past_cycles"},
     {"compliance"},

@@ -204,7 +204,7 @@ class Numbered:
     def __getattr__(self, name):
         if name == "registers":
             return self
-        if name in ("analog_values", "joint_mode"):
+        if name in ("analog_values", "joint_mode", "tool_output_modes"):
             return (10, 11, 12, 13, 14, 15)
         return tuple(range(128)) if name.startswith(("input_", "output_")) else 7
 

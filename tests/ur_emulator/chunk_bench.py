@@ -12,7 +12,6 @@ from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
@@ -27,9 +26,10 @@ class ChunkBench(Bench):
 
     def __init__(self, chunk):
         self.network = ChunkNetwork(chunk)
+        robot = robot_by_name("ur3" if chunk.software.startswith("3.") else "ur5e")
         self.controller = Controller(
-            robot_by_name("ur3"),
-            CB3.fidelity(chunk.fidelity),
+            robot,
+            robot.generation.fidelity(chunk.fidelity),
             chunk.seed,
             partial(ProgramSlot, network=self.network),
         )

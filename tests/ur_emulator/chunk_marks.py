@@ -33,7 +33,7 @@ Chunks stand apart by a line `---`; lines count from the first of the chunk. A l
                         `refuses` and `silent` for peers that do not take the connection
     #reply "ask" "text" sent by a peer when it has received `ask`
     #rpc f 5            result of a remote procedure; `#rpc f fails text`
-    #software 5.11      3.15, if not given
+    #software 5.11      3.15, if not given; the arm is a UR3, and a UR5e for 5.x
 
 Actions: see `chunk_actions`.
 """

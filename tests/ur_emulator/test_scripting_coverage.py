@@ -1,5 +1,6 @@
 """The catalogue's promise and the box must agree: what is called modelled is there, what is there is called modelled."""
 
+import pytest
 from box_support import Bench
 
 from ur_emulator.scripting.robot_host import RobotHost
@@ -17,10 +18,12 @@ def offered():
     return set(host.builtins()) | set(PURE) | FLOW
 
 
-def test_every_modelled_builtin_is_offered_and_every_offered_one_is_modelled():
-    modelled = {row.name for row in CB3_3_15 if row.support is not Support.DECLARED_ONLY}
+@pytest.mark.parametrize("version", ["3.15", "5.4", "5.11", "5.15", "5.22", "5.25"])
+def test_every_modelled_builtin_is_offered_and_every_offered_one_is_modelled(version):
+    catalogue = catalogue_for(version)
+    modelled = {row.name for row in catalogue if row.support is not Support.DECLARED_ONLY}
     missing = modelled - offered()
-    undeclared = {name for name in offered() if name in CB3_3_15} - modelled
+    undeclared = {name for name in offered() if name in catalogue} - modelled
     assert not missing
     assert not undeclared
 

@@ -77,9 +77,13 @@ MOVES = """def moves():
   movej([0.2, -1.5, -1.5, -0.8, 1.4, 0.8], a=3, v=1.5)
 end
 """
-INERTIA = (
-    "def inertia():\n  set_target_payload(1.5, [0, 0, 0.1], [0.01, 0.02, 0.03, 0.001, 0.002, 0.003])\nend\n"
-)
+TOOL = """def tool():
+  set_target_payload(1.5, [0, 0, 0.1], [0.01, 0.02, 0.03, 0.001, 0.002, 0.003])
+  set_tool_output_mode(1)
+  set_tool_digital_output_mode(0, 2)
+  set_tool_digital_output_mode(1, 3)
+end
+"""
 E_SERIES = """def e_series():
   set_gravity([0.1, 0.2, 9.8])
   encoder_enable_set_tick_count(0, 0)
@@ -154,7 +158,7 @@ class Story(Bench):
             }
         )
         self.run(MOVES)
-        e_series = compile_program(INERTIA, catalogue=catalogue_for((5, 12)))
+        e_series = compile_program(TOOL, catalogue=catalogue_for((5, 12)))
         self.tick(5, StartProgram(e_series))
         self.start(ENDLESS)
         self.tick(300)

@@ -195,11 +195,12 @@ class Controller:
         self.programs.step()
         if state.requests.take_power_off():
             self.safety.cut_power()
+        state.tool.step()
         payload = state.tool.payload
         if payload is not self._payload:
             # The plant carries the payload that programs declare.
             self._payload = payload
-            self.plant.set_payload(payload.mass, payload.cog)
+            self.plant.set_payload(payload.mass, payload.cog, payload.inertia)
 
     def _step_motion(self, running: bool) -> tuple[ControlMode, JointTarget]:
         """How the arm is driven in this cycle, and to where."""

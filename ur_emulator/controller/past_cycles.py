@@ -6,15 +6,20 @@ Ports show less recent values than the controller works with: see `Plant.report`
 from __future__ import annotations
 
 from collections import deque
+from itertools import islice
+from operator import mul
 
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.models.robot_generation import RobotGeneration
-from ur_emulator.models.robot_model import Vector6
+from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
 
 # How far back a script may ask for joint positions [s]; the real buffer's length is not known.
 HISTORY_TIME = 1.0
+# Measured accelerations are those of a parabola through the positions of this time [s]. Chosen: encoder noise
+# of 15 urad leaves 0.25 rad/s^2, and the value is 10 ms old.
+PARABOLA_TIME = 0.02
 
 
 class PastCycles:
@@ -28,13 +33,14 @@ class PastCycles:
         steady_cycles: number of cycles for which the target has not moved.
     """
 
-    __slots__ = ("q_history", "sensed", "snapshot", "steady_cycles", "target")
+    __slots__ = ("_generation", "q_history", "sensed", "snapshot", "steady_cycles", "target")
 
     snapshot: Snapshot
     target: JointTarget
     sensed: PlantState
 
     def __init__(self, generation: RobotGeneration) -> None:
+        self._generation = generation
         self.q_history: deque[Vector6] = deque(maxlen=generation.cycles(HISTORY_TIME))
         self.steady_cycles = 0
 
@@ -57,3 +63,15 @@ class PastCycles:
         self.target = target
         self.sensed = sensed
         self.q_history.appendleft(sensed.actual_q)
+
+    def joint_accelerations(self) -> Vector6:
+        """Return measured joint accelerations [rad/s^2], in the middle of PARABOLA_TIME."""
+        n = min(len(self.q_history), 1 + max(2, self._generation.cycles(PARABOLA_TIME)))
+        if n < 3:
+            return ZERO6
+        # The polynomial of second order that is orthogonal to a constant and to a line.
+        squares = [(i - 0.5 * (n - 1)) ** 2 for i in range(n)]
+        weights = [square - sum(squares) / n for square in squares]
+        scale = 2.0 / (sum(w * w for w in weights) * self._generation.period_s**2)
+        latest = islice(self.q_history, n)
+        return six([scale * sum(map(mul, weights, joint)) for joint in zip(*latest, strict=True)])

@@ -57,8 +57,12 @@ class Programs(Protocol):
         """Start a program; a primary one replaces the one that runs. `loaded`: it is played from a file."""
         ...
 
-    def stop(self) -> None:
-        """End the primary program, if one runs, and stop the arm."""
+    def stop(self, *, unscheduled: bool = False) -> None:
+        """End the primary program, if one runs, and stop the arm.
+
+        Args:
+            unscheduled: nobody wanted it; see `run_states.level`.
+        """
         ...
 
     def pause(self, deceleration: float = 0.0) -> None:

@@ -71,6 +71,7 @@ def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState
         analog_values=analog.values,
         analog_domains=analog.domains,
         tool_output_voltage=io.tool_voltage,
+        tool_output_modes=io.tool_output_modes,
         euromap_inputs=euromap.inputs,
         euromap_outputs=euromap.outputs,
         registers=state.registers.values(),

@@ -141,7 +141,7 @@ class SafetySystem:
         if row.arm is ArmEffect.POWER_OFF:
             if row_before.arm is not ArmEffect.POWER_OFF:
                 self._is_waiting = False
-                self._programs.stop()
+                self._programs.stop(unscheduled=True)
                 if robot_mode is RobotMode.RUNNING:
                     self._cut_after = state.clock.tick + round(LONGEST_BRAKING / state.clock.period_s)
                 elif robot_mode in POWERED:

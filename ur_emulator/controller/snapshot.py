@@ -68,6 +68,7 @@ class _Fields(NamedTuple):
     analog_values: tuple[float, ...]
     analog_domains: tuple[int, ...]
     tool_output_voltage: int
+    tool_output_modes: tuple[int, int, int]
     euromap_inputs: int
     euromap_outputs: int
     registers: RegisterValues

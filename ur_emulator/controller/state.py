@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ur_emulator.controller.arm_dynamics import ArmDynamics
 from ur_emulator.controller.client_inputs import ClientInputs
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.compliance.compliance import Compliance
@@ -55,6 +56,7 @@ class ControllerState:
         speed: speed slider, and the limits of a safety mode that has some.
         tool: TCP, payload and gravity.
         energy: what the arm has taken.
+        dynamics: the model of the arm with that payload.
         io: digital and analogue lines.
         registers: general purpose registers.
         io_configuration: which inputs act, which outputs follow the program.
@@ -85,6 +87,7 @@ class ControllerState:
     speed: SpeedScaling
     tool: ToolSettings
     energy: EnergyMeter
+    dynamics: ArmDynamics
     io: InputOutput
     registers: Registers
     io_configuration: IoConfiguration
@@ -116,7 +119,7 @@ def make_state(
     io, registers, speed, operational = InputOutput(), Registers(), SpeedScaling(), OperationalModeChoice()
     rules = robot.generation.limits
     safety = SafetyState(limits_of(robot), has_programs_in_recovery=rules.has_programs_in_recovery)
-    past = PastCycles(clock.generation)
+    past, tool = PastCycles(clock.generation), ToolSettings()
     modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
     io_configuration = IoConfiguration(io, registers, modbus)
     return ControllerState(
@@ -131,7 +134,8 @@ def make_state(
         operational=operational,
         enabling_device=EnablingDevice(),
         speed=speed,
-        tool=ToolSettings(),
+        tool=tool,
+        dynamics=ArmDynamics(robot, arm.calibration, tool),
         energy=EnergyMeter(clock.period_s),
         io=io,
         registers=registers,

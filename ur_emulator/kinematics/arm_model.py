@@ -140,6 +140,21 @@ class ArmModel:
         mujoco.mj_jac(self._model, self._data, jacobian[:3], jacobian[3:], point, self._flange_link)
         return jacobian
 
+    def jacobian_rate(
+        self, q: Sequence[float], qd: Sequence[float], tcp: Sequence[float] | None = None
+    ) -> NDArray[np.float64]:
+        """Change of the Jacobian (6, 6) with time at q (6,) [rad], qd (6,) [rad/s]."""
+        model, data = self._model, self._data
+        self._qpos[:] = q
+        self._qvel[:] = qd
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        rate = np.empty((6, 6))
+        point = np.array(self._tcp_pose(tcp)[:3])
+        mujoco.mj_jacDot(model, data, rate[:3], rate[3:], point, self._flange_link)
+        return rate
+
     def inverse(
         self, pose: Sequence[float], q_near: Sequence[float], tcp: Sequence[float] | None = None
     ) -> Vector6 | None:

@@ -105,9 +105,9 @@ class Drives:
         self.coulomb = self._friction.coulomb
         self.target_moment = self.target_current = ZERO6
 
-    def set_payload(self, mass: float, cog: Vector3) -> None:
-        """Declare the payload to the controller's model: mass [kg], centre in the flange frame [m]."""
-        self._dynamics.set_payload(mass, cog)
+    def set_payload(self, mass: float, cog: Vector3, inertia: Vector6) -> None:
+        """Declare the payload to the controller's model, see `set_payload_body`."""
+        self._dynamics.set_payload(mass, cog, inertia)
 
     def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
         """Set the joint ranges that freedrive keeps [rad]."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.calibration import Calibration, calibrated_dh
 from ur_emulator.models.mjcf import arm_spec
-from ur_emulator.models.robot_model import RobotModel, Vector3
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
 from ur_emulator.plant.payload import set_payload_body
 
 
@@ -30,9 +30,9 @@ class InverseDynamics:
         self.torque: NDArray[np.float64] = np.zeros(6)
         """Result of the last evaluation (6,) [Nm]."""
 
-    def set_payload(self, mass: float, cog: Vector3) -> None:
-        """Set the payload at the flange: mass [kg], centre of gravity in the flange frame [m]."""
-        set_payload_body(self._model, mass, cog)
+    def set_payload(self, mass: float, cog: Vector3, inertia: Vector6 = ZERO6) -> None:
+        """Set the payload at the flange, see `set_payload_body`."""
+        set_payload_body(self._model, mass, cog, inertia)
 
     def evaluate(
         self, q: NDArray[np.float64], qd: NDArray[np.float64], qdd: NDArray[np.float64]

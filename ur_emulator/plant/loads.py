@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ur_emulator.errors import PlantError
 from ur_emulator.models.mjcf import FLANGE, GRAVITY, LINKS
-from ur_emulator.models.robot_model import Vector3
+from ur_emulator.models.robot_model import Vector3, Vector6
 from ur_emulator.plant.payload import check_payload, set_payload_body
 
 
@@ -39,7 +39,7 @@ class Loads:
         self._declared: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
         self.is_unexpected = False
 
-    def declare(self, mass: float, cog: Vector3) -> None:
+    def declare(self, mass: float, cog: Vector3, inertia: Vector6) -> None:
         """Set the payload that the controller assumes, and the true one unless `attach` has set it.
 
         Raises:
@@ -48,7 +48,7 @@ class Loads:
         check_payload(mass, cog)
         self._declared = (mass, cog)
         if self._hung is None:
-            set_payload_body(self._model, mass, cog)
+            set_payload_body(self._model, mass, cog, inertia)
 
     def attach(self, mass: float, cog: Vector3) -> None:
         """Set the true payload, which the controller does not know.

@@ -184,19 +184,20 @@ class Plant:
         """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
         return self._physics.touches(q)
 
-    def set_payload(self, mass: float, cog: Vector3) -> None:
+    def set_payload(self, mass: float, cog: Vector3, inertia: Vector6 = ZERO6) -> None:
         """Set the payload that the controller assumes, and the true one unless `attach_load` has set it.
 
         Args:
             mass: [kg].
             cog: centre of gravity in the flange frame [m].
+            inertia: see `set_payload_body`.
 
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
         self._undo_run_ahead()
-        self._physics.loads.declare(mass, cog)
-        self._drives.set_payload(mass, cog)
+        self._physics.loads.declare(mass, cog, inertia)
+        self._drives.set_payload(mass, cog, inertia)
 
     def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
         """Set the joint ranges that freedrive keeps [rad]."""

@@ -8,6 +8,7 @@ from typing import Any
 from ur_emulator.controller.io.encoders import PULSE_INPUTS, RANGES, Decoder, Encoders
 from ur_emulator.controller.io.lines import InputOutput
 from urscript.errors import ScriptRuntimeError
+from urscript.values import wrap_int
 
 # The encoder of the old forms.
 _CONVEYOR = 0
@@ -44,6 +45,14 @@ def encoder_functions(encoders: Encoders, io: InputOutput) -> Mapping[str, Calla
             )
         encoder.set_count(float(count))
 
+    def get_tick_count(thread: object, index: float, opt: str = "") -> float:
+        count = encoders.encoders[int(index)].count
+        if opt not in ("", "raw"):
+            raise ScriptRuntimeError(
+                f'encoder_get_tick_count: opt "{opt}" does not exist; allowed: "" and "raw"'
+            )
+        return wrap_int(int(count)) if opt else count
+
     def unwind(thread: object, index: float, delta: float) -> float | None:
         encoder = encoders.encoders[int(index)]
         return encoder.unwind(float(delta)) if encoder.is_enabled else None
@@ -62,7 +71,7 @@ def encoder_functions(encoders: Encoders, io: InputOutput) -> Mapping[str, Calla
         "encoder_enable_pulse_decode": enable_pulse_decode,
         "encoder_enable_set_tick_count": enable_set_tick_count,
         "encoder_set_tick_count": set_tick_count,
-        "encoder_get_tick_count": lambda thread, index: encoders.encoders[int(index)].count,
+        "encoder_get_tick_count": get_tick_count,
         "encoder_unwind_delta_tick_count": unwind,
         "conveyor_pulse_decode": lambda thread, kind, a, b: enable_pulse_decode(
             thread, _CONVEYOR, kind, a, b

@@ -95,8 +95,11 @@ def _actions(configuration: IoConfiguration) -> dict[str, Function]:
 
 def _runstates(configuration: IoConfiguration) -> dict[str, Function]:
     def setter(kind: OutputKind, name: str) -> Function:
+        # The catalogue checks the codes of the others, which the e-Series has more of.
+        allowed = range(4) if kind in (OutputKind.GP_INTEGER, OutputKind.GP_FLOAT) else tuple(RunState)
+
         def set_runstate(thread: object, output: float, code: float) -> None:
-            if code not in tuple(RunState):
+            if code not in allowed:
                 raise ScriptRuntimeError(f"{name}: state {code:g} does not exist; allowed: 0 to 3")
             configuration.set_rule(kind, int(output), RunState(int(code)))
 

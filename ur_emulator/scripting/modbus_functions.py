@@ -25,6 +25,7 @@ from ur_emulator.controller.io.modbus_signals import (
 from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.scripting.network import Network
 from urscript.errors import ScriptRuntimeError
+from urscript.values import is_number, log_form
 
 Function = Callable[..., Any]
 
@@ -58,9 +59,22 @@ def modbus_functions(
 
 def _definitions(modbus: ModbusSignals, network: Network) -> dict[str, Function]:
     def add_signal(
-        thread: object, ip: str, slave: float, address: float, kind: float, name: str, sequential: bool
+        thread: object,
+        ip: str,
+        slave: float,
+        address: float,
+        kind: float,
+        name: str,
+        sequential: bool,
+        register_count: float = 1,
     ) -> None:
         builtin = "modbus_add_signal"
+        if kind not in tuple(SignalType):
+            raise ScriptRuntimeError(f"{builtin}: signal_type {kind:g} is not modelled; allowed: 0 to 3")
+        if register_count != 1:
+            raise ScriptRuntimeError(
+                f"{builtin}: register_count {register_count:g} is not modelled; allowed: 1"
+            )
         if not 0 < len(name) <= MAX_NAME:
             raise ScriptRuntimeError(
                 f'{builtin}: "{name}" is not a signal name; allowed: 1 to {MAX_NAME} characters'
@@ -97,15 +111,17 @@ def _values(modbus: ModbusSignals) -> dict[str, Function]:
         _require_answers(builtin, signal)
         return bool(signal.value) if signal.type.is_digital else signal.value
 
-    def set_output_signal(thread: object, name: str, value: bool, is_secondary: bool) -> None:
+    def set_output_signal(thread: object, name: str, value: Any, is_secondary: bool) -> None:
         builtin = "modbus_set_output_signal"
+        if not isinstance(value, bool):
+            raise ScriptRuntimeError(f"{builtin}: {log_form(value)} is not modelled; allowed: True or False")
         _set(builtin, _signal(modbus, builtin, name, SignalType.DIGITAL_OUTPUT), int(value))
 
-    def set_output_register(thread: object, name: str, value: float, is_secondary: bool) -> None:
+    def set_output_register(thread: object, name: str, value: Any, is_secondary: bool) -> None:
         builtin = "modbus_set_output_register"
-        if not 0 <= value <= WORD_MAX:
+        if not is_number(value) or not 0 <= value <= WORD_MAX:
             raise ScriptRuntimeError(
-                f"{builtin}: {value} does not fit into a register; allowed: 0 to {WORD_MAX}"
+                f"{builtin}: {log_form(value)} does not fit into a register; allowed: 0 to {WORD_MAX}"
             )
         _set(builtin, _signal(modbus, builtin, name, SignalType.REGISTER_OUTPUT), int(value))
 
@@ -123,7 +139,7 @@ def _values(modbus: ModbusSignals) -> dict[str, Function]:
 def _settings(modbus: ModbusSignals, configuration: IoConfiguration, clock: Clock) -> dict[str, Function]:
     def set_update_frequency(thread: object, name: str, frequency: float) -> None:
         signal = _signal(modbus, "modbus_set_signal_update_frequency", name)
-        signal.frequency = float(frequency)
+        signal.frequency = max(0.0, float(frequency))
         signal.due = clock.tick
 
     def set_input_action(thread: object, name: str, action: str) -> None:

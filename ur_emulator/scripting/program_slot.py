@@ -52,6 +52,7 @@ class ProgramSlot:
         self._phase = ProgramState.PLAYING
         self._phase_since = 0
         self._is_loaded = False
+        self._is_unscheduled = False
         self.name = ""
         self.reports_line = False
         self.latest: RunningProgram | None = None
@@ -123,11 +124,11 @@ class ProgramSlot:
         self._state.io_configuration.program_started()
         self._state.events.append(ProgramStarted(program.name, self._primary))
 
-    def stop(self) -> None:
+    def stop(self, *, unscheduled: bool = False) -> None:
         """End the primary program, if one runs, and stop the arm, also on its last segment to a waypoint."""
         if self._primary is not None:
             self._primary.kill()
-            self._end()
+            self._end(unscheduled=unscheduled)
         self._state.motion.stop(self._state.robot.stop_deceleration)
 
     def pause(self, deceleration: float = 0.0) -> None:
@@ -138,6 +139,7 @@ class ProgramSlot:
         """
         if self._primary is not None and self._phase not in _STANDS_STILL:
             self._state.motion.pause(deceleration)
+            self._is_unscheduled = False
             self._enter(ProgramState.PAUSING)
 
     def interrupt(self) -> None:
@@ -147,8 +149,9 @@ class ProgramSlot:
         the maker's client library wait for that, and drivers tell their users to send the program again.
         """
         if self._primary is None or not self._is_loaded:
-            self.stop()
+            self.stop(unscheduled=True)
             return
+        self._is_unscheduled = True
         self._state.motion.interrupt(self._state.robot.stop_deceleration)
         if self._phase not in _STANDS_STILL:
             self._enter(ProgramState.PAUSING)
@@ -184,9 +187,10 @@ class ProgramSlot:
             self._state.clock.advance_program()
             status = self._primary.step()
             if status is not ProgramStatus.RUNNING:
-                if status is ProgramStatus.FAILED:
+                has_failed = status is ProgramStatus.FAILED
+                if has_failed:
                     self._report(self._primary)
-                self._end()
+                self._end(unscheduled=has_failed)
 
     def _may_run(self) -> bool:
         """Advance towards a pause or out of it; return whether the threads run in this cycle."""
@@ -194,7 +198,7 @@ class ProgramSlot:
         is_new = self._phase_since == state.clock.tick
         if self._phase is ProgramState.PAUSING and not is_new and state.motion.is_paused:
             self._enter(ProgramState.PAUSED)
-            state.io_configuration.program_stopped()
+            state.io_configuration.program_stopped(unscheduled=self._is_unscheduled)
             state.events.append(ProgramPaused(self.name))
         if self._phase in _STANDS_STILL or state.motion.is_returning:
             return False
@@ -213,10 +217,10 @@ class ProgramSlot:
             ScriptFailed(error.line, error.column, error.wire_text, secondary, error.log_text)
         )
 
-    def _end(self) -> None:
+    def _end(self, *, unscheduled: bool) -> None:
         self._primary = None
         self._state.compliance.program_ended()
-        self._state.io_configuration.program_stopped()
+        self._state.io_configuration.program_stopped(unscheduled=unscheduled)
         self._state.watchdogs.clear()
         self._state.error_settings.program_ended()
         self._state.events.append(ProgramStopped(self.name))

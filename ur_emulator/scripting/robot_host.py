@@ -9,7 +9,7 @@ from ur_emulator.controller.events import TextPrinted
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.compliance_functions import compliance_functions
 from ur_emulator.scripting.conveyor_functions import ProgramConveyor
-from ur_emulator.scripting.e_series_functions import e_series_functions
+from ur_emulator.scripting.dynamics_functions import dynamics_functions
 from ur_emulator.scripting.encoder_functions import encoder_functions
 from ur_emulator.scripting.error_functions import error_functions
 from ur_emulator.scripting.io_configuration_functions import io_configuration_functions
@@ -25,6 +25,7 @@ from ur_emulator.scripting.settings_functions import settings_functions
 from ur_emulator.scripting.socket_functions import ProgramSockets
 from ur_emulator.scripting.speed_functions import speed_functions
 from ur_emulator.scripting.state_functions import state_functions
+from ur_emulator.scripting.tool_functions import tool_functions
 from ur_emulator.scripting.watchdog_functions import watchdog_functions
 from urscript.builtins import pure_builtins
 
@@ -46,14 +47,14 @@ class RobotHost:
         self._sockets = ProgramSockets(state.clock, state.events, network)
         self._remotes = ProgramRemotes(network, state.clock)
         self._conveyor = ProgramConveyor(arm, state.encoders, state.clock)
-        settings = settings_functions(state.robot, state.tool, state.requests)
         self._builtins: Mapping[str, Callable[..., Any]] = {
             **motion_functions(arm, state.place_arm, state.events),
             **speed_functions(arm, self.step_time),
             **state_functions(arm, state.past, self.step_time),
             **compliance_functions(arm, state.compliance, state.force_sense, state.past),
-            **settings,
-            **e_series_functions(state.tool, settings["set_payload"]),
+            **dynamics_functions(arm, state.dynamics, state.past),
+            **settings_functions(state.robot, state.tool, state.requests, self.step_time),
+            **tool_functions(state.io),
             **io_functions(state.io),
             **register_functions(state.registers),
             **io_configuration_functions(state.io, state.io_configuration),

@@ -131,7 +131,7 @@ _INPUTS_OUTPUTS: tuple[Builtin, ...] = (
         "how the tool outputs drive",
         since=NOT_CB3,
         support=APPROXIMATE,
-        note="kept; outputs have a level only",
+        note="kept and reported; outputs have a level only",
         undocumented=(Generation.E_SERIES,),
         source=POLYSCOPE_EXPORT,
     ),
@@ -142,7 +142,7 @@ _INPUTS_OUTPUTS: tuple[Builtin, ...] = (
         "how one tool output drives",
         since=NOT_CB3,
         support=APPROXIMATE,
-        note="kept; outputs have a level only",
+        note="kept and reported; outputs have a level only",
         undocumented=(Generation.E_SERIES,),
         source=POLYSCOPE_EXPORT,
     ),
@@ -401,6 +401,8 @@ _MODBUS: tuple[Builtin, ...] = (
         "supervise a signal of a Modbus server",
         since=LATE_E_SERIES,
         source=MANUAL_LATE,
+        support=APPROXIMATE,
+        note="one register a signal; one connection a server; the IP may be a name and may have a :port",
     ),
     _row("modbus_delete_signal", (_SIGNAL,), "None", "forget a signal", support=EXACT),
     *(
@@ -413,12 +415,12 @@ _MODBUS: tuple[Builtin, ...] = (
             since=since,
             until=until,
             source=source,
-            support=support,
-            note="a run-time error once no valid answer has come for 2 s" if support is APPROXIMATE else "",
+            support=APPROXIMATE,
+            note="a run-time error once no valid answer has come for 2 s" + more,
         )
-        for since, until, secondary, source, value, support in (
-            (_FIRST, _UNTIL_LATE, _SECONDARY, "", None, APPROXIMATE),
-            (LATE_E_SERIES, releases(), _SECONDARY_OPTIONAL, MANUAL_LATE, ANY, Support.DECLARED_ONLY),
+        for since, until, secondary, source, value, more in (
+            (_FIRST, _UNTIL_LATE, _SECONDARY, "", None, ""),
+            (LATE_E_SERIES, releases(), _SECONDARY_OPTIONAL, MANUAL_LATE, ANY, "; one value, no lists"),
         )
         for name, params, returns, summary in (
             ("modbus_get_signal_status", (), "bool or int", "last value of a signal"),
@@ -450,6 +452,7 @@ _MODBUS: tuple[Builtin, ...] = (
         "None",
         "how often a signal is refreshed",
         since=NOT_CB3,
+        support=EXACT,
     ),
     _row(
         "modbus_set_digital_input_action",

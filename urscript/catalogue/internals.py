@@ -17,7 +17,7 @@ ANY, BOOL, INT, NUMBER, STRING = (
 )
 POSE, JOINTS, VECTOR3, VECTOR6 = ParamType.POSE, ParamType.JOINTS, ParamType.VECTOR3, ParamType.VECTOR6
 LIST, POSE_OR_JOINTS = ParamType.LIST, ParamType.POSE_OR_JOINTS
-EXACT, APPROXIMATE = Support.EXACT, Support.APPROXIMATE
+EXACT, APPROXIMATE, DECLARED = Support.EXACT, Support.APPROXIMATE, Support.DECLARED_ONLY
 BOTH = (Generation.CB3, Generation.E_SERIES)
 _WITH_3_14_3 = f"{MANUAL_E}, module internals; CB3: {DRIVER_SCRIPT}"
 
@@ -166,6 +166,7 @@ _STATE: tuple[Builtin, ...] = (
         "list of 6, kg m^2",
         "active payload inertia",
         since=releases(None, "5.10", "10.0"),
+        support=EXACT,
     ),
     _row("is_steady", (), "bool", "whether the target velocity has been zero for 0.5 s", support=EXACT),
     _row(
@@ -234,6 +235,8 @@ _SETTINGS: tuple[Builtin, ...] = (
         "active TCP offset from the flange",
         since=LATE_E_SERIES,
         source=MANUAL_LATE,
+        support=APPROXIMATE,
+        note="the name is not used",
     ),
     _row(
         "set_payload",
@@ -261,7 +264,7 @@ _SETTINGS: tuple[Builtin, ...] = (
         "None",
         "payload mass, centre of gravity and inertia at once",
         support=APPROXIMATE,
-        note="the inertia is checked and not used; it counts at once",
+        note="the arm carries what is declared; a transition is a straight line (chosen)",
         since=releases(None, "5.10", "10.0"),
         # The manual of 5.11 has no fourth parameter; the maker's driver gives it from 5.10 on.
         source=f"{MANUAL_E}, module internals, and the maker's driver script",
@@ -384,11 +387,13 @@ _STRINGS: tuple[Builtin, ...] = tuple(
     )
 )
 
+_LIGHT = "accepted without effect: no port shows the light"
+_MODEL = "of the model that the drives use, with the declared payload (chosen)"
 _JOINT_ARGUMENTS = (Param("q", JOINTS, None, "rad", shown="current joint positions"),)
 
 _LATER: tuple[Builtin, ...] = (
     *(
-        _row(name, params, returns, summary, since=since, source=MANUAL_LATE)
+        _row(name, params, returns, summary, since=since, source=MANUAL_LATE, support=support, note=note)
         for since, rows in (
             (
                 releases(None, "5.15", "10.0"),
@@ -398,31 +403,65 @@ _LATER: tuple[Builtin, ...] = (
                         (Param("a", VECTOR3, unit="m/s^2"),),
                         "None",
                         "acceleration of the base",
+                        APPROXIMATE,
+                        "kept only; the base of the simulated arm never moves",
                     ),
                     (
                         "estimate_payload",
                         (Param("poses", LIST, unit="at least four"), Param("wrenches", LIST)),
                         "struct(mass, cog)",
                         "payload from wrenches measured at several poses",
+                        DECLARED,
+                        "",
                     ),
-                    ("high_holding_torque_disable", (), "None", "hold with less torque at rest"),
-                    ("high_holding_torque_enable", (), "None", "hold with full torque at rest"),
-                    ("set_baselight_off", (), "None", "base light off (UR20, UR30)"),
-                    ("set_baselight_iec", (), "None", "base light shows the state (UR20, UR30)"),
+                    (
+                        "high_holding_torque_disable",
+                        (),
+                        "None",
+                        "hold with less torque at rest",
+                        DECLARED,
+                        "",
+                    ),
+                    ("high_holding_torque_enable", (), "None", "hold with full torque at rest", DECLARED, ""),
+                    ("set_baselight_off", (), "None", "base light off (UR20, UR30)", APPROXIMATE, _LIGHT),
+                    (
+                        "set_baselight_iec",
+                        (),
+                        "None",
+                        "base light shows the state (UR20, UR30)",
+                        APPROXIMATE,
+                        _LIGHT,
+                    ),
                     (
                         "set_baselight_solid",
                         tuple(Param(colour, INT, unit="0 to 255", low=0, high=255) for colour in "rgb"),
                         "None",
                         "base light in one colour (UR20, UR30)",
+                        APPROXIMATE,
+                        _LIGHT,
                     ),
                 ),
             ),
             (
                 releases(None, "5.17", "10.0"),
                 (
-                    ("get_tool_temp", (), "float, degree C", "tool temperature"),
-                    ("get_gravity", (), "list of 3, m/s^2", "gravity in force"),
-                    ("get_base_acceleration", (), "list of 3, m/s^2", "base acceleration in force"),
+                    (
+                        "get_tool_temp",
+                        (),
+                        "float, degree C",
+                        "tool temperature",
+                        APPROXIMATE,
+                        "that of the last joint",
+                    ),
+                    ("get_gravity", (), "list of 3, m/s^2", "gravity in force", EXACT, ""),
+                    (
+                        "get_base_acceleration",
+                        (),
+                        "list of 3, m/s^2",
+                        "base acceleration in force",
+                        EXACT,
+                        "",
+                    ),
                 ),
             ),
             (
@@ -433,39 +472,61 @@ _LATER: tuple[Builtin, ...] = (
                         (),
                         "list of 6, rad/s^2",
                         "measured joint accelerations",
+                        APPROXIMATE,
+                        "of a parabola through the positions of the last 20 ms, so 10 ms old; chosen",
                     ),
                     (
                         "get_target_joint_accelerations",
                         (),
                         "list of 6, rad/s^2",
                         "commanded joint accelerations",
+                        EXACT,
+                        "",
                     ),
                 ),
             ),
         )
-        for name, params, returns, summary in rows
+        for name, params, returns, summary, support, note in rows
     ),
     *(
-        _row(name, params, returns, summary, since=releases(None, "5.23", "10.11"), source=MANUAL_LATE)
-        for name, params, returns, summary in (
-            ("get_jacobian", (*_JOINT_ARGUMENTS, _ACTIVE_TCP), "matrix 6 x 6", "geometric Jacobian in base"),
+        _row(
+            name,
+            params,
+            returns,
+            summary,
+            since=releases(None, "5.23", "10.11"),
+            source=MANUAL_LATE,
+            support=APPROXIMATE if note else EXACT,
+            note=note,
+        )
+        for name, params, returns, summary, note in (
+            (
+                "get_jacobian",
+                (*_JOINT_ARGUMENTS, _ACTIVE_TCP),
+                "matrix 6 x 6",
+                "geometric Jacobian in base",
+                "",
+            ),
             (
                 "get_jacobian_time_derivative",
                 (*_JOINT_ARGUMENTS, Param("qd", JOINTS, None, "rad/s", shown="current speeds"), _ACTIVE_TCP),
                 "matrix 6 x 6",
                 "time derivative of the Jacobian",
+                "",
             ),
             (
                 "get_mass_matrix",
                 (*_JOINT_ARGUMENTS, Param("include_rotors_inertia", BOOL, False)),
                 "matrix 6 x 6, kg m^2",
                 "joint space inertia",
+                _MODEL,
             ),
             (
                 "get_coriolis_and_centrifugal_torques",
                 (*_JOINT_ARGUMENTS, Param("qd", JOINTS, None, "rad/s", shown="current speeds")),
                 "list of 6, Nm",
                 "torques due to motion",
+                _MODEL,
             ),
         )
     ),

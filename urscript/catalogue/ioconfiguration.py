@@ -8,7 +8,7 @@ from .versions import CB3_ONLY, NOT_CB3, Generation, PerGeneration
 
 _row = Chapter("ioconfiguration").row
 
-EXACT, APPROXIMATE, DECLARED = Support.EXACT, Support.APPROXIMATE, Support.DECLARED_ONLY
+EXACT, APPROXIMATE = Support.EXACT, Support.APPROXIMATE
 INT, NUMBER, STRING, LIST = ParamType.INT, ParamType.NUMBER, ParamType.STRING, ParamType.LIST
 
 _KEPT = "kept as configuration; without effect, since the arm is not guided by hand"
@@ -104,7 +104,7 @@ def _runstate_rows(since: PerGeneration, last_choice: int) -> tuple[Builtin, ...
                 "None",
                 "what an output does when programs start and stop",
                 since=since,
-                support=EXACT if since is CB3_ONLY else DECLARED,
+                support=EXACT,
             )
             for output, last in outputs
         ),
@@ -117,7 +117,7 @@ def _runstate_rows(since: PerGeneration, last_choice: int) -> tuple[Builtin, ...
             "None",
             "what a Modbus output does when programs start and stop",
             since=since,
-            support=EXACT if since is CB3_ONLY else DECLARED,
+            support=EXACT,
         ),
     )
 

@@ -439,6 +439,8 @@ _CONVEYORS: tuple[Builtin, ...] = (
         "the filtered or the raw count",
         since=LATE_E_SERIES,
         source=MANUAL_LATE,
+        support=APPROXIMATE,
+        note="not filtered",
     ),
     _row(
         "encoder_unwind_delta_tick_count",

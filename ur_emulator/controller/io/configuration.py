@@ -89,25 +89,23 @@ class IoConfiguration:
             self._rules.pop((kind, index), None)
         else:
             self._rules[kind, index] = rule
-            self._apply(kind, index, rule)
+            self._set(kind, index, level(rule, self.program_runs))
 
     def program_started(self) -> None:
         """Set the outputs that follow the program."""
-        self.program_runs = True
-        self._apply_all()
+        self._follow(program_runs=True)
 
-    def program_stopped(self) -> None:
-        """Set the outputs that follow the program."""
-        self.program_runs = False
-        self._apply_all()
+    def program_stopped(self, *, unscheduled: bool = False) -> None:
+        """Set the outputs that follow the program; `unscheduled` as in `run_states.level`."""
+        self._follow(program_runs=False, unscheduled=unscheduled)
 
-    def _apply_all(self) -> None:
-        self.modbus.follow(self.program_runs)
+    def _follow(self, *, program_runs: bool, unscheduled: bool = False) -> None:
+        self.program_runs = program_runs
+        self.modbus.follow(program_runs, unscheduled=unscheduled)
         for (kind, index), rule in self._rules.items():
-            self._apply(kind, index, rule)
+            self._set(kind, index, level(rule, program_runs, unscheduled=unscheduled))
 
-    def _apply(self, kind: OutputKind, index: int, rule: RunState) -> None:
-        is_high = level(rule, self.program_runs)
+    def _set(self, kind: OutputKind, index: int, is_high: bool | None) -> None:
         if is_high is None:
             return
         match kind:

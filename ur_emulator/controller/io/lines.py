@@ -128,6 +128,8 @@ class InputOutput:
         digital_out: word of the digital outputs.
         analog: all analogue lines; the three lists below are its parts.
         tool_voltage: supply of the tool: 0, 12 or 24 V.
+        tool_output_modes: how the tool outputs drive: 0 each by itself, 1 both as power; then of each output
+            1 sinking, 2 sourcing, 3 push-pull. It is only reported.
         flags: of the scripts.
         euromap: signals to and from a moulding machine.
     """
@@ -139,6 +141,7 @@ class InputOutput:
     analog_out: list[AnalogLine] = field(init=False)
     tool_analog_in: list[AnalogLine] = field(init=False)
     tool_voltage: int = 0
+    tool_output_modes: tuple[int, int, int] = (0, 1, 1)
     flags: list[bool] = field(default_factory=lambda: [False] * 32)
     euromap: Euromap = field(default_factory=Euromap)
 
@@ -172,3 +175,8 @@ class InputOutput:
     def set_tool_voltage(self, voltage: int) -> None:
         """Set the supply of the tool [V]: 0, 12 or 24."""
         self.tool_voltage = voltage
+
+    def set_tool_output_mode(self, index: int, mode: int) -> None:
+        """Set one of `tool_output_modes`."""
+        modes = self.tool_output_modes
+        self.tool_output_modes = (*modes[:index], mode, *modes[index + 1 :])  # type: ignore[assignment]

@@ -174,12 +174,12 @@ class ModbusSignals:
     def set_rule(self, signal: ModbusSignal, rule: RunState, program_runs: bool) -> None:
         """Let an output follow the program; it takes its value for the present state at once."""
         signal.rule = rule
-        self._follow(signal, program_runs)
+        self._set_level(signal, level(rule, program_runs))
 
-    def follow(self, program_runs: bool) -> None:
-        """Set the outputs that follow the program, which has started or ended."""
+    def follow(self, program_runs: bool, *, unscheduled: bool) -> None:
+        """Set the outputs that follow the program, which has started or ended; see `run_states.level`."""
         for signal in self.signals.values():
-            self._follow(signal, program_runs)
+            self._set_level(signal, level(signal.rule, program_runs, unscheduled=unscheduled))
 
     def send(
         self,
@@ -202,8 +202,7 @@ class ModbusSignals:
         """True while a digital input with the action "freedrive" is high, and its unit answers."""
         return any(s.action == FREEDRIVE_ACTION and s.value and not s.trouble for s in self.signals.values())
 
-    def _follow(self, signal: ModbusSignal, program_runs: bool) -> None:
-        is_high = level(signal.rule, program_runs)
+    def _set_level(self, signal: ModbusSignal, is_high: bool | None) -> None:
         if is_high is not None:
             self.set_output(signal, int(is_high))
 

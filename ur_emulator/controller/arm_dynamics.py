@@ -1,0 +1,68 @@
+"""ArmDynamics: the controller's dynamic model of the arm, with the declared payload, as programs can ask it.
+
+It is the model that the drives' feed-forward uses: calibrated geometry, masses and inertias of the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_emulator.controller.tool_settings import Payload, ToolSettings
+from ur_emulator.models.calibration import Calibration
+from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.plant.inverse_dynamics import InverseDynamics
+
+_STILL = np.zeros(6)
+
+
+class ArmDynamics:
+    """Answers about the arm's dynamics; the model is built at the first question.
+
+    Args:
+        robot: type of the arm.
+        calibration: that the controller knows.
+        tool: has the payload.
+    """
+
+    def __init__(self, robot: RobotModel, calibration: Calibration, tool: ToolSettings) -> None:
+        self._robot = robot
+        self._calibration = calibration
+        self._tool = tool
+        self._payload: Payload | None = None
+
+    def mass_matrix(self, q: Sequence[float], *, with_rotors: bool) -> NDArray[np.float64]:
+        """Return the joint-space inertia (6, 6) [kg m²].
+
+        Args:
+            q: joint angles (6,) [rad].
+            with_rotors: with the inertia of rotors and gears, as felt at the joints.
+        """
+        gravity = self._torque(q, _STILL, _STILL)
+        columns = [self._torque(q, _STILL, axis) - gravity for axis in np.eye(6)]
+        matrix = np.column_stack(columns)
+        if not with_rotors:
+            matrix -= np.diag(self._robot.armature)
+        symmetric: NDArray[np.float64] = 0.5 * (matrix + matrix.T)
+        return symmetric
+
+    def velocity_torque(self, q: Sequence[float], qd: Sequence[float]) -> NDArray[np.float64]:
+        """Return the Coriolis and centrifugal torques (6,) [Nm] at q (6,) [rad] and qd (6,) [rad/s]."""
+        moving = self._torque(q, np.array(qd, dtype=np.float64), _STILL)
+        return moving - self._torque(q, _STILL, _STILL)
+
+    def _torque(
+        self, q: Sequence[float], qd: NDArray[np.float64], qdd: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        payload = self._tool.payload
+        if payload is not self._payload:
+            self._payload = payload
+            self._model.set_payload(payload.mass, payload.cog, payload.inertia)
+        return self._model.evaluate(np.array(q, dtype=np.float64), qd, qdd).copy()
+
+    @cached_property
+    def _model(self) -> InverseDynamics:
+        return InverseDynamics(self._robot, self._calibration)
