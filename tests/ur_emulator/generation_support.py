@@ -8,7 +8,7 @@ from protocol.primary.layout import ForceModeData
 from protocol.robot_api import CALLS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.robot_generation import ArmLimits, RobotGeneration, SafetyLimits
+from ur_emulator.models.robot_generation import ArmLimits, Electrics, RobotGeneration, SafetyLimits
 
 MISSING_BUILTIN = "popup"
 
@@ -29,6 +29,15 @@ SECOND = RobotGeneration(
         manual=ArmLimits(tool_speed=0.3),
         has_programs_in_recovery=False,
     ),
+    electrics=Electrics(
+        main_voltage=47.0,
+        robot_voltage=46.0,
+        joint_voltage=45.0,
+        idle_current=0.4,
+        joint_temperatures=(21.0, 22.0, 23.0, 24.0, 25.0, 26.0),
+    ),
+    gravity=9.82,
+    reports_control_as_target=True,
     has_operational_modes=True,
     has_remote_control=True,
     fidelities=tuple(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
+from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.ur3 import UR3
@@ -169,7 +170,7 @@ def test_force_drift_stays_in_its_bounds_without_jumps():
 
 
 def test_motors_warm_up_with_work_and_slowly():
-    idle, working = Thermometers(0.008), Thermometers(0.008)
+    idle, working = Thermometers(CB3), Thermometers(CB3)
     start = np.array(idle.reading)
     for _ in range(125 * 600):
         idle.step((0.0,) * 6)

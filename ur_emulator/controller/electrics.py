@@ -11,10 +11,10 @@ from math import exp
 
 from protocol.ur_types import JointMode
 from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
+from ur_emulator.models.robot_generation import Electrics
 
-# Voltage of the arm's bus and its current at rest, from captures of resting arms [V, A]; chosen: the drives
-# chop, so that a tenth of the joints' currents shows on the bus.
-BUS_VOLTAGE, IDLE_CURRENT, BUS_SHARE = 48.0, 0.25, 0.1
+# The part of the joints' currents that shows on the arm's bus, as the drives chop.
+BUS_SHARE = 0.1
 # What one high output of the box or one switched output of the tool carries [A]: a PLC's input.
 OUTPUT_CURRENT = 0.006
 # Resistance of what hangs at the tool's supply: 24 V give 60 mA, 12 V half of that [ohm].
@@ -33,9 +33,9 @@ TOOL_MODES: dict[int, JointMode] = {
 }
 
 
-def arm_current(joint_currents: Iterable[float]) -> float:
+def arm_current(supply: Electrics, joint_currents: Iterable[float]) -> float:
     """Return the current on the arm's bus [A] for those of the joints."""
-    return IDLE_CURRENT + BUS_SHARE * sum(map(abs, joint_currents))
+    return supply.idle_current + BUS_SHARE * sum(map(abs, joint_currents))
 
 
 def io_current(digital_out: int) -> float:

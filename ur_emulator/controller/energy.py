@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from protocol.ur_types import RobotMode
-from ur_emulator.controller.electrics import BUS_VOLTAGE, arm_current
+from ur_emulator.controller.electrics import arm_current
 from ur_emulator.controller.robot_mode import POWERED
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import Vector6
 
 
@@ -15,14 +16,15 @@ class EnergyMeter:
         consumed: energy [J].
     """
 
-    __slots__ = ("_joules_per_ampere", "consumed")
+    __slots__ = ("_joules_per_ampere", "_supply", "consumed")
 
-    def __init__(self, period_s: float) -> None:
-        """Begin with nothing; `period_s` is the control cycle [s]."""
-        self._joules_per_ampere = BUS_VOLTAGE * period_s
+    def __init__(self, generation: RobotGeneration) -> None:
+        """Begin with nothing; the generation has the control cycle and the voltage of the bus."""
+        self._supply = generation.electrics
+        self._joules_per_ampere = self._supply.robot_voltage * generation.period_s
         self.consumed = 0.0
 
     def step(self, mode: RobotMode, joint_currents: Vector6) -> None:
         """Add the energy of a cycle with these currents [A]."""
         if mode in POWERED:
-            self.consumed += self._joules_per_ampere * arm_current(joint_currents)
+            self.consumed += self._joules_per_ampere * arm_current(self._supply, joint_currents)

@@ -79,4 +79,5 @@ def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState
         gravity=tool.gravity,
         energy_consumed=state.energy.consumed,
         space=space,
+        supply=arm.robot.generation.electrics,
     )

@@ -20,6 +20,7 @@ from ur_emulator.controller.io.registers import RegisterValues
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION, torque_shares
 from ur_emulator.controller.safety.status_bits import RUNNING_STATES, robot_status_bits, safety_status_bits
+from ur_emulator.models.robot_generation import Electrics
 from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6, six
 
 
@@ -77,6 +78,7 @@ class _Fields(NamedTuple):
     energy_consumed: float
     # --- computed when it is read
     space: ArmInSpace
+    supply: Electrics
 
 
 class Snapshot(_Fields):
@@ -85,12 +87,11 @@ class Snapshot(_Fields):
     __slots__ = ()
 
     actual_execution_time = 0.0
-    actual_main_voltage = electrics.BUS_VOLTAGE
 
     def as_dict(self) -> dict[str, Any]:
         """Return all fields and all columns of the realtime interface by name."""
         fields = dict(zip(self._fields, self, strict=True))
-        del fields["space"]
+        del fields["space"], fields["supply"]
         return fields | {name: getattr(self, name) for name in SNAPSHOT_FIELDS}
 
     # --- the arm in space
@@ -138,14 +139,21 @@ class Snapshot(_Fields):
     # --- power
 
     @property
+    def actual_main_voltage(self) -> float:
+        """Voltage of the box [V]."""
+        return self.supply.main_voltage
+
+    @property
     def actual_robot_voltage(self) -> float:
         """Voltage of the arm's bus [V]."""
-        return electrics.BUS_VOLTAGE if self.robot_mode in POWERED else 0.0
+        return self.supply.robot_voltage if self.robot_mode in POWERED else 0.0
 
     @property
     def actual_robot_current(self) -> float:
         """Current on the arm's bus [A]."""
-        return electrics.arm_current(self.actual_current) if self.robot_mode in POWERED else 0.0
+        if self.robot_mode not in POWERED:
+            return 0.0
+        return electrics.arm_current(self.supply, self.actual_current)
 
     @property
     def actual_joint_voltage(self) -> Vector6:

@@ -136,7 +136,7 @@ def make_state(
         speed=speed,
         tool=tool,
         dynamics=ArmDynamics(robot, arm.calibration, tool),
-        energy=EnergyMeter(clock.period_s),
+        energy=EnergyMeter(clock.generation),
         io=io,
         registers=registers,
         io_configuration=io_configuration,

@@ -11,7 +11,7 @@ from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.fidelity import FIDELITIES
-from ur_emulator.models.robot_generation import UNLIMITED, Builds, RobotGeneration, SafetyLimits
+from ur_emulator.models.robot_generation import UNLIMITED, Builds, Electrics, RobotGeneration, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 
 _BUILDS: Builds = (
@@ -40,6 +40,15 @@ CB3 = RobotGeneration(
         manual=UNLIMITED,
         has_programs_in_recovery=True,  # chosen
     ),
+    electrics=Electrics(
+        main_voltage=48.0,  # captures of resting arms
+        robot_voltage=48.0,
+        joint_voltage=48.0,  # its drop along the arm's cable is small and left out
+        idle_current=0.25,  # chosen from the same captures
+        joint_temperatures=(28.0, 29.0, 31.0, 36.0, 38.0, 39.0),  # production log of a UR3 (thermometers.py)
+    ),
+    gravity=9.81,
+    reports_control_as_target=False,
     has_operational_modes=False,
     has_remote_control=False,
     fidelities=FIDELITIES,

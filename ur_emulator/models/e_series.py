@@ -1,4 +1,11 @@
-"""The e-Series generation: UR3e to UR30 with software 5.x."""
+"""The e-Series generation: UR3e to UR30 with software 5.x.
+
+Sources of its electrics and fidelities, cited by letter below:
+ A  Rows of a real UR3e (dsn-2022-rad-artifact, 25 Hz RTDE, 2021).
+ B  The same and records of a real UR10e (dynamic_calibration of S. Mamedov).
+ C  Chosen.
+Noise of encoders, speeds and currents: as in `fidelity.py`, whose source is a UR3e at 500 Hz.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +18,8 @@ from protocol.primary.layout import SUB_PACKAGES
 from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.models.fidelity import FIDELITIES
-from ur_emulator.models.robot_generation import ArmLimits, Builds, RobotGeneration, SafetyLimits
+from ur_emulator.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
+from ur_emulator.models.robot_generation import ArmLimits, Builds, Electrics, RobotGeneration, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 
 _BUILDS: Builds = (
@@ -29,6 +36,16 @@ _BUILDS: Builds = (
     (SoftwareVersion(5, 24), 1214860, datetime(2025, 10, 4, 0, 25, 33)),  # date: UR client library's bytes
 )
 
+_TYPICAL = replace(
+    TYPICAL,
+    dead_time=0.0,  # A: the drives add no dead time that shows
+    dead_time_spread=0.0,
+    drive_lag=0.0005,  # A: actual_q is .50 ms behind target_q
+    feedback_age=0.002,  # the package carries the state of one cycle before
+)
+_IDEAL = replace(IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
+_EXACT = replace(EXACT, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
+_POOR = replace(POOR, dead_time=0.002, dead_time_spread=0.002, drive_lag=0.002, feedback_age=0.004)  # C
 
 E_SERIES = RobotGeneration(
     name=Generation.E_SERIES.value,
@@ -48,18 +65,18 @@ E_SERIES = RobotGeneration(
         manual=ArmLimits(tool_speed=0.25),  # chosen: reduced speed of ISO 10218-1
         has_programs_in_recovery=False,  # UR5e hardware manual 2022
     ),
+    electrics=Electrics(
+        main_voltage=47.8,  # A
+        robot_voltage=47.9,  # A
+        joint_voltage=47.65,  # A: 47.5-47.8
+        idle_current=0.5,  # A: .69-1.28 A in motion
+        joint_temperatures=(34.0, 34.5, 36.0, 40.0, 41.0, 42.0),  # A: 34-43, wrists as on the UR3
+    ),
+    gravity=9.82,  # B: `target_moment` at rest
+    reports_control_as_target=True,  # A
     has_operational_modes=True,
     has_remote_control=True,
-    fidelities=tuple(
-        replace(
-            fidelity,
-            dead_time=fidelity.dead_time / 4.0,
-            dead_time_spread=fidelity.dead_time_spread / 4.0,
-            drive_lag=fidelity.drive_lag / 4.0,
-            feedback_age=fidelity.feedback_age / 4.0,
-        )
-        for fidelity in FIDELITIES
-    ),
+    fidelities=(_EXACT, _IDEAL, _TYPICAL, _POOR),
     robot_subtype=3,
     dashboard=COMMANDS,
     realtime=COLUMNS,

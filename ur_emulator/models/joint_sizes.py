@@ -2,7 +2,8 @@
 
 Sources, cited by letter below:
  A  Fits of the controller's own drive model to logs of a real UR10e (dynamic_calibration of S. Mamedov) and a
-    real UR3e (dsn-2022-rad-artifact): target torque against target current. Size 2 is in both and agrees.
+    real UR3e (dsn-2022-rad-artifact): target torque against target current. Size 2 is in both and agrees
+    within 1 %.
  B  UniversalRobots/Universal_Robots_ROS2_Description, config/*/joint_limits.yaml.
  C  Assumed for the joints of the UR20 and UR30, of which no log is known: the other sizes extrapolated by the
     rated torque. Rotor inertia grows with its power of 1.26; friction is proportional to it.
@@ -25,7 +26,8 @@ class JointSize:
         torque_constant: joint torque per motor current, gear included [Nm/A].
         armature: rotor and gear inertia as felt at the joint [kg m²].
         coulomb: Coulomb friction [Nm].
-        viscous: viscous friction [Nm s/rad].
+        viscous: viscous friction up to the kink at 0.5 rad/s [Nm s/rad].
+        viscous_fast: its slope beyond the kink [Nm s/rad].
     """
 
     tau_max: float
@@ -33,23 +35,40 @@ class JointSize:
     armature: float
     coulomb: float
     viscous: float
+    viscous_fast: float
 
 
 # A, B: wrists of a UR3e.
-SIZE_0 = JointSize(tau_max=9.0, torque_constant=3.600, armature=0.0712, coulomb=0.69, viscous=0.61)
+SIZE_0 = JointSize(
+    tau_max=9.0, torque_constant=3.600, armature=0.0712, coulomb=0.69, viscous=0.61, viscous_fast=0.63
+)
 # A, B: elbow of a UR3e.
-SIZE_1 = JointSize(tau_max=28.0, torque_constant=7.571, armature=0.2118, coulomb=1.52, viscous=2.08)
-# A, B: base and shoulder of a UR3e, wrists of a UR10e.
-SIZE_2 = JointSize(tau_max=54.0, torque_constant=10.79, armature=0.61, coulomb=3.15, viscous=3.8)
+SIZE_1 = JointSize(
+    tau_max=28.0, torque_constant=7.571, armature=0.2118, coulomb=1.52, viscous=2.08, viscous_fast=1.26
+)
+# A, B: wrists of a UR10e; base and shoulder of a UR3e have nearly the same numbers.
+SIZE_2 = JointSize(
+    tau_max=54.0, torque_constant=10.763, armature=0.61, coulomb=3.15, viscous=3.8, viscous_fast=2.6
+)
 # A, B: elbow of a UR10e.
-SIZE_3 = JointSize(tau_max=150.0, torque_constant=9.839, armature=1.93, coulomb=6.43, viscous=12.2)
+SIZE_3 = JointSize(
+    tau_max=150.0, torque_constant=9.839, armature=1.93, coulomb=6.43, viscous=12.2, viscous_fast=7.2
+)
 # A, B: base and shoulder of a UR10e.
-SIZE_4 = JointSize(tau_max=330.0, torque_constant=11.976, armature=5.95, coulomb=16.9, viscous=24.4)
+SIZE_4 = JointSize(
+    tau_max=330.0, torque_constant=11.976, armature=5.95, coulomb=16.9, viscous=24.4, viscous_fast=9.8
+)
 
 # B: torque. C: the rest.
-WRIST_OF_UR20 = JointSize(tau_max=107.0, torque_constant=10.8, armature=1.44, coulomb=5.5, viscous=8.0)
-ELBOW_OF_UR20 = JointSize(tau_max=433.0, torque_constant=12.0, armature=8.4, coulomb=22.0, viscous=32.0)
-BASE_OF_UR20 = JointSize(tau_max=738.0, torque_constant=12.0, armature=16.4, coulomb=37.0, viscous=55.0)
+WRIST_OF_UR20 = JointSize(
+    tau_max=107.0, torque_constant=10.8, armature=1.44, coulomb=5.5, viscous=8.0, viscous_fast=4.0
+)
+ELBOW_OF_UR20 = JointSize(
+    tau_max=433.0, torque_constant=12.0, armature=8.4, coulomb=22.0, viscous=32.0, viscous_fast=15.0
+)
+BASE_OF_UR20 = JointSize(
+    tau_max=738.0, torque_constant=12.0, armature=16.4, coulomb=37.0, viscous=55.0, viscous_fast=24.0
+)
 
 
 class DriveNumbers(TypedDict):
@@ -60,6 +79,9 @@ class DriveNumbers(TypedDict):
     armature: Vector6
     coulomb: Vector6
     viscous: Vector6
+    viscous_kink: float
+    viscous_fast: Vector6
+    reversal_speed: float
     coulomb_standstill: float
     coulomb_speed: float
     servo_frequency: float
@@ -74,8 +96,11 @@ def drives(*sizes: JointSize) -> DriveNumbers:
         armature=six([size.armature for size in sizes]),
         coulomb=six([size.coulomb for size in sizes]),
         viscous=six([size.viscous for size in sizes]),
-        coulomb_standstill=0.33,  # as for the UR5
-        coulomb_speed=0.08,
-        servo_frequency=12.0,  # assumed, as for the UR3
+        viscous_kink=0.5,  # A
+        viscous_fast=six([size.viscous_fast for size in sizes]),
+        reversal_speed=0.006,  # A: the sign has changed within .01-.015 rad/s
+        coulomb_standstill=1.0,  # A
+        coulomb_speed=1.0,  # without effect, as nothing is lost at standstill
+        servo_frequency=25.0,  # at 12 Hz the arm is further from its target than a real UR3e
         servo_damping=0.9,
     )

@@ -86,6 +86,25 @@ class SafetyLimits:
     has_programs_in_recovery: bool
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Electrics:
+    """What boxes of a generation measure of their own supply and of warm arms.
+
+    Attributes:
+        main_voltage: of the box [V].
+        robot_voltage: of the arm's bus, while it is powered [V].
+        joint_voltage: of the joints on that bus [V].
+        idle_current: of a powered arm whose motors give no torque [A].
+        joint_temperatures: of an arm that is powered and has been still for long [°C].
+    """
+
+    main_voltage: float
+    robot_voltage: float
+    joint_voltage: float
+    idle_current: float
+    joint_temperatures: tuple[float, float, float, float, float, float]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotGeneration:
     """One generation; its tables hold what any of its software versions has.
@@ -98,6 +117,9 @@ class RobotGeneration:
         default_version: what a box runs if the user names none.
         builds: which version has which build.
         limits: of the safety system.
+        electrics: of the box and its arms.
+        gravity: that the controller's model of the arm has [m/s²].
+        reports_control_as_target: `joint_control_output` is `target_current`, not what the servos ask for.
         has_operational_modes: manual and automatic mode, enabling device, automatic-mode safeguard.
         has_remote_control: local control, in which clients may not command the box, and remote control.
         fidelities: how far its arms are from perfect ones.
@@ -123,6 +145,9 @@ class RobotGeneration:
     default_version: str
     builds: Builds
     limits: SafetyLimits
+    electrics: Electrics
+    gravity: float
+    reports_control_as_target: bool
     has_operational_modes: bool
     has_remote_control: bool
     fidelities: tuple[Fidelity, ...]

@@ -100,7 +100,7 @@ class RobotModel:
         q_min: lower end of the joint range of the safety system [rad].
         q_max: upper end of the joint range of the safety system [rad].
         armature: rotor and gear inertia as felt at the joint [kg m²].
-        viscous: viscous friction [Nm s/rad].
+        viscous: viscous friction [Nm s/rad]; its slope at low speed where it has a kink.
         coulomb: Coulomb friction at speed [Nm].
         coulomb_standstill: share of the Coulomb friction that is left at standstill [1].
         coulomb_speed: speed over which friction rises from that share to the full value [rad/s].
@@ -116,6 +116,10 @@ class RobotModel:
         box_type: code of the control box, as above.
         home_q: a pose clear of the table, away from singularities [rad].
         first_version: oldest software that the maker has released for it; None: the generation's first.
+        reversal_speed: friction changes its sign over about this, in the controller's model [rad/s].
+        viscous_kink: joint speed beyond which viscous friction has another slope [rad/s]; None: it has one.
+        viscous_fast: that slope [Nm s/rad].
+        has_point_masses: the controller's model takes the links for points, without inertia tensors.
     """
 
     name: str
@@ -144,6 +148,15 @@ class RobotModel:
     box_type: int
     home_q: Vector6
     first_version: str | None = None
+    reversal_speed: float = 0.012
+    viscous_kink: float | None = None
+    viscous_fast: Vector6 = ZERO6
+    has_point_masses: bool = False
+
+    @property
+    def viscous_beyond_kink(self) -> Vector6:
+        """Slope of the viscous friction at high speed [Nm s/rad]."""
+        return self.viscous if self.viscous_kink is None else self.viscous_fast
 
     @property
     def qd_safety(self) -> Vector6:

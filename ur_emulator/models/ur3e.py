@@ -9,12 +9,15 @@ Sources, cited by letter below:
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 from ur_emulator.models.e_series import E_SERIES
 from ur_emulator.models.joint_ranges import FIRST_TURN, LAST_TURN, RANGE_END
 from ur_emulator.models.joint_sizes import SIZE_0, SIZE_1, SIZE_2, drives
 from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
+
+_SIZE_2 = replace(SIZE_2, torque_constant=10.827)  # C, of this arm
 
 UR3E = RobotModel(
     name="ur3e",
@@ -77,12 +80,13 @@ UR3E = RobotModel(
     qd_max=(pi, pi, pi, 2 * pi, 2 * pi, 2 * pi),  # B: 180 and 360 deg/s
     q_min=(*(-RANGE_END,) * 5, FIRST_TURN),  # wrist 3 is endless
     q_max=(*(RANGE_END,) * 5, LAST_TURN),
-    **drives(SIZE_2, SIZE_2, SIZE_1, SIZE_0, SIZE_0, SIZE_0),  # C
+    **drives(_SIZE_2, _SIZE_2, SIZE_1, SIZE_0, SIZE_0, SIZE_0),  # C
     stop_deceleration=20.0,  # as for the UR3
     # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
     servo_inertia=(0.852, 0.917, 0.377, 0.0817, 0.0733, 0.0713),
     payload_max=3.0,  # UR3e data sheet
     reach=0.5,
+    has_point_masses=True,  # C: its own log
     robot_type=3,  # UR client library
     box_type=6,
     # Elbow up, tool forward and 45 degrees down, flange at about (0.35, 0, 0.25) m.

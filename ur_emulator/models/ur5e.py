@@ -83,6 +83,7 @@ UR5E = RobotModel(
     servo_inertia=(3, 3.88, 2.73, 0.235, 0.217, 0.212),
     payload_max=5.0,  # UR5e data sheet
     reach=0.85,
+    has_point_masses=True,  # A calls the tensors of UR3e and UR5e negligible
     robot_type=1,  # client interface sheet, configuration data
     box_type=4,
     # Elbow up, tool forward and 45 degrees down, flange at about (.55, 0, .35) m.

@@ -20,7 +20,6 @@ from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.plant_state import PlantState, Target
-from ur_emulator.plant.sensors import SUPPLY_VOLTAGE
 
 
 class ExactPlant(Plant):
@@ -78,7 +77,7 @@ class ExactPlant(Plant):
                 actual_q=self._q,
                 actual_qd=self._qd,
                 actual_current=current,
-                joint_voltage=(SUPPLY_VOLTAGE,) * 6,
+                joint_voltage=(self.robot.generation.electrics.joint_voltage,) * 6,
                 tool_accelerometer=(x, y, z),
                 tcp_force=ZERO6,
                 joint_temperatures=self._thermometers.reading,

@@ -1,9 +1,10 @@
 """Joint friction: the true one, and the controller's model of it, which is not exact.
 
-Viscous friction is a joint damping in MuJoCo, Coulomb friction its frictionloss, whose size follows the
-speed: real joints lose two thirds of it towards standstill (see the robot's numbers), so they
-do not stick and slip. The controller compensates friction in its feed-forward with parameters that are off by
-what `Fidelity.friction_error` says.
+Viscous friction is a joint damping in MuJoCo, dry friction its frictionloss, whose size follows the speed:
+joints of a CB3 lose two thirds of it towards standstill (see the robot's numbers), so they do not stick and
+slip. On an e-Series arm the viscous friction grows faster up to a kink: the damping is the slope beyond it,
+the rest is part of the dry friction. The controller compensates friction in its feed-forward with parameters
+that are off by what `Fidelity.friction_error` says.
 """
 
 from __future__ import annotations
@@ -15,17 +16,17 @@ from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_model import RobotModel
 
-_REVERSAL_SPEED = 0.012  # rad/s; friction changes sign over about this, see `physics.py`
-
 
 class Friction:
-    """Evaluates true Coulomb friction and the controller's compensation together, once a cycle.
+    """Evaluates true dry friction and the controller's compensation together, once a cycle.
 
-        size(qd) = coulomb - lost exp(-|qd| / coulomb speed)
+        size(qd) = coulomb - lost exp(-|qd| / coulomb speed) + excess min(|qd|, kink)
         model(qd) = size(qd) tanh(qd / reversal speed) + viscous qd
 
+    `viscous` is the slope beyond the kink, `excess` by how much the one before it is greater.
+
     Attributes:
-        coulomb: true size of the Coulomb friction (6,) [Nm].
+        coulomb: true size of the dry friction (6,) [Nm].
         expected: friction that the controller expects at its target (6,) [Nm].
         compensation: torque that the drives add against friction (6,) [Nm].
     """
@@ -34,7 +35,7 @@ class Friction:
         errors = 1.0 + fidelity.friction_error * random_stream(seed, "friction").standard_normal((2, 6))
         # Greatest error of the model [1]: a worse one would be found at commissioning.
         errors = errors.clip(0.3, 1.7)
-        viscous = np.array(robot.viscous) * errors[0]
+        viscous = np.array(robot.viscous_beyond_kink) * errors[0]
         believed = np.array(robot.coulomb) * errors[1]
         # One row a use: the true size at the actual speed, the model at the speeds of target and set-point.
         # Constants have the full shape: broadcasting costs twice the arithmetic at this size.
@@ -42,7 +43,13 @@ class Friction:
         self._lost = self._coulomb * (1.0 - robot.coulomb_standstill)
         self._believed_viscous = np.array([viscous, viscous])
         self._per_speed = np.full((3, 6), -1.0 / robot.coulomb_speed)
-        self._per_reversal = np.full((2, 6), 1.0 / _REVERSAL_SPEED)
+        self._per_reversal = np.full((2, 6), 1.0 / robot.reversal_speed)
+        self._excess: NDArray[np.float64] | None = None
+        if robot.viscous_kink is not None:
+            excess = np.array(robot.viscous) - robot.viscous_beyond_kink
+            self._excess = np.array([excess, excess * errors[0], excess * errors[0]])
+            self._kinks = np.full((3, 6), robot.viscous_kink)
+            self._slow = np.zeros((3, 6))
         self._sizes = np.zeros((3, 6))
         self._beliefs = np.zeros((2, 6))
         self._viscous = np.zeros((2, 6))
@@ -61,10 +68,16 @@ class Friction:
         """Set the attributes for speeds (3, 6) [rad/s]: actual, of the target, of the set-point."""
         sizes, beliefs, viscous, believed_speeds = self._sizes, self._beliefs, self._viscous, speeds[1:]
         np.abs(speeds, sizes)
+        excess = self._excess
+        if excess is not None:
+            np.minimum(sizes, self._kinks, out=self._slow)
+            np.multiply(self._slow, excess, self._slow)
         np.multiply(sizes, self._per_speed, sizes)
         np.exp(sizes, sizes)
         np.multiply(sizes, self._lost, sizes)
         np.subtract(self._coulomb, sizes, sizes)
+        if excess is not None:
+            np.add(sizes, self._slow, sizes)
         np.multiply(believed_speeds, self._per_reversal, beliefs)
         np.tanh(beliefs, beliefs)
         np.multiply(beliefs, self._believed_sizes, beliefs)

@@ -1,7 +1,8 @@
 """InverseDynamics: the torque by the controller's own model of the arm.
 
 The model has the calibrated geometry, the table's masses, the declared payload and the rotors' inertia, but
-neither friction nor the true masses of the arm: the joint loops compensate its errors.
+neither friction nor the true masses of the arm: the joint loops compensate its errors. On small e-Series arms
+it takes the links for points.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ class InverseDynamics:
 
     def __init__(self, robot: RobotModel, calibration: Calibration) -> None:
         self._model = arm_spec(robot, calibrated_dh(robot, calibration), (1.0,) * 6).compile()
+        self._model.opt.gravity[2] = -robot.generation.gravity
+        if robot.has_point_masses:
+            self._model.body_inertia[:] = 0.0
         self._data = mujoco.MjData(self._model)
         self._armature = np.array(robot.armature)
         self._rotor = np.zeros(6)

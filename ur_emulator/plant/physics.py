@@ -119,7 +119,7 @@ def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:
     for i, name in enumerate(JOINTS):
         joint = spec.joint(name)
         joint.armature = robot.armature[i]
-        joint.damping = [robot.viscous[i], 0.0, 0.0]
+        joint.damping = [robot.viscous_beyond_kink[i], 0.0, 0.0]
         joint.frictionloss = robot.coulomb[i]
         joint.solref_friction = _FRICTION_SOLREF
         joint.solimp_friction = _FRICTION_SOLIMP

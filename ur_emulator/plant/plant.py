@@ -95,7 +95,7 @@ class Plant:
         )
         self._gear = (GearWithPlay if fidelity.backlash else GearRipple)(fidelity, seed)
         self._sensors = Sensors(robot, fidelity, seed, self.period_s)
-        self._thermometers = Thermometers(self.period_s)
+        self._thermometers = Thermometers(generation)
 
         # The measurement is taken in this sub-step of a cycle and reported so many cycles later.
         age_substeps = max(1, round(fidelity.feedback_age / substep))
@@ -104,6 +104,7 @@ class Plant:
         self._records = deque(Record() for _ in range(1 + (age_substeps - 1) // self._n_substeps))
         self._read_at = 1 % len(self._records)
 
+        self._reports_control_as_target = generation.reports_control_as_target
         self._per_torque = 1.0 / np.array(robot.torque_constant)
         self._currents = np.zeros(6)
         # Below this no joint can be at its torque limit [A].
@@ -319,7 +320,11 @@ class Plant:
         Args:
             before: what `sense` gave in the cycle before.
         """
-        return self.sense()._replace(target_current=before.target_current, target_moment=before.target_moment)
+        now, current = self.sense(), before.target_current
+        control = current if self._reports_control_as_target else now.joint_control_output
+        return now._replace(
+            target_current=current, target_moment=before.target_moment, joint_control_output=control
+        )
 
     def _run(self) -> None:
         """Advance the arm by a cycle and read its sensors; `_keep` completes the cycle."""

@@ -30,7 +30,6 @@ REC_MOTION = slice(0, 12)  # angles and speeds
 REC_SIMULATED = slice(0, 24)  # the part that MuJoCo's sensors fill, in their order
 
 _BLOCK = 256  # cycles of noise drawn at once
-SUPPLY_VOLTAGE = 48.0  # V, robot bus; its drop along the arm's cable is small and left out
 _SLOW = 0.02  # m/s; the direction of motion is smoothed below this
 _SMALLEST_SPEED = 1.4e-45  # smallest float32: the joints filter in float32, whose decay ends there
 
@@ -77,7 +76,7 @@ class Sensors:
     """All sensors of one arm.
 
     Args:
-        robot: gives the torque constants.
+        robot: gives the torque constants and the supply.
         fidelity: gives noise, grain, filters.
         seed: of the box.
         period: control cycle [s].
@@ -102,6 +101,7 @@ class Sensors:
         self._scale[REC_Q] = 1.0 / step
         self._scale[REC_TORQUE] = 1.0 / np.array(robot.torque_constant)
         self._keep = [exp(-2.0 * pi * pole * period) for pole in fidelity.speed_filter_hz]
+        self._supply_voltage = robot.generation.electrics.joint_voltage
         self._dead_band = fidelity.speed_dead_band
         self._force_friction = fidelity.force_friction
         self._noise: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
@@ -166,7 +166,7 @@ class Sensors:
         block = self._rng.standard_normal((_BLOCK, _N_NOISE))
         block *= self._sigmas
         block[:, REC_WRENCH] += self._drift.next_block(_BLOCK)
-        block[:, REC_VOLTAGE] += SUPPLY_VOLTAGE
+        block[:, REC_VOLTAGE] += self._supply_voltage
         moments = np.repeat(block[:, _NOISE_MOMENT, None], 6, axis=1)
         self._noise = list(zip(np.ascontiguousarray(block[:, :N_RECORD]), moments, strict=True))
         self._at = 0

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import exp
 
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import Vector6
 
-_IDLE: Vector6 = (28.0, 29.0, 31.0, 36.0, 38.0, 39.0)  # °C, powered and still for long
 _RISE: Vector6 = (0.25, 0.25, 0.5, 0.8, 0.8, 0.8)  # °C per A²
 _LARGEST_RISE = 20.0  # °C
 _TIME_CONSTANT = 900.0  # s
@@ -22,12 +22,13 @@ _STEPS_PER_DEGREE = 16.0
 class Thermometers:
     """Six thermometers; `reading` has their values [°C]."""
 
-    def __init__(self, period: float) -> None:
+    def __init__(self, generation: RobotGeneration) -> None:
+        period, self._idle = generation.period_s, generation.electrics.joint_temperatures
         self._every = max(1, round(_INTERVAL / period))
         self._gain = 1.0 - exp(-self._every * period / _TIME_CONSTANT)
         self._countdown = self._every
-        self._exact = list(_IDLE)
-        self.reading = _IDLE
+        self._exact = list(self._idle)
+        self.reading = self._idle
 
     def step(self, current: Sequence[float]) -> None:
         """Advance by one cycle with these motor currents (6,) [A]."""
@@ -36,7 +37,7 @@ class Thermometers:
             return
         self._countdown = self._every
         for i, amperes in enumerate(current):
-            final = _IDLE[i] + min(_LARGEST_RISE, _RISE[i] * amperes * amperes)
+            final = self._idle[i] + min(_LARGEST_RISE, _RISE[i] * amperes * amperes)
             self._exact[i] += self._gain * (final - self._exact[i])
         a, b, c, d, e, f = (round(_STEPS_PER_DEGREE * value) / _STEPS_PER_DEGREE for value in self._exact)
         self.reading = (a, b, c, d, e, f)
