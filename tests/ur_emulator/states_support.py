@@ -101,7 +101,8 @@ def check_wires(bench):
     powered = now.robot_mode in (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
 
     frame = LAYOUT.decode(encode_frame(now))
-    assert frame.safety_mode == frame.safety_status == safety
+    assert frame.safety_mode == safety
+    assert frame.safety_status == now.safety_status
     assert frame.robot_mode == now.robot_mode
     assert tuple(frame.joint_mode) == now.joint_mode
 

@@ -1,13 +1,16 @@
 """Random commands in random order: whatever people and clients do, a stopped arm stands still."""
 
+from dataclasses import replace
+
 import numpy as np
 from box_support import Bench
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 from states_support import BRAKING, COMMANDS, ENDLESS, ENTRY, check_wires, failures
 
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
+from ur_emulator.commands.operational import ChooseModeByDashboard, MoveEnablingDevice, SetOperationalMode
 from ur_emulator.commands.power import PowerOn, ReleaseBrakes, StartFreedrive
 from ur_emulator.commands.programs import (
     PauseProgram,
@@ -30,6 +33,9 @@ from ur_emulator.commands.safety import (
     UnlockProtectiveStop,
 )
 from ur_emulator.controller.safety.modes import MOVING_MODES, ROW
+from ur_emulator.controller.safety.operational_mode import OperationalMode
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.e_series import E_SERIES
 from urscript import compile_program
 
 STREAM = "def s():\n  while True:\n    speedj([0, 0, 0, 0, 0, 0.8], 4, 0.008)\n  end\nend\n"
@@ -61,7 +67,17 @@ ANYTHING = (
     AssignSafetyInput(0, "emergency stop"),
     AssignSafetyInput(0, "reduced"),
     AssignSafetyInput(0, "none"),
+    # Refused where there are no operational modes.
+    *(SetOperationalMode(mode) for mode in ("none", "manual", "automatic")),
+    *(ChooseModeByDashboard(mode) for mode in (None, OperationalMode.MANUAL, OperationalMode.AUTOMATIC)),
+    *(MoveEnablingDevice(position) for position in ("none", "released", "pressed", "fully pressed")),
+    *(SafeguardStop(active, "automatic mode") for active in (True, False)),
+    *(RequireSafeguardReset(required, "automatic mode") for required in (True, False)),
+    ResetSafeguard("automatic mode"),
+    *(AssignSafetyInput(1, function) for function in ("operational mode", "three-position enabling", "none")),
 )
+# An e-Series box in the states, with the cycle that the numbers of this file are for.
+WITH_MODES = replace(CB3, has_operational_modes=True, limits=E_SERIES.limits)
 # What wakes an arm up, three times as likely: else most boxes would sleep.
 LIKELY = (*ANYTHING, *3 * (ReleaseEmergencyStop(), RestartSafety(), SafeguardStop(False)))
 LIKELY += 3 * (UnlockProtectiveStop(), ReleaseBrakes(), StartProgram(PROGRAMS[0]))
@@ -72,8 +88,12 @@ RESTING = 0.03  # rad/s, what sensors may say of an arm at rest
 class AnyBox(RuleBasedStateMachine):
     def __init__(self):
         super().__init__()
-        self.bench = Bench()
+        self.bench = None
         self.stopped_for = self.unpowered_for = 0
+
+    @initialize(generation=st.sampled_from((CB3, WITH_MODES)))
+    def begin(self, generation):
+        self.bench = Bench(generation=generation)
 
     def tick(self, *commands):
         mode = self.bench.now.safety_mode
@@ -149,6 +169,9 @@ class AnyBox(RuleBasedStateMachine):
         """Whatever has happened: release, close, restart, confirm, release the brakes; then programs run."""
         for command in (
             AssignSafetyInput(0, "none"),
+            AssignSafetyInput(1, "none"),
+            ChooseModeByDashboard(None),
+            SetOperationalMode("none"),
             PressButton("teach", False),
             ReleaseEmergencyStop(),
             RequireSafeguardReset(False),
@@ -172,7 +195,8 @@ class AnyBox(RuleBasedStateMachine):
 
     @invariant()
     def ports_agree(self):
-        check_wires(self.bench)
+        if self.bench is not None:
+            check_wires(self.bench)
 
 
 AnyBox.TestCase.settings = settings(
