@@ -53,7 +53,7 @@ def test_the_reference_has_every_public_name(site):
 @pytest.mark.slow
 def test_diagrams_are_drawn_and_the_search_knows_the_pages(site):
     states = (site / "states.html").read_text(encoding="utf-8")
-    assert states.count('aria-roledescription="stateDiagram"') == 3
+    assert states.count('aria-roledescription="stateDiagram"') == 5
     assert "mermaid</code>" not in states
     index = (site / "search" / "search_index.js").read_text(encoding="utf-8")
     assert "lognormal" in index
