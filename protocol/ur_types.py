@@ -213,6 +213,7 @@ class Ports:
         primary_ro: as primary; takes nothing.
         secondary_ro: as secondary; takes nothing.
         realtime_ro: as realtime; takes nothing.
+        interpreter: takes statements for a program in interpreter mode; not on CB3. Source: script manual.
     """
 
     robot_api: int = 80
@@ -225,6 +226,7 @@ class Ports:
     primary_ro: int = 30011
     secondary_ro: int = 30012
     realtime_ro: int = 30013
+    interpreter: int = 30020
 
     @classmethod
     def of(cls, numbers: Mapping[str, int]) -> Ports:
@@ -241,7 +243,7 @@ class Ports:
         Raises:
             LocalProtocolError: a moved port would leave 1..65535.
         """
-        low, high = 1 - cls().dashboard, 65535 - cls().realtime_ro
+        low, high = 1 - cls().dashboard, 65535 - cls().interpreter
         if not low <= offset <= high:
             raise LocalProtocolError(f"port offset {offset} leaves the TCP ports: use {low} to {high}")
         return cls(
@@ -255,6 +257,7 @@ class Ports:
             primary_ro=30011 + offset,
             secondary_ro=30012 + offset,
             realtime_ro=30013 + offset,
+            interpreter=30020 + offset,
         )
 
 

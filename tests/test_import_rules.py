@@ -49,7 +49,9 @@ BOX_ORDER = (
 )
 CONTROLLER_ORDER = (
     {"events"},
-    {"arm_in_space", "clock", "operator", "program_requests", "programs", "robot_mode", "tool_settings"},
+    {"interpreter_log"},
+    {"arm_in_space", "clock", "interpreter_queue", "operator", "program_requests"}
+    | {"programs", "robot_mode", "tool_settings"},
     {"io"},
     {"safety"},
     {"arm_dynamics", "client_inputs", "electrics", "error_settings"},
@@ -88,7 +90,7 @@ PROTOCOL_ORDER = (
         "wire_codec",
         "wire_record",
     },
-    {"controller_words", "modbus", "robot_api", "script_channel", "velocity_stream", "xmlrpc"},
+    {"controller_words", "interpreter", "modbus", "robot_api", "script_channel", "velocity_stream", "xmlrpc"},
     {"realtime"},
     {"dashboard"},
     {"primary"},

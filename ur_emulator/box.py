@@ -32,6 +32,8 @@ from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from ur_emulator.servers.dashboard.answers import DashboardAnswers
 from ur_emulator.servers.dashboard.port import DashboardPort
 from ur_emulator.servers.dashboard.reports import ReportFolder
+from ur_emulator.servers.interpreter.intake import InterpreterIntake
+from ur_emulator.servers.interpreter.port import InterpreterPort
 from ur_emulator.servers.modbus.server import ModbusPort
 from ur_emulator.servers.port_set import CONTROL, ROBOT_API, PortSet
 from ur_emulator.servers.primary.port import PrimaryPort
@@ -187,6 +189,8 @@ class Box(BoxOperations):
         if software.dashboard:
             replies = DashboardAnswers(self._access, player, self._reports, self._shut_down)
             ports["dashboard"] = DashboardPort(self._access, replies)
+        if software.has_interpreter:
+            ports["interpreter"] = InterpreterPort(InterpreterIntake(self._access))
         if software.robot_api:
             from ur_emulator.servers.http.port import HttpPort
             from ur_emulator.servers.robot_api.answers import RobotApiAnswers

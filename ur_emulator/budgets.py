@@ -124,6 +124,18 @@ class Budgets:
         1_000, "elements", "the changed values of an update", "the others follow in the next one"
     )
 
+    # --- interpreter mode ---
+
+    # A compatible box of another maker has this number.
+    interpreter_lines: int = _budget(8_500, "lines", "interpreted since they were cleared", "it is discarded")
+    # They go to the compiler with each line: 0.2 ms.
+    interpreter_names: int = _budget(
+        2_000, "functions and variables", "of interpreted lines", "the line is discarded"
+    )
+    interpreter_bytes: int = _budget(
+        1 * MIB, "bytes", "lines of a box that are not interpreted yet", "it is discarded"
+    )
+
     # --- sockets of scripts ---
 
     # All that a box dials: sockets and remote procedures of scripts, Modbus units, External Control.

@@ -159,7 +159,7 @@ def _own_addresses() -> Iterator[str]:
 
 
 def _is_free(host: str) -> bool:
-    """Return whether all standard ports of an address can be opened, save that for Modbus."""
+    """Return whether all standard ports of an address can be opened that need no privileges."""
     import socket
     from dataclasses import astuple
 
@@ -167,7 +167,7 @@ def _is_free(host: str) -> bool:
 
     with ExitStack() as stack:
         try:
-            for port in astuple(Ports.standard())[1:]:
+            for port in (number for number in astuple(Ports.standard()) if number >= 1024):
                 sock = stack.enter_context(socket.socket())
                 sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 sock.bind((host, port))

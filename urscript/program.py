@@ -8,18 +8,22 @@
 from __future__ import annotations
 
 import marshal
-from collections.abc import Sequence
+import pickle
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from urscript.catalogue import CB3_3_15, Catalogue
 from urscript.compile.compiler import CompiledCode, compile_resolved
 from urscript.dialect import Dialect, dialect_for
 from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError
+from urscript.names.living_scope import living_scopes
 from urscript.names.resolver import resolve
 from urscript.names.scopes import ResolvedProgram
 from urscript.run import positions, runtime
+from urscript.run.interpreter_mode import InterpreterMode
 from urscript.run.metering import Meter, WorkBudget
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread
 from urscript.run.variables import UNDEFINED
@@ -112,6 +116,7 @@ def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -
         builtins=frozenset(program.builtins),
         globals=frozenset(program.globals),
         declared_globals=tuple(program.declared_globals),
+        living_scopes={name: pickle.dumps(scope) for name, scope in living_scopes(program).items()},
     )
 
 
@@ -130,6 +135,8 @@ class CompiledProgram:
         builtins: Builtin functions it uses.
         globals: Its global variables.
         declared_globals: Those that are declared with `global`, in the order of the text.
+        living_scopes: The names that statements of interpreter mode find, pickled, by the Python name of the
+            function that calls `interpreter_mode`.
     """
 
     name: str
@@ -141,6 +148,7 @@ class CompiledProgram:
     builtins: frozenset[str]
     globals: frozenset[str]
     declared_globals: tuple[str, ...]
+    living_scopes: Mapping[str, bytes] = field(repr=False)
 
     def start(self, host: Host, work: WorkBudget | None = None) -> RunningProgram:
         """A new run on `host`; it begins with its first `step`.
@@ -181,7 +189,20 @@ class RunningProgram:
         budget = program.dialect.statement_budget
         self._scheduler = Scheduler(self._namespace, meter, budget, host.thread_ended)
         self._namespace.update(runtime.flow_namespace(self._scheduler, self._namespace, meter))
-        self._namespace.update(runtime.builtin_namespace(program.builtins, program.catalogue, host, meter))
+        bind = partial(runtime.builtin_namespace, catalogue=program.catalogue, host=host, meter=meter)
+        self._namespace.update(bind(program.builtins))
+        self._texts = {program.compiled.file_name: (program.compiled, program.source)}
+        if "interpreter_mode" in program.builtins:
+            mode = InterpreterMode(
+                self._namespace,
+                self._scheduler,
+                meter,
+                bind,
+                self._texts,
+                program.living_scopes,
+                is_secondary=program.kind == "sec",
+            )
+            self._namespace["_interpret"] = mode.run
         self._namespace.update(program.compiled.constants)
         self._namespace.update(dict.fromkeys((f"g_{name}" for name in program.globals), UNDEFINED))
         exec(marshal.loads(program.compiled.code), self._namespace)
@@ -251,7 +272,7 @@ class RunningProgram:
         return positions.thread_position(thread, self.program.compiled)
 
     def _script_error(self, error: Exception) -> ScriptRuntimeError:
-        return positions.script_error(error, self.program.compiled, self.program.source)
+        return positions.script_error(error, self._texts)
 
     def _fail_secondary(self) -> None:
         line, column = self.position(self._main)
@@ -261,7 +282,7 @@ class RunningProgram:
     def _fail(self, error: ScriptRuntimeError) -> None:
         if error.stack:
             place = error.stack[-1]
-            error.locate(self.program.source, place.line, place.column)
+            error.locate(error.source, place.line, place.column)
         # The traceback would keep every frame of the run alive as long as the error is referenced.
         self.error = error.with_traceback(None)
         self._finish(ProgramStatus.FAILED)

@@ -1,7 +1,8 @@
 """A host without a robot: it records the calls of a program and answers from what they stored.
 
 Moves take three cycles and reach their target, registers and outputs read back what was stored, sockets
-deliver prepared data. Used by `urscript run` and by tests; it models no physics.
+deliver prepared data, interpreter mode ends at once. Used by `urscript run` and by tests; it models no
+physics.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any, Final, NamedTuple
 
 from urscript.catalogue import CB3_3_15, STEP_TIME, Builtin, Catalogue, TimeClass
 from urscript.program import CompiledProgram, ProgramStatus, RunningProgram
-from urscript.run.host import HostFunction
+from urscript.run.host import EnterMode, HostFunction
 from urscript.run.threads import ScriptThread
 from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
 from urscript.values import Pose
@@ -26,6 +27,26 @@ MOVE_CYCLES: Final = 3
 _ZERO_POSE: Final = Pose(0, 0, 0, 0, 0, 0)
 
 _HOME: Final = [0.0, -1.5708, 0.0, -1.5708, 0.0, 0.0]
+
+
+class _NoStatements:
+    """A queue for interpreter mode into which nobody puts anything: the mode ends at once."""
+
+    is_ending = True
+    is_clearing = clears_on_end = False
+
+    def take(self) -> None:
+        """No statements."""
+
+    def is_ready(self) -> bool:
+        """Never."""
+        return False
+
+    def cleared(self) -> None:
+        """Nothing is done."""
+
+    def leave(self) -> None:
+        """Nothing is done."""
 
 
 class RecordedCall(NamedTuple):
@@ -101,6 +122,7 @@ class RecordingHost:
         offered["socket_open"] = self._socket_open
         offered["socket_read_binary_integer"] = self._socket_read
         offered["random"] = lambda thread: self._random.random()
+        offered["interpreter_mode"] = self._interpreter_mode
         return offered
 
     def textmsg(self, text: str) -> None:
@@ -178,6 +200,10 @@ class RecordingHost:
                 self.tcp_pose = goal
             else:
                 self.q = goal
+
+    def _interpreter_mode(self, thread: ScriptThread, *arguments: Any) -> EnterMode:
+        self._record(thread, "interpreter_mode", arguments)
+        return lambda scope: _NoStatements()
 
     def _socket_open(
         self, thread: ScriptThread, address: str, port: int, socket_name: str

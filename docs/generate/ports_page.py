@@ -34,6 +34,9 @@ ROWS: tuple[MapRow, ...] = (
     MapRow("secondary_ro", "as 30002", "10 a second", "nothing", "primary.md"),
     MapRow("realtime_ro", "as 30003", "125 or 500 a second", "nothing", "realtime.md"),
     MapRow("robot_api", "answers", "on request", "HTTP requests, PolyScope X only", "robot_api.md"),
+    MapRow(
+        "interpreter", "an answer for each line", "on request", "statements of URScript", "interpreter.md"
+    ),
     MapRow("modbus", "answers", "on request", "Modbus functions 1-6, 15, 16", "modbus.md"),
 )
 """One row a port of `Ports`."""
@@ -47,7 +50,7 @@ Made from `docs/generate/ports_page.py` and `protocol/ur_types.py` by `make docs
 `ur-emulator serve` opens these ports, with the numbers of a real control box, which most clients
 have built in. `--port-base N` adds N to all of them. Several boxes can run side by side, each on
 its own loopback address. `--software` sets the software that the box reports, and with it the
-layouts.
+layouts. Port {Ports().interpreter} is that of e-Series software from 5.10 on.
 
 All ports accept several clients at once: at most {BUDGETS.clients_of_port} from one address at one
 port, {_OF_ADDRESS} from one address, {BUDGETS.clients} at one box. Further clients are accepted and

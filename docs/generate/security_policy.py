@@ -44,6 +44,7 @@ _PORTS = (
         "the same as the dashboard, and read and write files of programs in the folder `--programs`",
         "pages of other sites are refused",
     ),
+    _PortRow(("interpreter",), "add any URScript to a program that is in interpreter mode", _NOTHING),
     _PortRow(("rtde",), "read all variables, set outputs, registers and the speed slider", _NOTHING),
     _PortRow(("modbus",), "read and set outputs and registers", _NOTHING),
     _PortRow(("primary_ro", "secondary_ro", "realtime_ro"), "read states, frames and messages", _NOTHING),

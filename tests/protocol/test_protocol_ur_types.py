@@ -48,10 +48,10 @@ def test_ports_move_together():
     assert standard == dataclasses.asdict(Ports.standard())
     moved = dataclasses.asdict(Ports.standard(1000))
     assert {name: port - 1000 for name, port in moved.items()} == standard
-    for offset in (35523, -29999):
-        with pytest.raises(LocalProtocolError, match="-29998 to 35522"):
+    for offset in (35516, -29999):
+        with pytest.raises(LocalProtocolError, match="-29998 to 35515"):
             Ports.standard(offset)
-    assert Ports.standard(35522).realtime_ro == 65535
+    assert Ports.standard(35515).interpreter == 65535
     assert Ports.standard(-29998).dashboard == 1
     assert (Ports.standard(-501).modbus, Ports.standard(-502).modbus) == (1, 0)
     assert (Ports.standard(-79).robot_api, Ports.standard(-80).robot_api) == (1, 0)

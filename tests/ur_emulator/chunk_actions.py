@@ -4,6 +4,7 @@ in 3 high             a digital input: 0-7 standard, c0-c7 configurable, t0-t1 t
 analog in 0 0.5       an analogue input at a part of its range; `analog tool 1 0.5`
 euromap 4 high        a signal of the moulding machine
 write NAME VALUE      an RTDE input by its name
+interpret LINE        a line for interpreter mode; `interpret skipbuffer` and `interpret abort` act at once
 send "text"           the peer of the program's last socket sends
 bytes 0 0 0 3         the same with bytes
 hang up               that peer closes
@@ -17,6 +18,7 @@ push 0 0 -20          push the flange, base axes, N; zeros end it
 from ast import literal_eval
 
 from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.commands.interpreter import AbortMove, AppendStatements, SkipStatements
 from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.power import PowerOff
 from ur_emulator.commands.programs import (
@@ -28,9 +30,11 @@ from ur_emulator.commands.programs import (
 )
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.controller.io.lines import CONFIGURABLE, TOOL
+from ur_emulator.programs.compiling import compile_line
 from urscript import compile_program
 
 _SHIFTS = {"c": CONFIGURABLE.first, "t": TOOL.first}
+_WORDS = {"skipbuffer": SkipStatements, "abort": AbortMove}
 _PLAIN = {
     "stop": StopProgram,
     "unlock": UnlockProtectiveStop,
@@ -61,6 +65,13 @@ def act(bench, catalogue, action):
         case "write":
             name, value = rest.split(" ", 1)
             return [WriteInputs(((name, literal_eval(value)),))]
+        case "interpret" if rest in _WORDS:
+            return [_WORDS[rest]()]
+        case "interpret":
+            bench.n_interpreted = number = getattr(bench, "n_interpreted", 0) + 1
+            queue = state.interpreter
+            made = compile_line(rest, number, queue.scope, queue.added, catalogue)
+            return [AppendStatements(made, queue.epoch)]
         case "send":
             index, text = rest.split(" ", 1) if rest[0].isdigit() else ("-1", rest)
             bench.network.sockets[int(index)].receive(literal_eval(text).encode("latin-1"))

@@ -59,4 +59,5 @@ SECOND = RobotGeneration(
     rtde_outputs=tuple(field for field in CB3.rtde_outputs if field.name != "actual_momentum"),
     rtde_inputs=tuple(field for field in CB3.rtde_inputs if field.name != "speed_slider_mask"),
     builtins=tuple(row for row in CB3.builtins if row.name != MISSING_BUILTIN),
+    interpreter_since=SoftwareVersion(5, 1),
 )

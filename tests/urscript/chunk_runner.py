@@ -8,6 +8,8 @@ Chunks stand apart by a line `---`. Expectations are comments, so a chunk is a p
     #~ wire text       what the first error puts into the runtime-exception message
     #log text          what the first error writes into the controller's log
     #@ name name       the builtins with an effect that were called, in order
+    #interpret line    the next line of interpreter mode; it ends after the last one
+    #discard text      why the next line is discarded that cannot be compiled
     #< 1 2 3           a frame of integers that the peer of socket "s" sends (also makes it accept)
     #software 5.11     the software version, 3.15 if not given
     #ref 1.1 comment   the row of the language notes that the chunk shows (see `reference_rows`)
@@ -23,24 +25,96 @@ and chosen here.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import pytest
 from tree_printer import print_program
 
-from urscript.catalogue import catalogue_for
+from urscript.catalogue import Catalogue, catalogue_for
 from urscript.compile.inference import StaticTypes, Type
+from urscript.compile.statements import NO_NAMES, CompiledStatements, compile_statements
 from urscript.errors import ScriptCompileError, ScriptError
 from urscript.program import ProgramStatus, check_program, compile_program
 from urscript.recording_host import FakeSocket, RecordingHost
+from urscript.run.host import EnterMode, HostFunction
+from urscript.run.threads import ScriptThread
 from urscript.source import Source
 from urscript.syntax.parser import parse
 
 MAX_CYCLES = 2_000
+
+
+class InterpretingHost(RecordingHost):
+    """A recording host that has lines for interpreter mode; it is their queue too.
+
+    Attributes:
+        discarded: Errors of lines that could not be compiled, in order.
+    """
+
+    def __init__(self, catalogue: Catalogue, lines: list[str], **options: Any) -> None:
+        super().__init__(catalogue=catalogue, **options)
+        self.discarded: list[ScriptError] = []
+        self._lines = list(lines)
+        self._number = 0
+        self._scope = b""
+        self._kept = NO_NAMES
+        self.is_ending = self.is_clearing = False
+        self.clears_on_end = True
+
+    def builtins(self) -> Mapping[str, HostFunction]:
+        """All builtins, those of interpreter mode with their effect."""
+        offered = {**super().builtins(), "end_interpreter": self._end, "clear_interpreter": self._clear}
+        return {**offered, "interpreter_mode": self._mode} if self._lines else offered
+
+    def _mode(self, thread: ScriptThread, clear_queue_on_enter: bool, clear_on_end: bool) -> EnterMode:
+        self.clears_on_end = clear_on_end
+        return self.enter
+
+    def _end(self, thread: ScriptThread) -> None:
+        self.is_ending = True
+
+    def _clear(self, thread: ScriptThread) -> None:
+        self.is_clearing = True
+
+    def enter(self, scope: bytes) -> InterpretingHost:
+        """Begin the mode."""
+        self._scope = scope
+        return self
+
+    def take(self) -> CompiledStatements | None:
+        """The next line that can be compiled; one after the last ends the mode."""
+        self.is_ending = not self._lines
+        while self._lines:
+            self._number += 1
+            line = self._lines.pop(0)
+            try:
+                made = compile_statements(line, self._number, self._scope, self._kept, self._catalogue)
+            except ScriptCompileError as error:
+                self.discarded.append(error)
+                continue
+            self._kept = made.added
+            return made
+        return None
+
+    def is_ready(self) -> bool:
+        """Always."""
+        return True
+
+    def cleared(self) -> None:
+        """Forget the names."""
+        self._kept = NO_NAMES
+        self.is_clearing = False
+
+    def leave(self) -> None:
+        """End the mode."""
+        self.is_ending = False
+        if self.clears_on_end or self.is_clearing:
+            self.cleared()
 
 
 @dataclass
@@ -57,6 +131,8 @@ class Chunk:
     rows: list[str] = field(default_factory=list)
     calls: list[str] | None = None
     frames: list[list[int]] | None = None
+    lines: list[str] = field(default_factory=list)
+    discarded: list[str] = field(default_factory=list)
     software: str = "3.15"
 
     def __str__(self) -> str:
@@ -85,7 +161,7 @@ def _split(file: Path) -> list[Chunk]:
 
 def _expectations(chunk: Chunk) -> Chunk:
     for line in chunk.text.split("\n"):
-        mark = re.search(r"#(>|!|~|@|<|log|ref|software)(?: (.*))?$", line.rstrip("\r"))
+        mark = re.search(r"#(>|!|~|@|<|log|ref|software|interpret|discard)(?: (.*))?$", line.rstrip("\r"))
         if mark is None:
             continue
         kind, rest = mark[1], mark[2] or ""
@@ -103,6 +179,10 @@ def _expectations(chunk: Chunk) -> Chunk:
             chunk.rows.append(rest)
         elif kind == "@":
             chunk.calls = rest.split()
+        elif kind == "interpret":
+            chunk.lines.append(rest)
+        elif kind == "discard":
+            chunk.discarded.append(rest)
         elif kind == "<":
             chunk.frames = [*(chunk.frames or []), [int(word) for word in rest.split()]]
         else:
@@ -114,7 +194,7 @@ def run_chunk(chunk: Chunk) -> list[ScriptError]:
     """Compile and run a chunk; asserts everything it expects and returns the errors it met."""
     catalogue = catalogue_for(chunk.software)
     sockets = {} if chunk.frames is None else {"s": FakeSocket(chunk.frames, closed=True)}
-    host = RecordingHost(catalogue=catalogue, sockets=sockets)
+    host = InterpretingHost(catalogue, chunk.lines, sockets=sockets)
     errors: list[ScriptError] = list(check_program(chunk.text, catalogue=catalogue)[0])
     raised: list[ScriptError] = []
     if errors:
@@ -140,6 +220,11 @@ def run_chunk(chunk: Chunk) -> list[ScriptError]:
     if chunk.log_text is not None:
         assert errors[0].log_text == chunk.log_text
     assert host.messages == chunk.messages, f"{chunk}: {host.messages}"
+    found_reasons = [error.message for error in host.discarded]
+    assert len(found_reasons) == len(chunk.discarded), f"{chunk}: {found_reasons}"
+    for reason, want in zip(found_reasons, chunk.discarded, strict=True):
+        assert matches(want, reason), f"{chunk}: got {reason!r}, expected {want!r}"
+    errors += host.discarded
     if chunk.calls is not None:
         assert host.names_called() == chunk.calls
     return errors + raised

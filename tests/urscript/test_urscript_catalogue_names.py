@@ -197,7 +197,10 @@ BROUGHT = {
     "5.3": "get_target_waypoint",
     "5.4": "tool_contact",
     "5.9": "get_inverse_kin_has_solution ft_rtde_input_enable",
-    "5.10": "set_target_payload get_freedrive_status get_target_payload_inertia",
+    "5.10": """
+        set_target_payload get_freedrive_status get_target_payload_inertia
+        interpreter_mode end_interpreter clear_interpreter
+    """,
     "5.14": "struct",
     "5.15": """
         make_list estimate_payload high_holding_torque_disable high_holding_torque_enable

@@ -16,6 +16,7 @@ from ur_emulator.controller.compliance.force_sense import ForceSense
 from ur_emulator.controller.energy import EnergyMeter
 from ur_emulator.controller.error_settings import ErrorSettings
 from ur_emulator.controller.events import EventQueue
+from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.io.encoders import Encoders
 from ur_emulator.controller.io.lines import InputOutput
@@ -68,6 +69,7 @@ class ControllerState:
         compliance: force mode, and hand guiding.
         force_sense: zero and history of the wrench.
         operator: what programs ask of the operator, and the buttons that are pressed.
+        interpreter: statements that arrive for the running program.
         error_settings: what programs have set up about errors.
         requests: stops that programs and clients have asked for in this cycle.
         past: snapshot of the last cycle, and joint positions before it.
@@ -99,6 +101,7 @@ class ControllerState:
     compliance: Compliance
     force_sense: ForceSense
     operator: Operator
+    interpreter: InterpreterQueue
     error_settings: ErrorSettings
     requests: ProgramRequests
     past: PastCycles
@@ -148,6 +151,7 @@ def make_state(
         compliance=Compliance(motion, mode, safety, operational, io_configuration, past),
         force_sense=ForceSense(clock.generation),
         operator=Operator(),
+        interpreter=InterpreterQueue(),
         error_settings=ErrorSettings(),
         requests=ProgramRequests(),
         past=past,

@@ -60,4 +60,5 @@ CB3 = RobotGeneration(
     rtde_outputs=OUTPUTS,
     rtde_inputs=INPUTS,
     builtins=ALL_ROWS,
+    interpreter_since=None,
 )

@@ -85,4 +85,5 @@ E_SERIES = RobotGeneration(
     rtde_outputs=OUTPUTS,
     rtde_inputs=INPUTS,
     builtins=ALL_ROWS,
+    interpreter_since=SoftwareVersion(5, 10),  # UR support page of interpreter mode: "SW 5.10 above"
 )

@@ -133,6 +133,7 @@ class RobotGeneration:
         rtde_outputs: variables that a client can subscribe to.
         rtde_inputs: variables that a client can write.
         builtins: of URScript.
+        interpreter_since: first version with the port for interpreter mode; None if there is none.
 
     Raises:
         ModelError: the control cycle is no whole multiple of the physics step, or no part of a second.
@@ -161,6 +162,7 @@ class RobotGeneration:
     rtde_outputs: tuple[RtdeField, ...]
     rtde_inputs: tuple[RtdeField, ...]
     builtins: tuple[Builtin, ...]
+    interpreter_since: SoftwareVersion | None
 
     def __post_init__(self) -> None:
         if self.substep_us <= 0 or self.period_us <= 0 or self.period_us % self.substep_us:
@@ -258,6 +260,7 @@ class RobotGeneration:
 @cache
 def _software(generation: RobotGeneration, version: SoftwareVersion) -> Software:
     _, build, built = [row for row in generation.builds if row[0] <= version][-1]
+    since = generation.interpreter_since
     size = frame_size(version, generation.frame_sizes)
     return Software(
         version=version._replace(build=version.build or build),
@@ -269,4 +272,5 @@ def _software(generation: RobotGeneration, version: SoftwareVersion) -> Software
         rtde_outputs=output_fields(version, generation.rtde_outputs),
         rtde_inputs=input_fields(version, generation.rtde_inputs),
         catalogue=catalogue_for(version, rows=generation.builtins),
+        has_interpreter=since is not None and version >= since,
     )

@@ -32,6 +32,7 @@ class Software:
         rtde_outputs: variables that a client can subscribe to, by name.
         rtde_inputs: variables that a client can write, by name.
         catalogue: the builtins of URScript.
+        has_interpreter: statements can be sent to a program in interpreter mode.
     """
 
     version: SoftwareVersion
@@ -43,6 +44,7 @@ class Software:
     rtde_outputs: Mapping[str, RtdeField]
     rtde_inputs: Mapping[str, RtdeField]
     catalogue: Catalogue
+    has_interpreter: bool
 
     @property
     def day(self) -> str:

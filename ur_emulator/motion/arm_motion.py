@@ -111,6 +111,16 @@ class ArmMotion(PathMotion):
         self._time_scaling.paused = self._is_special = True
         self._time_scaling.factor = 0.0
 
+    def abort(self) -> None:
+        """End a movej or movel, as one whose waypoint is where the arm comes to rest.
+
+        The leading axis brakes with `stop_deceleration`. A real arm does not come to rest if the move has a
+        blend radius: it blends into the next one.
+        """
+        if (move := self._move) is not None and not move.leg.process:
+            self._abandon()
+            self._brake(self.stop_deceleration)
+
     # --- overlays
 
     def add_overlay(self, overlay: Overlay) -> None:

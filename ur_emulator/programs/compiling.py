@@ -19,6 +19,7 @@ from ur_emulator.programs.loading import LoadedProgram, load_program
 from ur_emulator.programs.script_header import setup_script
 from urscript import CompiledProgram, compile_program
 from urscript.catalogue import Catalogue
+from urscript.compile.statements import CompiledStatements, compile_statements
 from urscript.errors import ScriptError, ScriptTypeError
 
 # A program that can be started, or why it cannot.
@@ -57,6 +58,16 @@ def compile_text(
         if count > limit:
             return ScriptFailed(1, 1, f"the program has {count} {what}: at most {limit} are allowed")
     return program
+
+
+def compile_line(
+    text: str, number: int, scope: bytes, added: bytes, catalogue: Catalogue
+) -> CompiledStatements | str:
+    """Compile a line of interpreter mode, see `compile_statements`; return why it is discarded if it is."""
+    try:
+        return compile_statements(text, number, scope, added, catalogue)
+    except ScriptError as error:
+        return error.log_text
 
 
 def compile_loaded(

@@ -122,6 +122,7 @@ class ProgramSlot:
         self._phase = ProgramState.PLAYING
         self._is_loaded = loaded
         self._state.io_configuration.program_started()
+        self._state.interpreter.program_started()
         self._state.events.append(ProgramStarted(program.name, self._primary))
 
     def stop(self, *, unscheduled: bool = False) -> None:
@@ -220,6 +221,7 @@ class ProgramSlot:
     def _end(self, *, unscheduled: bool) -> None:
         self._primary = None
         self._state.compliance.program_ended()
+        self._state.interpreter.program_ended()
         self._state.io_configuration.program_stopped(unscheduled=unscheduled)
         self._state.watchdogs.clear()
         self._state.error_settings.program_ended()

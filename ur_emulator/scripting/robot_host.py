@@ -12,6 +12,7 @@ from ur_emulator.scripting.conveyor_functions import ProgramConveyor
 from ur_emulator.scripting.dynamics_functions import dynamics_functions
 from ur_emulator.scripting.encoder_functions import encoder_functions
 from ur_emulator.scripting.error_functions import error_functions
+from ur_emulator.scripting.interpreter_functions import interpreter_functions
 from ur_emulator.scripting.io_configuration_functions import io_configuration_functions
 from ur_emulator.scripting.io_functions import io_functions, register_functions
 from ur_emulator.scripting.modbus_functions import modbus_functions
@@ -64,6 +65,7 @@ class RobotHost:
             **encoder_functions(state.encoders, state.io),
             **self._conveyor.functions(),
             **operator_functions(state.operator, state.events),
+            **interpreter_functions(state.interpreter),
             **error_functions(state.error_settings, state.past, state.requests),
             **self._sockets.functions(),
             **self._remotes.functions(),

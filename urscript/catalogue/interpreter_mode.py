@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from .chapter import MANUAL_E, Chapter
-from .types import Builtin, Param, ParamType, TimeClass
-from .versions import NOT_CB3
+from .types import Builtin, Param, ParamType, Support, TimeClass
+from .versions import releases
 
 _row = Chapter("interpreter_mode").row
-# The release that brought it is not known; it is documented in 5.11.
-_SOURCE = f"{MANUAL_E}, chapter Interpreter mode"
+_SOURCE = f"{MANUAL_E}, chapter Interpreter mode; first release: UR support page of interpreter mode"
+_SINCE = releases(None, "5.10", "10.0")
 
 ROWS: tuple[Builtin, ...] = (
     _row(
@@ -20,9 +20,27 @@ ROWS: tuple[Builtin, ...] = (
         "None",
         "run the statements that arrive on port 30020",
         time=TimeClass.BLOCKING,
-        since=NOT_CB3,
+        since=_SINCE,
+        support=Support.APPROXIMATE,
+        note="most reasons of a discard, and the limits, are chosen",
         source=_SOURCE,
     ),
-    _row("end_interpreter", (), "None", "leave interpreter mode", since=NOT_CB3, source=_SOURCE),
-    _row("clear_interpreter", (), "None", "drop all interpreted statements", since=NOT_CB3, source=_SOURCE),
+    _row(
+        "end_interpreter",
+        (),
+        "None",
+        "leave interpreter mode",
+        since=_SINCE,
+        support=Support.EXACT,
+        source=_SOURCE,
+    ),
+    _row(
+        "clear_interpreter",
+        (),
+        "None",
+        "drop all interpreted statements",
+        since=_SINCE,
+        support=Support.EXACT,
+        source=_SOURCE,
+    ),
 )

@@ -14,6 +14,7 @@ from urscript import dialect
 from urscript.catalogue import Catalogue
 from urscript.catalogue.costs import EXPENSIVE, UNITS
 from urscript.compile.inference import StaticTypes, Type, is_numeric
+from urscript.compile.interpreter_call import interpreter_call
 from urscript.compile.python_tree import ask_after, call, constant, load, place
 from urscript.dialect import Dialect
 from urscript.names.own_calls import wrong_count
@@ -129,7 +130,8 @@ class ExpressionCompiler:
         if name in scope.locals:
             python_name, maybe_unassigned = f"v_{name}", name in scope.maybe_unassigned
         elif name in self._program.globals:
-            python_name, maybe_unassigned = f"g_{name}", name in self._program.maybe_unassigned_globals
+            python_name = self._program.python_name(name)
+            maybe_unassigned = name in self._program.maybe_unassigned_globals
         else:
             return constant(self._catalogue.variables[name].value, span)
         if not maybe_unassigned:
@@ -150,7 +152,7 @@ class ExpressionCompiler:
         """A constant of any type; lists and poses are never changed, so one object is enough."""
         if type(value) in _PLAIN:
             return constant(value, span)
-        name = f"k{len(self.constants)}"
+        name = f"{self._program.prefix}k{len(self.constants)}"
         self.constants[name] = value
         return load(name, span)
 
@@ -276,6 +278,8 @@ class ExpressionCompiler:
                 arguments.append(self.shared(slot[1], span))
         name = expression.function
         made: ast.expr = call(f"b_{name}", arguments, span)
+        if name == "interpreter_mode":
+            return self.asking(interpreter_call(made, scope, span))
         if self._catalogue[name].may_wait:
             made = ast.YieldFrom(made, **place(span))
         return self.asking(made, _ASK_EVERY if UNITS.get(name, 0) >= EXPENSIVE else 1)
@@ -363,5 +367,6 @@ class ExpressionCompiler:
         """The Python name under which a variable is stored."""
         if variable in scope.locals and not is_global:
             return f"v_{variable}"
-        self.globals_stored.add(f"g_{variable}")
-        return f"g_{variable}"
+        name = self._program.python_name(variable)
+        self.globals_stored.add(name)
+        return name

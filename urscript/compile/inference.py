@@ -8,11 +8,13 @@ at run time.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 from enum import Enum
 from typing import Any
 
 from urscript import dialect
 from urscript.catalogue import Catalogue
+from urscript.names.living_scope import calling_scopes
 from urscript.names.own_calls import wrong_count
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.syntax import nodes
@@ -71,7 +73,7 @@ class StaticTypes:
     def __init__(self, program: ResolvedProgram, catalogue: Catalogue) -> None:
         self._program = program
         self._catalogue = catalogue
-        self._types: dict[Symbol, Type] = {}
+        self._types: dict[Symbol, Type] = dict.fromkeys(_unknown(program), Type.ANY)
         self._constraints = _Constraints(program)
         self._solve()
 
@@ -221,6 +223,19 @@ class _Constraints:
             for position, argument in enumerate(part.arguments):
                 name = argument.name or callee.node.parameters[position].name
                 self.all.append(((callee, name), argument.value, scope))
+
+
+def _unknown(program: ResolvedProgram) -> Iterator[Symbol]:
+    """What statements outside of the program may give values of any type (interpreter mode)."""
+    if not program.is_open:
+        return
+    yield from ((None, name) for name in program.globals)
+    for scope in program.functions:
+        assert scope.node is not None
+        yield from ((scope, parameter.name) for parameter in scope.node.parameters)
+    for scope in calling_scopes(program):
+        yield from ((scope, name) for name in scope.locals)
+    yield from (scope for scope in program.main.functions.values() if scope.parent is None)
 
 
 _ARITHMETIC = frozenset("+-*/%")

@@ -25,7 +25,9 @@ def find_maybe_unassigned(program: ResolvedProgram) -> None:
     analysis = _AssignmentAnalysis(program.main, program.globals, program.maybe_unassigned_globals, set())
     analysis.block(program.main.body)
     # The order of assignments in functions is not known.
-    if analysis.set_before_calls is not None:
+    if program.is_open:
+        program.maybe_unassigned_globals |= program.globals
+    elif analysis.set_before_calls is not None:
         program.maybe_unassigned_globals |= (read_elsewhere & program.globals) - analysis.set_before_calls
 
 

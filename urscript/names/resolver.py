@@ -44,15 +44,26 @@ MAX_SUGGESTIONS: Final = 40
 
 
 def resolve(
-    block: Block, source: Source, catalogue: Catalogue, dialect: Dialect
+    block: Block,
+    source: Source,
+    catalogue: Catalogue,
+    dialect: Dialect,
+    within: ResolvedProgram | None = None,
 ) -> tuple[ResolvedProgram, list[ScriptCompileError]]:
     """Find every name of a parsed program.
+
+    Args:
+        block: The program.
+        source: Its text.
+        catalogue: The builtins.
+        dialect: Options of the language.
+        within: What it becomes, with the names that it finds (statements of interpreter mode).
 
     Returns:
         What was found, and all errors in the order of the text; with errors the program cannot be compiled.
     """
     resolver = _Resolver(source, catalogue, dialect)
-    program = resolver.resolve(block)
+    program = resolver.resolve(within or resolver.open(block))
     return program, sorted(resolver.errors, key=lambda error: (error.line, error.column))
 
 
@@ -91,8 +102,8 @@ class _Resolver:
         self.errors: list[ScriptCompileError] = []
         self._n_unknown = 0
 
-    def resolve(self, block: Block) -> ResolvedProgram:
-        self.program = program = self._open(block)
+    def resolve(self, program: ResolvedProgram) -> ResolvedProgram:
+        self.program = program
         self._declare(program.main)
         for scope in program.functions:
             self._declare_locals(scope)
@@ -103,7 +114,7 @@ class _Resolver:
         find_maybe_unassigned(program)
         return program
 
-    def _open(self, block: Block) -> ResolvedProgram:
+    def open(self, block: Block) -> ResolvedProgram:
         """The program: a single definition is the program itself, other text is its body.
 
         Calls of that program after its definition are ignored: on a port it has run before they come.
@@ -139,7 +150,7 @@ class _Resolver:
                 ScriptContextError("a secondary program cannot be defined inside another program"),
                 function.span,
             )
-        python_name = f"f{len(self.program.functions)}_{function.name}"
+        python_name = f"{self.program.prefix}f{len(self.program.functions)}_{function.name}"
         inner = FunctionScope(function.name, function, scope, function.body, python_name)
         scope.functions[function.name] = inner
         self.program.functions.append(inner)

@@ -82,6 +82,9 @@ class ResolvedProgram:
         declared_globals: Those that are declared with `global` (the keys), in the order of the text.
         maybe_unassigned_globals: Those that may be read before a value is assigned to them.
         builtins: Builtin functions the program uses.
+        prefix: Of the Python names of its functions and values.
+        interpreted: Variables of interpreter mode, and locals of the function that called it; the statements
+            of interpreter mode see them as globals.
     """
 
     source: Source
@@ -94,6 +97,17 @@ class ResolvedProgram:
     declared_globals: dict[str, None] = field(default_factory=dict)
     maybe_unassigned_globals: set[str] = field(default_factory=set)
     builtins: set[str] = field(default_factory=set)
+    prefix: str = ""
+    interpreted: set[str] = field(default_factory=set)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether other statements use its variables and functions too, or it uses those of others."""
+        return self.kind == "statements" or "interpreter_mode" in self.builtins
+
+    def python_name(self, name: str) -> str:
+        """What the global variable `name` is called in Python."""
+        return f"l_{name}" if name in self.interpreted else f"g_{name}"
 
     def is_variable(self, name: str, scope: FunctionScope) -> bool:
         """Whether `name` is a variable of the program in `scope`, so that it hides a builtin."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
+from urscript.compile.statements import CompiledStatements
 from urscript.run.threads import ScriptThread
 from urscript.run.waits import Wait
 
@@ -42,6 +43,41 @@ class Host(Protocol):
     def program_ended(self) -> None:
         """The program ended, for any reason: close its sockets, leave its modes."""
         ...
+
+
+class StatementQueue(Protocol):
+    """Where interpreter mode gets its statements.
+
+    Attributes:
+        is_ending: The mode ends when the present statements have ended.
+        is_clearing: All that was interpreted is to be cleared when the present statements have ended.
+        clears_on_end: It is also cleared when the mode ends.
+    """
+
+    is_ending: bool
+    is_clearing: bool
+    clears_on_end: bool
+
+    def take(self) -> CompiledStatements | None:
+        """The next line, which now begins to run; None if none is there."""
+        ...
+
+    def is_ready(self) -> bool:
+        """Whether there is something to do."""
+        ...
+
+    def cleared(self) -> None:
+        """All that was interpreted so far is cleared."""
+        ...
+
+    def leave(self) -> None:
+        """The mode has ended."""
+        ...
+
+
+EnterMode = Callable[[bytes], StatementQueue]
+"""What the builtin `interpreter_mode` of a host returns: called with the names that statements find, as
+`compile_statements` takes them, it begins the mode."""
 
 
 @runtime_checkable

@@ -6,6 +6,7 @@ Compiled code carries lines and columns of the script, see `compile.python_tree`
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -15,21 +16,24 @@ from urscript.run import elements
 from urscript.run.threads import ScriptThread
 from urscript.source import Source
 
+Texts = Mapping[str, tuple[CompiledCode, Source]]
+"""Code and text of a program and of what is linked into it, by pseudo file name."""
 
-def script_error(error: Exception, program: CompiledCode, source: Source) -> ScriptRuntimeError:
+
+def script_error(error: Exception, texts: Texts) -> ScriptRuntimeError:
     """The run-time error of the program for `error`, with its place and call stack.
 
     Where static types are known, compiled code uses Python's operators; their exceptions are translated here.
 
     Args:
         error: Exception of a thread.
-        program: That the thread runs.
-        source: Its text.
+        texts: That the thread runs.
     """
-    stack, innermost = _stack(error.__traceback__, program)
+    stack, innermost, source = _stack(error.__traceback__, texts)
     if isinstance(error, ScriptRuntimeError):
         found = error
     elif innermost is not None and isinstance(error, IndexError):
+        assert source is not None
         found = ScriptRuntimeError(_bad_index(innermost, stack[-1], source))
     elif innermost is not None and isinstance(error, ZeroDivisionError):
         found = ScriptRuntimeError("division by zero")
@@ -39,6 +43,7 @@ def script_error(error: Exception, program: CompiledCode, source: Source) -> Scr
         found = ScriptRuntimeError(f"internal error of this box: {type(error).__name__}: {error}")
         found.__cause__ = error
     found.stack = tuple(stack)
+    found.source = source
     return found
 
 
@@ -46,7 +51,9 @@ def _bad_index(frame: FrameType, place: StackEntry, source: Source) -> str:
     """The message for an IndexError of a subscript, which is always a variable with a constant index."""
     form = re.match(r"(\w+)\s*\[\s*(\d+)", source.line(place.line)[place.column - 1 :])
     if form is not None:
-        variable = frame.f_locals.get(f"v_{form[1]}", frame.f_globals.get(f"g_{form[1]}"))
+        names = f"v_{form[1]}", f"l_{form[1]}", f"g_{form[1]}"
+        found = {**frame.f_globals, **frame.f_locals}
+        variable = next((found[name] for name in names if name in found), None)
         try:
             elements.item(variable, int(form[2]))
         except ScriptRuntimeError as error:
@@ -55,22 +62,23 @@ def _bad_index(frame: FrameType, place: StackEntry, source: Source) -> str:
 
 
 def _stack(
-    traceback: TracebackType | None, program: CompiledCode
-) -> tuple[list[StackEntry], FrameType | None]:
-    """The call stack in the script, outermost first, and the innermost frame if it is in the script."""
+    traceback: TracebackType | None, texts: Texts
+) -> tuple[list[StackEntry], FrameType | None, Source | None]:
+    """The call stack in the script, outermost first, the innermost frame if it is in the script, its text."""
     stack: list[StackEntry] = []
-    innermost = None
+    innermost = source = None
     while traceback is not None:
         innermost = traceback.tb_frame
         code = innermost.f_code
-        if code.co_filename == program.file_name:
+        if code.co_filename in texts:
+            program, source = texts[code.co_filename]
             name = code.co_name
             line, column = program.positions[name].at(traceback.tb_lasti)
             stack.append(StackEntry(program.function_names.get(name, name), line, column))
         else:
             innermost = None
         traceback = traceback.tb_next
-    return stack, innermost
+    return stack, innermost, source
 
 
 def thread_position(thread: ScriptThread, program: CompiledCode) -> tuple[int, int]:

@@ -258,6 +258,7 @@ class DashboardAnswers:
                 "installation": _path_of(player.installation),
             },
             script=player.script,
+            interpreter=access.controller.state.interpreter.log.files,
         )
 
 

@@ -43,6 +43,7 @@ class BoxFacts:
         log: all entries, a line each.
         programs: names of what is loaded.
         script: of the loaded program.
+        interpreter: log files of interpreter mode, by name.
     """
 
     serial_number: str
@@ -52,6 +53,7 @@ class BoxFacts:
     log: str
     programs: dict[str, str] = field(default_factory=dict)
     script: str = ""
+    interpreter: dict[str, str] = field(default_factory=dict)
 
     @property
     def time(self) -> datetime:
@@ -181,6 +183,7 @@ def _contents(facts: BoxFacts) -> dict[str, bytes]:
         "programs.json": _json(facts.programs),
         "state.json": _json(facts.state),
     }
+    files |= {name: text.encode("latin-1", "replace") for name, text in facts.interpreter.items()}
     if facts.script:
         files["program.script"] = facts.script.encode("latin-1", "replace")
     return files

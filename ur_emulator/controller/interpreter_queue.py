@@ -1,0 +1,173 @@
+"""Interpreter mode: the statements that wait for the program, and how far it is.
+
+The port appends what was compiled, the main thread of the program takes it; numbers are those that clients
+read. Source: script manual 5.11. Where ids begin anew, at the start of each program, is chosen.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+from protocol.interpreter import MAX_ID, TOO_MANY
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.interpreter_log import InterpreterLog
+from ur_emulator.errors import RefusedError
+from urscript.compile.statements import NO_NAMES
+
+if TYPE_CHECKING:
+    from urscript.compile.statements import CompiledStatements
+
+# Until a line that calls one of these has ended, no further line is compiled: its names may be gone then.
+_CHANGE_NAMES = frozenset({"clear_interpreter", "end_interpreter"})
+
+
+class InterpreterQueue:
+    """The statements of the primary program; the `urscript.run.host.StatementQueue` of its main thread.
+
+    Attributes:
+        run: number of the program, from 1.
+        epoch: changes with everything that makes compiled lines useless.
+        n_cleanups: how often the mode began by dropping the lines that waited.
+        scope: the names at the call of `interpreter_mode`, pickled; empty while the mode is off.
+        added: the names that the lines so far have added, pickled.
+        last_executed: id of the last line that began to run; 0 for none, here and below.
+        last_interpreted: id of the last line that was compiled.
+        last_cleared: id of the last line that was cleared.
+        is_ending: the mode ends when the present line has ended.
+        is_clearing: all is cleared when the present line has ended.
+        clears_on_end: all is cleared when the mode ends.
+        log: its log files.
+    """
+
+    def __init__(self) -> None:
+        self.run = self.epoch = self.n_cleanups = 0
+        self.log = InterpreterLog()
+        self._n_lines = self._n_bytes = 0
+        self.program_started()
+
+    def program_started(self) -> None:
+        """Begin anew: no line was interpreted."""
+        self.run += 1
+        self.last_executed = self.last_interpreted = self.last_cleared = 0
+        self._forget()
+        self._turn_off()
+
+    def program_ended(self) -> None:
+        """Leave the mode; ids stay readable."""
+        self.last_cleared = self.last_interpreted
+        self._forget()
+        self._turn_off()
+
+    @property
+    def is_on(self) -> bool:
+        """True while the program is in interpreter mode."""
+        return bool(self.scope)
+
+    @property
+    def takes_lines(self) -> bool:
+        """True while lines can be compiled: the names that they find are known."""
+        return self.is_on and not (self.is_ending or self.is_clearing or self._held_by)
+
+    @property
+    def n_ready(self) -> int:
+        """Lines that were compiled and have not begun."""
+        return len(self._ready)
+
+    # --- what clients do
+
+    def append(self, statements: CompiledStatements, epoch: int) -> int:
+        """Take a compiled line; return its id, 0 if the names have changed since it was compiled.
+
+        Raises:
+            RefusedError: too much was interpreted already.
+        """
+        if epoch != self.epoch or not self.takes_lines:
+            return 0
+        size = len(statements.compiled.code)
+        if (
+            self._n_lines >= BUDGETS.interpreter_lines
+            or self._n_bytes + size > BUDGETS.program_code
+            or statements.n_added > BUDGETS.interpreter_names
+        ):
+            raise RefusedError(TOO_MANY)
+        self._n_lines += 1
+        self._n_bytes += size
+        self.added = statements.added
+        self.last_interpreted = number = self.last_interpreted % MAX_ID + 1
+        self._ready.append((number, statements))
+        if statements.builtins & _CHANGE_NAMES:
+            self._held_by = number
+        self.log.add(self.last_executed, number, statements.source.text)
+        return number
+
+    def skip(self) -> None:
+        """Drop what has not begun."""
+        if any(number == self._held_by for number, _ in self._ready):
+            self._held_by = 0
+        self._ready.clear()
+
+    # --- what programs do
+
+    def end(self) -> None:
+        """Leave the mode when the present line has ended; no effect while it is off."""
+        self.is_ending = self.is_on
+
+    def clear(self) -> None:
+        """Clear all when the present line has ended."""
+        self.is_clearing = True
+
+    # --- what the main thread does
+
+    def enter(self, scope: bytes, *, clear_queue: bool, clear_on_end: bool) -> InterpreterQueue:
+        """Begin with the mode; return itself."""
+        self.n_cleanups += clear_queue
+        self.clears_on_end = clear_on_end
+        self.scope = scope
+        self.epoch += 1
+        return self
+
+    def take(self) -> CompiledStatements | None:
+        """Begin with the next line; the one before has ended."""
+        if self._held_by == self.last_executed:
+            self._held_by = 0
+        if not self._ready:
+            return None
+        self.last_executed, statements = self._ready.popleft()
+        return statements
+
+    def is_ready(self) -> bool:
+        """Return whether the main thread can go on."""
+        return bool(self._ready) or self.is_ending or self.is_clearing
+
+    def cleared(self) -> None:
+        """All that was interpreted has gone."""
+        self.last_cleared = self.last_interpreted
+        self.log.move()
+        self._forget()
+
+    def leave(self) -> None:
+        """The mode has ended; what it keeps belongs to the program until its end."""
+        if self.clears_on_end or self.is_clearing:
+            self.cleared()
+        else:
+            self.log.save()
+        self._turn_off()
+
+    def _forget(self) -> None:
+        """Begin with nothing interpreted."""
+        self.added = NO_NAMES
+        self._n_lines = self._n_bytes = 0
+        self._empty()
+
+    def _turn_off(self) -> None:
+        self.scope = b""
+        self.is_ending = False
+        self.clears_on_end = True
+        self._empty()
+
+    def _empty(self) -> None:
+        self._ready: deque[tuple[int, CompiledStatements]] = deque()
+        self._held_by = 0
+        self.is_clearing = False
+        self.epoch += 1
