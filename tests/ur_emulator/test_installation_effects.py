@@ -354,7 +354,70 @@ def test_variables_survive_a_run(box, dashboard, tmp_path, text, packed):
     assert saved == expected
 
 
+# --- actions of inputs
+
+
+def pulse(box, dashboard, line):
+    for level in (True, False):
+        box.set_digital_input("standard", line, level)
+        dashboard.ask_all("running", "running")
+
+
+@pytest.fixture
+def machine(box, dashboard, tmp_path):
+    """A box with an installation whose inputs 0, 1 and 2 start, pause and stop, and a program for ever."""
+    actions = listed("DigitalInputActions", "START", "PAUSE", "STOP", "NONE")
+    (tmp_path / "cell.installation").write_bytes(installation("<IOs>", actions, "</IOs>"))
+    (tmp_path / "p.urp").write_bytes(urp(script_line("sleep(1000)"), installation="cell"))
+    dashboard.ask("load p.urp")
+    return box
+
+
+def test_inputs_start_pause_resume_and_stop_a_program(machine, dashboard):
+    for line, state in ((0, "PLAYING"), (1, "PAUSED"), (0, "PLAYING"), (2, "STOPPED"), (0, "PLAYING")):
+        pulse(machine, dashboard, line)
+        dashboard.until("programState", f"{state} p.urp")
+
+
+def test_inputs_act_on_rising_edges_of_the_installation_that_is_loaded(machine, dashboard, tmp_path):
+    machine.set_digital_input("standard", 2, True)
+    dashboard.ask_all("play", "running", "running")
+    dashboard.until("programState", "PLAYING p.urp")
+    machine.set_digital_input("standard", 2, False)
+    dashboard.ask_all("running", "running")
+    dashboard.until("programState", "PLAYING p.urp")
+    pulse(machine, dashboard, 2)
+    dashboard.until("programState", "STOPPED p.urp")
+    dashboard.ask("load installation default.installation")
+    pulse(machine, dashboard, 0)
+    dashboard.ask_all(*["running"] * 5)
+    assert dashboard.ask("programState") == "STOPPED p.urp"
+
+
+def test_an_input_starts_nothing_in_local_control(tmp_path):
+    actions = listed("DigitalInputActions", "START")
+    (tmp_path / "default.installation").write_bytes(installation("<IOs>", actions, "</IOs>", start_up("")))
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "p.urp").write_bytes(urp(script_line("sleep(1000)")))
+    with (
+        ControlBox("ur5e", pace="lockstep", port_base=None, programs=tmp_path) as box,
+        Dashboard(box) as dashboard,
+    ):
+        assert after_start_up(dashboard) == "Loaded program: /programs/sub/p.urp"
+        box.remote_control(False)
+        pulse(box, dashboard, 0)
+        dashboard.ask_all(*["running"] * 5)
+        assert dashboard.ask("running") == "Program running: false"
+        assert any("an input starts programs only in remote control" in entry.text for entry in box.log)
+
+
 # --- start-up
+
+
+def after_start_up(dashboard):
+    """What is loaded then: what a client asks to load comes after it."""
+    dashboard.ask("load installation default.installation")
+    return dashboard.ask("get loaded program")
 
 
 def start_up(line="digital_in[6]", level="true"):
@@ -376,11 +439,30 @@ def test_the_default_installation_loads_a_program_that_a_line_starts(tmp_path, l
         connect(box, "primary") as sock,
     ):
         reader = MessageReader(sock)
-        dashboard.until("get loaded program", "Loaded program: /programs/sub/p.urp")
+        assert after_start_up(dashboard) == "Loaded program: /programs/sub/p.urp"
         for state in (not level, level):
             box.set_digital_input("standard", 6, state)
             dashboard.ask_all("running", "running")
         assert reader.message(TextMessage).text == "started"
+
+
+def test_what_a_client_loads_at_start_up_stays(tmp_path):
+    """However soon it asks: the box loads its own program before."""
+    (tmp_path / "sub").mkdir()
+    for name in ("sub/p.urp", "other.urp"):
+        (tmp_path / name).write_bytes(urp(script_line("x = 1")))
+    (tmp_path / "default.installation").write_bytes(installation(start_up()))
+    with ControlBox(pace="lockstep", port_base=None, programs=tmp_path) as box, Dashboard(box) as dashboard:
+        assert dashboard.ask("load other.urp") == "Loading program: /programs/other.urp"
+        loaded = [entry.text for entry in box.log if entry.text.startswith("Loaded program")]
+        assert loaded == ["Loaded program: /programs/sub/p.urp", "Loaded program: /programs/other.urp"]
+        for level in (False, True):
+            box.set_digital_input("standard", 6, level)
+            dashboard.ask_all("running", "running")
+        assert dashboard.ask_all("running", "get loaded program") == [
+            "Program running: false",
+            "Loaded program: /programs/other.urp",
+        ]
 
 
 def test_a_start_line_that_is_no_input_is_said(tmp_path):
@@ -388,6 +470,6 @@ def test_a_start_line_that_is_no_input_is_said(tmp_path):
     (tmp_path / "sub" / "p.urp").write_bytes(urp(script_line("x = 1")))
     (tmp_path / "default.installation").write_bytes(installation(start_up("digital_in[9]")))
     with ControlBox(pace="lockstep", port_base=None, programs=tmp_path) as box, Dashboard(box) as dashboard:
-        dashboard.until("get loaded program", "Loaded program: /programs/sub/p.urp")
+        assert after_start_up(dashboard) == "Loaded program: /programs/sub/p.urp"
         dashboard.ask("running")
         assert any("'digital_in[9]': it is no digital input" in entry.text for entry in box.log)

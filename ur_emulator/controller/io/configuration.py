@@ -70,11 +70,12 @@ class IoConfiguration:
     def requests_freedrive(self) -> bool:
         """True while a line that is set up for it, or a signal of another unit, is high."""
         for (group, index), action in self.input_actions.items():
-            if action == FREEDRIVE_ACTION and self._is_high(group, index):
+            if action == FREEDRIVE_ACTION and self.is_high(group, index):
                 return True
         return self.modbus.requests_freedrive
 
-    def _is_high(self, group: str, index: int) -> bool:
+    def is_high(self, group: str, index: int) -> bool:
+        """Return the level of an input; names of groups as in those of builtins."""
         if group == "gp_boolean":
             return self.registers.inputs.booleans[index]
         return self.io.read_digital_in(_INPUTS[group].bits[index])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetUp, StartProgram, StopProgram
@@ -22,16 +22,20 @@ from ur_emulator.programs.compiling import (
     load_installation_and_compile,
 )
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import ExternalControlPc, Installation
-from ur_emulator.programs.installation_files import NEW_BOX
+from ur_emulator.programs.installation import ExternalControlPc, Installation, StartUp
+from ur_emulator.programs.installation_files import DEFAULT_NAME, NEW_BOX
 from ur_emulator.programs.variables_file import literal, write_variables
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.programs.external_control import request_program
+from ur_emulator.servers.programs.input_actions import follow_inputs
 from ur_emulator.servers.steps import Steps
 
 if TYPE_CHECKING:
     from ur_emulator.programs.loading import LoadedProgram
 
+T = TypeVar("T")
+# Who External Control asks if neither a client has sent `play` nor a node or the installation names a PC.
+THIS_MACHINE = "127.0.0.1"
 # Port of a PC's script sender when nothing names another. Source: the source text of the URCap.
 SCRIPT_SENDER_PORT = 50002
 # Modes in which the controller does not take programs yet.
@@ -70,6 +74,7 @@ class ProgramPlayer:
         self.loaded: LoadedProgram | None = None
         self.installation = NEW_BOX
         self._ready: Outcome | None = None
+        self._loading: list[Steps[Any]] = []
         self._catalogue = access.identity.software.catalogue
 
     # --- state
@@ -93,6 +98,24 @@ class ProgramPlayer:
 
     def load(self, name: str) -> Steps[None]:
         """Load a program and its installation; what was loaded stays if that fails."""
+        yield from self._in_turn(self._load(name))
+
+    def load_installation(self, name: str) -> Steps[None]:
+        """Load an installation; the one before stays if that fails."""
+        yield from self._in_turn(self._load_installation(name))
+
+    def load_default(self) -> Steps[StartUp]:
+        """Load the default installation and the program that it names; return what is to happen next."""
+        return (yield from self._in_turn(self._load_default()))
+
+    def _load_default(self) -> Steps[StartUp]:
+        yield from self._load_installation(DEFAULT_NAME)
+        start = self.installation.start_up
+        if start.program:
+            yield from self._load(start.program)
+        return start
+
+    def _load(self, name: str) -> Steps[None]:
         what = f"load {name}"
         self._must_be_stopped(what)
         try:
@@ -109,8 +132,7 @@ class ProgramPlayer:
         if isinstance(ready, ScriptFailed):
             self._access.note(f"{loaded.file_name} will not start: {ready.log_text or ready.text}")
 
-    def load_installation(self, name: str) -> Steps[None]:
-        """Load an installation; the one before stays if that fails."""
+    def _load_installation(self, name: str) -> Steps[None]:
         what = f"load installation {name}"
         self._must_be_stopped(what)
         try:
@@ -175,9 +197,21 @@ class ProgramPlayer:
 
     # --- how
 
+    def _in_turn(self, work: Steps[T]) -> Steps[T]:
+        """Load after all that was asked for before: each loading begins with what that has left."""
+        self._loading.append(work)
+        try:
+            while self._loading[0] is not work:
+                yield
+            return (yield from work)
+        finally:
+            self._loading.remove(work)
+
     def _use(self, installation: Installation, set_up: Outcome | None) -> Steps[None]:
         """Make an installation effective, and end when it is."""
-        self._declare(installation)
+        if installation is not self.installation:
+            self._declare(installation)
+            self._access.start_alone(self._follow_inputs())
         if isinstance(set_up, ScriptFailed):
             text = set_up.log_text or set_up.text
             self._access.note(f"{installation.wire_path} has no effect: {text}")
@@ -194,6 +228,25 @@ class ProgramPlayer:
         if loaded is not None and loaded.installation not in (None, installation):
             self.loaded = replace(loaded, installation=installation)
             self._ready = None
+
+    def _follow_inputs(self) -> Steps[None]:
+        """Do what the inputs of the installation ask for, until another one is loaded."""
+        begin, declared = self._access.start_alone, self.installation.input_actions
+        return follow_inputs(
+            self._access.controller.state.io_configuration,
+            declared,
+            {
+                "START": lambda: begin(self._start_by_input()),
+                "PAUSE": lambda: begin(self.pause()),
+                "STOP": lambda: begin(self.stop()),
+            },
+            lambda: self.installation.input_actions is declared,
+        )
+
+    def _start_by_input(self) -> Steps[None]:
+        if not self._access.controller.state.operator.remote_spell:
+            self._refuse("play", "an input starts programs only in remote control")
+        yield from self.play(THIS_MACHINE)
 
     def _keep_variables(self) -> Steps[None]:
         """Wait for the end of the program, then keep the values of the installation's variables."""

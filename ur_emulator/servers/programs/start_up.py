@@ -9,13 +9,11 @@ from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
 from ur_emulator.errors import RefusedError
 from ur_emulator.programs.installation_files import DEFAULT_NAME
 from ur_emulator.servers.box_access import BoxAccess
-from ur_emulator.servers.programs.player import ProgramPlayer
+from ur_emulator.servers.programs.player import THIS_MACHINE, ProgramPlayer
 from ur_emulator.servers.steps import Steps
 
 _LINE = re.compile(r"([a-z_]+)\[(\d)\]")
 _GROUPS = {"digital_in": STANDARD, "config_in": CONFIGURABLE, "tool_in": TOOL}
-# Who External Control asks if the installation names no PC.
-_THIS_MACHINE = "127.0.0.1"
 
 
 def start_up(access: BoxAccess, player: ProgramPlayer) -> Steps[None]:
@@ -30,12 +28,9 @@ def start_up(access: BoxAccess, player: ProgramPlayer) -> Steps[None]:
     if not player.folder.exists or not player.folder.has(DEFAULT_NAME):
         return
     with suppress(RefusedError):
-        yield from player.load_installation(DEFAULT_NAME)
-        start = player.installation.start_up
-        if not start.program or player.loaded is not None:
-            return
-        yield from player.load(start.program)
-        if not start.start_line:
+        start = yield from player.load_default()
+        program = player.loaded
+        if program is None or not start.start_line:
             return
         bit = _input_bit(player.installation.lines.get(start.start_line, start.start_line))
         if bit is None:
@@ -46,7 +41,8 @@ def start_up(access: BoxAccess, player: ProgramPlayer) -> Steps[None]:
         while lines.read_digital_in(bit) is before or before is start.start_level:
             before = lines.read_digital_in(bit)
             yield
-        yield from player.play(_THIS_MACHINE)
+        if player.loaded is not None and player.loaded.wire_path == program.wire_path:
+            yield from player.play(THIS_MACHINE)
 
 
 def _input_bit(line: str) -> int | None:
