@@ -204,7 +204,7 @@ class Numbered:
     def __getattr__(self, name):
         if name == "registers":
             return self
-        if name in ("analog_values", "joint_mode", "tool_output_modes"):
+        if name in ("analog_values", "encoder_counts", "joint_mode", "tool_output_modes"):
             return (10, 11, 12, 13, 14, 15)
         return tuple(range(128)) if name.startswith(("input_", "output_")) else 7
 
@@ -246,6 +246,6 @@ def test_a_snapshot_that_does_not_fit_is_explained():
 
 
 def test_variables_that_nothing_fills_have_no_encoder():
-    field = next(field for field in OUTPUTS if field.name == "control_step")
-    with pytest.raises(LocalProtocolError, match="control_step"):
+    field = next(field for field in OUTPUTS if field.origin is None)
+    with pytest.raises(LocalProtocolError, match=field.name):
         snapshot_encoder([field], b"")

@@ -44,7 +44,7 @@ class Box:
 
     def __init__(self):
         self.stops = 0
-        self.remote_spell = 1
+        self.remote_period = 1
         self.done = []
 
     def submit(self, command, *, in_place_of=""):

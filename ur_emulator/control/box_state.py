@@ -118,7 +118,7 @@ def take_state(controller: Controller) -> BoxState:
         safety_mode=SafetyMode(now.safety_mode).name,
         safety_status=SafetyStatus(now.safety_status).name,
         operational_mode=controller.state.operational.mode.name,
-        remote_control=bool(operator.remote_spell),
+        remote_control=bool(operator.remote_period),
         program_state=ProgramState(now.runtime_state).name,
         program=now.program_name,
         joint_modes=tuple(JointMode(mode).name for mode in now.joint_mode),

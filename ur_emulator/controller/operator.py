@@ -59,13 +59,13 @@ class Operator:
 
     Attributes:
         buttons: those of the pendant that are pressed, as in RobotStatusBits.
-        remote_spell: number of the present spell of remote control, from 1; 0 in local control. A client may
+        remote_period: number of the present period of remote control, from 1; 0 in local control. A client may
             command the box while it is that of its connect. A CB3 has no other than the first.
     """
 
     def __init__(self) -> None:
         self.buttons = 0
-        self.remote_spell = self._n_spells = 1
+        self.remote_period = self._n_periods = 1
         self._count = 0
         self._open: dict[int, OperatorRequest] = {}
         self._shown: deque[str] = deque(maxlen=MAX_SHOWN)
@@ -86,9 +86,9 @@ class Operator:
 
     def set_remote_control(self, is_remote: bool) -> None:
         """Switch to remote control, or to local control."""
-        if is_remote and not self.remote_spell:
-            self._n_spells += 1
-        self.remote_spell = self._n_spells if is_remote else 0
+        if is_remote and not self.remote_period:
+            self._n_periods += 1
+        self.remote_period = self._n_periods if is_remote else 0
 
     def show(self, text: str) -> None:
         """Show a popup that does not block a program; it stays, also without power, until it is closed."""

@@ -103,9 +103,9 @@ class ServedBox:
         return len(self._commands) < BUDGETS.commands
 
     @property
-    def remote_spell(self) -> int:
-        """Number of the present spell of remote control, 0 in local control."""
-        return self.controller.state.operator.remote_spell
+    def remote_period(self) -> int:
+        """Number of the present period of remote control, 0 in local control."""
+        return self.controller.state.operator.remote_period
 
     def submit(self, command: Command, done: Done | None = None, *, in_place_of: str = "") -> None:
         """Take a command for the next cycle.

@@ -60,10 +60,10 @@ class _DashboardSession(Session):
         super().__init__(connection, access)
         self.lines = DashboardConnection(access.identity.software.dashboard)
         self._answers = answers
-        self._remote_spell = self._spell_now()
+        self._remote_period = self._period_now()
 
-    def _spell_now(self) -> int:
-        return self._access.controller.state.operator.remote_spell
+    def _period_now(self) -> int:
+        return self._access.controller.state.operator.remote_period
 
     def _take(self, data: bytes) -> None:
         try:
@@ -77,7 +77,7 @@ class _DashboardSession(Session):
             return 0
         if not isinstance(event, CommandReceived):
             text = event.answer
-        elif event.command.needs_remote and not 0 < self._remote_spell == self._spell_now():
+        elif event.command.needs_remote and not 0 < self._remote_period == self._period_now():
             text = REMOTE_CONTROL_ONLY
         else:
             answer = self._answers.answer(event, self.connection.host)

@@ -49,8 +49,8 @@ class Box(Protocol):
     stops: int
 
     @property
-    def remote_spell(self) -> int:
-        """Number of the present spell of remote control, 0 in local control."""
+    def remote_period(self) -> int:
+        """Number of the present period of remote control, 0 in local control."""
         ...
 
     def submit(self, command: Command, *, in_place_of: str = "") -> None:
@@ -89,11 +89,11 @@ class ProgramIntake:
 
     def new_sender(self) -> Sender:
         """Return a client that has just connected."""
-        return Sender(self._box.remote_spell)
+        return Sender(self._box.remote_period)
 
     def received(self, sender: Sender, data: bytes) -> None:
         """Take script text of a client; in local control it has no effect, until the client connects anew."""
-        if not sender.remote_spell or sender.remote_spell != self._box.remote_spell:
+        if not sender.remote_period or sender.remote_period != self._box.remote_period:
             self._warn("Socket is read-only when the robot is in local control", READ_ONLY)
             return
         before = sender.channel.pending

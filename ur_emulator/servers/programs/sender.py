@@ -20,7 +20,7 @@ class Sender:
     """A client that sends scripts.
 
     Attributes:
-        remote_spell: number of the spell of remote control in which it has connected, see `Operator`.
+        remote_period: number of the period of remote control in which it has connected, see `Operator`.
         channel: what it has sent of a program that is not complete.
         waiting: its programs that wait, in order.
         compiling: its program that is being compiled, or whose result waits for the next cycle.
@@ -30,7 +30,7 @@ class Sender:
         is_told: it was informed that it sends too much.
     """
 
-    remote_spell: int = 1
+    remote_period: int = 1
     channel: ScriptChannel = field(default_factory=ScriptChannel)
     waiting: deque[Program] = field(default_factory=deque)
     compiling: Program | None = None

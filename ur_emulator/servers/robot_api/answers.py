@@ -86,7 +86,7 @@ class RobotApiAnswers:
             "PUT /program/v1/loaded": lambda request, _: self._load(request, "name"),
             "GET /program/v1/loaded": lambda *_: _at_once({"name": self._loaded_name()}),
             "GET /system/v1/controlmode": lambda *_: _at_once(
-                {"mode": "REMOTE" if access.controller.state.operator.remote_spell else "LOCAL"}
+                {"mode": "REMOTE" if access.controller.state.operator.remote_period else "LOCAL"}
             ),
             "GET /system/v1/operationalmode": lambda *_: _at_once({"mode": self._operational_mode()}),
             "GET /programs/v1": self._list_programs,
@@ -114,7 +114,7 @@ class RobotApiAnswers:
             if argument:
                 raise HttpError(405, f"{request.path} is asked with {argument}", ("Allow", argument))
             raise HttpError(404, f"there is no {ascii(request.path)[:80]}: see {BASE}/openapi.json")
-        if call.changes and not self._access.controller.state.operator.remote_spell:
+        if call.changes and not self._access.controller.state.operator.remote_period:
             raise HttpError(403, _LOCAL)
         try:
             return (yield from self._methods[f"{call.method} {call.path}"](request, argument))
