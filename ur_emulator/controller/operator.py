@@ -59,8 +59,8 @@ class Operator:
 
     Attributes:
         buttons: those of the pendant that are pressed, as in RobotStatusBits.
-        remote_period: number of the present period of remote control, from 1; 0 in local control. A client may
-            command the box while it is that of its connect. A CB3 has no other than the first.
+        remote_period: number of the present period of remote control, from 1; 0 in local control. A client
+            may command the box while it is that of its connect. A CB3 has no other than the first.
     """
 
     def __init__(self) -> None:
