@@ -244,7 +244,7 @@ class ProgramPlayer:
         )
 
     def _start_by_input(self) -> Steps[None]:
-        if not self._access.controller.state.operator.remote_spell:
+        if not self._access.controller.state.operator.remote_period:
             self._refuse("play", "an input starts programs only in remote control")
         yield from self.play(THIS_MACHINE)
 
