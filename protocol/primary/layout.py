@@ -21,9 +21,8 @@ from protocol.primary.setup import (
     ConfigurationData,
     KinematicsInfo,
     SingularityInfo,
-    ToolCommunicationInfo,
-    ToolModeInfo,
 )
+from protocol.primary.tool import ToolCommunicationInfo, ToolData, ToolModeInfo
 from protocol.ur_types import RobotMode, SafetyMode
 from protocol.wire_record import Since, ValueOrigin, since, wire
 
@@ -36,7 +35,6 @@ __all__ = [
     "MasterboardData",
     "RobotModeData",
     "SafetyData",
-    "ToolData",
 ]
 
 _MEASURED, _MODELLED, _PROPERTY, _CONSTANT, _ZERO = ValueOrigin
@@ -105,23 +103,6 @@ class JointData(SubPackage):
     joint_mode: tuple[int, ...] = wire(
         "B", "JointMode", count=6, interleaved="joint", default=239, origin=_MODELLED
     )
-
-
-@dataclass(frozen=True, slots=True)
-class ToolData(SubPackage):
-    """Tool connector: analogue inputs, supply, temperature."""
-
-    SUB_TYPE: ClassVar[int] = 2
-
-    analog_input_range2: int = wire("B", "0 current, 1 voltage", origin=_MODELLED)
-    analog_input_range3: int = wire("B", "0 current, 1 voltage", origin=_MODELLED)
-    analog_input2: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
-    analog_input3: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
-    tool_voltage_48v: float = wire("f", unit="V", default=48.0, origin=_MEASURED)
-    tool_output_voltage: int = wire("B", "0, 12 or 24", unit="V", origin=_MODELLED)
-    tool_current: float = wire("f", unit="A", default=0.0, origin=_MODELLED)
-    tool_temperature: float = wire("f", unit="degC", default=25.0, origin=_MEASURED)
-    tool_mode: int = wire("B", "JointMode, the tool's subset", default=239, origin=_MODELLED)
 
 
 @dataclass(frozen=True, slots=True)

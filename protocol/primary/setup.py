@@ -18,8 +18,6 @@ __all__ = [
     "ConfigurationData",
     "KinematicsInfo",
     "SingularityInfo",
-    "ToolCommunicationInfo",
-    "ToolModeInfo",
 ]
 
 _SINCE_5_25_1 = Since(None, SoftwareVersion(5, 25, 1))
@@ -104,33 +102,6 @@ class CalibrationData(SubPackage):
     SUB_TYPE: ClassVar[int] = 9
 
     wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", default=0.0, origin=_ZERO)
-
-
-@dataclass(frozen=True, slots=True)
-class ToolCommunicationInfo(SubPackage):
-    """Serial line at the tool, e-Series."""
-
-    SUB_TYPE: ClassVar[int] = 11
-    SINCE: ClassVar[Since] = since(None, (5, 0))
-
-    is_enabled: bool = wire("?", default=False, origin=_CONSTANT)
-    baud_rate: int = wire("i", default=115200, origin=_CONSTANT)
-    parity: int = wire("i", "0 none, 1 odd, 2 even", origin=_CONSTANT)
-    stop_bits: int = wire("i", default=1, origin=_CONSTANT)
-    rx_idle_chars: float = wire("f", default=1.5, origin=_CONSTANT)
-    tx_idle_chars: float = wire("f", default=3.5, origin=_CONSTANT)
-
-
-@dataclass(frozen=True, slots=True)
-class ToolModeInfo(SubPackage):
-    """Digital outputs at the tool, e-Series."""
-
-    SUB_TYPE: ClassVar[int] = 12
-    SINCE: ClassVar[Since] = since(None, (5, 1))
-
-    output_mode: int = wire("B", "0 digital, 1 dual-pin power", origin=_CONSTANT)
-    digital_output_mode0: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, origin=_CONSTANT)
-    digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, origin=_CONSTANT)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from protocol.primary import messages as M
 from protocol.primary import packages as P
 from protocol.primary import setup as U
 from protocol.primary import state as S
+from protocol.primary import tool as T
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_codec import codec_for
 from protocol.wire_record import wire_fields
@@ -275,8 +276,8 @@ def test_robot_mode_data_byte_by_byte():
 # Sub-packages of a 5.8 simulator's first state.
 CAPTURED = [
     (L.AdditionalInfo(freedrive_button_enabled=True), "00000009 08 00 01 00 01"),
-    (U.ToolCommunicationInfo(), "0000001a 0b 00 0001c200 00000000 00000001 3fc00000 40600000"),
-    (U.ToolModeInfo(), "00000008 0c 00 01 01"),
+    (T.ToolCommunicationInfo(), "0000001a 0b 00 0001c200 00000000 00000001 3fc00000 40600000"),
+    (T.ToolModeInfo(), "00000008 0c 00 01 01"),
     (
         L.MasterboardData(
             analog_output0=0.004000000189989805,
@@ -376,7 +377,7 @@ def test_states_that_do_not_add_up_are_refused(body, problem):
 
 def test_a_state_takes_each_sub_package_once():
     with pytest.raises(LocalProtocolError, match="ToolData is unknown or repeated"):
-        S.encode_state([L.ToolData(), L.ToolData()], V3_15)
+        S.encode_state([T.ToolData(), T.ToolData()], V3_15)
     with pytest.raises(LocalProtocolError, match="SubPackage is unknown"):
         S.encode_state([F.SubPackage()], V3_15)
 
@@ -385,7 +386,7 @@ def test_software_before_3_0_has_no_table():
     old = SoftwareVersion(1, 8)
     assert S.state_types(old, first=True) == ()
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0: use 3\.0\.0 or later"):
-        S.encode_state([L.ToolData()], old)
+        S.encode_state([T.ToolData()], old)
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0 had other layouts"):
         M.encode_message(M.TextMessage(text="x"), old)
     data = P.encode_message_package(M.TextMessage(text="x"), V3_15)

@@ -53,6 +53,13 @@ def test_what_is_out_of_range_is_refused(line, part):
     assert part in failure
 
 
+def test_settings_of_the_tool_are_reported():
+    box = Box(software="5.11")
+    box.send(b"set_tool_communication(True, 1000000, 2, 1, 2.0, 4.5)\n")
+    box.finish()
+    assert box.now.tool_line == (True, 1_000_000, 2, 1, 2.0, 4.5)
+
+
 def test_tool_pose_is_where_the_tool_is():
     box = Box(software="3.15")
     box.send(b"textmsg(tool_pose() == get_actual_tcp_pose())\n")

@@ -7,6 +7,7 @@ from wire_story import Story
 
 from protocol.primary import layout as L
 from protocol.primary.packages import decode_package
+from protocol.primary.tool import ToolData
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.fields import output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
@@ -91,7 +92,7 @@ def test_states_and_rtde_say_the_same(moments):
 
 def test_lines_and_supplies_are_the_same_in_states_and_rtde(moments):
     for rtde, _, state, _ in moments:
-        board, tool = state[L.MasterboardData], state[L.ToolData]
+        board, tool = state[L.MasterboardData], state[ToolData]
         assert board.digital_input_bits == rtde["actual_digital_input_bits"]
         assert board.digital_output_bits == rtde["actual_digital_output_bits"]
         assert board.analog_input0 == rtde["standard_analog_input0"]

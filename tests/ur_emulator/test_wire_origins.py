@@ -19,7 +19,7 @@ V3_15 = SoftwareVersion(3, 15, 8)
 ALIVE = (ValueOrigin.MEASURED, ValueOrigin.MODELLED)
 # Vectors are looked at element by element, but for these: the last of them is a radius; and a motor that does
 # little stays as warm as it is.
-ANY_ELEMENT = {"elbow_sphere", "joint_temperatures", "temperature_motor"}
+ANY_ELEMENT = {"target_base_acceleration", "elbow_sphere", "joint_temperatures", "temperature_motor"}
 
 
 @pytest.fixture(scope="module")
@@ -71,14 +71,23 @@ def test_every_column_of_a_frame_is_what_the_table_says(story):
         check(column.name, column.origin, [tuple(v) if column.count > 1 else v for v in values])
 
 
-@pytest.mark.parametrize("version", [V3_15, SoftwareVersion(3, 2), SoftwareVersion(5, 12)])
-def test_every_field_of_a_state_is_what_the_table_says(story, version):
+def check_states(story, version):
     encoder = StateEncoder(CB3.software(version), story.controller.state.arm, story.controller.state.safety)
     states = [decode_package(encoder.encode_first(s), version).sub_packages for s, _ in story.moments]
     for record, *sent in zip(state_types(version, first=True), *states, strict=True):
         for field in wire_fields(record):
             if field.since.covers(version) and not field.only_if:
                 check(f"{field.name}", field.origin, [getattr(one, field.name) for one in sent])
+
+
+@pytest.mark.parametrize("version", [V3_15, SoftwareVersion(3, 2)])
+def test_every_field_of_a_state_is_what_the_table_says(story, version):
+    check_states(story, version)
+
+
+@pytest.mark.parametrize("version", [SoftwareVersion(5, 12), SoftwareVersion(5, 26)])
+def test_every_field_of_an_e_series_state_is_what_the_table_says(e_series_story, version):
+    check_states(e_series_story, version)
 
 
 def test_every_field_of_the_tables_has_a_mark():

@@ -35,6 +35,7 @@ from ur_emulator.models.robots import robot_by_name
 from ur_emulator.servers.primary.event_messages import message_for
 from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder, dexterity, setup_records
+from ur_emulator.servers.programs.sender import Sender
 from ur_emulator.servers.programs.words import SPEED_WORD, WORDS
 
 V3_15 = SoftwareVersion(3, 15, 8)
@@ -81,6 +82,9 @@ class PortBench(Bench):
             for intake in (self, None)
             for every in (True, False)
         ]
+
+    def new_sender(self):
+        return Sender()
 
     def received(self, sender, data):
         self.taken.append(data)

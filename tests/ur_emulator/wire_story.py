@@ -90,7 +90,8 @@ E_SERIES = """def e_series():
   encoder_enable_set_tick_count(1, 0)
   encoder_set_tick_count(0, 7)
   encoder_set_tick_count(1, -9)
-  sync()
+  set_base_acceleration([0.1, 0.2, 0.3])
+  set_tool_communication(True, 1000000, 2, 2, 2, 4)
 end
 """
 ENDLESS = MOVES.replace("  movej", "  while True:\n    movej", 1).replace("\nend\n", "\n  end\nend\n")
@@ -204,4 +205,4 @@ class ESeriesStory(Story):
 
     def work(self):
         super().work()
-        self.run(E_SERIES)
+        self.tick(5, StartProgram(compile_program(E_SERIES, catalogue=catalogue_for((5, 26)))))

@@ -15,7 +15,7 @@ from protocol.realtime.layout import SNAPSHOT_FIELDS
 from protocol.rtde.types import TimeScaleSource
 from ur_emulator.controller import electrics
 from ur_emulator.controller.arm_in_space import ArmInSpace
-from ur_emulator.controller.io.lines import CONFIGURABLE
+from ur_emulator.controller.io.lines import CONFIGURABLE, ToolLine
 from ur_emulator.controller.io.registers import RegisterValues
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION, torque_shares
@@ -70,11 +70,13 @@ class _Fields(NamedTuple):
     analog_domains: tuple[int, ...]
     tool_output_voltage: int
     tool_output_modes: tuple[int, int, int]
+    tool_line: ToolLine
     euromap_inputs: int
     euromap_outputs: int
     registers: RegisterValues
     encoder_counts: tuple[int, int]
     gravity: Vector3
+    base_acceleration: Vector3
     energy_consumed: float
     # --- computed when it is read
     space: ArmInSpace
@@ -221,6 +223,11 @@ class Snapshot(_Fields):
     def configurable_outputs(self) -> int:
         """The configurable outputs, bit 0 the first."""
         return CONFIGURABLE.word_of(self.actual_digital_output_bits)
+
+    @property
+    def target_base_acceleration(self) -> Vector6:
+        """Of the base [m/s^2, rad/s^2]; programs can set the linear part only."""
+        return (*self.base_acceleration, 0.0, 0.0, 0.0)
 
     # --- how far the joints are from protective stops
 

@@ -7,6 +7,7 @@ Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from ur_emulator.controller.io.euromap import Euromap
 
@@ -119,6 +120,26 @@ class AnalogLine:
         self.value = low + min(1.0, max(0.0, ratio)) * (high - low)
 
 
+class ToolLine(NamedTuple):
+    """Settings of the serial line at the tool of an e-Series arm.
+
+    Attributes:
+        is_enabled: it is in use.
+        baud_rate: bits a second.
+        parity: 0 none, 1 odd, 2 even.
+        stop_bits: 1 or 2.
+        rx_idle_chars: characters of silence before what was received is passed on.
+        tx_idle_chars: the same before sending.
+    """
+
+    is_enabled: bool = False
+    baud_rate: int = 115200
+    parity: int = 0
+    stop_bits: int = 1
+    rx_idle_chars: float = 1.5
+    tx_idle_chars: float = 3.5
+
+
 @dataclass(slots=True)
 class InputOutput:
     """The lines of one box.
@@ -130,6 +151,7 @@ class InputOutput:
         tool_voltage: supply of the tool: 0, 12 or 24 V.
         tool_output_modes: how the tool outputs drive: 0 each by itself, 1 both as power; then of each output
             1 sinking, 2 sourcing, 3 push-pull. It is only reported.
+        tool_line: settings of the tool's serial line, which are only reported.
         flags: of the scripts.
         euromap: signals to and from a moulding machine.
     """
@@ -142,6 +164,7 @@ class InputOutput:
     tool_analog_in: list[AnalogLine] = field(init=False)
     tool_voltage: int = 0
     tool_output_modes: tuple[int, int, int] = (0, 1, 1)
+    tool_line: ToolLine = field(default_factory=ToolLine)
     flags: list[bool] = field(default_factory=lambda: [False] * 32)
     euromap: Euromap = field(default_factory=Euromap)
 
@@ -180,3 +203,7 @@ class InputOutput:
         """Set one of `tool_output_modes`."""
         modes = self.tool_output_modes
         self.tool_output_modes = (*modes[:index], mode, *modes[index + 1 :])  # type: ignore[assignment]
+
+    def set_tool_line(self, line: ToolLine) -> None:
+        """Set up the serial line at the tool."""
+        self.tool_line = line

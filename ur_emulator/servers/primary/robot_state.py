@@ -16,17 +16,15 @@ from protocol.primary.layout import (
     MasterboardData,
     RobotModeData,
     SafetyData,
-    ToolData,
 )
 from protocol.primary.setup import (
     CalibrationData,
     ConfigurationData,
     KinematicsInfo,
     SingularityInfo,
-    ToolCommunicationInfo,
-    ToolModeInfo,
 )
 from protocol.primary.state import encode_state
+from protocol.primary.tool import ToolCommunicationInfo, ToolData, ToolModeInfo
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import (
     SIMULATED_MASTERBOARD,
@@ -145,8 +143,8 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
             io_enabled_freedrive=snap.is_guided_by_input,
         ),
         SafetyData(safety_checksum=checksum, elbow_sphere=(*snap.elbow_position, ELBOW_RADIUS)),
-        ToolCommunicationInfo(),
-        ToolModeInfo(),
+        ToolCommunicationInfo(*snap.tool_line),
+        ToolModeInfo(*snap.tool_output_modes),
         SingularityInfo(),
     )
 
