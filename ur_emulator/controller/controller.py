@@ -37,6 +37,7 @@ from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.direct_torque import TorqueCommand
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import UnreachableError
 from ur_emulator.plant.exact import ExactPlant
@@ -155,8 +156,8 @@ class Controller:
         self._step_scripts()
         was_active = was_pushing or self.programs.has_work or state.motion.is_moving or state.mode.is_changing
         running = state.mode.mode is RobotMode.RUNNING
-        control, target = self._step_motion(running)
-        self.plant.step(target if running else None, control)
+        control, target, torque = self._step_motion(running)
+        self.plant.step(target if running else None, control, torque)
         sensed = self.plant.sense()
         state.energy.step(state.mode.mode, sensed.actual_current)
         self._watch(sensed, control, running)
@@ -202,14 +203,17 @@ class Controller:
             self._payload = payload
             self.plant.set_payload(payload.mass, payload.cog, payload.inertia)
 
-    def _step_motion(self, running: bool) -> tuple[ControlMode, JointTarget]:
-        """How the arm is driven in this cycle, and to where."""
+    def _step_motion(self, running: bool) -> tuple[ControlMode, JointTarget, TorqueCommand | None]:
+        """How the arm is driven in this cycle, to where, and by which torque."""
         state, compliance = self.state, self.state.compliance
         control = _BY_POSITION
         if compliance.is_on or state.io_configuration.input_actions or state.modbus.signals:
             control = compliance.step()
         target = self._next_target() if running else state.motion.step(self.period_s, state.speed.slider)
-        return control, compliance.freedrive_target() if control is _BY_HAND else target
+        if control is _BY_HAND:
+            return control, compliance.freedrive_target(), compliance.holding_torque()
+        torque = state.motion.torque
+        return control if torque is None else compliance.drive_by_torque(), target, torque
 
     def _watch(self, sensed: PlantState, control: ControlMode, running: bool) -> None:
         """Stop the arm if the measured state violates a limit, or a stop was requested."""
@@ -250,7 +254,7 @@ class Controller:
             scale = limiter.step(state.motion, state.arm, state.tool.tcp_offset, scale, self.period_s)
         try:
             target = state.motion.step(self.period_s, scale)
-            if target is before or state.safety.is_stopped:
+            if target is before or state.safety.is_stopped or state.motion.torque is not None:
                 return target
             violation = self._setpoints.find_invalid(state.safety.limits, before, target)
         except UnreachableError:

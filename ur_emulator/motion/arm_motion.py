@@ -6,6 +6,7 @@ Must not know scripts or physics.
 from __future__ import annotations
 
 from ur_emulator.models.robot_model import ZERO6, Vector6
+from ur_emulator.motion.direct_torque import DirectTorque, TorqueCommand
 from ur_emulator.motion.generators import Generator, StopJ
 from ur_emulator.motion.overlay import Overlay, OverlayChain
 from ur_emulator.motion.path_motion import HOLD, PathMotion
@@ -43,6 +44,21 @@ class ArmMotion(PathMotion):
     def is_paused(self) -> bool:
         """True when a pause has brought the arm to rest."""
         return self._time_scaling.paused and not any(self.target.qd)
+
+    @property
+    def torque(self) -> TorqueCommand | None:
+        """What the drives shall give; None where they follow `target`."""
+        generator = self._generator
+        return generator.command if isinstance(generator, DirectTorque) else None
+
+    def command_torque(self, owner: object, generator: DirectTorque) -> None:
+        """Drive the arm by torque for `owner` in the next cycle; overlays end.
+
+        Raises:
+            OwnershipError: another owner has the arm.
+        """
+        self.command(owner, generator)
+        self._chain.clear()
 
     # --- stops
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ur_emulator.models.calibration import Calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
+from ur_emulator.motion.direct_torque import TorqueCommand
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.freedrive import Freedrive
 from ur_emulator.plant.friction import Friction
@@ -37,8 +38,8 @@ TARGET_MAX = 1e6  # rad, rad/s, rad/s²; far above any real target, small enough
 class Drives:
     """The six drives and the controller's torque model that feeds them.
 
-    A cycle is `command`, `advance`, `keep`, or in freedrive `drive_freely` alone. Only `keep` ends a
-    cycle: the others may be repeated. Where `target_acts_later`, `advance` may come first;
+    A cycle is `command`, `advance`, `keep`, or for free joints `drive_freely` or `drive_by_torque` alone.
+    Only `keep` ends a cycle: the others may be repeated. Where `target_acts_later`, `advance` may come first;
     `command` is followed by `evaluate_friction` then, for `target_current`.
 
     Args:
@@ -181,15 +182,38 @@ class Drives:
         np.multiply(current, self._per_torque, current)
         self.target_current = six(current.tolist())
 
-    def drive_freely(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> None:
-        """Fill `control` for an arm in freedrive, with joints at q (6,) [rad], qd (6,) [rad/s]."""
+    def drive_freely(
+        self, q: NDArray[np.float64], qd: NDArray[np.float64], extra: Vector6 | None = None
+    ) -> None:
+        """Fill `control` for an arm in freedrive.
+
+        Args:
+            q: angles of the joints (6,) [rad].
+            qd: their speeds (6,) [rad/s].
+            extra: torque that holds blocked axes [Nm].
+        """
         still = np.zeros(6)
         gravity = self._dynamics.evaluate(q, still, still)
         self._friction.evaluate(np.array([qd, qd, qd]))
         torque = self._guiding.torque(gravity, self._friction.dry_compensation, q, qd)
+        if extra is not None:
+            torque += extra
+        self._give(torque, gravity)
+
+    def drive_by_torque(
+        self, q: NDArray[np.float64], qd: NDArray[np.float64], command: TorqueCommand
+    ) -> None:
+        """Fill `control` for an arm in torque control, with joints at q (6,) [rad], qd (6,) [rad/s]."""
+        still = np.zeros(6)
+        moment = self._dynamics.evaluate(q, still, still) + command.torque
+        self._friction.evaluate(np.array([qd, qd, qd]))
+        self._give(moment + self._friction.share(command.viscous, command.coulomb), moment)
+
+    def _give(self, torque: NDArray[np.float64], moment: NDArray[np.float64]) -> None:
+        """Let the free joints have a torque (6,) in this cycle; moment (6,) is its part without friction."""
         self._path.control[:] = torque
         self.bias[:] = 0.0
-        self.target_moment = six(gravity.tolist())
+        self.target_moment = six(moment.tolist())
         self.target_current = six((torque * self._per_torque).tolist())
 
     def are_pressing(self, q_motor: NDArray[np.float64]) -> bool:

@@ -16,6 +16,7 @@ from ur_emulator.errors import PlantError, RefusedError
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
+from ur_emulator.motion.direct_torque import TorqueCommand
 from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.plant import Plant
@@ -39,8 +40,15 @@ class ExactPlant(Plant):
         self._q: Vector6 = six([float(angle) for angle in q])
         self._qd = ZERO6
 
-    def step(self, target: Target | None, mode: ControlMode = ControlMode.POSITION) -> None:
-        """Move to the target; see `Plant.step`. Without one, and in freedrive, the arm stands still.
+    def step(
+        self,
+        target: Target | None,
+        mode: ControlMode = ControlMode.POSITION,
+        torque: TorqueCommand | None = None,
+    ) -> None:
+        """Move to the target; see `Plant.step`.
+
+        Without one, in freedrive and in torque control, the arm stands still.
 
         Raises:
             PlantError: the target is not finite.
@@ -50,7 +58,7 @@ class ExactPlant(Plant):
         if target is None:
             self._qd = ZERO6
             self._drives.release()
-        elif mode is ControlMode.TEACH:
+        elif mode in (ControlMode.TEACH, ControlMode.TORQUE):
             self._qd = ZERO6
             self._drives.expect(self._q, ZERO6, ZERO6)
         elif self._drives.expect(target.q, target.qd, target.qdd):

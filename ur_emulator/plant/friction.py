@@ -9,6 +9,8 @@ that are off by what `Fidelity.friction_error` says.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,6 +65,11 @@ class Friction:
         """Return the part of `compensation` that does not grow with the speed (6,) [Nm]."""
         dry: NDArray[np.float64] = self.compensation - self._viscous[1]
         return dry
+
+    def share(self, viscous: Sequence[float], coulomb: Sequence[float]) -> NDArray[np.float64]:
+        """Return shares (6,) of the viscous and of the dry part of `compensation` [Nm]."""
+        part: NDArray[np.float64] = viscous * self._viscous[1] + coulomb * self.dry_compensation
+        return part
 
     def evaluate(self, speeds: NDArray[np.float64]) -> None:
         """Set the attributes for speeds (3, 6) [rad/s]: actual, of the target, of the set-point."""

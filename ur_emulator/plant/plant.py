@@ -8,8 +8,8 @@ seed: equal seeds and equal targets give bit-identical states.
 Where the dead time is at least a cycle, no target acts within its own cycle: the arm can move before the
 target is known (`run_ahead`), while a client computes it. A change of the loads meanwhile undoes that.
 
-The arm has three control modes (`ControlMode`): position; force, with the slow outer loop of the servos held;
-and freedrive, where no joint holds a position.
+The arm has four control modes (`ControlMode`): position; force, with the slow outer loop of the servos held;
+freedrive and torque control, where no joint holds a position.
 
 Angles: the physics' hinge is the motor side of the gear, which the drive holds; the joint is there plus the
 gear's transmission error. Links move with the hinge: collisions leave out that error of 0.1 mrad.
@@ -31,6 +31,7 @@ from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
+from ur_emulator.motion.direct_torque import TorqueCommand
 from ur_emulator.plant.arm_physics import ArmPhysics
 from ur_emulator.plant.drives import TARGET_MAX, Drives
 from ur_emulator.plant.gear import GearRipple, GearWithPlay
@@ -40,6 +41,8 @@ from ur_emulator.plant.plant_state import PlantState, Target
 from ur_emulator.plant.sensors import REC_ACCELERATION, Record, Sensors
 from ur_emulator.plant.thermometers import Thermometers
 
+# Control modes in which no joint holds a position.
+_FREE = (ControlMode.TEACH, ControlMode.TORQUE)
 _WANDER_LEVELS = 64
 """A dead time that wanders goes through so many values: steps of 30 us for 2 ms."""
 
@@ -241,14 +244,20 @@ class Plant:
 
     # --- the cycle ---
 
-    def step(self, target: Target | None, mode: ControlMode = ControlMode.POSITION) -> None:
+    def step(
+        self,
+        target: Target | None,
+        mode: ControlMode = ControlMode.POSITION,
+        torque: TorqueCommand | None = None,
+    ) -> None:
         """Advance one control cycle.
 
         Args:
             target: set-point for the end of this cycle; the drives act on it from the beginning of the cycle
                 plus the dead time. None puts or keeps the brakes on: the joints stand still.
-            mode: control mode. In TEACH (freedrive) the target has no effect, but the first one afterwards
-                should be at the measured position.
+            mode: control mode. In TEACH (freedrive) and TORQUE the target has no effect, but the first one
+                afterwards should be at the measured position.
+            torque: of the joints; in TORQUE, and in TEACH where something holds the arm beside the hand [Nm].
 
         Raises:
             PlantError: the target is not finite, or the simulation diverged and needs a reset.
@@ -265,7 +274,9 @@ class Plant:
         elif self._trim_is_held and mode is ControlMode.POSITION and any(target.qd):
             self._trim_is_held = False
         if mode is ControlMode.TEACH:
-            self._drives.drive_freely(self._physics.q, self._physics.qd)
+            self._drives.drive_freely(self._physics.q, self._physics.qd, torque and torque.torque)
+        elif torque is not None:
+            self._drives.drive_by_torque(self._physics.q, self._physics.qd, torque)
         elif not self._drives.command(target):
             raise PlantError(
                 f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
@@ -286,7 +297,7 @@ class Plant:
         drives = self._drives
         if not (drives.target_acts_later and self._state) or self._braked or self._is_ahead:
             return
-        if self._mode is not ControlMode.TEACH and not self._physics.loads.is_unexpected:
+        if self._mode not in _FREE and not self._physics.loads.is_unexpected:
             self._physics.store_state()
             self._run()
             self._is_ahead = True
@@ -330,8 +341,8 @@ class Plant:
         """Advance the arm by a cycle and read its sensors; `_keep` completes the cycle."""
         physics, drives, gear = self._physics, self._drives, self._gear
         record, error = self._records[0], self._error
-        is_guided = self._mode is ControlMode.TEACH
-        if not is_guided:
+        is_free = self._mode in _FREE
+        if not is_free:
             drives.actual_speed[:] = physics.qd
             drives.advance()
         physics.run(drives, self._capture_at, record.simulated)
@@ -341,7 +352,7 @@ class Plant:
         record.wrench[:] = physics.loads.wrench if physics.loads.is_unexpected else 0.0
         if physics.data.ncon:
             record.wrench += physics.contact_wrench
-        if is_guided:
+        if is_free:
             error[:] = 0.0
         else:
             np.add(physics.q, gear.error, error)
@@ -361,7 +372,7 @@ class Plant:
         self._saturated_now = not (max(currents) < self._unsaturated > -min(currents)) and any(
             map(ge, map(abs, physics.torque.tolist()), self.robot.tau_max)
         )
-        if self._mode is not ControlMode.TEACH:
+        if self._mode not in _FREE:
             trims = not (self._saturated_now or (self._trim_is_held and self._is_pressing))
             self._drives.keep(self._error if trims else None)
         self._keep_reading()
@@ -381,11 +392,11 @@ class Plant:
     def _switch(self, mode: ControlMode, target: Target) -> None:
         """Change the control mode without a jump of the torques."""
         self._undo_run_ahead()
-        was_guided, self._mode = self._mode is ControlMode.TEACH, mode
-        self._physics.servos.set_free(mode is ControlMode.TEACH)
-        if was_guided:
+        was_free, self._mode = self._mode in _FREE, mode
+        self._physics.servos.set_free(mode in _FREE)
+        if was_free:
             self._drives.follow_moving(target, self._physics.q)
-        self._trim_is_held = mode is ControlMode.FORCE or (self._trim_is_held and not was_guided)
+        self._trim_is_held = mode is ControlMode.FORCE or (self._trim_is_held and not was_free)
 
     # --- brakes ---
 

@@ -12,15 +12,19 @@ from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.kinematics.wrench import moved_wrench
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
+from ur_emulator.motion.axis_hold import AxisHold, singularity_status
 from ur_emulator.motion.force_mode import ArmMeasurement, ForceMode, ForceSettings
 from ur_emulator.motion.task_frame import MIN_DISTANCE, FrameType, TaskFrame
 from ur_emulator.plant.physics import ServoGains
-from ur_emulator.scripting.script_arm import ScriptArm
+from ur_emulator.scripting.script_arm import ScriptArm, require_positive
 from urscript.errors import ScriptRuntimeError
-from urscript.values import log_form
+from urscript.values import Pose, log_form
 
 # Greatest distance of a task frame [m]: beyond it poses lose precision.
 MAX_FRAME_DISTANCE = 100.0
+_FEATURES = ("base", "tool")
+# Deviation of a stiff axis that stops nothing [m, rad].
+_UNLIMITED = 1e3
 
 
 def compliance_functions(
@@ -41,15 +45,28 @@ def compliance_functions(
     def freedrive_unchecked(thread: object) -> None:
         compliance.start_freedrive(by_program=True)
 
-    def freedrive_mode(thread: object, free_axes: Any = (1,) * 6, feature: Any = None) -> None:
-        if not all(x == 1 for x in free_axes):
+    def freedrive_mode(thread: object, free_axes: Any = (1,) * 6, feature: Any = "base") -> None:
+        if not all(x in (0, 1) for x in free_axes):
             raise ScriptRuntimeError(
-                f"freedrive_mode: blocked axes are not modelled, got freeAxes={log_form(free_axes)}; "
-                "allowed: [1,1,1,1,1,1]"
+                f"freedrive_mode: freeAxes must hold only 0 and 1, got {log_form(free_axes)}"
             )
+        q = past.sensed.actual_q
+        if feature in _FEATURES:
+            turn = arm.tcp_pose(q)[3:] if feature == "tool" else ZERO6[3:]
+        elif isinstance(feature, Pose):
+            turn = _floats(feature)[3:]
+        else:
+            raise ScriptRuntimeError(
+                f'freedrive_mode: feature {log_form(feature)} is unknown; allowed: a pose, "base", "tool"'
+            )
+        blocked = [x == 0 for x in free_axes]
+        hold = AxisHold(arm.tool, turn, blocked, q) if any(blocked) else None
         if not compliance.is_in_freedrive:
             compliance.check_payload(force_sense.residual(past.steady_cycles))
-        freedrive_unchecked(thread)
+        compliance.start_freedrive(by_program=True, hold=hold)
+
+    def get_freedrive_status(thread: object) -> int:
+        return singularity_status(arm.model.jacobian(past.sensed.actual_q, arm.settings.tcp_offset))
 
     def tool_contact(thread: object, direction: Any) -> int:
         return force_sense.steps_since_contact(tuple(direction)[:3])
@@ -58,6 +75,7 @@ def compliance_functions(
         **_force_mode(arm, compliance, force_sense, past),
         "freedrive_mode": freedrive_mode,
         "freedrive_mode_no_incorrect_payload_check": freedrive_unchecked,
+        "get_freedrive_status": get_freedrive_status,
         "end_freedrive_mode": end_freedrive_mode,
         "teach_mode": freedrive_mode,
         "end_teach_mode": end_freedrive_mode,
@@ -115,12 +133,26 @@ def _force_mode(
             ForceMode(tool, frame, settings, stiffness, lambda: _measure(past.snapshot, arm.model, offset))
         )
 
+    def screw_driving(thread: object, f: float, v_limit: float) -> None:
+        """Push along z of the tool; the other axes are stiff, without a limit of their own."""
+        require_positive("screw_driving", v_limit=v_limit)
+        settings = ForceSettings(
+            (False, False, True, False, False, False),
+            (0.0, 0.0, float(f), 0.0, 0.0, 0.0),
+            (_UNLIMITED, _UNLIMITED, float(v_limit), _UNLIMITED, _UNLIMITED, _UNLIMITED),
+            compliance.force_damping,
+            compliance.force_gain_scaling,
+        )
+        begin(TaskFrame(arm.tcp_pose(arm.motion.target.q), FrameType.FIXED), settings)
+
     def set_gain_scaling(thread: object, scaling: float) -> None:
         compliance.set_force_gain_scaling(float(scaling))
 
     return {
         "force_mode": force_mode,
         "end_force_mode": lambda thread: compliance.end_force(),
+        "screw_driving": screw_driving,
+        "end_screw_driving": lambda thread: compliance.end_force(),
         "force_mode_set_damping": lambda thread, damping: compliance.set_force_damping(float(damping)),
         "force_mode_set_gain_scaling": set_gain_scaling,
         "force_mode_get_damping": lambda thread: compliance.force_damping,

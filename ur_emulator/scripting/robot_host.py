@@ -19,6 +19,7 @@ from ur_emulator.scripting.modbus_functions import modbus_functions
 from ur_emulator.scripting.motion_functions import motion_functions
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.operator_functions import operator_functions
+from ur_emulator.scripting.path_offset_functions import ProgramPathOffset
 from ur_emulator.scripting.port_functions import port_functions
 from ur_emulator.scripting.remote_procedures import ProgramRemotes
 from ur_emulator.scripting.script_arm import ScriptArm
@@ -27,6 +28,7 @@ from ur_emulator.scripting.socket_functions import ProgramSockets
 from ur_emulator.scripting.speed_functions import speed_functions
 from ur_emulator.scripting.state_functions import state_functions
 from ur_emulator.scripting.tool_functions import tool_functions
+from ur_emulator.scripting.torque_functions import ProgramTorque
 from ur_emulator.scripting.watchdog_functions import watchdog_functions
 from urscript.builtins import pure_builtins
 
@@ -48,6 +50,7 @@ class RobotHost:
         self._sockets = ProgramSockets(state.clock, state.events, network)
         self._remotes = ProgramRemotes(network, state.clock)
         self._conveyor = ProgramConveyor(arm, state.encoders, state.clock)
+        self._path_offset = ProgramPathOffset(arm)
         self._builtins: Mapping[str, Callable[..., Any]] = {
             **motion_functions(arm, state.place_arm, state.events),
             **speed_functions(arm, self.step_time),
@@ -64,6 +67,8 @@ class RobotHost:
             **watchdog_functions(state.watchdogs, state.force_sense, state.clock),
             **encoder_functions(state.encoders, state.io),
             **self._conveyor.functions(),
+            **self._path_offset.functions(),
+            **ProgramTorque(state.motion, state.compliance, state.past, state.events).functions(),
             **operator_functions(state.operator, state.events),
             **interpreter_functions(state.interpreter),
             **error_functions(state.error_settings, state.past, state.requests),
@@ -85,7 +90,8 @@ class RobotHost:
         self._state.motion.release(thread)
 
     def program_ended(self) -> None:
-        """Close what the program opened, and end the tracking of its conveyor."""
+        """Close what the program opened, and end what displaces the arm from its path."""
         self._sockets.close_all()
         self._remotes.close_all()
         self._conveyor.end()
+        self._path_offset.end()

@@ -225,6 +225,7 @@ _MOVES: tuple[Builtin, ...] = (
     ),
 )
 
+_SCREW = "force mode along the Z axis of the TCP as it is at the call"
 _GUIDED = "joints are free on the physics; friction compensation and push back at limits are chosen"
 
 _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
@@ -293,7 +294,7 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "hand guiding along the free axes of a feature",
         time=SWITCH,
         support=APPROXIMATE,
-        note="with all axes free only; " + _GUIDED,
+        note="blocked axes are held by a spring and a damper (chosen); " + _GUIDED,
         since=releases(None, "5.10", "10.0"),
     ),
     _row(
@@ -321,6 +322,8 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         (),
         "int",
         "0 normal, 1 near, 2 too close to a singularity",
+        support=APPROXIMATE,
+        note="by the least singular value of the Jacobian: 0.1 and 0.04, chosen",
         since=releases(None, "5.10", "10.0"),
     ),
     _row(
@@ -349,13 +352,34 @@ _FORCE_AND_FREEDRIVE: tuple[Builtin, ...] = (
         "None",
         "follow a screw along the tool's Z axis",
         time=SWITCH,
+        support=APPROXIMATE,
+        note=_SCREW,
         since=NOT_CB3,
     ),
-    _row("end_screw_driving", (), "None", "leave screw driving", time=SWITCH, since=NOT_CB3),
+    _row(
+        "end_screw_driving",
+        (),
+        "None",
+        "leave screw driving",
+        time=SWITCH,
+        since=NOT_CB3,
+        support=APPROXIMATE,
+        note=_SCREW,
+    ),
 )
 
+_OFFSET = "the filter acts once a cycle; what of it is not documented, such as the frame at rest, is chosen"
+
 _PATH_OFFSET: tuple[Builtin, ...] = (
-    _row("path_offset_enable", (), "None", "superimpose an offset on all motion", since=NOT_CB3),
+    _row(
+        "path_offset_enable",
+        (),
+        "None",
+        "superimpose an offset on all motion",
+        since=NOT_CB3,
+        support=APPROXIMATE,
+        note=_OFFSET,
+    ),
     _row(
         "path_offset_disable",
         (Param("a", NUMBER, 20, "rad/s^2"),),
@@ -363,6 +387,8 @@ _PATH_OFFSET: tuple[Builtin, ...] = (
         "stop superimposing; the joints stop with a",
         time=MOTION,
         since=NOT_CB3,
+        support=APPROXIMATE,
+        note=_OFFSET,
     ),
     _row(
         "path_offset_set",
@@ -370,14 +396,26 @@ _PATH_OFFSET: tuple[Builtin, ...] = (
         "None",
         "the offset to superimpose",
         since=NOT_CB3,
+        support=APPROXIMATE,
+        note=_OFFSET,
     ),
-    _row("path_offset_get", (_OFFSET_TYPE,), "pose, m and rad", "the offset in force", since=NOT_CB3),
+    _row(
+        "path_offset_get",
+        (_OFFSET_TYPE,),
+        "pose, m and rad",
+        "the offset in force",
+        since=NOT_CB3,
+        support=APPROXIMATE,
+        note=_OFFSET,
+    ),
     _row(
         "path_offset_set_alpha_filter",
         (Param("alpha", NUMBER, unit="0 to 1", low=0, high=1),),
         "None",
         "smooth the offset by an exponentially weighted average",
         since=NOT_CB3,
+        support=APPROXIMATE,
+        note=_OFFSET,
     ),
     _row(
         "path_offset_set_max_offset",
@@ -385,6 +423,8 @@ _PATH_OFFSET: tuple[Builtin, ...] = (
         "None",
         "largest offset allowed, 0.1 m and 0.52 rad unless set",
         since=NOT_CB3,
+        support=APPROXIMATE,
+        note=_OFFSET,
     ),
 )
 
@@ -529,6 +569,7 @@ _CONVEYORS: tuple[Builtin, ...] = (
 
 _WITH_5_22 = releases(None, "5.22", "10.9")  # 10.9 is of the same time
 _WITH_5_24 = releases(None, "5.24", "10.11")
+_TORQUE = "on the physics; acts without delay; what stops the arm, and how it stops, is chosen"
 _WITH_SCALES = releases(None, "5.25", "10.12")  # in truth 5.25.1 and 10.12.1
 
 
@@ -581,6 +622,8 @@ _LATER: tuple[Builtin, ...] = (
         "None",
         "one cycle of joint torque beside gravity compensation",
         time=MOTION,
+        support=APPROXIMATE,
+        note=_TORQUE,
         since=releases(None, "5.23", "10.11"),
         until=_WITH_SCALES,
         source=MANUAL_LATE,
@@ -596,6 +639,8 @@ _LATER: tuple[Builtin, ...] = (
         "None",
         "one cycle of joint torque beside gravity compensation",
         time=MOTION,
+        support=APPROXIMATE,
+        note=_TORQUE,
         since=_WITH_SCALES,
         source=MANUAL_LATE,
     ),

@@ -20,8 +20,10 @@ from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.limit_checks import SPEED_TOLERANCE, Violation
 from ur_emulator.controller.safety.operational_mode import OperationalModeChoice
 from ur_emulator.controller.safety.safety_state import SafetyState
-from ur_emulator.models.robot_model import Vector6
+from ur_emulator.models.robot_model import ZERO6, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.axis_hold import AxisHold
+from ur_emulator.motion.direct_torque import TorqueCommand
 from ur_emulator.motion.force_mode import ForceMode
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
@@ -76,6 +78,7 @@ class Compliance:
         self.mode = ControlMode.POSITION
         self.by_program = self.by_client = self.by_input = False
         self.force_mode: ForceMode | None = None
+        self._hold: AxisHold | None = None
         self.is_on = False
         self._is_refused = False
         self._is_teach_pressed = False
@@ -87,8 +90,12 @@ class Compliance:
 
     # --- requests
 
-    def start_freedrive(self, *, by_program: bool = False, by_client: bool = False) -> None:
-        """Start freedrive in this cycle."""
+    def start_freedrive(
+        self, *, by_program: bool = False, by_client: bool = False, hold: AxisHold | None = None
+    ) -> None:
+        """Start freedrive in this cycle; `hold` has the axes that the program blocks, None for none."""
+        if by_program:
+            self._hold = hold
         self.by_program = self.by_program or by_program
         self.by_client = self.by_client or by_client
         self.is_on = True
@@ -143,6 +150,12 @@ class Compliance:
 
     # --- cycle
 
+    def drive_by_torque(self) -> ControlMode:
+        """Return the control mode of a cycle in which a program gives the torques."""
+        self.mode = ControlMode.TORQUE
+        self.is_on = True
+        return self.mode
+
     def step(self) -> ControlMode:
         """Return the control mode of this cycle, after the scripts have run."""
         motion = self._motion
@@ -181,17 +194,24 @@ class Compliance:
             self._motion.place(sensed.actual_q)
         return JointTarget(sensed.actual_q, sensed.actual_qd)
 
+    def holding_torque(self) -> TorqueCommand | None:
+        """Return what holds the axes that the program has blocked; None if a client or an input frees all."""
+        if self._hold is None or self.by_client or self.by_input:
+            return None
+        sensed = self._past.sensed
+        return TorqueCommand(self._hold.torque(sensed.actual_q, sensed.actual_qd), ZERO6, ZERO6)
+
     def find_violation(self, sensed: PlantState) -> Violation | None:
         """Return a violation by a compliant arm in this cycle, or None.
 
         Args:
             sensed: of this cycle.
         """
-        if self.mode is ControlMode.TEACH:
-            if self._is_refused:
-                self._is_refused = False
-                return WRONG_PAYLOAD
-            return _guided_too_far(self._safety.limits, sensed)
+        if self.mode is ControlMode.TEACH and self._is_refused:
+            self._is_refused = False
+            return WRONG_PAYLOAD
+        if self.mode in (ControlMode.TEACH, ControlMode.TORQUE):
+            return _moved_too_far(self._safety.limits, sensed)
         if self.force_mode is None:
             return None
         error = sensed.position_error
@@ -220,7 +240,7 @@ WRONG_PAYLOAD = Violation(
 )
 
 
-def _guided_too_far(limits: ConfiguredLimits, sensed: PlantState) -> Violation | None:
+def _moved_too_far(limits: ConfiguredLimits, sensed: PlantState) -> Violation | None:
     """Codes C150 and C191 from the maker's list; that they lead to a protective stop is chosen.
 
     A joint outside its range may be moved back.

@@ -1,0 +1,207 @@
+"""direct_torque: the arm is held against gravity, moves as its inertia says, and returns to position control."""
+
+import numpy as np
+import pytest
+from e_series_support import DT, ESeriesBench, program
+
+from protocol.ur_types import ControlMode, ProgramState, SafetyMode
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
+from ur_emulator.commands.push import Push
+
+ALL = "viscous_scale=[1,1,1,1,1,1], coulomb_scale=[1,1,1,1,1,1]"
+NONE = "viscous_scale=[0,0,0,0,0,0], coulomb_scale=[0,0,0,0,0,0]"
+
+
+def endless(torque, more=ALL):
+    return program("while True:", f"  direct_torque({torque}, {more})", "end")
+
+
+def truth(bench):
+    return bench.controller.plant.q_true.copy()
+
+
+def rest(bench, n=400):
+    """Whether the arm stands, and position control holds it."""
+    bench.tick(n)
+    before = truth(bench)
+    bench.tick(100)
+    return np.abs(truth(bench) - before).max() < 1e-5 and bench.now.control_mode == ControlMode.POSITION
+
+
+@pytest.mark.parametrize("robot", ["ur3e", "ur5e", "ur10e"])
+@pytest.mark.parametrize("fidelity", ["ideal", "typical"])
+def test_zero_torque_holds_the_arm_with_its_payload(robot, fidelity):
+    bench = ESeriesBench(robot=robot, fidelity=fidelity)
+    payload = "set_target_payload(2, [0, 0, 0.1])"
+    bench.start(program(payload, "while True:", "  direct_torque([0,0,0,0,0,0])", "end"))
+    bench.tick(20)
+    before = truth(bench)
+    bench.tick(1000)
+    assert np.abs(truth(bench) - before).max() < 1e-4
+    assert bench.now.control_mode == ControlMode.TORQUE
+    assert bench.now.target_q == pytest.approx(bench.now.actual_q, abs=1e-3)
+    assert not bench.errors
+
+
+@pytest.mark.parametrize(("joint", "torque"), [(0, 20.0), (1, -30.0), (2, 15.0), (3, 2.0), (5, -2.0)])
+def test_a_joint_accelerates_as_its_inertia_says(joint, torque):
+    bench = ESeriesBench(fidelity="ideal")
+    bench.run(program("global m = get_mass_matrix(get_actual_joint_positions(), True)"))
+    wanted = torque / np.array(list(bench["m"]))[joint, joint]
+    torques = [0.0] * 6
+    torques[joint] = torque
+    bench.start(endless(torques))
+    start = truth(bench)[joint]
+    n = 60
+    bench.tick(n - 1)
+    # The other joints yield a little, so that this one feels less than its inertia with them at rest.
+    assert truth(bench)[joint] - start == pytest.approx(0.5 * wanted * (n * DT) ** 2, rel=0.12)
+    assert bench.now.target_moment[joint] - gravity(bench)[joint] == pytest.approx(torque, abs=0.5)
+
+
+def gravity(bench):
+    still = np.zeros(6)
+    dynamics = bench.controller.state.dynamics
+    return dynamics._torque(bench.now.actual_q, still, still)
+
+
+def test_friction_brakes_what_is_not_compensated():
+    moved = {}
+    for name, more in (("all", ALL), ("default", ""), ("none", NONE), ("old", "friction_comp=False")):
+        bench = ESeriesBench(fidelity="ideal")
+        bench.start(endless([0, 0, 0, 0, 0, 2.5], more) if more else endless([0, 0, 0, 0, 0, 2.5], "True"))
+        start = truth(bench)[5]
+        bench.tick(100)
+        moved[name] = truth(bench)[5] - start
+    assert moved["all"] > moved["default"] > moved["none"] == moved["old"] > 0.0
+
+
+def test_the_deprecated_argument_is_logged_once_and_does_not_count_beside_a_scale():
+    bench = ESeriesBench(fidelity="ideal")
+    bench.start(endless([0, 0, 0, 0, 0, 0], f"False, {ALL}"))
+    bench.tick(50)
+    logged = [event.text for event in bench.events if type(event).__name__ == "LogAdded"]
+    assert logged == ["direct_torque: friction_comp is deprecated, use viscous_scale and coulomb_scale"]
+    command = bench.controller.state.motion.torque
+    assert command.viscous == command.coulomb == (1.0,) * 6
+
+
+def test_before_5_25_friction_comp_is_not_deprecated():
+    bench = ESeriesBench(fidelity="ideal", software="5.23")
+    bench.start(endless([0, 0, 0, 0, 0, 0], "friction_comp=True"))
+    bench.tick(50)
+    assert not [event for event in bench.events if type(event).__name__ == "LogAdded"]
+    assert bench.controller.state.motion.torque.viscous == (0.9, 0.9, 0.8, 0.9, 0.9, 0.9)
+
+
+@pytest.mark.parametrize("after", ["sleep(1)", "stopj(5)", "x = 1", "halt"])
+def test_without_a_call_in_a_cycle_position_control_brings_the_arm_to_rest(after):
+    bench = ESeriesBench(fidelity="ideal")
+    lines = ("i = 0", "while i < 100:", "  direct_torque([15, 0, 0, 0, 0, 0])", "  i = i + 1", "end", after)
+    bench.start(program(*lines))
+    bench.tick(60)
+    assert bench.now.actual_qd[0] > 0.3
+    before = truth(bench)[0]
+    assert rest(bench)
+    assert 0.0 < truth(bench)[0] - before < 0.5
+    assert not bench.errors
+    assert np.abs(np.array(bench.now.position_error)).max() < 1e-4
+
+
+def test_one_cycle_without_a_call_leaves_torque_control():
+    bench = ESeriesBench(fidelity="ideal")
+    bench.start(program("while True:", "  direct_torque([0, 0, 0, 0, 0, 0])", "  sync()", "end"))
+    modes = [bench.tick().control_mode for _ in range(40)]
+    assert modes[10:14] in ([3, 0, 3, 0], [0, 3, 0, 3])
+
+
+def test_pause_holds_the_arm_and_resume_goes_on():
+    bench = ESeriesBench(fidelity="ideal")
+    bench.start(endless([8, 0, 0, 0, 0, 0]), loaded=True)
+    bench.tick(60)
+    bench.tick(1, PauseProgram())
+    assert rest(bench)
+    assert bench.now.runtime_state == ProgramState.PAUSED
+    bench.tick(3, ResumeProgram())
+    assert bench.now.control_mode == ControlMode.TORQUE
+    bench.tick(1, StopProgram())
+    assert rest(bench)
+
+
+def test_a_joint_that_becomes_too_fast_is_stopped():
+    bench = ESeriesBench(fidelity="ideal")
+    bench.start(endless([0, 0, 0, 0, 0, 8]))
+    bench.tick(1500)
+    assert bench.errors == [(191, 37)]
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert rest(bench)
+
+
+def test_more_torque_than_the_drives_have_is_stopped_as_a_collision():
+    bench = ESeriesBench(fidelity="ideal")
+    bench.start(endless([1000, 0, 0, 0, 0, 0]))
+    bench.tick(200)
+    assert bench.errors[0] in [(157, 0), (191, 32)]
+    assert rest(bench)
+
+
+def test_an_impedance_in_a_script_yields_to_a_push_as_its_stiffness_says():
+    bench = ESeriesBench(fidelity="ideal")
+    bench.start(
+        program(
+            "q0 = get_actual_joint_positions()",
+            "while True:",
+            "  tau = (q0 - get_actual_joint_positions()) * 200 - get_actual_joint_speeds() * 40",
+            f"  direct_torque(tau, {NONE})",
+            "end",
+        )
+    )
+    bench.tick(20)
+    start = truth(bench)
+    bench.tick(1500, Push((0.0, 60.0, 0.0)))
+    jacobian = bench.controller.state.arm.jacobian(bench.now.actual_q)
+    moment = jacobian[:3].T @ [0.0, 60.0, 0.0]
+    off = truth(bench) - start
+    strongest = int(np.argmax(np.abs(moment)))
+    friction = bench.controller.state.robot.coulomb[strongest]  # holds a part of it back
+    assert abs(200.0 * off[strongest] - moment[strongest]) < friction < 0.25 * abs(moment[strongest])
+    assert not bench.errors
+
+
+def test_only_one_thread_may_drive():
+    bench = ESeriesBench(fidelity="ideal")
+    bench.start(
+        program(
+            "thread other():",
+            "  while True:",
+            "    direct_torque([0,0,0,0,0,0])",
+            "  end",
+            "end",
+            "run other()",
+            "sync()",
+            "direct_torque([0,0,0,0,0,0])",
+        )
+    )
+    bench.tick(20)
+    assert bench.errors == ["Another thread is already controlling the robot"]
+
+
+def test_force_mode_ends():
+    bench = ESeriesBench(fidelity="ideal")
+    force = "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,0,0,0,0], 2, [0.1,0.1,0.1,0.1,0.1,0.1])"
+    bench.start(program(force, "sleep(0.1)", "while True:", "  direct_torque([0,0,0,0,0,0])", "end"))
+    bench.tick(30)
+    assert bench.now.control_mode == ControlMode.FORCE
+    bench.tick(60)
+    assert bench.now.control_mode == ControlMode.TORQUE
+    bench.tick(1, StopProgram())
+    assert rest(bench)
+
+
+def test_an_arm_without_physics_stands_still_as_in_the_simulator_of_the_maker():
+    bench = ESeriesBench(fidelity="exact")
+    bench.start(endless([20, 0, 0, 0, 0, 0]))
+    before = bench.now.actual_q
+    bench.tick(200)
+    assert bench.now.actual_q == before
+    assert bench.now.control_mode == ControlMode.TORQUE
