@@ -14,7 +14,7 @@ NO_PAYLOAD = (0.0, (0.0, 0.0, 0.0), np.zeros((3, 3)))
 
 
 def pinocchio_arm(robot, payload=NO_PAYLOAD):
-    """The arm by its table: every joint turns about z, its link follows the constant part of its DH row."""
+    """The arm as the controller knows it: each joint turns about z, its link follows the rest of its DH row."""
     model = pin.Model()
     placement, parent = pin.SE3.Identity(), 0
     for i, (row, link) in enumerate(zip(robot.dh, robot.links, strict=True)):
@@ -23,7 +23,7 @@ def pinocchio_arm(robot, payload=NO_PAYLOAD):
         placement = pin.SE3(np.array([[1, 0, 0], [0, c, -s], [0, s, c]]), np.array([row.a, 0.0, row.d]))
         xy, xz, yz = link.products
         xx, yy, zz = link.inertia
-        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) * (not robot.has_point_masses)
         model.appendBodyToJoint(parent, pin.Inertia(link.mass, np.array(link.com), inertia), placement)
     mass, cog, inertia = payload
     model.appendBodyToJoint(parent, pin.Inertia(mass, np.array(cog), inertia), placement)

@@ -68,7 +68,11 @@ class Friction:
 
     def share(self, viscous: Sequence[float], coulomb: Sequence[float]) -> NDArray[np.float64]:
         """Return shares (6,) of the viscous and of the dry part of `compensation` [Nm]."""
-        part: NDArray[np.float64] = viscous * self._viscous[1] + coulomb * self.dry_compensation
+        wet, dry = self._viscous[1], self.dry_compensation
+        if self._excess is not None:
+            slow = np.sign(dry) * self._slow[2]
+            wet, dry = wet + slow, dry - slow
+        part: NDArray[np.float64] = viscous * wet + coulomb * dry
         return part
 
     def evaluate(self, speeds: NDArray[np.float64]) -> None:
