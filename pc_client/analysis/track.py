@@ -1,9 +1,8 @@
 """The TCP path of one recording: reference and actual position at the same controller time stamps.
 
 Both go through the same operator, the first difference over the time between two samples, so that a perfect
-arm gives a perfect figure. Nothing here smooths or shifts. Samples are 8 ms apart, as the paper's were; of
-an arm with 500 Hz it is every fourth frame. Encoders have the same noise at both rates, so differenced over
-2 ms it is four times as large, and the figure could not stand beside the paper's.
+arm gives a perfect figure. Nothing here smooths or shifts. Samples are 8 ms apart, as the paper's were: of
+an arm with 500 Hz, every fourth frame is one.
 """
 
 from __future__ import annotations
@@ -15,15 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from pc_client.control.loop_model import SAMPLING_TIME
 from pc_client.errors import RecordingError
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import Recording
 
 # Fewer samples than this are no movement: 80 ms.
 MIN_MOVEMENT_ROWS = 10
-
-_SAMPLING_TIME = 0.008
-"""Time between two samples [s]: the control cycle of the paper's arm."""
 
 SHORTEST_CYCLE, LONGEST_CYCLE = 0.5e-3, 0.05
 """Median steps of time stamps outside are of no robot [s]: UR's control cycles are 8 and 2 ms."""
@@ -101,7 +98,7 @@ def track_of(recording: Recording) -> TcpTrack:
             f"{recording.path} has time stamps {cycle:g} s apart; {SHORTEST_CYCLE:g} to {LONGEST_CYCLE:g} s "
             "are a robot's"
         )
-    each = max(round(_SAMPLING_TIME / cycle), 1)
+    each = max(round(SAMPLING_TIME / cycle), 1)
     rows = rows[moving[0] % each :: each]
     moving = _movement_of(recording, rows)
     return TcpTrack(

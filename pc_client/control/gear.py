@@ -24,8 +24,8 @@ from pc_client.control.reference import JointReference
 
 Array = NDArray[np.float64]
 
-_MOST_STEPS = 60_000
-"""Older runs are forgotten beyond so many steps: 8 minutes at 125 Hz, twice what ten movements take."""
+_LONGEST = 480.0
+"""Older runs are forgotten beyond so much time [s]: twice what ten movements take."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +86,11 @@ class GearObserver:
         period: control cycle [s].
     """
 
-    __slots__ = ("_response", "_runs")
+    __slots__ = ("_most", "_response", "_runs")
 
     def __init__(self, loop: LoopModel, period: float) -> None:
         self._response = velocity_response(loop, period) * period
+        self._most = round(_LONGEST / period)  # steps
         self._runs: deque[tuple[Array, Array]] = deque()
 
     def take(self, qd_cmd: Array, q: Array) -> None:
@@ -102,7 +103,7 @@ class GearObserver:
         n = len(q)
         commanded = [np.convolve(joint, self._response)[1:n] for joint in qd_cmd.T]  # up to frames 1, 2, ...
         self._runs.append((q, np.diff(q, axis=0) - np.transpose(commanded)))
-        while sum(len(surprise) for _, surprise in self._runs) > _MOST_STEPS and len(self._runs) > 1:
+        while sum(len(surprise) for _, surprise in self._runs) > self._most and len(self._runs) > 1:
             self._runs.popleft()
 
     def model(self) -> GearModel | None:

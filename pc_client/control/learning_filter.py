@@ -17,7 +17,7 @@ from math import pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.control.loop_model import LoopModel, frequency_response
+from pc_client.control.loop_model import SAMPLING_TIME, LoopModel, frequency_response
 from pc_client.control.stability import sensitivity
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def design_filter(
         np.abs(weight * (1.0 - learning_gain * ratio) * sensitivity(real, gain_p, gain_i, period, hertz))
         for real, ratio in zip(loop.corners(), ratios, strict=True)
     ]
-    density = 1.0 - np.cos(2.0 * pi * hertz * period)
+    density = 1.0 - np.cos(2.0 * pi * hertz * max(SAMPLING_TIME, period))
     return replace(
         unchecked,
         contraction=float(np.max(factors)),
@@ -98,7 +98,9 @@ def design_filter(
 def noise_share_below(hertz: float, period: float) -> float:
     """Share of the power of a differenced white noise that lies below a frequency [Hz].
 
-    The difference of a white noise has the density 1 - cos(w T); integrated from 0 to w.
+    The difference of a white noise over T has the density 1 - cos(w T), up to half the frame rate; integrated
+    from 0 to w.
     """
-    angle = 2.0 * pi * hertz * period
-    return (angle - sin(angle)) / pi
+    over = max(SAMPLING_TIME, period)
+    angle = 2.0 * pi * hertz * over
+    return (angle - sin(angle)) / (pi * (over / period))

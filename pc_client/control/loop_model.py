@@ -18,6 +18,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+SAMPLING_TIME = 0.008
+"""Eq. 10 differences positions over this time [s], the control cycle of the paper's arm, on every arm:
+encoders have the same noise in each frame, and over 2 ms it would be four times as large."""
+
 NO_LAG = 1e-6
 """A lag below this [s] is none: no motion of an arm shows it."""
 

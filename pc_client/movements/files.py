@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 
@@ -26,6 +27,7 @@ __all__ = [
     "DEFAULT_SET",
     "LIBRARY_FOLDER",
     "LIBRARY_SETS",
+    "library_name_of",
     "library_names",
     "library_path",
     "load_motion",
@@ -101,6 +103,18 @@ def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
             "give one of the library, or the path of a .toml or .csv file"
         )
     return _read(path)
+
+
+def library_name_of(text: str) -> str | None:
+    """Which movement of the library has this file; None: none."""
+    return _names_by_text().get(text)
+
+
+@cache
+def _names_by_text() -> Mapping[str, str]:
+    names = [name for names in LIBRARY_SETS.values() for name in names]
+    paths = ((name, library_path(name)) for name in names)
+    return {path.read_text(encoding="utf-8"): name for name, path in paths if path}
 
 
 def save_movement(movement: Movement, path: str | Path) -> None:

@@ -33,7 +33,7 @@ class SimulatedArm:
     """An arm that a case starts for itself.
 
     Attributes:
-        robot: "ur3", "ur5" or "ur10".
+        robot: a name such as "ur3" or "ur5e".
         fidelity: how imperfect it is, as `ur-emulator serve --fidelity`.
         seed: which arm of its kind.
     """
@@ -50,7 +50,7 @@ class GivenRobot:
     Attributes:
         host: its name or address.
         port_base: offset of its ports.
-        robot: "ur3", "ur5" or "ur10", as it reported.
+        robot: a name such as "ur3" or "ur5e", as it reported.
         serial: its serial number: this is who it is, wherever it answers.
         cell: what stands around it and what it carries.
         reverse_port: where its programs dial back; see `ReverseServer`.

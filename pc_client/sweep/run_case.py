@@ -15,7 +15,7 @@ from pc_client.experiment.prepare import Experiment, Plan, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.robot_model import robot_model
-from pc_client.movements.files import load_movement
+from pc_client.movements.files import library_name_of, load_movement
 from pc_client.sweep.box import simulated_box
 from pc_client.sweep.case import Case, MovementFile, SimulatedArm
 from pc_client.sweep.measure import loop_figures, measure_run
@@ -84,5 +84,5 @@ def _planned(movement: MovementFile, robot: str, cell: Cell) -> Plan:
     with TemporaryDirectory(prefix="ur-sweep-") as folder:
         path = Path(folder) / movement.file_name
         path.write_text(movement.text, encoding="utf-8")
-        loaded = load_movement(path)
+        loaded = load_movement(library_name_of(movement.text) or path)
     return prepare_experiment([loaded], repeat=1, out=Path(), robot=robot, cell=cell).planned[0]

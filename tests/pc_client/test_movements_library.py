@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pc_client.errors import MovementError
+from pc_client.errors import MovementError, PlanningError
+from pc_client.experiment.prepare import make_plan
+from pc_client.kinematics.robot_model import ROBOTS, robot_model
 from pc_client.movements import Movement, generate_movement, library_names, load_movement
 from pc_client.movements.description import snr_of_delay, speed_rms_frequency
-from pc_client.movements.geometry import UR3_BOX, Box
+from pc_client.movements.geometry import UR3_BOX, WORKING_BOXES, Box
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.stroke import Stroke
 from pc_client.movements.targets import TargetRules, random_targets
@@ -52,6 +55,18 @@ def test_a_ur3_can_do_it(name: str) -> None:
     report = plan_movement(load_movement(name)).report
     assert report.joint_speed.value < 1.2  # rad/s
     assert report.joint_acceleration.value < 4.2  # rad/s^2
+
+
+@pytest.mark.parametrize("arm", [name for name in ROBOTS if name != "ur10"])
+def test_every_other_arm_can_do_one_that_comes_near_the_base(arm: str) -> None:
+    planned = make_plan(load_movement("lognorm_4_1"), robot_model(arm)).movement
+    assert WORKING_BOXES[arm].contains(planned.target_points, 0.025)  # a UR5 does it where a UR3 does
+
+
+def test_a_movement_of_a_user_stays_where_it_is() -> None:
+    own = replace(load_movement("lognorm_4_1"), from_library=False)
+    with pytest.raises(PlanningError, match="move the movement away from the base"):
+        make_plan(own, robot_model("ur5e"))
 
 
 @pytest.mark.parametrize("name", PAPER + ARCS)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
-from sweep_samples import PREVIEW, write
+from sweep_samples import PREVIEW, case, write
 
 from pc_client.errors import ClientError
 from pc_client.movements.files import library_path
@@ -156,6 +156,12 @@ def test_a_given_robot_stands_in_its_cell(tmp_path):
     assert cases[0].identity != cases[1].identity == cases[2].identity
     assert plan_case(cases[1]).model.cell is config.cell
     assert plan_case(cases[1]).planned[0].joints.report.cell == config.cell
+
+
+def test_a_case_of_the_library_is_planned_where_its_arm_can_do_it():
+    small, large = (replace(case(), arm=SimulatedArm(robot, "typical", 7)) for robot in ("ur3e", "ur5e"))
+    x = [plan_case(one).planned[0].movement.target_points[:, 0] for one in (small, large)]
+    assert x[1] - x[0] == pytest.approx([0.075] * 4)
 
 
 def test_a_file_that_is_not_there(tmp_path):
