@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 
 from pc_client.commands import compare, doctor, draw, experiment, extract, movements, recordings, sweep
-from pc_client.errors import ClientError, InterruptedByUserError, full_message, one_line
+from pc_client.errors import ClientError, InterruptedByUserError, UnknownMovementError, full_message, one_line
 from protocol.errors import ProtocolError
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
 
@@ -90,6 +90,9 @@ def run(arguments: list[str] | None = None) -> int:
     except InterruptedByUserError as error:
         _complain(full_message(error))
         return ExitCode.INTERRUPTED
+    except UnknownMovementError as error:
+        _complain(full_message(error))
+        return ExitCode.WRONG_USAGE
     except (ClientError, ProtocolError) as error:
         _complain(full_message(error))
         return ExitCode.FAILED

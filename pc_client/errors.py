@@ -2,6 +2,7 @@
 
 ClientError
 ├── MovementError      a movement file or its parameters make no sense
+│   └── UnknownMovementError  the library has no movement of that name
 ├── ControllerError    the numbers of a controller, or its file, make no sense
 ├── CellError          a cell file makes no sense
 ├── PlanningError      a path leaves reach or limits; nothing has moved
@@ -25,6 +26,10 @@ class ClientError(Exception):
 
 class MovementError(ClientError):
     """A movement file, or the parameters of a movement, make no sense."""
+
+
+class UnknownMovementError(MovementError):
+    """The library has no movement of that name."""
 
 
 class ControllerError(ClientError):

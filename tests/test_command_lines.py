@@ -113,6 +113,32 @@ def test_completion_is_offered_for_the_shells(program):
     assert {"--install-completion", "--show-completion"} <= names
 
 
+@pytest.mark.parametrize(
+    ("line", "offered", "not_offered"),
+    [
+        ("ur-emulator ctl ", {"push", "set_digital_input", "--host"}, {"--force"}),
+        ("ur-emulator ctl pu", {"push"}, {"state"}),
+        ("ur-emulator ctl --json push ", {"--force", "--duration", "--token"}, {"push", "--json"}),
+        ("ur-emulator ctl push --force 0 0 20 --d", {"--duration"}, {"--force"}),
+        ("ur-emulator ctl set_digital_input --group ", {"standard", "configurable", "tool"}, {"--n"}),
+        ("ur-emulator ctl set_digital_input --level o", {"on", "off"}, {"--n"}),
+    ],
+)
+def test_the_shell_completes_what_ctl_takes(monkeypatch, capsys, line, offered, not_offered):
+    words = line.split(" ")
+    for name, value in {
+        "_UR_EMULATOR_COMPLETE": "complete_bash",
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(len(words) - 1),
+    }.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(SystemExit):
+        ur_emulator.cli.app(prog_name="ur-emulator")
+    shown = set(capsys.readouterr().out.split())
+    assert offered <= shown
+    assert not shown & not_offered
+
+
 def test_the_software_of_the_robot_keeps_its_old_option_in_serve_only():
     for words, command in LEAVES:
         taken = {option for parameter in command.params for option in parameter.opts}

@@ -10,9 +10,10 @@ import sys
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from protocol.errors import ProtocolError
 from ur_emulator import check_platform
@@ -187,19 +188,35 @@ def serve(
         err.close()
 
 
+class _CtlCommand(TyperCommand):
+    """Its options are words of its argument, for the parser of `ctl`: also when the shell completes them."""
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Return what may follow."""
+        return self.params[0].shell_complete(ctx, incomplete)
+
+
+def _next_words(context: typer.Context, incomplete: str) -> list[str]:
+    from ur_emulator.control.command_line import next_words
+
+    words = next_words(context.params.get("words") or [])
+    return [word for word in words if word.startswith(incomplete)]
+
+
 @app.command(
-    context_settings={
-        "allow_extra_args": True,
-        "ignore_unknown_options": True,
-        "allow_interspersed_args": False,
-    },
+    cls=_CtlCommand,
+    context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False},
     add_help_option=False,
 )
-def ctl(context: typer.Context) -> None:
+def ctl(
+    words: Annotated[
+        list[str] | None, typer.Argument(metavar="OPERATION ...", autocompletion=_next_words)
+    ] = None,
+) -> None:
     """Do something to a box that runs with --control-port: set inputs, push, stop, answer, read the log."""
     from ur_emulator.control.command_line import main as control
 
-    raise typer.Exit(control(context.args))
+    raise typer.Exit(control(words or ()))
 
 
 def _ports_line(box: Box) -> str:

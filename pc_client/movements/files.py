@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pc_client.errors import MovementError
+from pc_client.errors import MovementError, UnknownMovementError
 from pc_client.input_files import FILE_KINDS
 from pc_client.movements.columns import parse_rows
 from pc_client.movements.joint_trajectory import JOINT_COLUMNS, JointTrajectory
@@ -98,7 +98,7 @@ def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
     path = Path(name_or_path)
     if not path.suffix and not path.exists():
         known = [name for names in LIBRARY_SETS.values() for name in names]
-        raise MovementError(
+        raise UnknownMovementError(
             f'no movement "{name_or_path}": {nearest(str(name_or_path), known)}; '
             "give one of the library, or the path of a .toml or .csv file"
         )

@@ -71,6 +71,8 @@ def test_every_command_has_help(command, capsys):
         ([*RUN, "--gain-p", "much"], "--gain-p"),
         ([*RUN, "--reverse-port", "65536"], "--reverse-port"),
         ([*RUN, "--reverse-port", "-1"], "--reverse-port"),
+        (["run", "lognorm_9_9", "--robot", "127.0.0.1", "--out", "o"], "no movement"),
+        (["movements", "show", "lognorm_9_9"], "no movement"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(arguments, words, capsys):
@@ -87,7 +89,6 @@ def free_offset():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["run", "lognorm_9_9", "--robot", "127.0.0.1", "--out", "o"], "no movement"),
         (["run", "nowhere.toml", "--robot", "127.0.0.1", "--out", "o"], "nowhere.toml"),
         (["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o", "--controller", "pid"], "preview"),
         ([*RUN, "--controller", "mine.toml"], "mine.toml: cannot be read"),
@@ -95,7 +96,6 @@ def free_offset():
         (["doctor", "--robot", "127.0.0.1", "--cell", "mine.toml"], "mine.toml: cannot be read"),
         (["report", "empty"], "no recordings"),
         (["export", "missing.mcap"], "missing.mcap"),
-        (["movements", "show", "lognorm_9_9"], "no movement"),
         (["run", "uniform_4_1", "--robot", "127.0.0.1", "--port-base", "FREE", "--out", "o"], "refuses"),
         (["run", "uniform_4_1", "--robot", "no.such.invalid", "--yes", "--out", "o"], "cannot be looked up"),
     ],

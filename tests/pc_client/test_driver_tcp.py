@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import socket
 import struct
+from types import SimpleNamespace
 
 import pytest
 from fake_robot import LAYOUT, FakeRobot
 
-from pc_client.driver import realtime_client
+from pc_client.driver import realtime_client, transport
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.transport import PortTakenError, TcpNetwork, TcpTransport
 from pc_client.errors import DriverError
@@ -84,6 +85,23 @@ def test_a_port_is_listened_on_once_and_again_right_after_a_session():
     again = TcpNetwork().listen("127.0.0.1", port)
     assert again.port == port
     again.close()
+
+
+@pytest.mark.parametrize(("system", "shared"), [("posix", True), ("nt", False)])
+def test_no_system_lets_a_second_program_listen(monkeypatch, system, shared):
+    """On Windows the option that a POSIX system needs would let it."""
+    monkeypatch.setattr(transport, "os", SimpleNamespace(name=system))
+    listener = TcpNetwork().listen("127.0.0.1", 0)
+    assert bool(listener._socket.getsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR)) is shared
+    with pytest.raises(PortTakenError):
+        TcpNetwork().listen("127.0.0.1", listener.port)
+    listener.close()
+
+
+def test_time_comes_from_the_clock_that_is_fine_on_every_system(monkeypatch):
+    """time.monotonic may have steps of 16 ms on Windows."""
+    monkeypatch.setattr(transport, "time", SimpleNamespace(perf_counter=lambda: 5.001))
+    assert TcpNetwork().now() == 5.001
 
 
 def test_listener_accepts_and_times_out():

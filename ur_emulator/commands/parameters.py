@@ -104,6 +104,11 @@ class Parameter:
             case _:
                 return f"{self.kind.value}{unit}"
 
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What may be given for it, where that is one of a few words."""
+        return ("on", "off") if self.kind is Kind.BOOLEAN else self.choices
+
     def check(self, value: Any) -> Any:
         """Return a value as operations want it.
 

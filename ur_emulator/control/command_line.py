@@ -27,6 +27,7 @@ from ur_hil.command_line import ExitCode
 PROGRAM = "ur-emulator ctl"
 # Pause between two requests of a log that is followed [s].
 _FOLLOW_PERIOD = 0.2
+_COMMON_OPTIONS = ("--host", "--control-port", "--token", "--json", "--help")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -93,6 +94,21 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def next_words(words: Sequence[str]) -> tuple[str, ...]:
+    """Return what may follow words of a command line, for the completion of shells."""
+    name = next((word for word in words if word in OPERATIONS), None)
+    if name is None:
+        return (*OPERATIONS, *_COMMON_OPTIONS)
+    parameters = {_option(parameter): parameter for parameter in OPERATIONS[name].parameters}
+    if words[-1] in parameters:
+        return parameters[words[-1]].words
+    return tuple(option for option in (*parameters, *_COMMON_OPTIONS) if option not in words)
+
+
+def _option(parameter: Parameter) -> str:
+    return f"--{parameter.name.replace('_', '-')}"
+
+
 def example(name: str) -> str:
     """Return a command line of an operation, to copy."""
     return f"{PROGRAM} {name} {_EXAMPLES.get(name, '')}".rstrip()
@@ -142,7 +158,7 @@ def _add_option(command: argparse.ArgumentParser, parameter: Parameter) -> None:
     if parameter.kind is Kind.VECTOR:
         least, most = parameter.lengths
         words |= {"nargs": most if least == most else "*"}
-    command.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **words)
+    command.add_argument(_option(parameter), dest=parameter.name, **words)
     if parameter.kind is Kind.SCRIPT:
         command.add_argument(
             f"--{parameter.name}-file", metavar="FILE", help=f"{parameter.name} from a file of this machine"
