@@ -53,7 +53,7 @@ MAX_SIZE = 0xFFFF
 """Largest package in bytes that the header can announce."""
 
 MAX_NAMES_SIZE = 2048
-"""Longest list of names in bytes. Source: UR RTDE guide."""
+"""Longest list of names in bytes that every software takes. Source: UR RTDE guide."""
 
 
 # --- encoding

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde.codec import MAX_NAMES_SIZE, data_header, decode_message, encode_message, take_package
@@ -48,11 +48,33 @@ from protocol.rtde.states import TRANSITIONS, RtdeState
 from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeValue
 from protocol.ur_types import SoftwareVersion
 
-__all__ = ["MAX_REQUEST_SIZE", "InputReceived", "RtdeServerConnection", "ServerEvent"]
+__all__ = ["InputReceived", "RequestLimits", "RtdeServerConnection", "ServerEvent", "request_limits"]
 
-MAX_REQUEST_SIZE = 0x1FFF
-"""Largest package in bytes that the robot accepts: four times the longest list of names, and less than the
-number that the first two characters of any printable text make, such as an HTTP request on the wrong port."""
+
+class RequestLimits(NamedTuple):
+    """What a robot takes.
+
+    Attributes:
+        package: largest package in bytes: less than the number that two letters make, such as the first two
+            of an HTTP request on the wrong port.
+        names: longest list of names in bytes; what lies beyond is not found.
+        n_names: greatest number of names; the others are not found.
+    """
+
+    package: int
+    names: int
+    n_names: int
+
+
+_CB3_LIMITS = RequestLimits(0x1FFF, MAX_NAMES_SIZE, MAX_NAMES_SIZE)
+# UR's client library asks the newest simulator for all outputs at once: 9 kB, some 400 names.
+_E_SERIES_LIMITS = RequestLimits(0x2FFF, 0x2FFF, 512)
+
+
+def request_limits(version: SoftwareVersion) -> RequestLimits:
+    """The limits of software `version`; they are chosen but for the 2048 bytes of names of a CB3."""
+    return _CB3_LIMITS if version.major < 5 else _E_SERIES_LIMITS
+
 
 _LAST_ID = 255
 
@@ -90,6 +112,7 @@ class RtdeServerConnection:
         inputs: Mapping[str, RtdeField],
     ) -> None:
         self._software = version
+        self._limits = request_limits(version)
         self._known_outputs = outputs
         self._known_inputs = inputs
         self._buffer = bytearray()
@@ -116,7 +139,7 @@ class RtdeServerConnection:
         """
         if self._unanswered is not None:
             raise LocalProtocolError(f"{self._unanswered!r} has no reply yet: one for each, in order")
-        while (package := take_package(self._buffer, MAX_REQUEST_SIZE)) is not None:
+        while (package := take_package(self._buffer, self._limits.package)) is not None:
             event = self._read(*package)
             if event is not None:
                 return event
@@ -180,7 +203,7 @@ class RtdeServerConnection:
 
     def _set_up_outputs(self, request: SetupOutputs) -> SetupOutputsReply:
         """Replace the output recipe. One that is refused takes no id, and nothing is sent until the next."""
-        fields, types = _look_up(request.names, self._known_outputs, ())
+        fields, types = _look_up(request.names, self._known_outputs, (), self._limits)
         is_v1 = self.protocol_version == 1
         self.frequency = request.frequency
         self._encoder = None
@@ -194,7 +217,7 @@ class RtdeServerConnection:
 
     def _set_up_inputs(self, request: SetupInputs, in_use: Collection[str]) -> SetupInputsReply:
         """Add an input recipe. One that is refused takes no id."""
-        fields, types = _look_up(request.names, self._known_inputs, in_use)
+        fields, types = _look_up(request.names, self._known_inputs, in_use, self._limits)
         recipe_id = len(self.input_recipes) + 1
         if not fields or recipe_id > _LAST_ID:
             return SetupInputsReply(types, 0)
@@ -203,7 +226,7 @@ class RtdeServerConnection:
 
 
 def _look_up(
-    names: tuple[str, ...], known: Mapping[str, RtdeField], in_use: Collection[str]
+    names: tuple[str, ...], known: Mapping[str, RtdeField], in_use: Collection[str], limits: RequestLimits
 ) -> tuple[tuple[RtdeField, ...], tuple[str, ...]]:
     """The fields of a recipe, and a word for each name; one refusal leaves no fields at all."""
     fields: list[RtdeField] = []
@@ -211,8 +234,8 @@ def _look_up(
     end = -1
     for name in names:
         end += 1 + len(name)
-        # The guide limits the list; we answer what lies beyond as if it had not been read.
-        field = known.get(name) if end <= MAX_NAMES_SIZE else None
+        # What lies beyond the limits is answered as if it had not been read.
+        field = known.get(name) if end <= limits.names and len(words) < limits.n_names else None
         if field is None:
             words.append(NOT_FOUND)
         elif name in in_use:

@@ -6,8 +6,11 @@ import pytest
 from clients_support import connect, receive_exactly, served_box
 from driver_startup import UR_TYPES, RefusedError, series, start
 from primary_wire import KEY, TEXT, PrimaryWire
+from strict_rtde import StrictRtde
 
 from protocol.primary.setup import ConfigurationData
+from protocol.rtde.fields import OUTPUTS
+from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.models.e_series import E_SERIES
 from ur_emulator.models.robots import ROBOTS
@@ -46,6 +49,21 @@ def test_frames_have_the_size_of_the_software(box):
     with connect(box, "realtime") as sock:
         frames = [receive_exactly(sock, SOFTWARE[box.software]) for _ in range(3)]
     assert [struct.unpack_from(">i", frame)[0] for frame in frames] == [SOFTWARE[box.software]] * 3
+
+
+@pytest.mark.parametrize("box", FOR_DRIVERS, indirect=True)
+def test_all_outputs_can_be_asked_for_at_once(box):
+    """The library's list of all names, then the same without those that this software does not have."""
+    software = SoftwareVersion.parse(box.software)
+    absent = {field.name for field in OUTPUTS if not (field.origin and field.since.covers(software))}
+    names = [field.name for field in OUTPUTS]
+    with StrictRtde(box) as client:
+        number, types = client.types_of_outputs(names, 500.0)
+        assert {name for name, kind in zip(names, types, strict=True) if kind == "NOT_FOUND"} == absent
+        assert number == (0 if absent else 1)
+        client.want(*(name for name in names if name not in absent), frequency=500.0)
+        assert client.start()
+        assert client.data()["timestamp"] > 0.0
 
 
 @pytest.mark.parametrize("box", FOR_DRIVERS, indirect=True)

@@ -14,7 +14,7 @@ from protocol.rtde import messages as M
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.codec import MAX_NAMES_SIZE, encode_message
 from protocol.rtde.fields import input_fields, output_fields
-from protocol.rtde.server_connection import MAX_REQUEST_SIZE, InputReceived, RtdeServerConnection
+from protocol.rtde.server_connection import InputReceived, RtdeServerConnection, request_limits
 from protocol.rtde.states import TRANSITIONS, RtdeState, cycles_per_package
 from protocol.ur_types import SoftwareVersion
 
@@ -215,6 +215,24 @@ def test_a_list_of_names_beyond_the_limit_is_answered_but_not_found(pair):
     assert not pair.robot.input_recipes
 
 
+def test_an_e_series_takes_the_names_of_all_its_outputs_at_once():
+    version = SoftwareVersion(5, 26)
+    known = output_fields(version)
+
+    def answer(names):
+        robot = RtdeServerConnection(version, known, input_fields(version))
+        listed = ",".join(names).encode()
+        robot.receive_data((3 + len(listed)).to_bytes(2, "big") + b"O" + listed)
+        assert robot.next_event() == M.SetupOutputs(tuple(names), None)
+        return robot.reply()[3:].decode().split(",")
+
+    assert len(",".join(known)) > 9000
+    assert answer(known) == [field.type.value for field in known.values()]
+    assert answer(["payload"] * 513) == ["DOUBLE"] * 512 + ["NOT_FOUND"]
+    most = request_limits(version).package - 3
+    assert len(answer(["x"] * (most // 2))) == most // 2  # the reply fits into a package
+
+
 # --- rates
 
 
@@ -301,7 +319,7 @@ def test_no_bytes_do_more_than_end_the_connection(data, step):
 
 
 def test_the_longest_package_is_taken(pair):
-    size = MAX_REQUEST_SIZE
+    size = request_limits(V3_15).package
     pair.robot.receive_data(size.to_bytes(2, "big") + b"I" + b"x" * (size - 3))
     assert pair.robot.next_event() == M.SetupInputs(("x" * (size - 3),))
     assert pair.robot.reply() == b"\0\x0dI\0NOT_FOUND"
