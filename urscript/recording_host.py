@@ -19,7 +19,7 @@ from urscript.program import CompiledProgram, ProgramStatus, RunningProgram
 from urscript.run.host import EnterMode, HostFunction
 from urscript.run.threads import ScriptThread
 from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
-from urscript.values import Pose
+from urscript.values import Pose, Struct
 
 MOVE_CYCLES: Final = 3
 """Duration of a move without the argument `t`."""
@@ -121,6 +121,7 @@ class RecordingHost:
                 offered[builtin.name] = partial(self._answer, builtin)
         offered["socket_open"] = self._socket_open
         offered["socket_read_binary_integer"] = self._socket_read
+        offered["pause"] = self._pause
         offered["random"] = lambda thread: self._random.random()
         offered["interpreter_mode"] = self._interpreter_mode
         return offered
@@ -167,6 +168,9 @@ class RecordingHost:
         name = builtin.name
         if name == "get_steptime":
             return self.step_time
+        if name == "time":
+            seconds, rest = divmod(self.cycle * round(self.step_time * 1e6), 1_000_000)
+            return Struct({"sec": seconds, "nanosec": rest * 1000})
         if builtin.returns == "None" or name.startswith("socket_"):
             self._record(thread, name, arguments)
             if arguments:
@@ -185,6 +189,11 @@ class RecordingHost:
         self._record(thread, builtin.name, arguments)
         yield NEXT_CYCLE
         return _default(builtin)
+
+    def _pause(self, thread: ScriptThread) -> Generator[Wait, None, None]:
+        """The statement `pause`: recorded, and the program goes on in the next cycle."""
+        self._record(thread, "pause", ())
+        yield NEXT_CYCLE
 
     def _move(self, builtin: Builtin, thread: ScriptThread, *arguments: Any) -> Generator[Wait, None, None]:
         self._record(thread, builtin.name, arguments)
@@ -247,4 +256,7 @@ def _default(builtin: Builtin) -> Any:
         return [0.0] * 3
     if kind.startswith(("list", "six-vector")):
         return [0.0] * 6
+    if kind.startswith("struct("):
+        names = kind.removeprefix("struct(").removesuffix(")").split(", ")
+        return Struct(dict.fromkeys(names, 0.0))
     return None

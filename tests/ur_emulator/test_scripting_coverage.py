@@ -10,12 +10,13 @@ from urscript.catalogue.types import Support
 
 # Run by the interpreter itself.
 FLOW = {"sync", "sleep", "textmsg", "varmsg"}
+STATEMENTS = {"pause"}
 
 
 def offered():
     bench = Bench()
     host = RobotHost(bench.controller.state, bench.network)
-    return set(host.builtins()) | set(PURE) | FLOW
+    return (set(host.builtins()) | set(PURE) | FLOW) - STATEMENTS
 
 
 @pytest.mark.parametrize("version", ["3.15", "5.4", "5.11", "5.15", "5.22", "5.25"])

@@ -194,6 +194,8 @@ class Controller:
         """All threads of all programs, and the effects of their requests."""
         state = self.state
         self.programs.step()
+        if state.requests.take_pause():
+            self.programs.pause()
         if state.requests.take_power_off():
             self.safety.cut_power()
         state.tool.step()

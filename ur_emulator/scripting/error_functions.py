@@ -1,8 +1,8 @@
-"""Builtins about errors and limits (most only keep a setting), and `powerdown`."""
+"""Builtins about errors and limits (most only keep a setting), `powerdown`, and the statement `pause`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from typing import Any, NoReturn
 
 from ur_emulator.controller.error_settings import ErrorSettings
@@ -10,12 +10,13 @@ from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.controller.program_requests import ProgramRequests
 from ur_emulator.models.robot_model import six
 from urscript.run.threads import ProgramHalted
+from urscript.run.waits import NEXT_CYCLE, Wait
 
 
 def error_functions(
     settings: ErrorSettings, past: PastCycles, requests: ProgramRequests
 ) -> Mapping[str, Callable[..., Any]]:
-    """Return the builtins about errors, and `powerdown`."""
+    """Return the builtins about errors, `powerdown` and `pause`."""
 
     def pause_on_error_code(thread: object, code: float, argument: float | None) -> None:
         settings.pause_on(int(code), None if argument is None else int(argument))
@@ -36,7 +37,12 @@ def error_functions(
         requests.power_off()
         raise ProgramHalted
 
+    def pause(thread: object) -> Generator[Wait, None, None]:
+        requests.pause()
+        yield NEXT_CYCLE
+
     return {
+        "pause": pause,
         "pause_on_error_code": pause_on_error_code,
         "position_deviation_warning": position_deviation_warning,
         "set_safety_mode_transition_hardness": set_safety_mode_transition_hardness,

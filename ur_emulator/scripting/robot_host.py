@@ -7,6 +7,7 @@ from typing import Any
 
 from ur_emulator.controller.events import TextPrinted
 from ur_emulator.controller.state import ControllerState
+from ur_emulator.scripting.clock_functions import clock_functions
 from ur_emulator.scripting.compliance_functions import compliance_functions
 from ur_emulator.scripting.conveyor_functions import ProgramConveyor
 from ur_emulator.scripting.dynamics_functions import dynamics_functions
@@ -71,6 +72,7 @@ class RobotHost:
             **ProgramTorque(state.motion, state.compliance, state.past, state.events).functions(),
             **operator_functions(state.operator, state.events),
             **interpreter_functions(state.interpreter),
+            **clock_functions(state.clock),
             **error_functions(state.error_settings, state.past, state.requests),
             **self._sockets.functions(),
             **self._remotes.functions(),

@@ -73,7 +73,7 @@ UNUSED_VALUE: Final = Rule(
 CALL_WITHOUT_HANDLE: Final = Rule(
     "W115",
     "a method is called where nothing has methods",
-    "only values of rpc_factory have methods; lists and strings have functions instead",
+    "only handles have methods, and lists from 5.15 on; lists and strings have functions instead",
 )
 REFUSED_ARGUMENT: Final = Rule(
     "W116", "a builtin gets an argument that it refuses", "the call fails when it is reached"
