@@ -3,6 +3,7 @@
 import pickle
 import re
 import socket
+import zipfile
 from contextlib import ExitStack
 
 import pytest
@@ -241,6 +242,29 @@ def test_only_software_with_the_mode_has_the_port():
     for robot, version in (("ur3", "3.15.8"), ("ur5e", "5.9.4")):
         with ControlBox(robot=robot, version=version, port_base=None, pace="lockstep") as box:
             assert box.ports.interpreter == 0
+
+
+def test_words_of_many_clients_act_once_in_a_cycle_and_are_all_answered(lockstep_box):
+    lockstep_box.run_program(IN_MODE)
+    with Helper(lockstep_box) as one, Helper(lockstep_box) as other:
+        one.send(*["skipbuffer", "abort"] * 50)
+        other.send(*["skipbuffer"] * 50)
+        assert sorted(one.answer() for _ in range(100)) == 50 * ["ack: 0: abort"] + 50 * [
+            "ack: 0: skipbuffer"
+        ]
+        assert {other.answer() for _ in range(50)} == {"ack: 0: skipbuffer"}
+
+
+def test_reports_have_the_log(tmp_path):
+    with ControlBox(robot="ur5e", version="5.12", pace="lockstep", port_base=None, programs=tmp_path) as box:
+        box.run_program(IN_MODE)
+        with Helper(box) as helper, connect(box, "dashboard") as sock, sock.makefile("r") as dashboard:
+            helper.execute("x = 1")
+            sock.sendall(b"generate flight report\n")
+            assert "Universal Robots" in dashboard.readline()
+            number = dashboard.readline().rpartition(":")[2].strip()
+    with zipfile.ZipFile(tmp_path / "flightreports" / f"flightreport_{number}.zip") as archive:
+        assert archive.read("interpreter.log") == b"interpreter log\ne: 0 c: 1 : x = 1\n"
 
 
 # --- the queue itself

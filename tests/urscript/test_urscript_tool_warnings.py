@@ -5,6 +5,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from urscript.catalogue import catalogue_for
 from urscript.cli import app
 from urscript.lint.rules import RULES
 from urscript.program import check_program
@@ -204,6 +205,21 @@ def test_every_warning_underlines_something():
 def test_every_rule_of_the_table_is_tested_and_has_its_own_code():
     codes = [rule.code for rule in RULES]
     assert codes == sorted(set(codes)) == sorted(WARNED) == sorted(FINE)
+
+
+def test_statements_of_interpreter_mode_may_use_everything():
+    lines = [
+        "global x = 1",
+        "def f(a):",
+        "local y = 2",
+        "interpreter_mode()",
+        "end",
+        "thread t():",
+        "sync()",
+        "end",
+        "f(1)",
+    ]
+    assert check_program(body(*lines), catalogue=catalogue_for("5.12")) == ((), [])
 
 
 def test_programs_with_errors_get_no_warnings():

@@ -28,7 +28,8 @@ Variable = tuple[FunctionScope | None, str]
 
 def name_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
     """Everything this module warns about, in no order."""
-    yield from _unused_variables(program)
+    if not program.is_open:  # statements of interpreter mode may read them
+        yield from _unused_variables(program)
     yield from _functions(program)
     yield from _hidden_builtins(program, catalogue)
 
@@ -129,7 +130,7 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
             message = f"'{part.thread}' is run as a thread but defined with 'def'"
             yield ScriptWarning(RUN_OF_DEF, message, part.span, program.source)
     reached: set[FunctionScope] = set()
-    todo = [program.main]
+    todo = program.scopes() if program.is_open else [program.main]
     while todo:
         scope = todo.pop()
         if scope not in reached:

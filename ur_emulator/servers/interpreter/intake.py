@@ -6,14 +6,14 @@ Clients take turns, so that one that sends thousands of lines does not keep othe
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from protocol.interpreter import CLEANED_UP, INVALID_STATE, TOO_MANY, Word, acknowledge, discard, state
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.interpreter import AbortMove, AppendStatements, SkipStatements
-from ur_emulator.controller.command import Command
+from ur_emulator.controller.command import Box, Command, Result
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.errors import NotRunningError, RefusedError, WorkerError
 from ur_emulator.programs.compiling import compile_line
@@ -52,6 +52,19 @@ class _Line:
         return _LINE_COST + len(self.text)
 
 
+@dataclass(frozen=True, slots=True)
+class _Noted:
+    """A command, and what is called as it is applied."""
+
+    command: Command
+    begun: Callable[[], object]
+
+    def apply(self, box: Box) -> Result:
+        """Apply it."""
+        self.begun()
+        return self.command.apply(box)
+
+
 class InterpreterIntake:
     """Turns lines into statements of the running program."""
 
@@ -66,6 +79,8 @@ class InterpreterIntake:
         # Lines that have no answer, and what they are counted with [bytes].
         self._n_waiting = self._held = 0
         self._is_serving = False
+        # Who waits for the answer to a word that acts in the next cycle.
+        self._asking: dict[Word, list[Connection]] = {}
 
     @property
     def _queue(self) -> InterpreterQueue:
@@ -111,15 +126,22 @@ class InterpreterIntake:
             client.close_when_sent()
 
     def _act(self, client: Connection, word: Word, command: Command) -> None:
-        """Do what a word asks for, and answer when it is done."""
+        """Do what a word asks for, and answer when it is done; a word acts once in a cycle."""
+        if word in self._asking:
+            self._asking[word].append(client)
+            return
+        clients = self._asking[word] = [client]
 
         def done(_: object, error: Exception | None) -> None:
-            if error is None:
-                _send(client, acknowledge(self._queue.last_interpreted, word.value))
-            elif not isinstance(error, NotRunningError):
-                client.failed(error)
+            answer = acknowledge(self._queue.last_interpreted, word.value)
+            for each, count in Counter(clients).items():
+                if error is None:
+                    _send(each, count * answer)
+                elif not isinstance(error, NotRunningError):
+                    each.failed(error)
 
-        self._access.steps.start(self._access.apply(command), done)
+        noted = _Noted(command, lambda: self._asking.pop(word))
+        self._access.steps.start(self._access.apply(noted), done)
 
     # --- lines
 
