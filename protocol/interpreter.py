@@ -14,7 +14,6 @@ The number in the answers to `abort` and `skipbuffer` has no meaning; clients re
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum
@@ -29,12 +28,10 @@ __all__ = [
     "MAX_LINE",
     "TOO_MANY",
     "InterpreterConnection",
-    "Reply",
     "Statements",
     "Word",
     "acknowledge",
     "discard",
-    "parse_reply",
     "state",
 ]
 
@@ -54,7 +51,6 @@ CLEANED_UP: Final = "Cleaned up before interpretation"
 """Reason of a discard: interpreter mode began with an empty queue, or `skipbuffer` came first."""
 
 _BLANKS: Final = " \t\r\n\f\v"
-_REPLY: Final = re.compile(r"(ack|state): (\d+): (.*)|(discard): ([^\n]*)", re.DOTALL)
 
 
 class Word(Enum):
@@ -132,32 +128,3 @@ def _line(text: str) -> bytes:
     if "\n" in text or "\r" in text:
         raise LocalProtocolError(f"an answer of the interpreter cannot hold a line break: {text!r}")
     return text.encode("latin-1", "replace") + b"\n"
-
-
-@dataclass(frozen=True, slots=True)
-class Reply:
-    """An answer, as a client reads it.
-
-    Attributes:
-        kind: "ack", "discard" or "state".
-        number: id or count; None in a discard.
-        text: what follows: the statements or the word, in a discard the reason before them.
-    """
-
-    kind: str
-    number: int | None
-    text: str
-
-
-def parse_reply(line: bytes) -> Reply:
-    """Read one answer, its line end included or not.
-
-    Raises:
-        RemoteProtocolError: it is none.
-    """
-    match = _REPLY.fullmatch(line.decode("latin-1").rstrip("\r\n"))
-    if match is None:
-        raise RemoteProtocolError(f"not an answer of interpreter mode: {line[:80]!r}")
-    if match[4]:
-        return Reply(match[4], None, match[5])
-    return Reply(match[1], int(match[2]), match[3])

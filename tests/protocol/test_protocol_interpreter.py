@@ -13,12 +13,10 @@ from protocol.interpreter import (
     MAX_LINE,
     TOO_MANY,
     InterpreterConnection,
-    Reply,
     Statements,
     Word,
     acknowledge,
     discard,
-    parse_reply,
     state,
 )
 
@@ -79,18 +77,16 @@ def test_a_line_has_a_longest_length(step):
     st.integers(0, 2**31 - 1),
     st.sampled_from(Word),
 )
-def test_answers_are_read_as_they_are_written_and_as_the_helper_of_the_maker_reads_them(text, number, word):
-    for answer, reply in (
-        (acknowledge(number, text), Reply("ack", number, text)),
-        (state(number, word), Reply("state", number, word.value)),
-        (discard(INVALID_STATE, text), Reply("discard", None, f"{INVALID_STATE}: {text}")),
+def test_answers_are_what_the_helper_of_the_maker_reads(text, number, word):
+    for answer, kind, found, rest in (
+        (acknowledge(number, text), "ack", str(number), text),
+        (state(number, word), "state", str(number), word.value),
+        (discard(INVALID_STATE, text), "discard", None, text),
     ):
-        assert answer.endswith(b"\n")
-        assert answer.count(b"\n") == 1
-        assert parse_reply(answer) == parse_reply(answer[:-1]) == reply
-        found = HELPER.match(answer.decode("latin-1"))
-        assert found[1] == reply.kind
-        assert found[2] == (None if reply.number is None else str(reply.number))
+        line = answer.decode("latin-1")
+        assert line.endswith(f": {rest}\n")
+        assert line.count("\n") == 1
+        assert HELPER.match(line).groups() == (kind, found)
 
 
 @pytest.mark.parametrize(
@@ -103,9 +99,3 @@ def test_a_reason_stands_between_the_first_colons(reason):
 def test_an_answer_is_one_line():
     with pytest.raises(LocalProtocolError, match="line break"):
         acknowledge(1, "two\nlines")
-
-
-@pytest.mark.parametrize("line", [b"", b"ack: x: y", b"ack 1: y", b"state:1:statelastexecuted", b"\xff"])
-def test_other_lines_are_no_answers(line):
-    with pytest.raises(RemoteProtocolError, match="not an answer"):
-        parse_reply(line)
