@@ -1,5 +1,7 @@
 """The catalogue's promise and the box must agree: what is called modelled is there, what is there is called modelled."""
 
+import inspect
+
 import pytest
 from box_support import Bench
 
@@ -19,7 +21,22 @@ def offered():
     return (set(host.builtins()) | set(PURE) | FLOW) - STATEMENTS
 
 
-@pytest.mark.parametrize("version", ["3.15", "5.4", "5.11", "5.15", "5.22", "5.25"])
+VERSIONS = ("3.15", "5.0", "5.4", "5.9", "5.12", "5.15", "5.17", "5.18", "5.22", "5.25", "10.11", "10.12")
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_every_function_takes_the_parameters_of_its_row(version):
+    bench = Bench()
+    effects = RobotHost(bench.controller.state, bench.network).builtins()
+    for row in catalogue_for(version):
+        values = [None] * len(row.params)
+        if row.name in effects:
+            inspect.signature(effects[row.name]).bind(None, *values)
+        elif row.name in PURE and not row.any_names:
+            inspect.signature(PURE[row.name]).bind(*values)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
 def test_every_modelled_builtin_is_offered_and_every_offered_one_is_modelled(version):
     catalogue = catalogue_for(version)
     modelled = {row.name for row in catalogue if row.support is not Support.DECLARED_ONLY}

@@ -1,8 +1,9 @@
 """`rpc_factory`: handles whose methods are calls to an XML-RPC server. A call blocks its thread only.
 
 Values on the wire: integers, floats, booleans, strings and lists as they are, a matrix as a list of rows, a
-pose as a struct of x, y, z, rx, ry, rz. A call that fails, for whatever reason, is a run-time error.
-Source: URScript manual CB3 3.15, rpc_factory, and UR's XML-RPC article.
+pose as a struct of x, y, z, rx, ry, rz, on an e-Series other structs, too. A call that fails, for whatever
+reason, is a run-time error.
+Source: URScript manual CB3 3.15, rpc_factory, and UR's XML-RPC article; e-Series 5.19, Lists and Structs.
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, 
 from urscript.dialect import LONGEST_STRING
 from urscript.errors import ScriptRuntimeError
 from urscript.run.threads import ScriptThread
+from urscript.run.variables import same_type
 from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
-from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, a_type, to_script_text
+from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, Struct, a_type, to_script_text
 
-_IN_LISTS: Final = frozenset({bool, int, float, str, Pose})
+_IN_LISTS: Final = frozenset({bool, int, float, str, Pose, Struct})
 _POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
 # Of a text that a server gives as its error, so many characters are shown.
 LONGEST_MESSAGE = 500
@@ -29,11 +31,16 @@ _CLOSE = "closeXMLRPCClientConnection"
 
 
 class ProgramRemotes:
-    """The remote-procedure handles of one program."""
+    """The remote-procedure handles of one program.
+
+    Attributes:
+        has_structs: the language of the controller has structs.
+    """
 
     def __init__(self, network: Network, clock: Clock) -> None:
         self._network = network
         self._clock = clock
+        self.has_structs = clock.generation.major > 3
         # Those whose handle the program still has, or that are connected.
         self._servers: WeakSet[RemoteServer] = WeakSet()
         self._sent = 0
@@ -92,7 +99,7 @@ class RemoteHandle:
         call: RemoteCall = self._server.call(method, [_to_wire(value) for value in arguments])
         yield Blocked(lambda: call.is_done, outside=True)
         try:
-            return _from_wire(call.result())
+            return _from_wire(call.result(), self._program.has_structs)
         except RemoteCallError as error:
             text = to_script_text(" ".join(str(error).split())[:LONGEST_MESSAGE])
             raise ScriptRuntimeError(f"{method}: remote procedure call failed: {text}") from None
@@ -103,6 +110,8 @@ def _n_values(argument: Any) -> int:
     if isinstance(argument, Matrix):
         rows, columns = argument.shape
         return 1 + rows * (1 + columns)
+    if isinstance(argument, Struct):
+        return argument.size
     return 1 + len(argument) if isinstance(argument, list) else 1
 
 
@@ -111,6 +120,8 @@ def _to_wire(value: Any) -> Any:
         return dict(zip(_POSE_KEYS, value, strict=True))
     if isinstance(value, (list, Matrix)):
         return [_to_wire(item) for item in value]
+    if isinstance(value, Struct):
+        return {name: _to_wire(item) for name, item in value.members.items()}
     if isinstance(value, str):
         data = value.encode("latin-1", "replace")  # one character a byte: what clients mean is UTF-8
         try:
@@ -122,7 +133,7 @@ def _to_wire(value: Any) -> Any:
     raise ScriptRuntimeError(f"{a_type(value)} cannot be an argument of a remote procedure")
 
 
-def _from_wire(value: Any) -> Any:
+def _from_wire(value: Any, has_structs: bool) -> Any:
     match value:
         case None | bool() | float():
             return value
@@ -135,7 +146,9 @@ def _from_wire(value: Any) -> Any:
             if all(type(number) in (int, float) for number in numbers):
                 return Pose.of(numbers)
         case list():
-            return _one_type([_from_wire(item) for item in value])
+            return _one_type([_from_wire(item, has_structs) for item in value])
+    if isinstance(value, dict) and value and has_structs:
+        return Struct({to_script_text(name): _from_wire(item, True) for name, item in value.items()})
     raise RemoteCallError(f"the result has no counterpart in a script: {str(value)[:80]}")
 
 
@@ -150,6 +163,6 @@ def _one_type(items: list[Any]) -> list[Any] | Matrix:
         raise RemoteCallError("the result is a list of what no list of a script has")
     if types == {int, float}:
         return [float(item) for item in items]
-    if len(types) > 1:
+    if len(types) > 1 or not all(same_type(items[0], item) for item in items):
         raise RemoteCallError("the result is a list of several types")
     return items
