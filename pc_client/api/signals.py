@@ -27,7 +27,7 @@ __all__ = ["Run", "Signals"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Signals:
-    """Signals of one motion, one row a control cycle.
+    """Signals of one motion, one row a control cycle; of a run one every 8 ms, as Eq. 10 has them.
 
     Attributes:
         t: (n,) time since the motion began [s]; of a run, since its movement began: negative before it.
@@ -67,7 +67,7 @@ class Signals:
         )
 
     def to_frame(self) -> polars.DataFrame:
-        """A table with a row a control cycle; units are those of the attributes."""
+        """A table with the rows of the attributes, in their units."""
         import polars
 
         return polars.DataFrame(dict(self.columns()))

@@ -6,6 +6,7 @@ All but the duplicate, which moves its target points as people do, have the same
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pc_client.errors import ClientError
@@ -31,12 +32,13 @@ def make_sets(n_targets: int, seed: int, n_sets: int) -> list[MovementSet]:
     if n_sets < 1:
         raise ClientError(f"{n_sets} sets of movements is nothing to compare; give at least one")
     return [
-        {
-            kind: generate_movement(kind, n_targets, number, name=f"{kind}_{n_targets}_seed{number}")
-            for kind in GENERATORS
-        }
-        for number in range(seed, seed + n_sets)
+        {kind: _make(kind, n_targets, number) for kind in GENERATORS} for number in range(seed, seed + n_sets)
     ]
+
+
+def _make(kind: str, n_targets: int, seed: int) -> Movement:
+    made = generate_movement(kind, n_targets, seed, name=f"{kind}_{n_targets}_seed{seed}")
+    return replace(made, may_be_moved=True)
 
 
 def save_sets(sets: Sequence[MovementSet], folder: Path) -> None:

@@ -15,6 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from pc_client.analysis.run import MeasuredRun
 from pc_client.comparison.filtering import filtered_motion
+from pc_client.control.loop_model import SAMPLING_TIME
 from pc_client.movements.movement import Movement
 from pc_client.movements.stroke import Motion
 
@@ -64,6 +65,11 @@ def filtered_signal(movement: Movement, rate: float) -> Signal:
     return _inner(t, filtered_motion(movement.sample(t).p, rate), movement.duration, rate)
 
 
+def sampling_rate(run: MeasuredRun) -> float:
+    """Samples a second of the track of a run, Hz."""
+    return 1.0 / max(run.provenance.cycle_time_s, SAMPLING_TIME)
+
+
 def executed_signal(run: MeasuredRun, duration: float) -> Signal:
     """What the robot did, through the filter.
 
@@ -73,7 +79,7 @@ def executed_signal(run: MeasuredRun, duration: float) -> Signal:
         run: a recording and what was measured on it.
         duration: of the movement, s.
     """
-    rate = 1.0 / run.provenance.cycle_time_s
+    rate = sampling_rate(run)
     t = _grid(duration, rate)
     at = t + run.track.t_begin + run.snr.speed_lag_s
     # Frames come on the same grid but for the lag, which is no whole number of cycles.

@@ -22,6 +22,7 @@ from pc_client.comparison.signals import (
     executed_signal,
     filtered_signal,
     planned_signal,
+    sampling_rate,
 )
 from pc_client.errors import ClientError
 from pc_client.movements.movement import Movement
@@ -155,15 +156,15 @@ def build_comparison(
     Args:
         sets: what was planned.
         runs: the recordings by the movement's name; None where nothing was executed.
-        rate: of the control cycle, Hz, where nothing was executed.
+        rate: of the samples, Hz, where nothing was executed.
 
     Raises:
         ClientError: a movement has no recording although others have.
     """
     if runs:
-        provenance = next(iter(runs.values())).provenance
-        rate = 1.0 / provenance.cycle_time_s
-        robot: str | None = f"{provenance.arm}, controller {provenance.controller}"
+        run = next(iter(runs.values()))
+        rate = sampling_rate(run)
+        robot: str | None = f"{run.provenance.arm}, controller {run.provenance.controller}"
     else:
         robot = None
     rows = [

@@ -128,7 +128,7 @@ def prepare_experiment(
 
 
 def make_plan(motion: Motion, model: RobotModel) -> Plan:
-    """Plan what the TCP, or what the joints shall do; a movement of the library where the arm can do it.
+    """Plan what the TCP, or what the joints shall do; one that may be moved where the arm can do it.
 
     Args:
         motion: a movement of the TCP, or joint angles over time.
@@ -141,7 +141,7 @@ def make_plan(motion: Motion, model: RobotModel) -> Plan:
         joints = plan_joints(motion, model=model)
         trajectory = SampledTrajectory(joints.t, joints.p)
         return Plan(Movement(motion.name, trajectory, np.array([trajectory.duration])), joints, "")
-    if motion.from_library and (shift := LIBRARY_SHIFTS.get(model.name)):
+    if motion.may_be_moved and (shift := LIBRARY_SHIFTS.get(model.name)):
         motion = motion.transformed(Similarity(1.0, np.eye(3), np.array(shift)))
     return Plan(motion, plan_movement(motion, model=model, rotations=motion.rotations), _text_of(motion))
 

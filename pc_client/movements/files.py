@@ -94,7 +94,7 @@ def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
     found = library_path(name_or_path) if isinstance(name_or_path, str) else None
     if found:
         movement = _read(found)
-        return replace(movement, from_library=True) if isinstance(movement, Movement) else movement
+        return replace(movement, may_be_moved=True) if isinstance(movement, Movement) else movement
     path = Path(name_or_path)
     if not path.suffix and not path.exists():
         known = [name for names in LIBRARY_SETS.values() for name in names]

@@ -130,14 +130,14 @@ class Movement:
             overlap, the times between the speed minima of those that do, or, where a trajectory names them,
             between its passages at the target points; their sum is the duration.
         provenance: how it was made, as short facts; written into its file.
-        from_library: it lies in the UR3's box, and planning moves it for an arm that cannot do it there.
+        may_be_moved: it was made for the UR3's box; planning moves it for an arm that cannot do it there.
     """
 
     name: str
     trajectory: Trajectory
     stroke_durations: NDArray[np.float64]
     provenance: Mapping[str, str | int | float] = field(default_factory=lambda: MappingProxyType({}))
-    from_library: bool = False
+    may_be_moved: bool = False
 
     def __post_init__(self) -> None:
         durations = read_only(self.stroke_durations)

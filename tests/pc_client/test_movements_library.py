@@ -64,7 +64,7 @@ def test_every_other_arm_can_do_one_that_comes_near_the_base(arm: str) -> None:
 
 
 def test_a_movement_of_a_user_stays_where_it_is() -> None:
-    own = replace(load_movement("lognorm_4_1"), from_library=False)
+    own = replace(load_movement("lognorm_4_1"), may_be_moved=False)
     with pytest.raises(PlanningError, match="move the movement away from the base"):
         make_plan(own, robot_model("ur5e"))
 
