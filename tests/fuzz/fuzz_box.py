@@ -401,7 +401,8 @@ class FuzzBox:
                 away = max(abs(a - b) for a, b in zip(values, self.rest, strict=True))
                 assert away < _GIVES_WAY, f"the arm moved by {away} rad"
         elif snapshot.robot_mode != RobotMode.RUNNING:
-            assert not any(snapshot.target_qd), "an arm without power is told to move"
+            # A package shows the target with which its cycle began, so ask for that of the next one.
+            assert not any(self.controller.state.motion.target.qd), "an arm without power is told to move"
 
     def _ask(self):
         questions = {"dashboard": b"robotmode\n", "modbus": ASK_MODBUS, "control": ASK_HTTP}
