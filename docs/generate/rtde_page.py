@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from docs.generate.page_parts import MARKS, example, table
 from protocol.capture import RtdeDecoder
 from protocol.rtde.client_connection import RtdeClientConnection
+from protocol.rtde.codec import MAX_NAMES_SIZE
 from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField, input_fields, output_fields
 from protocol.rtde.messages import Request, RequestProtocolVersion, RtdePackageType, SetupOutputs, Start
 from protocol.rtde.server_connection import RtdeServerConnection, request_limits
@@ -51,9 +52,9 @@ connection begins in protocol version 1; `V` requests version 2, as all current 
 * Inputs are accepted at any time, also before `S`, and act in the next control cycle; the last
   value stays. Of a package that is too long or too short, the complete leading values are used.
 * If a client does not read, whole packages are dropped. The names of a recipe have at most
-  {_CB3.names} bytes, a package {_CB3.package} (e-Series: {_E_SERIES.names} with {_E_SERIES.n_names}
-  names, and {_E_SERIES.package}); data that is not RTDE ends the connection, with a text message
-  that gives the reason.
+  {MAX_NAMES_SIZE} bytes, a package {_CB3.package}. An e-Series takes longer lists, in packages up to
+  {_E_SERIES.package}, but beyond {MAX_NAMES_SIZE} bytes no name twice. Data that is not RTDE ends the
+  connection, with a text message that gives the reason.
 * A program may watch that an input is written often enough (`rtde_set_watchdog`), and may take
   `external_force_torque` in place of the estimated force (`enable_external_ft_sensor`).
 """

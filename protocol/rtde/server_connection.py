@@ -57,22 +57,20 @@ class RequestLimits(NamedTuple):
     Attributes:
         package: largest package in bytes: less than the number that two letters make, such as the first two
             of an HTTP request on the wrong port.
-        names: longest list of names in bytes; what lies beyond is not found.
-        n_names: greatest number of names; the others are not found.
+        takes_long_lists: beyond `MAX_NAMES_SIZE` it finds names that it has not yet read; else none at all.
     """
 
     package: int
-    names: int
-    n_names: int
+    takes_long_lists: bool
 
 
-_CB3_LIMITS = RequestLimits(0x1FFF, MAX_NAMES_SIZE, MAX_NAMES_SIZE)
-# UR's client library asks the newest simulator for all outputs at once: 9 kB, some 400 names.
-_E_SERIES_LIMITS = RequestLimits(0x2FFF, 0x2FFF, 512)
+_CB3_LIMITS = RequestLimits(0x1FFF, takes_long_lists=False)
+# UR's client library asks the newest simulator for all outputs at once, 9 kB.
+_E_SERIES_LIMITS = RequestLimits(0x2FFF, takes_long_lists=True)
 
 
 def request_limits(version: SoftwareVersion) -> RequestLimits:
-    """The limits of software `version`; they are chosen but for the 2048 bytes of names of a CB3."""
+    """The limits of software `version`; the sizes of packages are chosen."""
     return _CB3_LIMITS if version.major < 5 else _E_SERIES_LIMITS
 
 
@@ -231,11 +229,14 @@ def _look_up(
     """The fields of a recipe, and a word for each name; one refusal leaves no fields at all."""
     fields: list[RtdeField] = []
     words: list[str] = []
+    read: set[str] = set()
     end = -1
     for name in names:
         end += 1 + len(name)
         # What lies beyond the limits is answered as if it had not been read.
-        field = known.get(name) if end <= limits.names and len(words) < limits.n_names else None
+        is_read = end <= MAX_NAMES_SIZE or (limits.takes_long_lists and name not in read)
+        read.add(name)
+        field = known.get(name) if is_read else None
         if field is None:
             words.append(NOT_FOUND)
         elif name in in_use:

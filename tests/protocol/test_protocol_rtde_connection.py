@@ -228,7 +228,10 @@ def test_an_e_series_takes_the_names_of_all_its_outputs_at_once():
 
     assert len(",".join(known)) > 9000
     assert answer(known) == [field.type.value for field in known.values()]
-    assert answer(["payload"] * 513) == ["DOUBLE"] * 512 + ["NOT_FOUND"]
+    fit = (MAX_NAMES_SIZE + 1) // 8
+    assert answer([*["payload"] * 300, "robot_mode"]) == (
+        ["DOUBLE"] * fit + ["NOT_FOUND"] * (300 - fit) + ["INT32"]
+    )
     most = request_limits(version).package - 3
     assert len(answer(["x"] * (most // 2))) == most // 2  # the reply fits into a package
 
