@@ -21,6 +21,6 @@ def test_the_client_reads_every_port(software, size, payload):
     assert str(found.info.version).startswith(software.removesuffix(".0"))
     assert found.info.simulated is True
     assert found.rhythm.frame_size == size
-    assert found.report.configured == "UR5"
+    assert found.report.configured == found.info.model == "UR5e"
     assert found.report.payload == payload
     assert found.report.tcp_offset == (0.0,) * 6
