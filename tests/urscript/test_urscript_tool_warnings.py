@@ -106,6 +106,10 @@ WARNED = {
         (body("movel(p[0.4, 0, 0.2, 0, 3.14, 0], r=50)"), "2:39 movel: 50 m is farther than any arm reaches"),
         (body("speedl([100, 0, 0, 0, 0, 0], 0.5)"), "2:10 speedl: 100 m/s is faster than any arm"),
     ],
+    "W120": [
+        (body("servoj([0, 0, 0, 0, 0, 0], t=0.002)"), "2:32 servoj: 0.002 s is shorter than a control cycle of 0.008 s"),
+        (body("speedj([0, 0, 0, 0, 0, 0], 1, 0.004)"), "2:33 speedj: 0.004 s is shorter than a control cycle of 0.008 s"),
+    ],
     "W115": [(body("x = [1]", "x.append(2)"), "3:3 nothing in this program has a method 'append'")],
     "W113": [("def f():\n  sync()\nend\nf()\n", "4:1 'f' runs when it is defined; this call is a program of its own and fails")],
 }  # fmt: skip
@@ -173,6 +177,7 @@ FINE = {
     ],
     "W119": [body("def f(a, b=0):", "return a + b", "end", "textmsg(f(1), f(b=2, a=1))")],
     "W118": [body("movel(p[0.4, -1.8, 0.2, 0, 3.14, 0], a=15, v=3, r=0.5)", "set_payload(20, [0, 0, 0.3])")],
+    "W120": [body("servoj([0, 0, 0, 0, 0, 0], t=0.008)", "speedl([0, 0, 0, 0, 0, 0], 1, get_steptime())", "sleep(0.001)")],
     "W115": [body('x = rpc_factory("xmlrpc", "http://a")', "x.append(2)")],
     "W113": ["def f(a):\n  textmsg(a)\nend\nf(1)\n", "def f():\n  sync()\nend\n"],
 }  # fmt: skip
@@ -252,6 +257,25 @@ def test_strict_fails_with_warnings_unless_they_are_ignored(check):
     assert check("--strict", "a.script").exit_code == 1
     result = check("--strict", "--ignore", "w102,W101", "a.script")
     assert (result.exit_code, result.output) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("text", "on_cb3", "on_e_series"),
+    [
+        (body("servoj([0, 0, 0, 0, 0, 0], t=0.002)"), ["W120"], []),
+        (body("servoj([0, 0, 0, 0, 0, 0], t=0.001)"), ["W120"], ["W120"]),
+        (body("x = [1]", "textmsg(x)", "x.append(2)"), ["W115"], []),
+        # What a method has changed is no constant any more.
+        (body("q = [0, 0, 0, 0, 0, 0, 0]", "q.pop()", "movej(q)"), ["W115"], []),
+    ],
+)
+def test_some_warnings_depend_on_the_generation(text, on_cb3, on_e_series):
+    def codes(software):
+        _, warnings = check_program(text, catalogue=catalogue_for(software))
+        return [warning.rule.code for warning in warnings]
+
+    assert codes("3.15") == on_cb3
+    assert codes("5.15") == on_e_series
 
 
 def test_ignoring_a_code_that_does_not_exist_is_wrong_use(check):

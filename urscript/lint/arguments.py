@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from urscript.builtins import PURE
-from urscript.catalogue import Catalogue
+from urscript.catalogue import STEP_TIME, Catalogue
 from urscript.catalogue.argument_checks import compile_check, fits, type_error
 from urscript.catalogue.types import Builtin, Param
 from urscript.errors import ScriptRuntimeError
 from urscript.lint.names import Variable, expressions_read, owner
-from urscript.lint.rules import REFUSED_ARGUMENT, WRONG_COUNT, ScriptWarning
+from urscript.lint.rules import REFUSED_ARGUMENT, SHORT_TIME, WRONG_COUNT, ScriptWarning
 from urscript.lint.units import wrong_unit
 from urscript.names.own_calls import wrong_count
 from urscript.names.scopes import FunctionScope, ResolvedProgram
@@ -21,6 +21,8 @@ from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression
 from urscript.syntax.walk import all_statements
 from urscript.values import Pose
+
+_STREAMED: Final = frozenset({"servoj", "speedj", "speedl"})
 
 
 class KnownValue(NamedTuple):
@@ -38,6 +40,7 @@ class KnownValue(NamedTuple):
 def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
     """Everything this module warns about, in no order; pure functions check their arguments themselves."""
     constants = _constants(program)
+    cycle = STEP_TIME[catalogue.version.generation]
     for scope, call in expressions_read(program):
         if not isinstance(call, nodes.Call):
             continue
@@ -59,6 +62,10 @@ def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterato
             elif found := wrong_unit(param, known.value):
                 rule, text, hint = found
                 yield ScriptWarning(rule, f"{builtin.name}: {text}", argument.span, program.source, hint)
+            elif builtin.name in _STREAMED and param.name == "t" and 0 < known.value < cycle:
+                text = f"{builtin.name}: {known.value:g} s is shorter than a control cycle of {cycle:g} s"
+                hint = "write get_steptime()"
+                yield ScriptWarning(SHORT_TIME, text, argument.span, program.source, hint)
 
 
 def _constants(program: ResolvedProgram) -> dict[Variable, Expression]:

@@ -89,6 +89,11 @@ MILLIMETRES: Final = Rule(
     "positions are in metres and speeds of the tool in m/s; no arm reaches 3 m",
 )
 WRONG_COUNT: Final = Rule("W119", "a function of the program gets too many or too few arguments", "as W116")
+SHORT_TIME: Final = Rule(
+    "W120",
+    "a streamed motion command shall take less than a control cycle",
+    "it takes a whole one, 8 ms on a CB3 and 2 ms on an e-Series, so a stream of them gets slower",
+)
 
 RULES: Final = (
     UNUSED_GLOBAL,
@@ -110,6 +115,7 @@ RULES: Final = (
     DEGREES,
     MILLIMETRES,
     WRONG_COUNT,
+    SHORT_TIME,
 )
 
 
