@@ -8,7 +8,8 @@ from protocol.primary.layout import ForceModeData
 from protocol.robot_api import CALLS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.robot_generation import ArmLimits, Electrics, RobotGeneration, SafetyLimits
+from ur_emulator.models.robot_generation import Electrics, RobotGeneration
+from ur_emulator.models.safety_limits import ArmLimits, SafetyLimits
 
 MISSING_BUILTIN = "popup"
 

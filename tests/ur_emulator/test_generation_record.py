@@ -18,7 +18,7 @@ from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.controller.safety.speed_scaling import ModeLimits, limits_of_mode
 from ur_emulator.errors import ArgumentError, EmulatorError
 from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.robot_generation import ArmLimits
+from ur_emulator.models.safety_limits import ArmLimits
 from ur_emulator.models.ur3 import UR3
 
 

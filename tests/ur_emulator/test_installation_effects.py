@@ -19,9 +19,9 @@ from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.controller.safety.configured_limits import SafetySettings, limits_of
 from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.emulator import ControlBox
-from ur_emulator.models.robot_generation import ArmLimits
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.models.safety_limits import ArmLimits
 from ur_emulator.models.ur3 import UR3
 from ur_emulator.programs.installation import (
     DeclaredPayload,

@@ -20,7 +20,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.models.robot_generation import ArmLimits
+from ur_emulator.models.safety_limits import ArmLimits
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import DeclaredPayload, DeclaredSignal, Feature, OutputRule, StartUp
 from ur_emulator.programs.installation_files import NEW_BOX, load_installation

@@ -34,8 +34,8 @@ from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.controller.safety.speed_scaling import TOLERANCE, ModeLimits, limits_of_mode
 from ur_emulator.errors import EmulatorError
 from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.robot_generation import UNLIMITED
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.models.safety_limits import UNLIMITED
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import SpeedJ
 from ur_emulator.scripting.program_slot import ProgramSlot

@@ -11,7 +11,8 @@ from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.fidelity import FIDELITIES
-from ur_emulator.models.robot_generation import UNLIMITED, Builds, Electrics, RobotGeneration, SafetyLimits
+from ur_emulator.models.robot_generation import Builds, Electrics, RobotGeneration
+from ur_emulator.models.safety_limits import UNLIMITED, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 
 _BUILDS: Builds = (

@@ -19,7 +19,8 @@ from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
-from ur_emulator.models.robot_generation import ArmLimits, Builds, Electrics, RobotGeneration, SafetyLimits
+from ur_emulator.models.robot_generation import Builds, Electrics, RobotGeneration
+from ur_emulator.models.safety_limits import ArmLimits, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 
 _BUILDS: Builds = (

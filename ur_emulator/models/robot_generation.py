@@ -23,6 +23,7 @@ from protocol.rtde.fields import RtdeField, input_fields, output_fields
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
 from ur_emulator.models.fidelity import Fidelity, read_fidelity
+from ur_emulator.models.safety_limits import SafetyLimits
 from ur_emulator.models.software import Software
 from urscript.catalogue import Builtin, catalogue_for
 from urscript.catalogue.versions import Version
@@ -30,60 +31,6 @@ from urscript.catalogue.versions import Version
 # First version, build and date of each row, the oldest first; software between two rows has the build and the
 # date of the earlier one.
 Builds = tuple[tuple[SoftwareVersion, int, datetime], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ArmLimits:
-    """Limits of a mode beside the speeds of the joints; infinite where the mode has none.
-
-    Attributes:
-        tool_speed: of TCP and elbow [m/s].
-        force: at the TCP [N].
-        power: mechanical, of all joints [W].
-        momentum: of the arm [kg m/s].
-    """
-
-    tool_speed: float = math.inf
-    force: float = math.inf
-    power: float = math.inf
-    momentum: float = math.inf
-
-    def within(self, other: ArmLimits) -> ArmLimits:
-        """Return the stricter of two limits, each."""
-        return ArmLimits(
-            tool_speed=min(self.tool_speed, other.tool_speed),
-            force=min(self.force, other.force),
-            power=min(self.power, other.power),
-            momentum=min(self.momentum, other.momentum),
-        )
-
-
-UNLIMITED = ArmLimits()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SafetyLimits:
-    """Limits that the safety systems of all arms have in common.
-
-    Attributes:
-        reduced_share: joint speeds of reduced mode, as a share of the rated ones.
-        recovery_speed: joint speed of recovery mode [rad/s].
-        speed_margin: how far a joint may exceed its rated speed before the safety system stops it [rad/s].
-        acceleration: largest joint acceleration that the configuration data announce [rad/s^2].
-        reduced: in reduced mode.
-        recovery: in recovery mode.
-        manual: in the operational mode MANUAL, where the generation has it.
-        has_programs_in_recovery: programs run in recovery mode.
-    """
-
-    reduced_share: float
-    recovery_speed: float
-    speed_margin: float
-    acceleration: float
-    reduced: ArmLimits
-    recovery: ArmLimits
-    manual: ArmLimits
-    has_programs_in_recovery: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

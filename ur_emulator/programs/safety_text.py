@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator
 from ur_emulator.controller.safety.configured_limits import SafetySettings
 from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, SafetyInput
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.models.robot_generation import ArmLimits
 from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.models.safety_limits import ArmLimits
 
 _NORMAL, _REDUCED = "SafetyLimits Normal Values", "SafetyLimits Reduced Values"
 _NORMAL_JOINTS, _REDUCED_JOINTS = "SafetyLimits Normal Joints", "SafetyLimits Reduced Joints"

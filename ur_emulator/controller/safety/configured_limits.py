@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ur_emulator.controller.safety.inputs import SafetyInput
-from ur_emulator.models.robot_generation import UNLIMITED, ArmLimits
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
+from ur_emulator.models.safety_limits import UNLIMITED, ArmLimits
 
 
 @dataclass(frozen=True, slots=True)

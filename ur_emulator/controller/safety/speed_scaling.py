@@ -18,8 +18,8 @@ from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.limit_checks import Violation
 from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
-from ur_emulator.models.robot_generation import UNLIMITED, ArmLimits, SafetyLimits
 from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.path_motion import SCALING_RATE
 from ur_emulator.plant.plant_state import PlantState
