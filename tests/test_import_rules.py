@@ -50,7 +50,7 @@ BOX_ORDER = (
 CONTROLLER_ORDER = (
     {"events"},
     {"interpreter_log"},
-    {"arm_in_space", "clock", "interpreter_queue", "operator", "program_requests"}
+    {"arm_in_space", "clock", "interpreter_queue", "operator", "planning", "program_requests"}
     | {"programs", "robot_mode", "tool_settings"},
     {"io"},
     {"safety"},

@@ -60,9 +60,7 @@ def test_a_joint_accelerates_as_its_inertia_says(joint, torque):
 
 
 def gravity(bench):
-    still = np.zeros(6)
-    dynamics = bench.controller.state.dynamics
-    return dynamics._torque(bench.now.actual_q, still, still)
+    return bench.controller.state.dynamics.gravity_torque(bench.now.actual_q)
 
 
 def test_friction_brakes_what_is_not_compensated():

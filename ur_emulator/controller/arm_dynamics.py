@@ -17,6 +17,9 @@ from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
 
 _STILL = np.zeros(6)
+# Share of the rated torque for gravity and acceleration; friction and the arm's motion take the rest. Chosen.
+_TORQUE_SHARE = 0.7
+_LEAST = 1e-9  # Nm; a joint that needs less does not limit anything
 
 
 class ArmDynamics:
@@ -41,7 +44,7 @@ class ArmDynamics:
             q: joint angles (6,) [rad].
             with_rotors: with the inertia of rotors and gears, as felt at the joints.
         """
-        gravity = self._torque(q, _STILL, _STILL)
+        gravity = self.gravity_torque(q)
         columns = [self._torque(q, _STILL, axis) - gravity for axis in np.eye(6)]
         matrix = np.column_stack(columns)
         if not with_rotors:
@@ -52,7 +55,23 @@ class ArmDynamics:
     def velocity_torque(self, q: Sequence[float], qd: Sequence[float]) -> NDArray[np.float64]:
         """Return the Coriolis and centrifugal torques (6,) [Nm] at q (6,) [rad] and qd (6,) [rad/s]."""
         moving = self._torque(q, np.array(qd, dtype=np.float64), _STILL)
-        return moving - self._torque(q, _STILL, _STILL)
+        return moving - self.gravity_torque(q)
+
+    def gravity_torque(self, q: Sequence[float]) -> NDArray[np.float64]:
+        """Return the torques that hold the arm at q (6,) [rad], (6,) [Nm]."""
+        return self._torque(q, _STILL, _STILL)
+
+    def greatest_acceleration(self, q: Sequence[float], slope: Sequence[float]) -> float:
+        """Return the greatest acceleration along a path that the drives can give from rest.
+
+        Args:
+            q: joint angles (6,) [rad].
+            slope: change of the angles per length of the path (6,) [rad per unit].
+        """
+        gravity = self.gravity_torque(q)
+        per_acceleration = np.abs(self._torque(q, _STILL, np.array(slope, dtype=np.float64)) - gravity)
+        left = np.maximum(_TORQUE_SHARE * np.array(self._robot.tau_max) - np.abs(gravity), 0.0)
+        return float((left / np.maximum(per_acceleration, _LEAST)).min())
 
     def _torque(
         self, q: Sequence[float], qd: NDArray[np.float64], qdd: NDArray[np.float64]

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 from protocol.primary.messages import ReportLevel
-from protocol.ur_types import ControlMode, RobotMode
+from protocol.ur_types import ControlMode, ProgramState, RobotMode
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.compliance.flange_push import FlangePush
@@ -22,6 +22,7 @@ from ur_emulator.controller.reporting import make_snapshot
 from ur_emulator.controller.robot_mode import ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety.limit_checks import (
     UNREACHABLE_PATH,
+    HighHoldingTorque,
     SetpointCheck,
     Violation,
     find_violation,
@@ -82,6 +83,8 @@ class Controller:
         self._setpoints = SetpointCheck(robot.stop_deceleration, self.period_s)
         self._mode = mode
         self._saturated_s = 0.0
+        holding = generation.limits.holding_deviation
+        self._holding = None if holding is None else HighHoldingTorque(holding)
         self._settle = 0
         self._settle_cycles = generation.cycles(SETTLE_TIME)
         # Time must not pause before a protective stop can be unlocked. Two cycles more: the cycle of the stop
@@ -223,7 +226,12 @@ class Controller:
         self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
         stop_requested = state.requests.take_protective_stop()
         if running and state.safety.is_watched:
-            violation = find_violation(state.robot, sensed, self._saturated_s)
+            holding_deviation = None
+            if self._holding is not None:
+                is_enabled = self.programs.runtime_state is ProgramState.PLAYING
+                is_enabled = is_enabled and state.error_settings.holds_high
+                holding_deviation = self._holding.step(is_enabled, state.motion.target.qd, sensed.actual_qd)
+            violation = find_violation(state.robot, sensed, self._saturated_s, holding_deviation)
             if self.safety.is_busy and violation is None:
                 violation = self.safety.find_violation(sensed)
             if control and violation is None:

@@ -28,6 +28,7 @@ class ErrorSettings:
         deviation_threshold: part of the deviation limit at which to warn.
         transition_hardness: of safeguard stops and reduced mode: 0 hard, 1 soft.
         revolution_reference: joint positions of the last `reset_revolution_counter` [rad]; kept only.
+        holds_high: a resting arm of the e-Series may give way further before it is stopped.
     """
 
     pause_codes: set[tuple[int, int | None]] = field(default_factory=set)
@@ -35,6 +36,7 @@ class ErrorSettings:
     deviation_threshold: float = 0.8
     transition_hardness: int = 0
     revolution_reference: Vector6 | None = None
+    holds_high: bool = True
     _has_warned: bool = False
 
     def pause_on(self, code: int, argument: int | None) -> None:
@@ -56,6 +58,10 @@ class ErrorSettings:
     def set_revolution_reference(self, q: Vector6) -> None:
         """Keep the joint positions of `reset_revolution_counter` [rad]."""
         self.revolution_reference = q
+
+    def set_high_holding_torque(self, enabled: bool) -> None:
+        """Let a resting arm give way further before it is stopped, or as a moving one."""
+        self.holds_high = enabled
 
     def must_pause(self, events: Iterable[Event]) -> bool:
         """True when one of the events is an error code at which the program is to be paused."""

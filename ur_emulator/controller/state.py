@@ -26,6 +26,7 @@ from ur_emulator.controller.io.registers import Registers
 from ur_emulator.controller.io.watchdogs import Watchdogs
 from ur_emulator.controller.operator import Operator
 from ur_emulator.controller.past_cycles import PastCycles
+from ur_emulator.controller.planning import PlanningSettings
 from ur_emulator.controller.program_requests import ProgramRequests
 from ur_emulator.controller.robot_mode import RobotModeMachine
 from ur_emulator.controller.safety.configured_limits import limits_of
@@ -58,6 +59,7 @@ class ControllerState:
         tool: TCP, payload and gravity.
         energy: what the arm has taken.
         dynamics: the model of the arm with that payload.
+        planning: how programs want their moves to be planned.
         io: digital and analogue lines.
         registers: general purpose registers.
         io_configuration: which inputs act, which outputs follow the program.
@@ -90,6 +92,7 @@ class ControllerState:
     tool: ToolSettings
     energy: EnergyMeter
     dynamics: ArmDynamics
+    planning: PlanningSettings
     io: InputOutput
     registers: Registers
     io_configuration: IoConfiguration
@@ -139,6 +142,7 @@ def make_state(
         speed=speed,
         tool=tool,
         dynamics=ArmDynamics(robot, arm.calibration, tool),
+        planning=PlanningSettings(),
         energy=EnergyMeter(clock.generation),
         io=io,
         registers=registers,

@@ -56,6 +56,7 @@ E_SERIES = RobotGeneration(
     default_version="5.15.0",
     builds=_BUILDS,
     limits=SafetyLimits(
+        holding_deviation=0.3,  # chosen: twice that of a moving arm
         reduced_share=1.0,  # installations: the limits of reduced mode are those of normal mode
         recovery_speed=radians(30.0),  # PolyScope X manual
         speed_margin=0.2,  # configuration data of a UR5e capture: pi + .2 rad/s

@@ -40,6 +40,7 @@ class SafetyLimits:
     """Limits that the safety systems of all arms have in common.
 
     Attributes:
+        holding_deviation: how far a joint of a resting arm may give way [rad]; None: as that of a moving one.
         reduced_share: joint speeds of reduced mode, as a share of the rated ones.
         recovery_speed: joint speed of recovery mode [rad/s].
         speed_margin: how far a joint may exceed its rated speed before the safety system stops it [rad/s].
@@ -50,6 +51,7 @@ class SafetyLimits:
         has_programs_in_recovery: programs run in recovery mode.
     """
 
+    holding_deviation: float | None = None
     reduced_share: float
     recovery_speed: float
     speed_margin: float

@@ -39,6 +39,7 @@ class Leg:
         r: blend radius at the waypoint [m]; 0 to end at rest.
         process: the speed stays constant through blends (movep).
         samples: of a path of the tool, up to where the arm can follow it.
+        smoothing: time in which the acceleration changes, from rest to rest [s]; 0: it has steps.
     """
 
     path: JointPath
@@ -51,6 +52,7 @@ class Leg:
     r: float = 0.0
     process: bool = False
     samples: tuple[Sample, ...] = ()
+    smoothing: float = 0.0
 
     def near(self, s: float) -> Vector6:
         """Return joint angles close to those after the length s [rad], for the inverse kinematics."""

@@ -18,6 +18,7 @@ from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.blend import blend
 from ur_emulator.motion.leg import Leg
 from ur_emulator.motion.path_segment import PathSegment, segment_of_blend, segment_of_leg
+from ur_emulator.motion.smooth_plan import SmoothPlan
 from ur_emulator.motion.speed_plan import SpeedPlan, StoppingCurve, plan, stopping_curve
 from ur_emulator.motion.target import JointTarget
 
@@ -57,11 +58,12 @@ class Move:
         self._zone = _zone(leg, 0.0)
         self._segments: list[PathSegment] = [segment_of_leg(leg, 0.0, 1.0)]
         self._ends: list[float] = []
-        self._plan: SpeedPlan
+        self._plan: SpeedPlan | SmoothPlan
         self._stopping: StoppingCurve | None = None
         rest = plan(self._segments[0].intervals, 0.0)
         assert rest is not None
-        self._use(rest)
+        is_smooth = leg.smoothing > 0.0 and leg.r <= 0.0 < rest.duration
+        self._use(SmoothPlan(rest, leg.smoothing) if is_smooth else rest)
         # A move of length 0 may have a duration.
         self._wait = leg.t if leg.path.length <= 0.0 else 0.0
         self.done = self.duration <= 0.0
@@ -179,7 +181,7 @@ class Move:
         self.done = True
         self.left_out = None
 
-    def _use(self, found: SpeedPlan) -> None:
+    def _use(self, found: SpeedPlan | SmoothPlan) -> None:
         """Begin to execute a plan for the segments."""
         self._plan = found
         self._time = self._time_before = 0.0

@@ -48,4 +48,6 @@ def error_functions(
         "set_safety_mode_transition_hardness": set_safety_mode_transition_hardness,
         "reset_revolution_counter": reset_revolution_counter,
         "powerdown": powerdown,
+        "high_holding_torque_enable": lambda thread: settings.set_high_holding_torque(True),
+        "high_holding_torque_disable": lambda thread: settings.set_high_holding_torque(False),
     }

@@ -13,10 +13,11 @@ from ur_emulator.motion.generators import StopJ
 from ur_emulator.motion.leg import Leg, move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
 from ur_emulator.motion.path import PoseLine, PosePath, arc_through
+from ur_emulator.scripting.move_planner import MovePlanner
 from ur_emulator.scripting.script_arm import Cycles, ScriptArm, floats, require_positive, require_range
 from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import NEXT_CYCLE
-from urscript.values import Pose
+from urscript.values import Pose, log_form
 
 # Acceleration and speed of moves that give none. Source: URScript manual, module variables of motion.
 JOINT_DEFAULTS = (1.4, 1.05)  # rad/s^2, rad/s
@@ -29,7 +30,7 @@ MAX_PER_CYCLE = 4
 
 
 def motion_functions(
-    arm: ScriptArm, place_arm: Callable[[Vector6], bool], events: EventQueue
+    arm: ScriptArm, place_arm: Callable[[Vector6], bool], events: EventQueue, planner: MovePlanner
 ) -> Mapping[str, Callable[..., Any]]:
     """Return the builtins that move the arm from waypoint to waypoint.
 
@@ -37,6 +38,7 @@ def motion_functions(
         arm: that they move.
         place_arm: puts it at joint angles [rad]; False where it would touch something.
         events: get warnings of overlapping blends.
+        planner: of moves whose limits follow from the arm.
     """
     motion = arm.motion
 
@@ -97,7 +99,17 @@ def motion_functions(
         def make(start: Vector6, _: ToolPose) -> Leg:
             goal = joints_of(q, start)
             require_range("movej", goal, arm.safety.limits)
-            return move_j(start, goal, arm.tool, a=a, v=v, t=t, r=r)
+            return planner.usual(move_j(start, goal, arm.tool, a=a, v=v, t=t, r=r))
+
+        return travel(thread, make)
+
+    def optimovej(thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
+        _require_shares("optimovej", goal, a, v, r)
+
+        def make(start: Vector6, _: ToolPose) -> Leg:
+            q = joints_of(goal, start)
+            require_range("optimovej", q, arm.safety.limits)
+            return planner.optimal(move_j(start, q, arm.tool, a=1.0, v=1.0, r=r), a, v)
 
         return travel(thread, make)
 
@@ -117,25 +129,35 @@ def motion_functions(
         make_path: Callable[[ToolPose], PosePath],
         a: float,
         v: float,
-        t: float,
         r: float,
-        *,
-        process: bool,
     ) -> Cycles:
         def make(q: Vector6, start: ToolPose) -> Leg:
-            return move_tool(make_path(start), q, arm.tool, a=a, v=v, t=t, r=r, process=process)
+            return move_tool(make_path(start), q, arm.tool, a=a, v=v, r=r, process=True)
 
         return travel(thread, make)
 
     def movel(thread: object, pose: Any, a: float, v: float, t: float, r: float) -> Cycles:
         a, v = _limits("movel", a, v, t, r, TOOL_DEFAULTS)
         goal = pose_of(pose)
-        return along(thread, lambda start: PoseLine(start, goal), a, v, t, r, process=False)
+
+        def make(q: Vector6, start: ToolPose) -> Leg:
+            return planner.usual(move_tool(PoseLine(start, goal), q, arm.tool, a=a, v=v, t=t, r=r))
+
+        return travel(thread, make)
+
+    def optimovel(thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
+        _require_shares("optimovel", goal, a, v, r)
+        pose = pose_of(goal)
+
+        def make(q: Vector6, start: ToolPose) -> Leg:
+            return planner.optimal(move_tool(PoseLine(start, pose), q, arm.tool, a=1.0, v=1.0, r=r), a, v)
+
+        return travel(thread, make)
 
     def movep(thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
         _require_limits("movep", a, v, 0.0, r)
         goal = pose_of(pose)
-        return along(thread, lambda start: PoseLine(start, goal), a, v, 0.0, r, process=True)
+        return along(thread, lambda start: PoseLine(start, goal), a, v, r)
 
     def servoc(thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
         _require_limits("servoc", a, v, 0.0, r)
@@ -152,9 +174,7 @@ def motion_functions(
     ) -> Cycles:
         _require_limits("movec", a, v, 0.0, r)
         via, goal, fixed = pose_of(pose_via), pose_of(pose_to), mode == 1
-        return along(
-            thread, lambda start: arc_through(start, via, goal, fixed=fixed), a, v, 0.0, r, process=True
-        )
+        return along(thread, lambda start: arc_through(start, via, goal, fixed=fixed), a, v, r)
 
     def set_pos(thread: object, q: Any) -> None:
         angles = floats(q)
@@ -169,6 +189,8 @@ def motion_functions(
     return {
         "movej": movej,
         "movel": movel,
+        "optimovej": optimovej,
+        "optimovel": optimovel,
         "movep": movep,
         "movec": movec,
         "servoc": servoc,
@@ -193,6 +215,18 @@ def _require_limits(function: str, a: float, v: float, t: float, r: float) -> No
             raise ScriptRuntimeError(f"{function}: {name} must not be below 0, got {value:g}")
     if t:
         require_positive(function, t=t)
+
+
+def _require_shares(function: str, goal: Any, a: float, v: float, r: float) -> None:
+    if not isinstance(goal, Pose) and not (isinstance(goal, list) and len(goal) == 6):
+        raise ScriptRuntimeError(
+            f"{function}: goal {log_form(goal)} is not modelled; allowed: six joint positions or a pose"
+        )
+    for name, share in (("a", a), ("v", v)):
+        if not 0.0 < share <= 1.0:
+            raise ScriptRuntimeError(f"{function}: {name} must be above 0 and up to 1, got {share:g}")
+    if r < 0.0:
+        raise ScriptRuntimeError(f"{function}: r must not be below 0, got {r:g}")
 
 
 def _pose(value: Sequence[float]) -> ToolPose:

@@ -121,6 +121,8 @@ class ProgramSlot:
         self.latest = self._primary = program.start(RobotHost(self._state, self._network), self._work)
         self._phase = ProgramState.PLAYING
         self._is_loaded = loaded
+        if loaded:
+            self._state.planning.set_motion_version(1)
         self._state.io_configuration.program_started()
         self._state.interpreter.program_started()
         self._state.events.append(ProgramStarted(program.name, self._primary))

@@ -18,11 +18,15 @@ from ur_emulator.scripting.io_configuration_functions import io_configuration_fu
 from ur_emulator.scripting.io_functions import io_functions, register_functions
 from ur_emulator.scripting.modbus_functions import modbus_functions
 from ur_emulator.scripting.motion_functions import motion_functions
+from ur_emulator.scripting.move_planner import MovePlanner
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.operator_functions import operator_functions
 from ur_emulator.scripting.path_offset_functions import ProgramPathOffset
+from ur_emulator.scripting.payload_functions import payload_functions
+from ur_emulator.scripting.planning_functions import planning_functions
 from ur_emulator.scripting.port_functions import port_functions
 from ur_emulator.scripting.remote_procedures import ProgramRemotes
+from ur_emulator.scripting.rtde_functions import rtde_functions
 from ur_emulator.scripting.script_arm import ScriptArm
 from ur_emulator.scripting.settings_functions import settings_functions
 from ur_emulator.scripting.socket_functions import ProgramSockets
@@ -53,13 +57,18 @@ class RobotHost:
         self._conveyor = ProgramConveyor(arm, state.encoders, state.clock)
         self._path_offset = ProgramPathOffset(arm)
         self._builtins: Mapping[str, Callable[..., Any]] = {
-            **motion_functions(arm, state.place_arm, state.events),
+            **motion_functions(
+                arm, state.place_arm, state.events, MovePlanner(state.dynamics, state.planning)
+            ),
+            **planning_functions(state.planning),
             **speed_functions(arm, self.step_time),
             **state_functions(arm, state.past, self.step_time),
             **compliance_functions(arm, state.compliance, state.force_sense, state.past),
             **dynamics_functions(arm, state.dynamics, state.past),
             **settings_functions(state.robot, state.tool, state.requests, self.step_time),
             **tool_functions(state.io),
+            **payload_functions(state.tool),
+            **rtde_functions(state.past, state.robot.generation.rtde_outputs),
             **io_functions(state.io),
             **register_functions(state.registers),
             **io_configuration_functions(state.io, state.io_configuration),

@@ -233,6 +233,8 @@ _REGISTERS: tuple[Builtin, ...] = (
         (Param("key", STRING),),
         "value",
         "an RTDE output by name",
+        support=APPROXIMATE,
+        note="of the last cycle; outputs of later software too",
         since=releases(None, "5.24", "10.11"),
         source=MANUAL_LATE,
     ),

@@ -17,7 +17,7 @@ ANY, BOOL, INT, NUMBER, STRING = (
 )
 POSE, JOINTS, VECTOR3, VECTOR6 = ParamType.POSE, ParamType.JOINTS, ParamType.VECTOR3, ParamType.VECTOR6
 LIST, POSE_OR_JOINTS = ParamType.LIST, ParamType.POSE_OR_JOINTS
-EXACT, APPROXIMATE, DECLARED = Support.EXACT, Support.APPROXIMATE, Support.DECLARED_ONLY
+EXACT, APPROXIMATE = Support.EXACT, Support.APPROXIMATE
 BOTH = (Generation.CB3, Generation.E_SERIES)
 _WITH_3_14_3 = f"{MANUAL_E}, module internals; CB3: {DRIVER_SCRIPT}"
 
@@ -387,6 +387,7 @@ _STRINGS: tuple[Builtin, ...] = tuple(
     )
 )
 
+_HOLDING = "a resting joint gives way by 0.3 rad before it is stopped; disabled as a moving one; chosen"
 _LIGHT = "accepted without effect: no port shows the light"
 _MODEL = "of the model that the drives use, with the declared payload (chosen)"
 _JOINT_ARGUMENTS = (Param("q", JOINTS, None, "rad", shown="current joint positions"),)
@@ -411,18 +412,25 @@ _LATER: tuple[Builtin, ...] = (
                         (Param("poses", LIST, unit="at least four"), Param("wrenches", LIST)),
                         "struct(mass, cog)",
                         "payload from wrenches measured at several poses",
-                        DECLARED,
-                        "",
+                        APPROXIMATE,
+                        "least squares (chosen)",
                     ),
                     (
                         "high_holding_torque_disable",
                         (),
                         "None",
                         "hold with less torque at rest",
-                        DECLARED,
-                        "",
+                        APPROXIMATE,
+                        _HOLDING,
                     ),
-                    ("high_holding_torque_enable", (), "None", "hold with full torque at rest", DECLARED, ""),
+                    (
+                        "high_holding_torque_enable",
+                        (),
+                        "None",
+                        "hold with full torque at rest",
+                        APPROXIMATE,
+                        _HOLDING,
+                    ),
                     ("set_baselight_off", (), "None", "base light off (UR20, UR30)", APPROXIMATE, _LIGHT),
                     (
                         "set_baselight_iec",

@@ -16,7 +16,7 @@ from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
-from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.models.robot_model import RobotModel, Vector6
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
 
@@ -24,6 +24,8 @@ from ur_emulator.plant.plant_state import PlantState
 MAX_POSITION_DEVIATION = 0.15
 # A drive at its torque limit for longer than this cannot follow [s].
 MAX_SATURATION_TIME = 0.1
+# A joint that is not faster is at rest, for the high holding torque [rad/s]. Source: see there.
+RESTING_SPEED = 0.01
 # Rounding of a joint speed.
 SPEED_TOLERANCE = 1.0 + 1e-6
 
@@ -151,19 +153,50 @@ def torque_shares(robot: RobotModel, currents: tuple[float, ...]) -> list[float]
     ]
 
 
-def find_violation(robot: RobotModel, sensed: PlantState, saturated_s: float) -> Violation | None:
+class HighHoldingTorque:
+    """Whether a resting arm gives way further, with all torque of its drives, before it is stopped.
+
+    Source: URScript manual e-Series 5.15, high_holding_torque_disable: while a program runs, no joint moves
+    faster than 0.01 rad/s, and the target rests. Chosen: once it has begun it lasts until the target moves.
+
+    Args:
+        deviation: of a joint at which such an arm is stopped [rad].
+    """
+
+    def __init__(self, deviation: float) -> None:
+        self._deviation = deviation
+        self._holds = False
+
+    def step(self, is_enabled: bool, target_qd: Vector6, actual_qd: Vector6) -> float | None:
+        """Return the deviation at which this cycle stops the arm [rad]; None for the usual limits.
+
+        Args:
+            is_enabled: a program runs and has not switched it off.
+            target_qd: of the set-point [rad/s].
+            actual_qd: measured [rad/s].
+        """
+        may_hold = is_enabled and not any(target_qd)
+        self._holds = may_hold and (self._holds or max(map(abs, actual_qd)) <= RESTING_SPEED)
+        return self._deviation if self._holds else None
+
+
+def find_violation(
+    robot: RobotModel, sensed: PlantState, saturated_s: float, holding_deviation: float | None = None
+) -> Violation | None:
     """Return a violation by the measured state, or None.
 
     Args:
         robot: torque constants and limits of the arm.
         sensed: measured state of the arm.
         saturated_s: for how long a drive has been at its torque limit without a break [s].
+        holding_deviation: see `HighHoldingTorque.step`.
     """
     errors = sensed.position_error
-    if max(errors) > MAX_POSITION_DEVIATION or min(errors) < -MAX_POSITION_DEVIATION:
-        i = next(i for i, error in enumerate(errors) if abs(error) > MAX_POSITION_DEVIATION)
+    most = MAX_POSITION_DEVIATION if holding_deviation is None else holding_deviation
+    if max(errors) > most or min(errors) < -most:
+        i = next(i for i, error in enumerate(errors) if abs(error) > most)
         return _stop(153, i, f"Protective stop: position deviates from path: {JOINT_NAMES[i]}", blocked=True)
-    if saturated_s > MAX_SATURATION_TIME:
+    if saturated_s > MAX_SATURATION_TIME and holding_deviation is None:
         joint = most_loaded_joint(robot, sensed.joint_control_output)
         text = f"Protective stop: Collision detected by joint: {JOINT_NAMES[joint]}"
         return _stop(157, joint, text, blocked=True)
