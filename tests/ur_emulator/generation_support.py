@@ -8,7 +8,8 @@ from protocol.primary.layout import ForceModeData
 from protocol.robot_api import CALLS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.robot_generation import Electrics, RobotGeneration
+from ur_emulator.models.measuring import Electrics, ForceSensing
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.safety_limits import ArmLimits, SafetyLimits
 
 MISSING_BUILTIN = "popup"
@@ -36,6 +37,14 @@ SECOND = RobotGeneration(
         joint_voltage=45.0,
         idle_current=0.4,
         joint_temperatures=(21.0, 22.0, 23.0, 24.0, 25.0, 26.0),
+    ),
+    force_sensing=ForceSensing(
+        has_sensor=True,
+        bandwidth=50.0,
+        precision=(4.0, 0.3),
+        contact_force=6.0,
+        least_averaging=0.04,
+        most_averaging=0.2,
     ),
     gravity=9.82,
     reports_control_as_target=True,

@@ -82,6 +82,16 @@ def test_gravity_of_a_declared_payload_is_in_the_target_moment():
     assert ours.evaluate(q, STILL, STILL) == pytest.approx(expected, abs=1e-9)
 
 
+def test_no_payload_of_an_arm_of_point_masses_needs_no_warning_of_the_library():
+    warnings = []
+    mujoco.set_mju_user_warning(warnings.append)
+    try:
+        InverseDynamics(ROBOTS["ur3e"], NOMINAL).set_payload(0.0, (0.0, 0.0, 0.0))
+    finally:
+        mujoco.set_mju_user_warning(None)
+    assert warnings == []
+
+
 def friction_law(robot, qd):
     c, v1, v2 = (np.array(row) for row in (robot.coulomb, robot.viscous, robot.viscous_fast))
     return np.sign(qd) * (c + v1 * np.minimum(np.abs(qd), 0.5) + v2 * np.maximum(np.abs(qd) - 0.5, 0.0))

@@ -10,7 +10,7 @@ from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.ur3 import UR3
-from ur_emulator.plant.force_estimate import ForceDrift
+from ur_emulator.plant.force_drift import ForceDrift
 from ur_emulator.plant.friction import Friction
 from ur_emulator.plant.gear import GearRipple
 from ur_emulator.plant.inverse_dynamics import InverseDynamics

@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from protocol.pose import rotvec_to_matrix
 from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
 from ur_emulator.kinematics.wrench import moved_wrench
-from ur_emulator.models.robot_model import RobotModel, Vector6, six
+from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 
 # Time from a state to those that accelerations are the differences of [s].
 _STEP = 1e-3
@@ -25,9 +28,20 @@ class ArmInSpace:
         actual: measured angles and speeds.
         wrench: at the flange, base axes [N, Nm].
         tcp: tool centre point in the flange frame; None for the flange itself.
+        force_at_flange: the reported wrench is that at the flange, wherever the TCP is.
     """
 
-    __slots__ = ("_actual", "_actual_joints", "_arm", "_qdd", "_target", "_target_joints", "_tcp", "_wrench")
+    __slots__ = (
+        "_actual",
+        "_actual_joints",
+        "_arm",
+        "_force_at_flange",
+        "_qdd",
+        "_target",
+        "_target_joints",
+        "_tcp",
+        "_wrench",
+    )
 
     def __init__(
         self,
@@ -37,6 +51,8 @@ class ArmInSpace:
         actual: tuple[Vector6, Vector6],
         wrench: Vector6,
         tcp: Sequence[float] | None,
+        *,
+        force_at_flange: bool,
     ) -> None:
         self._arm = arm
         self._target_joints = target
@@ -44,6 +60,7 @@ class ArmInSpace:
         self._actual_joints = actual
         self._wrench = wrench
         self._tcp = tcp
+        self._force_at_flange = force_at_flange
         self._target: CartesianState | None = None
         self._actual: CartesianState | None = None
 
@@ -88,12 +105,31 @@ class ArmInSpace:
         return six([(b - a) / (2.0 * _STEP) for a, b in zip(before, after, strict=True)])
 
     @property
+    def reported_force(self) -> Vector6:
+        """The wrench that clients and programs see, base axes [N, Nm]."""
+        return self._wrench if self._force_at_flange else self.tcp_force
+
+    @property
     def tcp_force(self) -> Vector6:
         """The wrench at the tool centre point, base axes [N, Nm]."""
         if self._tcp is None:
             return self._wrench
         actual = self.actual
         return moved_wrench(self._wrench, actual.flange_position, actual.tcp_pose)
+
+    def in_flange_axes(self, wrench: Vector6, mass: float, cog: Vector3, gravity: Vector3) -> Vector6:
+        """Return a wrench at the flange with the weight of the payload, along the axes of the flange.
+
+        Args:
+            wrench: without the weight, base axes [N, Nm].
+            mass: of the payload [kg].
+            cog: its centre of gravity in the flange frame [m].
+            gravity: acceleration that it feels at rest, base axes [m/s^2]: upwards.
+        """
+        rotation = rotvec_to_matrix(self._arm.fk(self._actual_joints[0])[3:])
+        weight = -mass * (rotation.T @ gravity)
+        force, moment = rotation.T @ wrench[:3] + weight, rotation.T @ wrench[3:] + np.cross(cog, weight)
+        return six([*force.tolist(), *moment.tolist()])
 
     def __eq__(self, other: object) -> bool:
         """True when everything that can be read is the same."""

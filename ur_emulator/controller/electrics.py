@@ -11,7 +11,7 @@ from math import exp
 
 from protocol.ur_types import JointMode
 from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
-from ur_emulator.models.robot_generation import Electrics
+from ur_emulator.models.measuring import Electrics
 
 # The part of the joints' currents that shows on the arm's bus, as the drives chop.
 BUS_SHARE = 0.1

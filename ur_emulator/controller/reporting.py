@@ -39,6 +39,7 @@ def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState
         (sensed.actual_q, sensed.actual_qd),
         wrench,
         tcp if any(tcp) else None,
+        force_at_flange=state.force_sense.refers_to_flange,
     )
     mode, safety_mode = state.mode.mode, state.safety.mode
     speed, tool, io, compliance = state.speed, state.tool, state.io, state.compliance

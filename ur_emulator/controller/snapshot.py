@@ -20,7 +20,7 @@ from ur_emulator.controller.io.registers import RegisterValues
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION, torque_shares
 from ur_emulator.controller.safety.status_bits import RUNNING_STATES, robot_status_bits, safety_status_bits
-from ur_emulator.models.robot_generation import Electrics
+from ur_emulator.models.measuring import Electrics
 from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6, six
 
 
@@ -110,8 +110,13 @@ class Snapshot(_Fields):
 
     @property
     def actual_tcp_force(self) -> Vector6:
-        """Wrench at the tool centre point [N, Nm]."""
-        return self.space.tcp_force
+        """Wrench at the tool centre point, on arms with a force sensor at the flange [N, Nm]."""
+        return self.space.reported_force
+
+    @property
+    def ft_raw_wrench(self) -> Vector6:
+        """What a sensor at the flange measures, without a zero and with the payload, its axes [N, Nm]."""
+        return self.space.in_flange_axes(self.estimated_force, self.payload, self.payload_cog, self.gravity)
 
     @property
     def target_tcp_pose(self) -> Vector6:

@@ -11,7 +11,8 @@ from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.fidelity import FIDELITIES
-from ur_emulator.models.robot_generation import Builds, Electrics, RobotGeneration
+from ur_emulator.models.measuring import Electrics, ForceSensing
+from ur_emulator.models.robot_generation import Builds, RobotGeneration
 from ur_emulator.models.safety_limits import UNLIMITED, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 
@@ -47,6 +48,16 @@ CB3 = RobotGeneration(
         joint_voltage=48.0,  # its drop along the arm's cable is small and left out
         idle_current=0.25,  # chosen from the same captures
         joint_temperatures=(28.0, 29.0, 31.0, 36.0, 38.0, 39.0),  # production log of a UR3 (thermometers.py)
+    ),
+    force_sensing=ForceSensing(
+        has_sensor=False,
+        bandwidth=None,
+        precision=(10.0, 5.0),  # UR3/CB3 manual
+        # The friction offset of the estimate changes its sign with the motion, by 8 N for a poor arm, and
+        # noise leaves 2 N in the mean of a contact.
+        contact_force=15.0,
+        least_averaging=0.2,  # leaves 0.6 N of 3 N
+        most_averaging=1.0,  # leaves 0.3 N
     ),
     gravity=9.81,
     reports_control_as_target=False,

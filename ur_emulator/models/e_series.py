@@ -4,6 +4,8 @@ Sources of its electrics and fidelities, cited by letter below:
  A  Rows of a real UR3e (dsn-2022-rad-artifact, 25 Hz RTDE, 2021).
  B  The same and records of a real UR10e (dynamic_calibration of S. Mamedov).
  C  Chosen.
+ D  Universal_Robots_ROS_Driver issue 633: 1.3 and 4.1 N within five minutes; ROS2_Driver issue 447: a few
+    newtons.
 Noise of encoders, speeds and currents: as in `fidelity.py`, whose source is a UR3e at 500 Hz.
 """
 
@@ -19,7 +21,8 @@ from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
-from ur_emulator.models.robot_generation import Builds, Electrics, RobotGeneration
+from ur_emulator.models.measuring import Electrics, ForceSensing
+from ur_emulator.models.robot_generation import Builds, RobotGeneration
 from ur_emulator.models.safety_limits import ArmLimits, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
 
@@ -43,10 +46,26 @@ _TYPICAL = replace(
     dead_time_spread=0.0,
     drive_lag=0.0005,  # A: actual_q is .50 ms behind target_q
     feedback_age=0.002,  # the package carries the state of one cycle before
+    force_offset=5.0,  # C: before the first zero
+    force_bias=4.0,  # D
+    force_sigma=0.15,  # A
+    force_ratio=30.0,  # A: .003-.005 Nm
+    force_friction=0.0,
 )
-_IDEAL = replace(IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
+_IDEAL = replace(IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002, force_sigma=0.01)
 _EXACT = replace(EXACT, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
-_POOR = replace(POOR, dead_time=0.002, dead_time_spread=0.002, drive_lag=0.002, feedback_age=0.004)  # C
+_POOR = replace(  # C
+    POOR,
+    dead_time=0.002,
+    dead_time_spread=0.002,
+    drive_lag=0.002,
+    feedback_age=0.004,
+    force_offset=10.0,
+    force_bias=8.0,
+    force_sigma=0.3,
+    force_ratio=30.0,
+    force_friction=0.0,
+)
 
 E_SERIES = RobotGeneration(
     name=Generation.E_SERIES.value,
@@ -73,6 +92,14 @@ E_SERIES = RobotGeneration(
         joint_voltage=47.65,  # A: 47.5-47.8
         idle_current=0.5,  # A: .69-1.28 A in motion
         joint_temperatures=(34.0, 34.5, 36.0, 40.0, 41.0, 42.0),  # A: 34-43, wrists as on the UR3
+    ),
+    force_sensing=ForceSensing(
+        has_sensor=True,
+        bandwidth=100.0,  # C: no figure is known
+        precision=(3.5, 0.2),  # UR5e data sheet
+        contact_force=5.0,  # C: more than noise and drift make of it
+        least_averaging=0.02,  # C
+        most_averaging=0.1,  # C
     ),
     gravity=9.82,  # B: `target_moment` at rest
     reports_control_as_target=True,  # A

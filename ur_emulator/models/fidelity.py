@@ -89,9 +89,11 @@ class Fidelity:
         mass_error: sd of the relative error of each link's mass in the controller's model [1].
         calibration_length: sd of each length of the factory calibration [m].
         calibration_angle: sd of each angle of the factory calibration [rad].
-        force_bias: bound of the slow drift of the force estimate [N]; moments drift by a tenth of it [Nm].
-        force_sigma: sd of the force estimate [N]; moments by a tenth of it [Nm].
-        force_friction: offset of the force estimate against the direction of motion [N].
+        force_bias: bound of the slow drift of the measured force [N].
+        force_sigma: sd of the measured force [N].
+        force_offset: bound of its constant offset, which a zero takes away [N].
+        force_ratio: of these three to those of the measured moments [1/m].
+        force_friction: offset of the measured force against the direction of motion [N].
         accelerometer_sigma: sd of each axis of the tool accelerometer [m/s²].
         voltage_sigma: sd of each joint voltage [V].
         has_physics: False: the arm is at its target, and the numbers above have no effect.
@@ -121,6 +123,8 @@ class Fidelity:
     calibration_angle: Angle
     force_bias: Noise
     force_sigma: Noise
+    force_offset: Noise
+    force_ratio: Annotated[float, number(0.1, 1000.0)]
     force_friction: Noise
     accelerometer_sigma: Noise
     voltage_sigma: Noise
@@ -184,6 +188,8 @@ TYPICAL = Fidelity(
     calibration_angle=0.001,  # C
     force_bias=5.0,  # D
     force_sigma=3.0,  # D
+    force_offset=0.0,
+    force_ratio=10.0,  # E
     force_friction=2.0,  # D
     accelerometer_sigma=0.05,  # E
     voltage_sigma=0.05,  # E

@@ -23,6 +23,7 @@ from protocol.rtde.fields import RtdeField, input_fields, output_fields
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
 from ur_emulator.models.fidelity import Fidelity, read_fidelity
+from ur_emulator.models.measuring import Electrics, ForceSensing
 from ur_emulator.models.safety_limits import SafetyLimits
 from ur_emulator.models.software import Software
 from urscript.catalogue import Builtin, catalogue_for
@@ -31,25 +32,6 @@ from urscript.catalogue.versions import Version
 # First version, build and date of each row, the oldest first; software between two rows has the build and the
 # date of the earlier one.
 Builds = tuple[tuple[SoftwareVersion, int, datetime], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Electrics:
-    """What boxes of a generation measure of their own supply and of warm arms.
-
-    Attributes:
-        main_voltage: of the box [V].
-        robot_voltage: of the arm's bus, while it is powered [V].
-        joint_voltage: of the joints on that bus [V].
-        idle_current: of a powered arm whose motors give no torque [A].
-        joint_temperatures: of an arm that is powered and has been still for long [°C].
-    """
-
-    main_voltage: float
-    robot_voltage: float
-    joint_voltage: float
-    idle_current: float
-    joint_temperatures: tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,6 +47,7 @@ class RobotGeneration:
         builds: which version has which build.
         limits: of the safety system.
         electrics: of the box and its arms.
+        force_sensing: how its arms know the wrench at the flange.
         gravity: that the controller's model of the arm has [m/s²].
         reports_control_as_target: `joint_control_output` is `target_current`, not what the servos ask for.
         has_operational_modes: manual and automatic mode, enabling device, automatic-mode safeguard.
@@ -94,6 +77,7 @@ class RobotGeneration:
     builds: Builds
     limits: SafetyLimits
     electrics: Electrics
+    force_sensing: ForceSensing
     gravity: float
     reports_control_as_target: bool
     has_operational_modes: bool

@@ -23,6 +23,9 @@ class InverseDynamics:
     def __init__(self, robot: RobotModel, calibration: Calibration) -> None:
         self._model = arm_spec(robot, calibrated_dh(robot, calibration), (1.0,) * 6).compile()
         self._model.opt.gravity[2] = -robot.generation.gravity
+        # Points alone would leave the last joint without inertia, which MuJoCo warns of; `evaluate` adds the
+        # rotors by itself.
+        self._model.dof_armature[:] = robot.armature
         if robot.has_point_masses:
             self._model.body_inertia[:] = 0.0
         self._data = mujoco.MjData(self._model)

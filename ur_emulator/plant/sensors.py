@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
-from ur_emulator.plant.force_estimate import ForceDrift
+from ur_emulator.plant.force_drift import ForceDrift
 
 # A record of true values: what `Plant` captures in a sub-step.
 REC_Q = slice(0, 6)  # joint angles [rad]
@@ -92,7 +92,7 @@ class Sensors:
         sigmas[REC_QD] = fidelity.speed_sigma
         sigmas[REC_TORQUE] = fidelity.current_sigma
         sigmas[REC_ACCELERATION] = fidelity.accelerometer_sigma
-        sigmas[REC_WRENCH] = np.repeat([fidelity.force_sigma, fidelity.force_sigma / 10.0], 3)
+        sigmas[REC_WRENCH] = np.repeat([fidelity.force_sigma, fidelity.force_sigma / fidelity.force_ratio], 3)
         sigmas[REC_VOLTAGE] = fidelity.voltage_sigma
         sigmas[_NOISE_MOMENT] = fidelity.sample_jitter / step
         self._sigmas = sigmas
@@ -103,6 +103,9 @@ class Sensors:
         self._keep = [exp(-2.0 * pi * pole * period) for pole in fidelity.speed_filter_hz]
         self._supply_voltage = robot.generation.electrics.joint_voltage
         self._dead_band = fidelity.speed_dead_band
+        bandwidth = robot.generation.force_sensing.bandwidth
+        self._force_keep = None if bandwidth is None else exp(-2.0 * pi * bandwidth * period)
+        self._force = self._next_force = np.zeros(6)
         self._force_friction = fidelity.force_friction
         self._noise: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
         self._at = _BLOCK
@@ -114,6 +117,7 @@ class Sensors:
     def reset(self) -> None:
         """Reset the filters; the random stream continues."""
         self._speeds = ZERO6
+        self._force = np.zeros(6)
 
     def read(self, record: Record) -> Reading:
         """Read all sensors of an arm whose true values are `record`; the same again until `keep`."""
@@ -123,6 +127,10 @@ class Sensors:
         values, steps, work = self._values, self._steps, self._work
         # In the sensors' units and noisy; angles also sampled a moment early or late, in whole encoder steps.
         np.multiply(record.values, self._scale, values)
+        if self._force_keep is not None:
+            # One pole, as for the speeds.
+            self._next_force = record.wrench + self._force_keep * (self._force - record.wrench)
+            values[REC_WRENCH] = self._next_force
         np.add(values, noise, values)
         np.multiply(record.qd, moment, work)
         np.add(steps, work, steps)
@@ -130,7 +138,7 @@ class Sensors:
         np.multiply(steps, self._step, steps)
         reading: list[float] = values.tolist()
         self._next_speeds = speeds = self._filtered(record.qd.tolist(), reading[REC_QD])
-        # The force estimate takes some of the friction for a force against the motion.
+        # An estimate of the force takes some of the friction for a force against the motion.
         ax, ay, az, vx, vy, vz, fx, fy, fz, mx, my, mz = reading[18:30]
         if self._force_friction:
             against = -self._force_friction / (sqrt(vx * vx + vy * vy + vz * vz) + _SLOW)
@@ -148,6 +156,7 @@ class Sensors:
         """Advance to the next cycle."""
         self._at += 1
         self._speeds = self._next_speeds
+        self._force = self._next_force
 
     def _filtered(self, true_qd: list[float], measured: list[float]) -> Vector6:
         """One pole a joint: y = u + keep (y - u), whose input u is gated to zero at rest."""

@@ -168,7 +168,7 @@ def _measure(snapshot: Snapshot, model: ArmModel, offset: Vector6) -> ArmMeasure
         model: kinematics of the arm.
         offset: error of the wrench, at the flange in base axes [N, Nm].
     """
-    wrench = snapshot.actual_tcp_force
+    wrench = snapshot.space.tcp_force
     if offset is not ZERO6:
         moved = moved_wrench(offset, model.fk(snapshot.actual_q), snapshot.actual_tcp_pose)
         wrench = six([w - z for w, z in zip(wrench, moved, strict=True)])

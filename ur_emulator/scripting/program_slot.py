@@ -125,6 +125,7 @@ class ProgramSlot:
             self._state.planning.set_motion_version(1)
         self._state.io_configuration.program_started()
         self._state.interpreter.program_started()
+        self._state.force_sense.program_started(self._state.past.steady_cycles)
         self._state.events.append(ProgramStarted(program.name, self._primary))
 
     def stop(self, *, unscheduled: bool = False) -> None:

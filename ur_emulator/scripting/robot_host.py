@@ -65,7 +65,7 @@ class RobotHost:
             **state_functions(arm, state.past, self.step_time),
             **compliance_functions(arm, state.compliance, state.force_sense, state.past),
             **dynamics_functions(arm, state.dynamics, state.past),
-            **settings_functions(state.robot, state.tool, state.requests, self.step_time),
+            **settings_functions(state.robot, state.tool, state.force_sense, state.requests, self.step_time),
             **tool_functions(state.io),
             **payload_functions(state.tool),
             **rtde_functions(state.past, state.robot.generation.rtde_outputs),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ur_emulator.controller.compliance.force_sense import ForceSense
 from ur_emulator.controller.program_requests import ProgramRequests
 from ur_emulator.controller.tool_settings import Payload, ToolSettings
 from ur_emulator.models.robot_model import RobotModel, Vector3, six
@@ -21,13 +22,18 @@ MAX_INERTIA = 133.0
 
 
 def settings_functions(
-    robot: RobotModel, tool: ToolSettings, requests: ProgramRequests, step_time: float
+    robot: RobotModel,
+    tool: ToolSettings,
+    force_sense: ForceSense,
+    requests: ProgramRequests,
+    step_time: float,
 ) -> Mapping[str, Callable[..., Any]]:
     """Return the builtins for TCP, payload and mounting, and the protective stop.
 
     Args:
         robot: has the greatest payload.
         tool: what they set.
+        force_sense: a sensor is zeroed with the payload.
         requests: get the protective stop.
         step_time: duration of a cycle [s].
     """
@@ -61,6 +67,7 @@ def settings_functions(
     def set_payload(thread: object, m: float, cog: Any) -> None:
         mass, place = mass_of(m), cog_of(tool.tcp_offset[:3] if cog is None else cog)
         tool.set_payload(mass, None if cog is None else place)
+        force_sense.payload_declared()
 
     def set_payload_mass(thread: object, m: float) -> None:
         tool.set_payload_mass(mass_of(m))

@@ -1,8 +1,9 @@
 """ForceSense: the measured wrench at the flange: its zero, its history, and contacts in it.
 
-A CB3 arm has no force sensor; the wrench is estimated from motor currents (see `plant/force_estimate.py`).
-Source: maker's script manual for e-Series 5.x, zero_ftsensor and tool_contact; on a CB3 the
-compiler knows both, undocumented. Thresholds are chosen for the precision of the estimate.
+A CB3 arm has no force sensor; the wrench is estimated from motor currents. The sensor of an e-Series arm is
+also zeroed when a program starts and when it declares a payload (Universal_Robots_ROS_Driver issue 512).
+Source: maker's script manual for e-Series 5.x, zero_ftsensor and tool_contact; on a CB3 the compiler knows
+both, undocumented.
 """
 
 from __future__ import annotations
@@ -12,19 +13,16 @@ from collections.abc import Sequence
 from itertools import islice
 from math import hypot
 
+import numpy as np
+
 from ur_emulator.controller.compliance.external_sensor import ExternalSensor
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
 
-# Least and most time that is averaged to separate a zero from noise [s]: 0.2 s leave 0.6 N of 3 N, 1 s 0.3 N.
-# The greater one is the length of the history.
-MIN_AVERAGING_TIME, MAX_AVERAGING_TIME = 0.2, 1.0
-# Precision of the estimate [N, Nm]. Source: UR3/CB3 manual.
-PRECISION: Vector6 = (10.0, 10.0, 10.0, 5.0, 5.0, 5.0)
-
-# A contact is a force that has risen by this within the history [N]. The friction offset of the
-# estimate changes its sign with the motion, by 8 N for a poor arm, and noise leaves 2 N of the mean below.
-CONTACT_FORCE = 15.0
+# Length of the history [s].
+HISTORY_TIME = 1.0
+# A declared payload is in the measurements after this time [s].
+_PAYLOAD_TIME = 0.01
 # Time that is averaged at the end and, as the force before, at the beginning of the history [s].
 _RECENT_TIME, _EARLY_TIME = 0.04, 0.2
 # A contact begins where the force has risen by this part of its total change.
@@ -40,19 +38,25 @@ class ForceSense:
     """
 
     def __init__(self, generation: RobotGeneration) -> None:
-        """Begin with an empty history; the generation gives the duration of a cycle."""
-        self._n_min, self._n_max = (
-            generation.cycles(MIN_AVERAGING_TIME),
-            generation.cycles(MAX_AVERAGING_TIME),
-        )
+        """Begin with an empty history; the generation has the control cycle and says how arms measure."""
+        self._sensing = sensing = generation.force_sensing
+        self._n_min = generation.cycles(sensing.least_averaging)
+        self._n_max = generation.cycles(sensing.most_averaging)
+        self._precision = np.repeat(sensing.precision, 3).tolist()
+        self._n_payload = generation.cycles(_PAYLOAD_TIME) + self._n_min
+        self._cycles_to_zero = 0
         self._n_recent, self._n_early = generation.cycles(_RECENT_TIME), generation.cycles(_EARLY_TIME)
-        self._history: deque[Vector6] = deque(maxlen=self._n_max)
+        self._history: deque[Vector6] = deque(maxlen=generation.cycles(HISTORY_TIME))
         self.zero: Vector6 | None = None
         self.sensor: ExternalSensor | None = None
 
     def measure(self, wrench: Vector6) -> Vector6:
         """Add the measurement of this cycle; return it less the zero."""
         self._history.appendleft(wrench)
+        if self._cycles_to_zero:
+            self._cycles_to_zero -= 1
+            if not self._cycles_to_zero:
+                self.zero = self._present(0)
         zero = self.zero
         return wrench if zero is None else six([w - z for w, z in zip(wrench, zero, strict=True)])
 
@@ -61,6 +65,7 @@ class ForceSense:
         self.sensor = sensor
         self._history.clear()
         self.zero = None
+        self._cycles_to_zero = 0
 
     def set_zero(self, still_cycles: int) -> None:
         """Set the zero to the present wrench. Source: zero_ftsensor.
@@ -70,20 +75,35 @@ class ForceSense:
         """
         self.zero = self._present(still_cycles)
 
+    def program_started(self, still_cycles: int) -> None:
+        """Zero a built-in sensor; argument as in `set_zero`."""
+        if self._sensing.has_sensor and self.sensor is None:
+            self.set_zero(still_cycles)
+
+    def payload_declared(self) -> None:
+        """Zero a built-in sensor as soon as it measures with the new payload."""
+        if self._sensing.has_sensor and self.sensor is None:
+            self._cycles_to_zero = self._n_payload
+
+    @property
+    def refers_to_flange(self) -> bool:
+        """The reported wrench is that at the flange; otherwise that at the TCP."""
+        return self._sensing.has_sensor and self.sensor is None
+
     def residual(self, still_cycles: int) -> Vector6:
         """Return the present wrench, averaged, less the zero; argument as in `set_zero`."""
         zero = ZERO6 if self.zero is None else self.zero
         return six([w - z for w, z in zip(self._present(still_cycles), zero, strict=True)])
 
     def offset(self, still_cycles: int) -> Vector6:
-        """Return the part of the present wrench that may be an error of the estimate: see PRECISION.
+        """Return the part of the present wrench that may be an error, see `ForceSensing.precision`.
 
         Zero once a program has set the zero. Argument as in `set_zero`.
         """
         if self.zero is not None:
             return ZERO6
         present = self.residual(still_cycles)
-        return six([w if abs(w) <= bound else 0.0 for w, bound in zip(present, PRECISION, strict=True)])
+        return six([w if abs(w) <= bound else 0.0 for w, bound in zip(present, self._precision, strict=True)])
 
     def steps_since_contact(self, direction: Sequence[float]) -> int:
         """Return how many cycles ago a contact began; 0 if the history has none.
@@ -102,7 +122,7 @@ class ForceSense:
             [-x / size for x in direction] if size > 0.0 else [x / (hypot(*change) or 1.0) for x in change]
         )
         risen = _along(change, against)
-        if risen < CONTACT_FORCE:
+        if risen < self._sensing.contact_force:
             return 0
         onset = _along(before, against) + _ONSET_SHARE * risen
         felt = [_along(force, against) for force in forces]
