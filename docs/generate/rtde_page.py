@@ -64,7 +64,7 @@ _OUTPUTS = """\
 ## Outputs
 
 *From* gives the first software of CB3 and e-Series; before it, and where it is "-", the answer is
-`NOT_FOUND`, as for `{missing}`, which this box never answers.
+`NOT_FOUND`.
 """
 
 _INPUTS = """\
@@ -83,7 +83,7 @@ def render() -> str:
             "## Try it\n",
             _example(),
             "\nThis decodes a running box; `decode rtde FILE --names ...` decodes captured bytes.\n",
-            _OUTPUTS.format(missing="` and `".join(field.name for field in OUTPUTS if not field.origin)),
+            _OUTPUTS,
             MARKS,
             *table(("name", "type", "unit", "origin", "meaning", "from"), _output_rows()),
             "",
@@ -102,7 +102,7 @@ def render() -> str:
 
 def _output_rows() -> Iterator[tuple[object, ...]]:
     for name, field in _grouped(OUTPUTS):
-        if field.origin:
+        if field.origin:  # all outputs have one
             yield f"`{name}`", field.type.value, field.unit, field.origin.value, field.meaning, field.since
 
 

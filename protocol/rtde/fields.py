@@ -33,8 +33,7 @@ class RtdeField:
         type: its data type.
         unit: SI unit, "enum", "bits" or "-".
         since: first software of each generation that has it.
-        origin: how the emulated box fills an output; None for an input, and for an output that it does not
-            answer.
+        origin: how the emulated box fills an output; None for an input.
         meaning: of the value, with its frame of reference.
         comes_from: attribute of the snapshot, such as "actual_q" or "registers.output_integers[3]"; empty if
             `constant` is what the box sends.
@@ -107,11 +106,6 @@ def _fixed(
 ) -> RtdeField:
     """An output that is not simulated."""
     return RtdeField(name, kind, unit, since, _CONSTANT, meaning, "", constant, source)
-
-
-def _not_answered(name: str, kind: RtdeType, unit: str, meaning: str, since: Since) -> RtdeField:
-    """An output that this box has no value for."""
-    return RtdeField(name, kind, unit, since, None, meaning)
 
 
 def _in(
@@ -271,7 +265,8 @@ OUTPUTS: tuple[RtdeField, ...] = (
          since=_SINCE_5_26),
     _out("control_step", _U64, "-", _MODELLED, "count of control cycles", since=_SINCE_5_26,
          comes_from="tick"),
-    _not_answered("target_base_wrench", _VEC6, "N, Nm", "at the base", _SINCE_5_26),
+    _out("target_base_wrench", _VEC6, "N, Nm", _MODELLED,
+         "what holds the base at the target, base axes at its origin", since=_SINCE_5_26),
 )  # fmt: skip
 """Variables that a client can subscribe to, in the order of the guide."""
 
@@ -312,10 +307,8 @@ INPUTS: tuple[RtdeField, ...] = (
 def output_fields(
     version: SoftwareVersion, table: tuple[RtdeField, ...] = OUTPUTS
 ) -> Mapping[str, RtdeField]:
-    """Outputs that a box with software `version` answers, by name."""
-    return MappingProxyType(
-        {field.name: field for field in table if field.origin and field.since.covers(version)}
-    )
+    """Outputs that software `version` has, by name."""
+    return MappingProxyType({field.name: field for field in table if field.since.covers(version)})
 
 
 @cache

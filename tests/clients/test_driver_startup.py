@@ -55,7 +55,7 @@ def test_frames_have_the_size_of_the_software(box):
 def test_all_outputs_can_be_asked_for_at_once(box):
     """The library's list of all names, then the same without those that this software does not have."""
     software = SoftwareVersion.parse(box.software)
-    absent = {field.name for field in OUTPUTS if not (field.origin and field.since.covers(software))}
+    absent = {field.name for field in OUTPUTS if not field.since.covers(software)}
     names = [field.name for field in OUTPUTS]
     with StrictRtde(box) as client:
         number, types = client.types_of_outputs(names, 500.0)

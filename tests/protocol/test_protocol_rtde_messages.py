@@ -221,7 +221,7 @@ def test_data_package_of_the_guide():
     assert recipe.decode(package[4:]) == (1.5, (0.5, -0.5, 1.0, 2.0, 3.0, math.pi))
 
 
-@pytest.mark.parametrize("field", [f for f in OUTPUTS if f.origin is not None and f.type.count == 1])
+@pytest.mark.parametrize("field", [f for f in OUTPUTS if f.type.count == 1])
 def test_every_scalar_is_taken_from_where_the_table_says(field):
     encode = snapshot_encoder([field], data_header(field.type.size, None))
     (value,) = Recipe([field.name], [field.type]).decode(encode(Numbered())[HEADER_SIZE:])
@@ -243,9 +243,3 @@ def test_a_snapshot_that_does_not_fit_is_explained():
     for name, value in (("actual_q", (0.0,) * 5), ("actual_q", 3.0), ("robot_mode", 2**31)):
         with pytest.raises(LocalProtocolError, match=name):
             encode(SimpleNamespace(**{**good, name: value}))
-
-
-def test_variables_that_nothing_fills_have_no_encoder():
-    field = next(field for field in OUTPUTS if field.origin is None)
-    with pytest.raises(LocalProtocolError, match=field.name):
-        snapshot_encoder([field], b"")

@@ -1,10 +1,12 @@
-"""Jacobian, mass matrix and Coriolis torques of scripts, against Pinocchio, which has its own model of the arm."""
+"""Dynamics that scripts and RTDE clients see, against Pinocchio, which has its own model of the arm."""
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from e_series_support import ESeriesBench, program
 
+from ur_emulator.controller.arm_in_space import ArmInSpace
+from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robots import robot_by_name
 
 Q = (0.3, -1.2, 1.9, -0.7, 1.1, 0.4)
@@ -113,3 +115,30 @@ def test_payload_transition_is_smooth_and_the_arm_carries_it():
     steps = np.diff(np.array(moments), axis=0)
     assert np.abs(steps).max() < 0.01 * np.abs(np.array(moments[-1])).max()
     assert np.abs(np.array(bench.now.position_error)).max() < 1e-3
+
+
+def space(robot, qdd):
+    model, data = pinocchio_arm(robot, (2.0, (0.01, 0.02, 0.05), np.zeros((3, 3))))
+    model.gravity.linear = np.array([0.0, 0.0, -9.82])
+    arm = ArmInSpace(ArmModel(robot), (Q, QD), qdd, (Q, QD), (0.0,) * 6, TCP)
+    return model, data, arm
+
+
+@pytest.mark.parametrize("qdd", [(0.0,) * 6, (1.0, -2.0, 3.0, -4.0, 5.0, -6.0)])
+def test_acceleration_of_the_tcp(qdd):
+    model, data, arm = space(robot_by_name("ur10e"), qdd)
+    pin.forwardKinematics(model, data, np.array(Q), np.array(QD), np.array(qdd))
+    expected = pin.getFrameClassicalAcceleration(
+        model, data, model.getFrameId("tcp"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    )
+    assert arm.target_acceleration == pytest.approx(expected.vector, abs=1e-4)
+    assert arm.actual_acceleration == arm.target_acceleration
+
+
+@pytest.mark.parametrize("qdd", [(0.0,) * 6, (1.0, -2.0, 3.0, -4.0, 5.0, -6.0)])
+def test_wrench_that_holds_the_base(qdd):
+    model, data, arm = space(robot_by_name("ur10e"), qdd)
+    pin.rnea(model, data, np.array(Q), np.array(QD), np.array(qdd))
+    expected = data.liMi[1].act(data.f[1]).vector
+    wrench = arm.target_base_wrench((0.0, 0.0, 9.82), 2.0, (0.01, 0.02, 0.05))
+    assert wrench == pytest.approx(expected, abs=1e-3)

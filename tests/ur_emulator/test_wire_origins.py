@@ -93,7 +93,7 @@ def test_every_field_of_an_e_series_state_is_what_the_table_says(e_series_story,
 def test_every_field_of_the_tables_has_a_mark():
     assert all(field.origin for record in SUB_PACKAGES for field in wire_fields(record))
     assert all(column.origin for column in COLUMNS)
-    assert all(field.origin for field in OUTPUTS if field.since.cb3)
+    assert all(field.origin for field in OUTPUTS)
 
 
 def test_what_is_constant_is_little():

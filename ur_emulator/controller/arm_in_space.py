@@ -5,7 +5,10 @@ Most cycles of a box without clients, and all that a program does in joint space
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 import numpy as np
 
@@ -93,16 +96,38 @@ class ArmInSpace:
         """Acceleration of the TCP at the measured joints, which accelerate as the target does."""
         return self._acceleration(*self._actual_joints)
 
+    def target_base_wrench(self, gravity: Vector3, mass: float, cog: Vector3) -> Vector6:
+        """Return what holds the base of the arm at the target, base axes at its origin [N, Nm].
+
+        Args:
+            gravity: what a resting arm is held up with, base axes [m/s^2].
+            mass: of the payload [kg].
+            cog: of the payload, in the flange frame [m].
+        """
+
+        def momentum(q: list[float], qd: list[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            of_arm, moment = self._arm.momentum(q, qd)
+            payload = self._arm.state(q, qd, (*cog, 0.0, 0.0, 0.0))
+            place, linear = np.array(payload.tcp_pose[:3]), mass * np.array(payload.tcp_speed[:3])
+            return of_arm + np.concatenate((linear, np.cross(place, linear))), moment + mass * place
+
+        (before, _), (after, _) = (momentum(*joints) for joints in self._around(*self._target_joints))
+        _, moment = momentum(*map(list, self._target_joints))
+        weight = (self._arm.mass + mass) * np.array(gravity)
+        held = np.concatenate((weight, np.cross(moment, gravity)))
+        return six(((after - before) / (2.0 * _STEP) + held).tolist())
+
     def _acceleration(self, q: Vector6, qd: Vector6) -> Vector6:
-        before, after = (
-            self._arm.state(
+        before, after = (self._arm.state(*joints, self._tcp).tcp_speed for joints in self._around(q, qd))
+        return six([(b - a) / (2.0 * _STEP) for a, b in zip(before, after, strict=True)])
+
+    def _around(self, q: Vector6, qd: Vector6) -> Iterator[tuple[list[float], list[float]]]:
+        """Angles and speeds shortly before and after these, with the target's accelerations."""
+        for h in (-_STEP, _STEP):
+            yield (
                 [a + h * (v + 0.5 * h * acc) for a, v, acc in zip(q, qd, self._qdd, strict=True)],
                 [v + h * acc for v, acc in zip(qd, self._qdd, strict=True)],
-                self._tcp,
-            ).tcp_speed
-            for h in (-_STEP, _STEP)
-        )
-        return six([(b - a) / (2.0 * _STEP) for a, b in zip(before, after, strict=True)])
+            )
 
     @property
     def reported_force(self) -> Vector6:

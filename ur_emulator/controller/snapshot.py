@@ -234,6 +234,11 @@ class Snapshot(_Fields):
         """Of the base [m/s^2, rad/s^2]; programs can set the linear part only."""
         return (*self.base_acceleration, 0.0, 0.0, 0.0)
 
+    @property
+    def target_base_wrench(self) -> Vector6:
+        """What holds the base of the arm, with the declared payload, at the target [N, Nm]."""
+        return self.space.target_base_wrench(self.gravity, self.payload, self.payload_cog)
+
     # --- how far the joints are from protective stops
 
     @property

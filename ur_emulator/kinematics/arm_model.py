@@ -57,6 +57,9 @@ class ArmModel:
         robot: type of the arm.
         calibration: differences of this arm from the nominal one.
 
+    Attributes:
+        mass: of all moving links [kg].
+
     `tcp` in all methods: pose of the tool centre point in the flange frame; None for the flange itself.
     """
 
@@ -80,7 +83,8 @@ class ArmModel:
         self._elbow_motion = data.cvel[elbow_link]
         self._centre = data.subtree_com[root]
         self._root_velocity = data.subtree_linvel[root]
-        self._mass = float(self._model.body_subtreemass[root])
+        self._root_spin = data.subtree_angmom[root]
+        self.mass = float(self._model.body_subtreemass[root])
         self._tcp: Sequence[float] | None = None
         self._tcp_offset: Vector3 = (0.0, 0.0, 0.0)
         self.set_range(robot.q_min, robot.q_max)
@@ -125,8 +129,25 @@ class ArmModel:
         elbow_velocity = (vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx)
         fx, fy, fz = self._flange_position.tolist()
         vx, vy, vz = self._root_velocity.tolist()
-        momentum = self._mass * sqrt(vx * vx + vy * vy + vz * vz)
+        momentum = self.mass * sqrt(vx * vx + vy * vy + vz * vz)
         return CartesianState(pose, speed, (ex, ey, ez), elbow_velocity, (fx, fy, fz), momentum)
+
+    def momentum(
+        self, q: Sequence[float], qd: Sequence[float]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the momentum of the arm without a payload, and where its mass is.
+
+        Args:
+            q: joint angles (6,) [rad].
+            qd: joint speeds (6,) [rad/s].
+
+        Returns:
+            Linear and angular momentum about the base's origin (6,) [kg m/s, kg m^2/s]; first moment of the
+            mass (3,) [kg m].
+        """
+        self.state(q, qd)
+        centre, linear = self._centre.copy(), self.mass * self._root_velocity
+        return np.concatenate((linear, self._root_spin + np.cross(centre, linear))), self.mass * centre
 
     def jacobian(
         self, q: Sequence[float] | NDArray[np.float64], tcp: Sequence[float] | None = None
