@@ -63,6 +63,7 @@ class FakeModbusUnit:
     def want(self, signal):
         where = (int(signal.type), signal.address)
         signal.trouble = self.trouble
+        signal.connection_error = -2 if self.trouble else 0
         self.log.append((signal.name, "read" if signal.output is None else signal.output))
         if self.trouble:
             return
@@ -76,6 +77,9 @@ class FakeModbusUnit:
 
     def send(self, slave, function_code, data):
         self.log.append((slave, function_code, data))
+
+    def reset(self):
+        self.log.append("reset")
 
     def release(self):
         self.is_released = True

@@ -7,7 +7,13 @@ from hypothesis import strategies as st
 
 from protocol.modbus import take_frame
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.io.modbus_signals import ModbusSignal, SignalType, UnitAddress
+from ur_emulator.controller.io.modbus_signals import (
+    DISCONNECTED,
+    NO_ANSWER,
+    ModbusSignal,
+    SignalType,
+    UnitAddress,
+)
 from ur_emulator.servers.modbus.link import (
     ANSWER_TIMEOUT,
     CONNECT_TIMEOUT,
@@ -505,3 +511,60 @@ def test_no_bytes_break_it_and_a_good_unit_is_heard_afterwards(pieces):
         for transaction, _ in wire.asked():
             wire.answer(transaction, bytes.fromhex("040204d2"))
     assert (s.value, s.trouble) == (1234, "")
+
+
+def test_errors_of_a_signal_are_codes_until_an_answer_is_valid(wire):
+    it = signal()
+    wire.want(it)
+    ((transaction, _),) = wire.asked()
+    wire.answer(transaction, b"\x84\x02")
+    assert (it.device_error, it.connection_error) == (2, 0)
+    wire.want(it)
+    wire.sock.is_open = False
+    wire.advance()
+    assert (it.device_error, it.connection_error) == (2, DISCONNECTED)
+    wire.advance(LAST_RETRY)
+    ((transaction, _),) = wire.asked()
+    wire.answer(transaction, b"\x04\x02\x00\x07")
+    assert (it.device_error, it.connection_error, it.value) == (0, 0, 7)
+
+
+def test_a_silent_unit_is_an_error_of_its_own(wire):
+    it = signal()
+    wire.want(it)
+    wire.asked()
+    wire.advance(ANSWER_TIMEOUT)
+    assert it.connection_error == NO_ANSWER
+
+
+def test_an_answer_that_makes_no_sense_is_a_failure_of_the_server(wire):
+    it = signal()
+    wire.want(it)
+    ((transaction, _),) = wire.asked()
+    wire.answer(transaction, b"\x04\x01\x00")
+    assert it.device_error == 4
+
+
+def test_a_signal_has_its_own_tolerance(wire):
+    patient, hasty = signal(name="a", tolerance=3 * TOLERANCE), signal(name="b", tolerance=0.5)
+    wire.want(patient, hasty)
+    wire.advance(1.0)
+    wire.advance(1.0)
+    assert hasty.trouble
+    assert not patient.trouble
+    wire.advance(3 * TOLERANCE)
+    assert patient.trouble
+
+
+def test_a_reset_connects_anew_and_asks_again(wire):
+    it = signal()
+    wire.want(it)
+    wire.asked()
+    wire.link.reset()
+    assert not wire.sock.is_open
+    assert it.connection_error == DISCONNECTED
+    wire.advance()
+    assert len(wire.sockets) == 2
+    ((transaction, _),) = wire.asked()
+    wire.answer(transaction, b"\x04\x02\x00\x05")
+    assert (it.connection_error, it.value) == (0, 5)

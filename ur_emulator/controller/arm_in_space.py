@@ -10,8 +10,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-import numpy as np
-
 from protocol.pose import rotvec_to_matrix
 from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
 from ur_emulator.kinematics.wrench import moved_wrench

@@ -8,7 +8,7 @@ Source: URScript manual CB3 3.15, module interfaces.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
 from ur_emulator.controller.clock import Clock
@@ -25,7 +25,8 @@ from ur_emulator.controller.io.modbus_signals import (
 from ur_emulator.controller.io.run_states import RunState
 from ur_emulator.scripting.network import Network
 from urscript.errors import ScriptRuntimeError
-from urscript.values import is_number, log_form
+from urscript.run.waits import Blocked
+from urscript.values import is_number, log_form, wrap_int
 
 Function = Callable[..., Any]
 
@@ -54,6 +55,7 @@ def modbus_functions(
         **_definitions(modbus, network),
         **_values(modbus),
         **_settings(modbus, configuration, clock),
+        **_connections(modbus, clock),
     }
 
 
@@ -157,6 +159,41 @@ def _settings(modbus: ModbusSignals, configuration: IoConfiguration, clock: Cloc
         "modbus_set_signal_update_frequency": set_update_frequency,
         "modbus_set_digital_input_action": set_input_action,
         "modbus_set_runstate_dependent_choice": set_runstate_choice,
+    }
+
+
+def _connections(modbus: ModbusSignals, clock: Clock) -> dict[str, Function]:
+    def get_error(thread: object, name: str, source: float) -> int:
+        signal = _signal(modbus, "modbus_get_error", name)
+        device, connection = signal.device_error, signal.connection_error
+        # Both: the connection error in the upper two bytes.
+        return (wrap_int((connection & WORD_MAX) << 16 | device), device, connection)[int(source)]
+
+    def get_time_invalid(thread: object, name: str) -> float:
+        return clock.period_s * _signal(modbus, "modbus_get_time_since_signal_invalid", name).invalid_cycles
+
+    def request_update(thread: object, name: str) -> None:
+        modbus.refresh(_signal(modbus, "modbus_request_update_signal_value", name))
+
+    def set_watchdog(thread: object, name: str, timeout: float) -> None:
+        _signal(modbus, "modbus_set_signal_watchdog", name).tolerance = float(timeout)
+
+    def reset_connection(
+        thread: object, connection_id: str, is_blocking: bool
+    ) -> Generator[Blocked, None, None]:
+        builtin = "modbus_reset_connection"
+        signals = modbus.reset(_unit_address(builtin, connection_id))
+        if not signals:
+            raise ScriptRuntimeError(f'{builtin}: no signal is connected to "{connection_id}"')
+        if is_blocking:
+            yield Blocked(lambda: not any(signal.connection_error for signal in signals), outside=True)
+
+    return {
+        "modbus_get_error": get_error,
+        "modbus_get_time_since_signal_invalid": get_time_invalid,
+        "modbus_request_update_signal_value": request_update,
+        "modbus_set_signal_watchdog": set_watchdog,
+        "modbus_reset_connection": reset_connection,
     }
 
 

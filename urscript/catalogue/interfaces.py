@@ -477,8 +477,18 @@ _MODBUS: tuple[Builtin, ...] = (
         note="lost when the server cannot be reached",
     ),
     *(
-        _row(name, params, returns, summary, time=time, since=_SIGNALS_5_15, source=MANUAL_LATE)
-        for name, params, returns, summary, time in (
+        _row(
+            name,
+            params,
+            returns,
+            summary,
+            time=time,
+            since=_SIGNALS_5_15,
+            source=MANUAL_LATE,
+            support=APPROXIMATE if note else Support.DECLARED_ONLY,
+            note=note,
+        )
+        for name, params, returns, summary, time, note in (
             (
                 "modbus_add_rw_signal",
                 (
@@ -494,6 +504,7 @@ _MODBUS: tuple[Builtin, ...] = (
                 "None",
                 "read and write registers in one request",
                 TimeClass.ZERO,
+                "",
             ),
             (
                 "modbus_get_error",
@@ -501,6 +512,7 @@ _MODBUS: tuple[Builtin, ...] = (
                 "int",
                 "error of a signal: 0 combined, 1 device, 2 connection",
                 TimeClass.ZERO,
+                "connection errors are -2 not connected and 110 no answer",
             ),
             (
                 "modbus_get_time_since_signal_invalid",
@@ -508,6 +520,7 @@ _MODBUS: tuple[Builtin, ...] = (
                 "float, s",
                 "how long a signal has been in error",
                 TimeClass.ZERO,
+                "counted in robot time, in whole cycles",
             ),
             (
                 "modbus_request_update_signal_value",
@@ -515,6 +528,7 @@ _MODBUS: tuple[Builtin, ...] = (
                 "None",
                 "refresh a signal now",
                 TimeClass.ZERO,
+                "done as soon as the unit can be reached",
             ),
             (
                 "modbus_reset_connection",
@@ -522,6 +536,7 @@ _MODBUS: tuple[Builtin, ...] = (
                 "None",
                 "connect anew",
                 BLOCKING,
+                "waits for an answer to all signals of the unit",
             ),
             (
                 "modbus_set_signal_watchdog",
@@ -529,6 +544,7 @@ _MODBUS: tuple[Builtin, ...] = (
                 "None",
                 "how long errors are tolerated",
                 TimeClass.ZERO,
+                "in real time",
             ),
         )
     ),

@@ -20,6 +20,10 @@ from ur_emulator.controller.io.run_states import RunState, level
 DEFAULT_PORT = 502
 DEFAULT_FREQUENCY = 10.0
 """How often a signal is refreshed unless a program says otherwise [Hz]."""
+DISCONNECTED = -2
+"""Connection error of a signal whose unit is not connected. Source: manual, modbus_get_error."""
+NO_ANSWER = 110
+"""That of one whose unit does not answer: ETIMEDOUT."""
 MAX_SIGNALS = 256
 """Chosen: a program that adds signals in an endless loop must end at some point."""
 
@@ -77,7 +81,11 @@ class ModbusSignal:
         rule: what an output does when programs start and stop.
         value: last one known: of the unit, or what a program has set; 0 before.
         output: what a program has set, to be written; None while the signal is only read.
-        trouble: why there has been no valid answer for too long; empty while answers come. The unit sets it.
+        tolerance: how long there may be no valid answer [s]; None for the usual time.
+        trouble: why there has been no valid answer for longer; empty while answers come. The unit sets it.
+        device_error: exception code of the last answer, 0 for a valid one. The unit sets it.
+        connection_error: DISCONNECTED, NO_ANSWER, or 0. The unit sets it.
+        invalid_cycles: number of cycles for which there has been an error.
         due: tick of the next refresh; with a fraction, so that any frequency is kept on average.
     """
 
@@ -92,7 +100,11 @@ class ModbusSignal:
     rule: RunState = RunState.KEEP
     value: int = 0
     output: int | None = None
+    tolerance: float | None = None
     trouble: str = ""
+    device_error: int = 0
+    connection_error: int = 0
+    invalid_cycles: int = 0
     due: float = 0.0
 
     def is_same_place(self, other: ModbusSignal) -> bool:
@@ -118,6 +130,10 @@ class ModbusUnit(Protocol):
 
     def send(self, slave: int, function_code: int, data: bytes) -> None:
         """Send a request and ignore the answer; the request is lost if the unit cannot be reached."""
+        ...
+
+    def reset(self) -> None:
+        """Close the connection and make a new one; all signals are disconnected until it answers."""
         ...
 
     def release(self) -> None:
@@ -154,6 +170,8 @@ class ModbusSignals:
     def step(self, tick: int) -> None:
         """Request the signals that are due in this cycle."""
         for signal in self.signals.values():
+            has_error = signal.device_error or signal.connection_error
+            signal.invalid_cycles = signal.invalid_cycles + 1 if has_error else 0
             if signal.frequency and tick >= signal.due:
                 interval = self._rate / signal.frequency
                 # Of requests that were missed at most one is made up for.
@@ -163,6 +181,15 @@ class ModbusSignals:
     def refresh(self, signal: ModbusSignal) -> None:
         """Request a signal now."""
         self._units[signal.unit].want(signal)
+
+    def reset(self, unit: UnitAddress) -> list[ModbusSignal]:
+        """Connect to a unit anew; return its signals."""
+        signals = [signal for signal in self.signals.values() if signal.unit == unit]
+        if signals:
+            self._units[unit].reset()
+            for signal in signals:
+                self.refresh(signal)
+        return signals
 
     def set_output(self, signal: ModbusSignal, value: int) -> None:
         """Set an output: it is written from now on."""

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from protocol.errors import RemoteProtocolError
 from protocol.modbus import ModbusFrame, decode_value, encode_frame, take_frame
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.io.modbus_signals import ModbusSignal
+from ur_emulator.controller.io.modbus_signals import DISCONNECTED, NO_ANSWER, ModbusSignal
 from ur_emulator.scripting.network import ScriptSocket
-from ur_emulator.servers.modbus.requests import SentRequest, problem_of, request_for
+from ur_emulator.servers.modbus.requests import SentRequest, error_of, problem_of, request_for
 
-# A signal may be without a valid answer for this long [s].
+# A signal may be without a valid answer for this long, unless a program says otherwise [s].
 TOLERANCE = 2.0
 # Limits for making a connection, and for an answer [s].
 CONNECT_TIMEOUT = 2.0
@@ -95,6 +95,12 @@ class ModbusLink:
         if len(self._own_requests) < BUDGETS.modbus_requests:
             self._own_requests.append((slave, bytes((function_code,)) + data))
 
+    def reset(self) -> None:
+        """Close the connection and make a new one at once."""
+        self._drop(DISCONNECTED)
+        self._retry_at = -math.inf
+        self._pause = FIRST_RETRY
+
     def release(self) -> None:
         """Close once what was sent is answered."""
         self.is_released = True
@@ -159,15 +165,21 @@ class ModbusLink:
     def _fail(self, now: float, why: str) -> None:
         """Give the connection up; signals keep waiting, a program's own requests are lost."""
         self._why = why
+        self._drop(NO_ANSWER if why == _SILENT else DISCONNECTED)
+        self._own_requests.clear()
+        self._retry_at = now + self._pause
+        self._pause = min(2.0 * self._pause, LAST_RETRY)
+
+    def _drop(self, error: int) -> None:
+        """Close the connection; signals keep waiting, with a connection error."""
         for request in self._under_way.values():
             if request.signal is not None:
                 self._wanted[request.signal] = None
         for waiting in self._waiting.values():
             waiting.why = ""
+        for signal in self._signals:
+            signal.connection_error = error
         self.close()
-        self._own_requests.clear()
-        self._retry_at = now + self._pause
-        self._pause = min(2.0 * self._pause, LAST_RETRY)
 
     # --- answers
 
@@ -194,8 +206,10 @@ class ModbusLink:
         value = decode_value(request.pdu, frame.pdu)
         if value is None:
             self._waiting[signal].why = problem_of(frame.pdu, request.pdu)
+            signal.device_error, signal.connection_error = error_of(frame.pdu, request.pdu), 0
             return
         signal.trouble = ""
+        signal.device_error = signal.connection_error = 0
         if signal in self._wanted:
             self._waiting[signal] = _Waiting(now)
         else:
@@ -215,6 +229,7 @@ class ModbusLink:
             if request.signal is not None:
                 self._wanted[request.signal] = None
                 self._waiting[request.signal].why = "gives no answer"
+                request.signal.connection_error = NO_ANSWER
 
     # --- requests
 
@@ -255,7 +270,7 @@ class ModbusLink:
 
     def _look_for_trouble(self, now: float) -> None:
         for signal, waiting in self._waiting.items():
-            if now - waiting.since > TOLERANCE:
+            if now - waiting.since > (TOLERANCE if signal.tolerance is None else signal.tolerance):
                 signal.trouble = f"{self._name} {waiting.why or self._why}"
 
     def _next_time(self, now: float) -> float:

@@ -44,6 +44,12 @@ def request_for(signal: ModbusSignal) -> bytes:
     return encode_write(_WRITE[signal.type], signal.address, signal.output)
 
 
+def error_of(answer: bytes, request: bytes) -> int:
+    """Return the code of an answer that has no value: of its exception, or of a failure of the server."""
+    is_exception = answer[0] == request[0] | EXCEPTION_BIT and len(answer) > 1
+    return answer[1] if is_exception else ExceptionCode.SLAVE_DEVICE_FAILURE
+
+
 def problem_of(answer: bytes, request: bytes) -> str:
     """Return what is wrong with an answer that has no value."""
     if answer[0] == request[0] | EXCEPTION_BIT and len(answer) > 1:
