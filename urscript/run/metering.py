@@ -47,6 +47,9 @@ _OF_ELEMENT: Final = {
 }
 _OF_TWO: Final = ("_add", "_sub", "_mul", "_div", "_mod", "_equal", "_unequal")
 
+_METHOD: Final = 10
+"""Units of a call of a method (0.5 µs); one that changes its list takes three times as long."""
+
 _OF_METHOD: Final = {"to_string": 12, "slice": 1, "get_row": 1, "get_column": 1}
 """Units for each element of the value of a method; the others take the same time for all values."""
 
@@ -153,8 +156,9 @@ class Meter:
             for argument in arguments:
                 kind = type(argument)
                 if kind is list:
-                    statements += len(argument) >> 3
-                    work += of_element * len(argument)
+                    elements = _elements(argument)
+                    statements += elements >> 3
+                    work += of_element * elements
                 elif kind is str:
                     statements += len(argument) >> 3
                     work += len(argument) >> 3
@@ -227,13 +231,11 @@ class Meter:
 
         def operate(*arguments: Any) -> Any:
             array = arguments[-1]
-            if type(array) is list:
-                charge(len(array) >> 3, units * len(array))
+            if isinstance(array, (list, Struct)):
+                weight = _weight(array)
+                charge(weight >> 3, units * weight)
             elif type(array) is Matrix:
                 charge(_cells(array), units * _cells(array))
-            elif isinstance(array, (list, Struct)):
-                size = size_of(array)
-                charge(size >> 3, units * size)
             return operation(*arguments)
 
         return operate
@@ -243,9 +245,8 @@ class Meter:
         charge = self.charge
 
         def call(thread: Any, target: Any, name: str, *arguments: Any) -> Any:
-            if name in _OF_METHOD:
-                size = size_of(target)
-                charge(size >> 3, _OF_METHOD[name] * size)
+            size = size_of(target) if name in _OF_METHOD else 0
+            charge(size >> 3, _METHOD + _OF_METHOD.get(name, 0) * size)
             return method(thread, target, name, *arguments)
 
         return call
@@ -258,7 +259,11 @@ class Meter:
         charge = self.charge
 
         def call(thread: Any, name: str, arguments: list[Any], named: Any, steps: Any, root: Any) -> Any:
-            charge(0, (size_of(root) >> 4) + 10 * sum(map(size_of, arguments)))
+            copied = _weight(root) if isinstance(root, (list, Struct)) else 0
+            charge(
+                0,
+                3 * _METHOD + (copied >> 3 if steps == [] else 2 * copied) + 3 * sum(map(size_of, arguments)),
+            )
             return method(thread, name, arguments, named, steps, root)
 
         return call
@@ -277,7 +282,15 @@ def pure_cost(name: str) -> tuple[int, int]:
 
 
 def _elements(items: list[Any]) -> int:
-    return size_of(items) if items and type(items[0]) is Struct else len(items)
+    """Elements of a list, with what is in them."""
+    return size_of(items) if items and type(items[0]) in (str, Struct) else len(items)
+
+
+def _weight(value: list[Any] | Struct) -> int:
+    """Values that are copied, or counted anew, when something inside `value` changes."""
+    if isinstance(value, Struct):
+        return value.size
+    return len(value) + (value[0].size if value and type(value[0]) is Struct else 0)
 
 
 def _cells(matrix: Matrix) -> int:
