@@ -11,8 +11,10 @@ from plant_support import HOME, PERIOD, SpeedRamp, column, hold
 
 from ur_emulator.errors import ModelError
 from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.e_series import E_SERIES
 from ur_emulator.models.fidelity import IDEAL, POOR, TYPICAL, Ripple
 from ur_emulator.models.ur3 import UR3
+from ur_emulator.models.ur5e import UR5E
 from ur_emulator.plant.gear import GearRipple, GearWithPlay
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.presliding import Presliding
@@ -55,6 +57,22 @@ def test_a_file_changes_what_it_names_and_keeps_the_rest_of_its_base(tmp_path):
     assert read(tmp_path, text) == expected
     joint = read(tmp_path, "ripples = [{ cycles = 7, rms = 0.01, phase = 0, joints = [1] }]").ripples
     assert joint == (Ripple(cycles=7.0, rms=0.01, phase=0.0, joints=(1,)),)
+
+
+def test_a_file_starts_from_the_fidelities_of_the_arms_own_generation(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("encoder_step = 1e-6")
+    own = E_SERIES.fidelity("typical")
+    assert E_SERIES.fidelity(str(path)) == replace(own, name="mine", encoder_step=1e-6)
+    assert own.dead_time < TYPICAL.dead_time
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_arm_of_500_hz_comes_to_rest_with_every_example(path):
+    plant = Plant(UR5E, E_SERIES.fidelity(str(path)), 3)
+    states = hold(plant, UR5E.home_q, 400)
+    assert plant.q_true == pytest.approx(UR5E.home_q, abs=5e-4)
+    assert column(states, "torque_saturated").sum() == 0
 
 
 @pytest.mark.parametrize(

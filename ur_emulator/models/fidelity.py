@@ -20,6 +20,7 @@ Sources, cited by letter below:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated
@@ -143,14 +144,14 @@ class Fidelity:
                 )
 
 
-def read_fidelity(path: Path) -> Fidelity:
-    """The fidelity of a file: `base`, one of those below, and other values of its fields.
+def read_fidelity(path: Path, fidelities: Sequence[Fidelity]) -> Fidelity:
+    """The fidelity of a file: `base`, one of those of a generation, and other values of its fields.
 
     Raises:
         ModelError: the file cannot be read, a field does not exist or cannot hold its value.
     """
     values = _FILE.read_toml(path)
-    bases = {it.name: it for it in FIDELITIES if it.has_physics}
+    bases = {it.name: it for it in fidelities if it.has_physics}
     base = bases[checked(word(bases), values.pop("base", TYPICAL.name), f"{path}: base", ModelError)]
     own = {field.name: getattr(base, field.name) for field in fields(base)} | {"name": path.stem}
     known = own.keys() - {"name", "has_physics"}

@@ -176,7 +176,7 @@ class RobotGeneration:
             ModelError: no set has that name, or the file is wrong.
         """
         if name.endswith(".toml"):
-            return read_fidelity(Path(name))
+            return read_fidelity(Path(name), self.fidelities)
         for fidelity in self.fidelities:
             if fidelity.name == name.lower():
                 return fidelity
