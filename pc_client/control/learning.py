@@ -97,6 +97,20 @@ def learn(
     return bounded(learned * _fade(n, quiet, period)[:, None], bounds, period)
 
 
+def learnable_power(run: RunSignals, weight: LearningFilter, period: float) -> float:
+    """Mean square of the differenced error [(rad/s)2], a joint, in the frequencies that are learned.
+
+    Args:
+        run: complete and without gaps.
+        weight: Q.
+        period: control cycle [s].
+    """
+    slope = np.diff(run.error, axis=0) / period
+    hertz: Array = np.asarray(np.fft.rfftfreq(len(slope), period), dtype=np.float64)
+    kept = np.fft.irfft(weight.weight(hertz)[:, None] * np.fft.rfft(slope, axis=0), len(slope), axis=0)
+    return float(np.mean(np.square(kept)))
+
+
 def bounded(learned: Array, bounds: LearningBounds, period: float) -> Array:
     """Keep a learned command (n, 6) within its bounds; it begins at 0."""
     step = bounds.acceleration * period

@@ -9,13 +9,14 @@ be sent is held against the limits that the plan itself was held against.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.control.controller import Controller
 from pc_client.control.gear import GearModel
-from pc_client.control.learning import LearningBounds, RunSignals, learn
+from pc_client.control.learning import LearningBounds, RunSignals, learn, learnable_power
 from pc_client.control.learning_filter import LearningFilter
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
@@ -27,6 +28,10 @@ from pc_client.planning.plan import JointPlan
 from protocol.realtime.layout import RealtimeFrame
 
 Array = NDArray[np.float64]
+
+_WORSE = 1.5
+"""Growth of the learnable error from one run to the next that ends learning: the arm does not answer small
+motions as the model of the loop does. Noise changes it by up to a fifth."""
 
 
 class RunLog:
@@ -111,6 +116,7 @@ class Repetitions:
         self._model = model
         self._period = period
         self._refused = False
+        self._power = inf
         self.learned: Array | None = None
         self.learned_from = 0
         self.remarks: list[str] = []
@@ -148,8 +154,15 @@ class Repetitions:
             )
             return
         config = self._config
+        signals = log.signals(self.learned, lead, self._period)
+        power = learnable_power(signals, self._learning, self._period)
+        if self.learned is not None and power > _WORSE * self._power:
+            self.forget(f"run {repetition} was worse than the one before: nothing more is learned")
+            self._learning = None
+            return
+        self._power = power
         self.learned = learn(
-            log.signals(self.learned, lead, self._period),
+            signals,
             self._loop,
             self._learning,
             config.learning_gain,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from pc_client.errors import DriverError
 from pc_client.experiment.command_check import broken_limit
 from pc_client.experiment.identification import learning_filter
 from pc_client.experiment.prepare import load_movements, prepare_experiment
-from pc_client.experiment.repetitions import Repetitions, is_clean
+from pc_client.experiment.repetitions import Repetitions, RunLog, is_clean
 from pc_client.experiment.runner import LEAD, SETTLE, ExperimentRunner
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import load_recording
@@ -189,6 +191,37 @@ def test_gears_are_renewed_unless_something_was_learned_with_them(two):
     memory.forget("run 2 had a late frame")
     memory.renew(lambda: None)
     assert memory.gear is None
+
+
+def log_of(slow, fast):
+    """A run of 4 s, from rest to rest, whose joints swing about the reference by so much at 10 and 50 Hz [rad]."""
+    log = RunLog()
+    for k in range(500):
+        t = k * PERIOD
+        swing = slow * math.sin(20.0 * math.pi * t) + fast * math.sin(100.0 * math.pi * t)
+        q = [math.sin(math.pi * t / 4.0) ** 2 * swing] * 6
+        frame = SimpleNamespace(actual_q=np.array(q))
+        point = SimpleNamespace(q=(0.0,) * 6, qd_feedforward=(0.0,) * 6)
+        log.append(frame, SimpleNamespace(t=t - 0.2, point=point, qd_cmd=[0.0] * 6))
+    return log
+
+
+@pytest.mark.parametrize(
+    ("slow", "fast", "learned_from"),
+    [
+        ((1e-3, 2e-4, 2.05e-4), (0.0, 0.0, 0.0), 3),
+        ((1e-3, 1.3e-3, 1e-3), (0.0, 0.0, 0.0), 0),
+        ((1e-4, 1e-4, 1e-4), (1e-5, 2e-5, 4e-5), 3),
+    ],
+    ids=["better", "worse", "worse where nothing is learned"],
+)
+def test_learning_ends_when_it_makes_a_run_worse(two, slow, fast, learned_from):
+    memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), two.model, PERIOD)
+    for n in range(3):
+        memory.take(n + 1, log_of(slow[n], fast[n]), StreamReport(), 0.2, 0.3)
+    assert memory.learned_from == learned_from
+    worse = [remark for remark in memory.remarks if "was worse than the one before" in remark]
+    assert len(worse) == (learned_from == 0)
 
 
 def test_learning_that_might_not_converge_is_refused():
