@@ -44,6 +44,8 @@ SECOND = RobotGeneration(
         precision=(4.0, 0.3),
         contact_force=6.0,
         least_averaging=0.04,
+        filter_time=0.02,
+        control_rate=9.0,
         most_averaging=0.2,
     ),
     gravity=9.82,

@@ -37,6 +37,9 @@ class ForceSensing:
         contact_force: a contact is a force that has risen by this [N].
         least_averaging: time that is averaged at least to separate a zero from noise [s].
         most_averaging: and at most [s].
+        filter_time: of force mode: time constant of its filter of the wrench [s].
+        control_rate: of force mode: rate at which the force approaches the one asked for at gain scaling 1
+            [1/s]. What the delay of the whole loop allows.
     """
 
     has_sensor: bool
@@ -45,3 +48,5 @@ class ForceSensing:
     contact_force: float
     least_averaging: float
     most_averaging: float
+    filter_time: float
+    control_rate: float

@@ -27,15 +27,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from protocol.pose import Pose, pose_add, pose_sub, rotvec_to_matrix
+from ur_emulator.models.measuring import ForceSensing
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.task_frame import TaskFrame
 from ur_emulator.motion.tool import Tool
 
-# Rate at which the force approaches the one asked for at gain scaling 1 [1/s]. The whole loop takes about
-# 60 ms (poor fidelity 75): 8 * .075 leaves more than 50 degrees of phase, and scaling 2 is still stable.
-FORCE_RATE = 8.0
-# Time constant of the filter of the measured wrench [s]: leaves little of 3 N of noise.
-FILTER_TIME = 0.024
 # The speed that this missing force or moment causes [N, Nm] is not maintained. So noise and the error of the
 # zero do not accelerate a free arm.
 _IDLE_WRENCH = np.repeat([1.5, 0.25], 3)
@@ -105,6 +101,7 @@ class ForceMode:
         tool: that is moved.
         frame: its axes are compliant or stiff.
         settings: arguments of force_mode.
+        sensing: how the wrench is measured, which says how fast the mode may act.
         stiffness: of the joint servos (6,) [Nm/rad].
         measure: gives the present measurement.
     """
@@ -114,11 +111,13 @@ class ForceMode:
         tool: Tool,
         frame: TaskFrame,
         settings: ForceSettings,
+        sensing: ForceSensing,
         stiffness: Sequence[float],
         measure: Callable[[], ArmMeasurement],
     ) -> None:
         self.tool = tool
         self._measure = measure
+        self._sensing = sensing
         self._joint_compliance = 1.0 / np.array(stiffness)
         self._shift: Pose = ZERO6
         self._speed = np.zeros(6)  # of the displacement, base axes
@@ -137,7 +136,7 @@ class ForceMode:
         if settings == self._settings:
             return
         self._settings = settings
-        self._rate = settings.gain_scaling * FORCE_RATE
+        self._rate = settings.gain_scaling * self._sensing.control_rate
         self._maintained = 1.0 - settings.damping
         self._chosen = np.array(settings.selection)
         self._demanded = np.array(settings.wrench)
@@ -151,7 +150,7 @@ class ForceMode:
         along_path = ZERO6 if self._path_pose is None else pose_sub(tool_pose, self._path_pose)
         self._path_pose = tool_pose
         measured = self._measure()
-        share = dt / (FILTER_TIME + dt)
+        share = dt / (self._sensing.filter_time + dt)
         self._wrench += share * (np.array(measured.wrench) - self._wrench)
         self._twist += share * (np.array(measured.twist) - self._twist)
         place = pose_add(self._shift, tool_pose)

@@ -87,7 +87,7 @@ def compliance_functions(
 def _force_mode(
     arm: ScriptArm, compliance: Compliance, force_sense: ForceSense, past: PastCycles
 ) -> dict[str, Callable[..., Any]]:
-    stiffness = ServoGains.of(arm.robot).kp.tolist()
+    stiffness, sensing = ServoGains.of(arm.robot).kp.tolist(), arm.robot.generation.force_sensing
 
     def force_mode(
         thread: object, task_frame: Any, selection_vector: Any, wrench: Any, type: float, limits: Any
@@ -130,7 +130,14 @@ def _force_mode(
             return
         offset = ZERO6 if force_sense.sensor is not None else force_sense.offset(past.steady_cycles)
         compliance.begin_force(
-            ForceMode(tool, frame, settings, stiffness, lambda: _measure(past.snapshot, arm.model, offset))
+            ForceMode(
+                tool,
+                frame,
+                settings,
+                sensing,
+                stiffness,
+                lambda: _measure(past.snapshot, arm.model, offset),
+            )
         )
 
     def screw_driving(thread: object, f: float, v_limit: float) -> None:
