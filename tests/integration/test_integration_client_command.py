@@ -62,11 +62,11 @@ def test_a_movement_out_of_the_arm_s_reach_is_refused_before_anything_moves(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", ["lognorm_9_9", "nowhere.toml", ".", ""])
-def test_a_movement_that_does_not_exist_is_one_line(ur_client, tmp_path, monkeypatch, name):
+@pytest.mark.parametrize(("name", "code"), [("lognorm_9_9", 2), ("nowhere.toml", 1), (".", 1), ("", 1)])
+def test_a_movement_that_does_not_exist_is_one_line(ur_client, tmp_path, monkeypatch, name, code):
     monkeypatch.chdir(tmp_path)
     done = ur_client("run", name, "--robot", "127.0.0.1", "--out", tmp_path / "out")
-    assert done.code == 1
+    assert done.code == code
     assert done.complaint()
 
 
