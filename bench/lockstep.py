@@ -40,7 +40,8 @@ def _measure(robot: str, fidelity: str) -> tuple[float, float]:
     """Wall time of a cycle [us] with an arm of this fidelity, and the cycle of the robot [s]."""
     options = ("--robot", robot, "--pace", "lockstep", "--seed", "7", "--fidelity", fidelity)
     with box_process(*options) as box, tempfile.TemporaryDirectory() as folder:
-        experiment = prepare_experiment(load_movements(library_names()), repeat=1, out=Path(folder))
+        movements = load_movements(library_names())
+        experiment = prepare_experiment(movements, repeat=1, out=Path(folder), robot=robot)
         with UrDriver("127.0.0.1", box.ports) as driver:
             report = ExperimentRunner(driver, experiment, CONTROLLERS["preview"]).run()
         period = driver.info.period
