@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 # Ports of the line that says that a box is ready.
-_SHOWN_PORTS = ("robot_api", "dashboard", "primary", "secondary", "realtime", "rtde", "modbus")
+_SHOWN_PORTS = ("robot_api", "dashboard", "primary", "secondary", "realtime", "rtde", "interpreter", "modbus")
 
 app = new_app("An emulated Universal Robots control box.")
 
