@@ -30,8 +30,9 @@ def folder(tmp_path):
 
 
 @pytest.fixture
-def box(folder):
-    with ControlBox(pace="lockstep", port_base=None, seed=7, programs=folder) as box:
+def box(folder, request):
+    robot = getattr(request, "param", "ur3")
+    with ControlBox(robot=robot, pace="lockstep", port_base=None, seed=7, programs=folder) as box:
         yield box
 
 
@@ -274,6 +275,7 @@ def test_an_installation_with_a_port_that_is_none(folder, port):
 SENT = 'textmsg("from the PC")\n'
 
 
+@pytest.mark.parametrize("box", ["ur3", "ur5e"], indirect=True)
 @pytest.mark.parametrize("keep_open", [False, True])
 def test_external_control_plays_what_the_pc_sends(box, dashboard, folder, keep_open):
     with pc_with_script(SENT, keep_open=keep_open) as (port, asked), connect(box, "primary") as sock:
@@ -281,10 +283,9 @@ def test_external_control_plays_what_the_pc_sends(box, dashboard, folder, keep_o
             urp(external_control("127.0.0.1", port) + script_line('textmsg("behind it")'))
         )
         reader = MessageReader(sock)
-        assert dashboard.ask_all("load pc.urp", "play") == [
-            "Loading program: /programs/pc.urp",
-            "Starting program",
-        ]
+        loaded, started = dashboard.ask_all("load pc.urp", "play")
+        assert loaded.startswith("Loading program: /programs/pc.urp")
+        assert started == "Starting program"
         assert [reader.message(TextMessage).text for _ in range(2)] == ["from the PC", "behind it"]
     assert asked == [b"request_program\n"]
 
