@@ -29,23 +29,14 @@ from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.realtime.worker_process import prestart_process
 from ur_emulator.scripting.program_slot import ProgramSlot
 from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
-from ur_emulator.servers.dashboard.answers import DashboardAnswers
-from ur_emulator.servers.dashboard.port import DashboardPort
+from ur_emulator.servers.box_ports import SendingPorts, answering_ports
 from ur_emulator.servers.dashboard.reports import ReportFolder
-from ur_emulator.servers.interpreter.intake import InterpreterIntake
-from ur_emulator.servers.interpreter.port import InterpreterPort
-from ur_emulator.servers.modbus.server import ModbusPort
-from ur_emulator.servers.port_set import CONTROL, ROBOT_API, PortSet
-from ur_emulator.servers.primary.port import PrimaryPort
-from ur_emulator.servers.primary.robot_state import StateEncoder
+from ur_emulator.servers.port_set import CONTROL, PortSet
 from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.programs.player import ProgramPlayer
 from ur_emulator.servers.programs.start_up import start_up
-from ur_emulator.servers.realtime_port import RealtimePort
-from ur_emulator.servers.rtde_port import RtdePort
 from ur_emulator.servers.scripts.closed_ports import close_to_scripts, give_back
 from ur_emulator.servers.scripts.loop_network import LoopNetwork
-from ur_emulator.servers.tcp.listener import Port
 
 
 class Box(BoxOperations):
@@ -162,41 +153,12 @@ class Box(BoxOperations):
         folder = ProgramFolder(None if programs is None else Path(programs))
         self._player = player = ProgramPlayer(self._access, folder, skip_unknown=skip_unknown_nodes)
         self._reports = ReportFolder(player.folder)
-        states = StateEncoder(software, controller.state.arm, controller.state.safety)
-        realtime, realtime_ro = (RealtimePort(software.realtime, intake) for intake in (self._intake, None))
-        rtde = RtdePort(self._access)
-        modbus = ModbusPort(self._access)
-        primary, secondary, primary_ro, secondary_ro = messengers = tuple(
-            PrimaryPort(software, controller, intake, states, all_messages=all_messages)
-            for intake in (self._intake, None)
-            for all_messages in (True, False)
+        sending = SendingPorts.make(self._access, self._intake)
+        self._box.attach(
+            (*sending.in_order, self._intake, self._access.steps),
+            [port.send_message for port in sending.messengers],
         )
-        read_only = (realtime_ro, primary_ro, secondary_ro)
-        self._box.attach(  # first those whose clients act on a cycle
-            (realtime, rtde, primary, secondary, *read_only, self._intake, self._access.steps),
-            [port.send_message for port in messengers],
-        )
-        ports: dict[str, Port] = {
-            "realtime": realtime,
-            "rtde": rtde,
-            "primary": primary,
-            "secondary": secondary,
-            "modbus": modbus,
-            "realtime_ro": realtime_ro,
-            "primary_ro": primary_ro,
-            "secondary_ro": secondary_ro,
-        }
-        if software.dashboard:
-            replies = DashboardAnswers(self._access, player, self._reports, self._shut_down)
-            ports["dashboard"] = DashboardPort(self._access, replies)
-        if software.has_interpreter:
-            ports["interpreter"] = InterpreterPort(InterpreterIntake(self._access))
-        if software.robot_api:
-            from ur_emulator.servers.http.port import HttpPort
-            from ur_emulator.servers.robot_api.answers import RobotApiAnswers
-
-            calls = RobotApiAnswers(self._access, player, self._shut_down, host)
-            ports[ROBOT_API] = HttpPort(self._access, calls)
+        ports = sending.by_name | answering_ports(self._access, player, self._reports, self._shut_down, host)
         self.ports = Ports.of({name: getattr(self.ports, name) for name in ports if name not in closed})
         self.control_port = 0
         self._facts = {
