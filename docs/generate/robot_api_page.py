@@ -15,9 +15,9 @@ Made from `protocol/robot_api.py` by `make docs`.
 server. Clients call `http://HOST{BASE}` instead: JSON over HTTP. Port {Ports().robot_api} needs
 privileges on most systems; `--port-base N` moves it with the others.
 
-The other ports stay closed until their service is enabled, as on a new robot: `--services
-primary,rtde`. The service `primary` opens 30001, 30002, 30003 and their read-only twins, `rtde`
-opens 30004.
+The ports of two services stay closed until somebody enables the service, as on a new robot:
+`--services primary,rtde`. The service `primary` opens 30001, 30002, 30003 and their read-only
+twins, `rtde` opens 30004. Modbus and interpreter mode are open.
 
 Answers: 200 with the fields of the table; 400 for a body that is not JSON, 403 for a call marked
 with R in local control, 404 for a path or a program that does not exist, 405 for another method,

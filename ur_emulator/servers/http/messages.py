@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from ipaddress import ip_address
 from typing import Any, NoReturn
@@ -76,6 +76,28 @@ class HttpRequest:
         if not isinstance(arguments, dict):
             raise HttpError(400, "the body must be a JSON object, such as {}")
         return arguments
+
+    def text(self, key: str) -> str:
+        """Return a text of the JSON object in the body.
+
+        Raises:
+            HttpError: there is none.
+        """
+        text = self.json_object().get(key)
+        if not isinstance(text, str):
+            raise HttpError(422, f'the body needs a text {key!r}: {{"{key}": "..."}}')
+        return text
+
+    def word(self, key: str, allowed: Iterable[str]) -> str:
+        """Return a text of the body that must be one of some words.
+
+        Raises:
+            HttpError: it is another, or there is none.
+        """
+        word, words = self.text(key), tuple(allowed)
+        if word not in words:
+            raise HttpError(422, f"{key} {ascii(word)[:60]} given: choose one of {', '.join(words)}")
+        return word
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -26,18 +26,10 @@ from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.http.messages import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer
-from ur_emulator.servers.robot_api.program_files import (
-    find_program,
-    form_file,
-    list_programs,
-    read_program,
-    write_program,
-)
+from ur_emulator.servers.robot_api.program_calls import ProgramCalls
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
 
-# Name of the program of a box that has loaded none. Source: a fresh simulator.
-DEFAULT_PROGRAM = "Default program"
 _DONE = HttpAnswer(200, {"message": "done"})
 _LOCAL = "the robot is in local control: switch to remote control first"
 # Modes from which an action starts, and the effect; in the modes behind it has happened already.
@@ -65,7 +57,7 @@ class RobotApiAnswers:
         self, access: BoxAccess, player: ProgramPlayer, shut_down: Callable[[], None], own_host: str
     ) -> None:
         self._access = access
-        self._player = player
+        programs = ProgramCalls(access, player)
         self._shut_down = shut_down
         self._own_host = own_host
         self._calls = access.identity.software.robot_api
@@ -78,21 +70,21 @@ class RobotApiAnswers:
             "GET /robotstate/v1/safetymode": lambda *_: _at_once(
                 {"mode": SAFETY_MODE_NAMES[SafetyMode(access.snapshot.safety_mode)], "message": ""}
             ),
-            "PUT /program/v1/state": self._change_program_state,
+            "PUT /program/v1/state": lambda request, _: programs.change_state(request),
             "GET /program/v1/state": lambda *_: _at_once(
-                {"state": self._program_state(), "message": "", "details": ""}
+                {"state": programs.state(), "message": "", "details": ""}
             ),
-            "PUT /program/v1/load": lambda request, _: self._load(request, "programName"),
-            "PUT /program/v1/loaded": lambda request, _: self._load(request, "name"),
-            "GET /program/v1/loaded": lambda *_: _at_once({"name": self._loaded_name()}),
+            "PUT /program/v1/load": lambda request, _: programs.load(request, "programName"),
+            "PUT /program/v1/loaded": lambda request, _: programs.load(request, "name"),
+            "GET /program/v1/loaded": lambda *_: _at_once({"name": programs.loaded_name()}),
             "GET /system/v1/controlmode": lambda *_: _at_once(
                 {"mode": "REMOTE" if access.controller.state.operator.remote_period else "LOCAL"}
             ),
             "GET /system/v1/operationalmode": lambda *_: _at_once({"mode": self._operational_mode()}),
-            "GET /programs/v1": self._list_programs,
-            "POST /programs/v1": lambda request, _: self._store(request, is_new=True),
-            "PUT /programs/v1": lambda request, _: self._store(request, is_new=False),
-            "GET /programs/v1/{name}": self._send_program,
+            "GET /programs/v1": lambda *_: programs.list_all(),
+            "POST /programs/v1": lambda request, _: programs.store(request, is_new=True),
+            "PUT /programs/v1": lambda request, _: programs.store(request, is_new=False),
+            "GET /programs/v1/{name}": lambda _, name: programs.send(name),
             "POST /popup/v1": self._show_popup,
             "DELETE /popup/v1": lambda *_: self._applied(ClosePopup()),
             "DELETE /popup/v1/safety": lambda *_: _at_once({"message": "done"}),
@@ -141,7 +133,7 @@ class RobotApiAnswers:
             "UNLOCK_PROTECTIVE_STOP": self._unlock,
             "RESTART_SAFETY": lambda: self._applied(RestartSafety()),
         }
-        action = _word(request, "action", actions)
+        action = request.word("action", actions)
         return (yield from actions[action]())
 
     def _power(self, action: str) -> Steps[HttpAnswer]:
@@ -177,86 +169,13 @@ class RobotApiAnswers:
         self._shut_down()
         return _DONE
 
-    # --- the loaded program
-
-    def _program_state(self) -> str:
-        if self._player.is_paused:
-            return "PAUSED"
-        return "PLAYING" if self._player.is_running else "STOPPED"
-
-    def _loaded_name(self) -> str:
-        loaded = self._player.loaded
-        return loaded.file_name.rpartition(".")[0] if loaded else DEFAULT_PROGRAM
-
-    def _change_program_state(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
-        player = self._player
-        actions: dict[str, Callable[[], Steps[None]]] = {
-            "play": lambda: player.play(""),
-            "pause": player.pause,
-            "resume": self._resume,
-            "stop": player.stop,
-        }
-        yield from actions[_word(request, "action", actions)]()
-        return HttpAnswer(200, {"state": self._program_state(), "message": "", "details": ""})
-
-    def _resume(self) -> Steps[None]:
-        if not self._player.is_paused:
-            raise RefusedError(f"resume given: the program is {self._program_state()}")
-        yield from self._player.play("")
-
-    def _load(self, request: HttpRequest, key: str) -> Steps[HttpAnswer]:
-        name = _text(request, key)
-        file = find_program(self._player.folder, name)
-        yield from self._player.load(file.wire_path)
-        return HttpAnswer(200, {"name": name, "message": ""})
-
-    # --- program files
-
-    def _list_programs(self, *_: object) -> Steps[HttpAnswer]:
-        names = yield from self._access.in_worker(list_programs, self._player.folder)
-        loaded, state = self._loaded_name(), self._program_state()
-        return HttpAnswer(
-            200,
-            {
-                "programs": [
-                    {
-                        "name": name,
-                        "description": None,
-                        "createdDate": None,
-                        "lastModifiedDate": None,
-                        "lastSavedDate": None,
-                        "programState": state if name == loaded else None,
-                    }
-                    for name in names
-                ]
-            },
-        )
-
-    def _send_program(self, _: HttpRequest, name: str) -> Steps[HttpAnswer]:
-        data = yield from self._access.in_worker(read_program, self._player.folder, name)
-        return HttpAnswer(200, data)
-
-    def _store(self, request: HttpRequest, *, is_new: bool) -> Steps[HttpAnswer]:
-        form = form_file(request.headers.get("content-type", ""), request.body)
-        if form is None:
-            raise HttpError(422, "the body has no form field 'file': send multipart/form-data")
-        file_name, data = form
-        if file_name.rpartition(".")[0] == self._loaded_name() and self._player.is_running:
-            raise RefusedError(f"{file_name} is loaded and plays: stop it first")
-        name = yield from self._access.in_worker(write_program, self._player.folder, file_name, data, is_new)
-        if name is None and is_new:
-            raise HttpError(400, f"there is a program {file_name!r} already: PUT replaces it")
-        if name is None:
-            raise HttpError(404, f"there is no program {file_name!r} yet: POST makes it")
-        return HttpAnswer(200, {"programName": name})
-
     # --- popups and log
 
     def _show_popup(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
-        return (yield from self._applied(ShowPopup(_text(request, "message"))))
+        return (yield from self._applied(ShowPopup(request.text("message"))))
 
     def _add_to_log(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
-        self._access.announce(LogAdded("Robot API", _text(request, "message")))
+        self._access.announce(LogAdded("Robot API", request.text("message")))
         return (yield from _at_once({"message": "done"}))
 
     def _applied(self, command: Command) -> Steps[HttpAnswer]:
@@ -278,28 +197,3 @@ def _described(call: ApiCall) -> dict[str, Any]:
         **({"parameters": [parameter]} if name else {}),
         "responses": {"200": {"description": "done"}},
     }
-
-
-def _text(request: HttpRequest, key: str) -> str:
-    """Return a text of the body.
-
-    Raises:
-        HttpError: there is none.
-    """
-    text = request.json_object().get(key)
-    if not isinstance(text, str):
-        raise HttpError(422, f'the body needs a text {key!r}: {{"{key}": "..."}}')
-    return text
-
-
-def _word(request: HttpRequest, key: str, allowed: Iterable[str]) -> str:
-    """Return a text of the body that must be one of some words.
-
-    Raises:
-        HttpError: it is another, or there is none.
-    """
-    word = _text(request, key)
-    words = list(allowed)
-    if word not in words:
-        raise HttpError(422, f"{key} {ascii(word)[:60]} given: choose one of {', '.join(words)}")
-    return word
